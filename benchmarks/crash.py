@@ -59,7 +59,7 @@ def _path() -> Any:
     from strapdown.crash.entry import Entry
     from strapdown.simulation.crash_recording import record_crash
     from strapdown.simulation.crash_scenarios import find_crash
-    from strapdown.simulation.paper_recorders import paper_units
+    from strapdown.simulation.recorder_design import paper_units
     from strapdown.systems.crash_reconstruction import reconstruct_crash
 
     crash = find_crash("pole")

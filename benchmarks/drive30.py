@@ -44,7 +44,7 @@ def drive(seed: int) -> Drive:
     from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
     from strapdown.simulation import simulate_imu
     from strapdown.simulation.earth_motion import Origin
-    from strapdown.simulation.sine_velocity import SineVelocityMotion
+    from strapdown.simulation.spline_motion import SineVelocityMotion
     from strapdown.tables import ACCEL, GYRO, imu_table
 
     rng = np.random.default_rng(seed)
@@ -79,9 +79,9 @@ def drive(seed: int) -> Drive:
 
 def navigator(form: str) -> Any:
     from strapdown.aiding.gnss import Gnss
-    from strapdown.estimation.covariances import COVARIANCES
+    from strapdown.estimation.covariance import COVARIANCES
     from strapdown.estimation.error_filter import ErrorFilter
-    from strapdown.estimation.rotation_vector_model import RotationVectorModel
+    from strapdown.estimation.error_model import RotationVectorModel
     from strapdown.estimation.sensor_blocks import accel_bias, gyro_bias
     from strapdown.mechanization import NorthEastDown
     from strapdown.navigation.navigator import Navigator, with_states

@@ -59,7 +59,7 @@ def ratios() -> Iterator[Ratio]:
 
 
 def against_numpy(n: int) -> Iterator[Ratio]:
-    from strapdown.estimation.covariances import COVARIANCES
+    from strapdown.estimation.covariance import COVARIANCES
 
     P, Phi, Q, z, H, R = problem(n)
     for name in FORMS:
@@ -149,9 +149,8 @@ def compiled() -> dict[str, Any]:
 
 def robust() -> Ratio:
     """What asking a rule costs: three good observations under Hampel's function."""
-    from strapdown.estimation.covariances import COVARIANCES
-    from strapdown.estimation.influence_hampel import Hampel
-    from strapdown.estimation.robust_update import RobustUpdate
+    from strapdown.estimation.covariance import COVARIANCES
+    from strapdown.estimation.robust import Hampel, RobustUpdate
 
     P, _, _, z, H, R = problem(15)
     form, rule, x = COVARIANCES["ud"](), RobustUpdate(Hampel()), np.zeros(15)

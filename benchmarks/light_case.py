@@ -10,16 +10,15 @@ import pandas as pd
 
 from strapdown import rotation
 from strapdown.aiding.heading import Heading
-from strapdown.config.choice import make_choice
+from strapdown.config.choice import SLOTS, make_choice
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.navigation_file import navigation_spec
 from strapdown.config.navigation_modules import given_of, sensors_of
-from strapdown.config.slots import SLOTS
 from strapdown.navigation.navigator import with_states
 from strapdown.systems.progress import silent
-from strapdown.systems.sins.build import make_chain
 from strapdown.systems.sins.chain import Chain
 from strapdown.systems.sins.drive import run_batch
+from strapdown.systems.sins.run import make_chain
 from strapdown.systems.sins.source import NavigationSource, read_navigation_source
 from strapdown.systems.sins.trust import trust_of
 

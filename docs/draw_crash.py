@@ -26,7 +26,7 @@ from strapdown.report.svg_chart import draw
 from strapdown.simulation import point_kinematics
 from strapdown.simulation.crash_recording import record_crash
 from strapdown.simulation.crash_scenarios import find_crash
-from strapdown.simulation.paper_recorders import paper_units
+from strapdown.simulation.recorder_design import paper_units
 from strapdown.systems.crash_reconstruction import reconstruct_crash
 from strapdown.tables import NED, VELOCITY
 

@@ -9,8 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from strapdown.estimation.influences import INFLUENCES
-from strapdown.estimation.robust_update import RobustUpdate
+from strapdown.estimation.robust import INFLUENCES, RobustUpdate
 from strapdown.report.chart import BLACK, BLUE, GREEN, ORANGE, VERMILLION, Chart, Line, Panel
 from strapdown.report.svg_chart import draw
 

@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from strapdown import rotation
-from strapdown.aiding.view import View
-from strapdown.estimation.covariances import COVARIANCES
+from strapdown.aiding.aid import View
+from strapdown.estimation.covariance import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter
-from strapdown.estimation.error_model import PHYSICAL
-from strapdown.estimation.rotation_vector_model import RotationVectorModel
+from strapdown.estimation.error_model import PHYSICAL, RotationVectorModel
 from strapdown.estimation.sensor_blocks import accel_bias, gyro_bias, gyro_scale
 from strapdown.frames import q_ne
 from strapdown.nav_state import NavState

@@ -8,9 +8,9 @@ from functools import cache
 import numpy as np
 
 from strapdown import rotation
-from strapdown.estimation.covariances import COVARIANCES
+from strapdown.estimation.covariance import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter
-from strapdown.estimation.rotation_vector_model import RotationVectorModel
+from strapdown.estimation.error_model import RotationVectorModel
 from strapdown.estimation.sensor_blocks import accel_bias, gyro_bias
 from strapdown.increments import motion_increments
 from strapdown.mechanization import MECHANIZATIONS

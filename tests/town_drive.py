@@ -8,9 +8,9 @@ import numpy as np
 
 from strapdown import rotation
 from strapdown.aiding.gnss import Gnss
-from strapdown.estimation.covariances import COVARIANCES
+from strapdown.estimation.covariance import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter
-from strapdown.estimation.rotation_vector_model import RotationVectorModel
+from strapdown.estimation.error_model import RotationVectorModel
 from strapdown.estimation.sensor_blocks import accel_bias, gyro_bias
 from strapdown.frames import place_difference
 from strapdown.increments import motion_increments
@@ -20,7 +20,7 @@ from strapdown.navigation.navigator import Navigator, with_states
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation import Origin, car, simulate_imu
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
-from strapdown.simulation.manoeuvres import Accelerate, Brake, Straight, Turn
+from strapdown.simulation.vehicles import Accelerate, Brake, Straight, Turn
 
 DEG = np.pi / 180.0
 GYRO_NOISE, ACCEL_NOISE = 0.005 * DEG, 1e-3

@@ -31,7 +31,9 @@ from strapdown.crash import (
     pdof,
     resolved_delta_v_bound,
     trailing_delta_v,
-    velocity_change,
+)
+from strapdown.crash import (
+    delta_v_bound as velocity_change,
 )
 
 Array = NDArray[np.float64]

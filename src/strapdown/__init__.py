@@ -27,8 +27,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from strapdown.alignment.alignment import Site
     from strapdown.alignment.fine import FineAlignment
-    from strapdown.alignment.site import Site
     from strapdown.api.alignment import AlignmentRun, OutageRun, align, coast
     from strapdown.api.attitude import (
         Attitude,
@@ -54,8 +54,10 @@ if TYPE_CHECKING:
     from strapdown.api.reading import GnssFixes, Imu, Streams, read, read_gnss, read_imu
     from strapdown.crash.entry import Entry
     from strapdown.crash.monte_carlo import sample_paths
-    from strapdown.evaluation.trajectory_differences import trajectory_differences
-    from strapdown.evaluation.trajectory_summary import summarise_differences
+    from strapdown.evaluation.trajectory_differences import (
+        summarise_differences,
+        trajectory_differences,
+    )
     from strapdown.formats import read_log
     from strapdown.formats.crash_records import read_crash_record
     from strapdown.formats.nhtsa import read_nhtsa
@@ -66,12 +68,10 @@ if TYPE_CHECKING:
     from strapdown.nav_state import NavState
     from strapdown.report.simulation import simulate
     from strapdown.report.verify import verify
-    from strapdown.sensors.assumed import Assumed
-    from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
+    from strapdown.sensors.crash_unit import Assumed, CrashUnit, Mounting, RecordedTriad
     from strapdown.sensors.imu_health import check_imu_channels
-    from strapdown.sensors.imu_uncertainty import ImuUncertainty
     from strapdown.sensors.redundant_units import vote_units
-    from strapdown.sensors.triad_uncertainty import TriadUncertainty
+    from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
     from strapdown.systems.crash_reconstruction import CrashReconstruction, reconstruct_crash
 
 __version__ = "0.2.0.dev0"
@@ -140,7 +140,7 @@ __all__ = [
 # Loaded on first use: numba alone takes longer to import than most commands take to run.
 _HOMES = {
     "FineAlignment": "strapdown.alignment.fine",
-    "Site": "strapdown.alignment.site",
+    "Site": "strapdown.alignment.alignment",
     "AlignmentRun": "strapdown.api.alignment",
     "OutageRun": "strapdown.api.alignment",
     "align": "strapdown.api.alignment",
@@ -172,7 +172,7 @@ _HOMES = {
     "Entry": "strapdown.crash.entry",
     "sample_paths": "strapdown.crash.monte_carlo",
     "trajectory_differences": "strapdown.evaluation.trajectory_differences",
-    "summarise_differences": "strapdown.evaluation.trajectory_summary",
+    "summarise_differences": "strapdown.evaluation.trajectory_differences",
     "read_log": "strapdown.formats",
     "read_crash_record": "strapdown.formats.crash_records",
     "read_nhtsa": "strapdown.formats.nhtsa",
@@ -186,14 +186,14 @@ _HOMES = {
     "NavState": "strapdown.nav_state",
     "simulate": "strapdown.report.simulation",
     "verify": "strapdown.report.verify",
-    "Assumed": "strapdown.sensors.assumed",
+    "Assumed": "strapdown.sensors.crash_unit",
     "CrashUnit": "strapdown.sensors.crash_unit",
     "Mounting": "strapdown.sensors.crash_unit",
     "RecordedTriad": "strapdown.sensors.crash_unit",
     "check_imu_channels": "strapdown.sensors.imu_health",
-    "ImuUncertainty": "strapdown.sensors.imu_uncertainty",
+    "ImuUncertainty": "strapdown.sensors.uncertainty",
     "vote_units": "strapdown.sensors.redundant_units",
-    "TriadUncertainty": "strapdown.sensors.triad_uncertainty",
+    "TriadUncertainty": "strapdown.sensors.uncertainty",
     "reconstruct_crash": "strapdown.systems.crash_reconstruction",
 }
 

@@ -9,16 +9,15 @@ import numpy as np
 
 from strapdown import rotation
 from strapdown.aiding.gnss import Gnss
-from strapdown.estimation.covariances import COVARIANCES
+from strapdown.estimation.covariance import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter
-from strapdown.estimation.quaternion_model import QuaternionModel
-from strapdown.estimation.rotation_vector_model import RotationVectorModel
+from strapdown.estimation.error_model import QuaternionModel, RotationVectorModel
 from strapdown.estimation.sensor_blocks import accel_bias, gauss_markov, gyro_bias
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown, WanderAzimuth
 from strapdown.mechanization.state_error import state_error
 from strapdown.nav_state import NavState
-from strapdown.navigation.damping import DAMPINGS
+from strapdown.navigation.filter_options import DAMPINGS
 from strapdown.navigation.navigator import Navigator, with_states
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation.earth_motion import Origin

@@ -14,13 +14,12 @@ from tests.unit.crash.assumed_case import (
 )
 
 from strapdown.crash.entry import Entry
-from strapdown.sensors.assumed import Assumed
-from strapdown.sensors.crash_unit import Mounting
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.sensors.crash_unit import Assumed, Mounting
+from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.simulation.crash_recording import record_crash
 from strapdown.simulation.crash_scenarios import find_crash
 from strapdown.simulation.mounted_motion import MountedMotion
-from strapdown.simulation.paper_recorders import paper_units
+from strapdown.simulation.recorder_design import paper_units
 from strapdown.systems.crash_reconstruction import reconstruct_crash
 from strapdown.tables import NED, VELOCITY
 

@@ -13,11 +13,8 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import town_drive as town
-from strapdown.estimation.adaptive_rule import AdaptiveRule
-from strapdown.estimation.influence_hampel import Hampel
-from strapdown.estimation.influence_tukey import Tukey
-from strapdown.estimation.robust_update import RobustUpdate
-from strapdown.simulation.gnss_faults import Frozen, Outage, Outliers, WrongSd, inject_gnss_faults
+from strapdown.estimation.robust import AdaptiveRule, Hampel, RobustUpdate, Tukey
+from strapdown.simulation.gnss import Frozen, Outage, Outliers, WrongSd, inject_gnss_faults
 
 SETTLED = 30.0
 OUTAGE = (60.0, 120.0)

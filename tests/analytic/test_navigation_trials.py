@@ -11,14 +11,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from strapdown.estimation.adaptive_rule import AdaptiveRule
-from strapdown.estimation.adaptive_scale import AdaptiveScale
-from strapdown.estimation.covariances import COVARIANCES
-from strapdown.estimation.influence_huber import Huber
-from strapdown.estimation.influence_igg3 import Igg3
-from strapdown.estimation.influence_tukey import Tukey
-from strapdown.estimation.robust_update import RobustUpdate
-from strapdown.evaluation.nees import band_of_mean, normalised_squares
+from strapdown.estimation.covariance import COVARIANCES
+from strapdown.estimation.robust import (
+    AdaptiveRule,
+    AdaptiveScale,
+    Huber,
+    Igg3,
+    RobustUpdate,
+    Tukey,
+)
+from strapdown.evaluation.truth_comparison import band_of_mean, normalised_squares
 from strapdown.mechanization import NorthEastDown, run_mechanization
 from strapdown.mechanization.state_error import state_error
 

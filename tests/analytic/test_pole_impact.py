@@ -19,8 +19,7 @@ from strapdown.simulation import (
     point_kinematics,
     simulate_imu,
 )
-from strapdown.simulation.front_impacts import pole_impact
-from strapdown.simulation.other_impacts import rear_impact, side_impact
+from strapdown.simulation.crash_scenarios import pole_impact, rear_impact, side_impact
 
 POLE = CRASHES["pole"]
 END = POLE.start + 0.113

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from strapdown.evaluation.nees import band_of_mean, normalised_squares
+from strapdown.evaluation.truth_comparison import band_of_mean, normalised_squares
 from strapdown.mechanization.state_error import state_error
 from strapdown.nav_state import NavState
 from strapdown.navigation.recorder import FullRecorder

@@ -13,10 +13,9 @@ from strapdown import errors
 from strapdown.config.alignment_file import alignment_spec
 from strapdown.config.navigation_file import navigation_spec
 from strapdown.errors import Finding
-from strapdown.report.alignment_json import alignment_json
+from strapdown.report.alignment import alignment_json
 from strapdown.report.alignment_trust import trust as alignment_trust
-from strapdown.report.navigation_found import examine
-from strapdown.report.navigation_result import told_of
+from strapdown.report.navigation_found import examine, told_of
 from strapdown.report.navigation_trust import trust as navigation_trust
 from strapdown.systems.alignment_run import run_alignment
 from strapdown.systems.sins.run import run_navigation

@@ -21,7 +21,7 @@ from strapdown.sensors.crash_unit import RecordedTriad
 from strapdown.sensors.synchronise import synchronise
 from strapdown.simulation.crash_recording import record_crash
 from strapdown.simulation.crash_scenarios import find_crash
-from strapdown.simulation.paper_recorders import paper_units
+from strapdown.simulation.recorder_design import paper_units
 
 LOW, HIGH, GYRO = 0, 1, 2
 DESIGNS = {design.name: design for design in paper_units()}

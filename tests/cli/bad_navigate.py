@@ -20,7 +20,7 @@ from bad_command import said_by
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.simulation import Origin, car, simulate_imu
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
-from strapdown.simulation.manoeuvres import Accelerate, Straight, Turn
+from strapdown.simulation.vehicles import Accelerate, Straight, Turn
 from strapdown.tables import ACCEL, GYRO
 
 __all__ = ["FILE", "NAVIGATE_CASES", "navigate_said", "navigate_section", "write_drive"]

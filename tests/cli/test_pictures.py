@@ -21,10 +21,10 @@ from strapdown.ellipsoids import find_ellipsoid
 from strapdown.report.attitude_charts import charts
 from strapdown.report.document_files import drawings
 from strapdown.report.navigation_document import navigation_document
-from strapdown.report.navigation_result import told_of
+from strapdown.report.navigation_found import told_of
 from strapdown.report.svg_chart import draw
 from strapdown.report.trajectory_simulation import simulation_chart
-from strapdown.report.verdict_picture import light_picture
+from strapdown.report.verdict_document import light_picture
 from strapdown.systems.attitude_bench import bench_attitude
 from strapdown.systems.sins.draft import draft_navigation
 from strapdown.systems.sins.run import run_navigation

@@ -19,18 +19,21 @@ from strapdown import rotation
 from strapdown.aiding.aid import Aid, TableAid, WatchingAid
 from strapdown.aiding.aids import AIDS
 from strapdown.aiding.barometer import Barometer
-from strapdown.aiding.body_velocity import BodyVelocity
 from strapdown.aiding.gnss import Gnss
 from strapdown.aiding.heading import Heading
-from strapdown.aiding.no_slip import NoSlip
-from strapdown.aiding.odometer import Odometer
-from strapdown.aiding.zero_rate import ZeroRate
-from strapdown.aiding.zero_velocity import ZeroVelocity
+from strapdown.aiding.standstill import ZeroRate, ZeroVelocity
+from strapdown.aiding.vehicle import BodyVelocity, NoSlip, Odometer
 from strapdown.mechanization import MECHANIZATIONS
-from strapdown.simulation.barometer import PressureHeight, simulate_barometer
-from strapdown.simulation.body_velocity import VelocityLog, simulate_body_velocity
-from strapdown.simulation.heading import Compass, simulate_heading
-from strapdown.simulation.odometer import WheelSpeed, simulate_odometer
+from strapdown.simulation.aiding_sensors import (
+    Compass,
+    PressureHeight,
+    VelocityLog,
+    WheelSpeed,
+    simulate_barometer,
+    simulate_body_velocity,
+    simulate_heading,
+    simulate_odometer,
+)
 from strapdown.tables import (
     barometer_table,
     body_velocity_table,

@@ -25,31 +25,35 @@ from tests.town_drive import (
 from strapdown.aiding.aid import WatchingAid
 from strapdown.aiding.aids import AIDS
 from strapdown.aiding.gnss import Gnss
+from strapdown.alignment.alignment import Site
 from strapdown.alignment.coarse_alignments import COARSE_ALIGNMENTS
 from strapdown.alignment.fine import FineAlignment
-from strapdown.alignment.site import Site
-from strapdown.estimation.covariances import COVARIANCES
+from strapdown.estimation.covariance import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter
-from strapdown.estimation.error_models import ERROR_MODELS
+from strapdown.estimation.error_model import ERROR_MODELS
+from strapdown.estimation.robust import UPDATE_RULES
 from strapdown.estimation.sensor_blocks import accel_bias, gyro_bias, gyro_drift
-from strapdown.estimation.update_rules import UPDATE_RULES
 from strapdown.mechanization import MECHANIZATIONS
 from strapdown.nav_state import NavState
-from strapdown.navigation.damping import DAMPINGS
+from strapdown.navigation.filter_options import DAMPINGS
 from strapdown.navigation.navigator import Navigator, with_states
 from strapdown.navigation.recorder import RECORDERS, FullRecorder
 from strapdown.navigation.smoother import SMOOTHERS
 from strapdown.prefilter import PREFILTERS
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
 from strapdown.simulation import Origin, StationaryMotion, simulate_imu
 from strapdown.systems.sins.chain import Chain
 from strapdown.systems.sins.drive import Recording, run_batch, run_by_sample
-from strapdown.systems.sins.gaps import GapPolicy
-from strapdown.systems.sins.intake import Intake
-from strapdown.systems.sins.known_start import KnownStart
-from strapdown.systems.sins.modes import CoarseMode, Command, FineMode, Navigation, Until
+from strapdown.systems.sins.intake import GapPolicy, Intake
+from strapdown.systems.sins.modes import (
+    CoarseMode,
+    Command,
+    FineMode,
+    KnownStart,
+    Navigation,
+    Until,
+)
 from strapdown.tables import (
     ACCEL,
     GYRO,

@@ -7,13 +7,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from strapdown.alignment.alignment import Alignment
-from strapdown.alignment.coarse import CoarseAlignment
+from strapdown.alignment.alignment import Alignment, CoarseAlignment, Site
 from strapdown.alignment.coarse_alignments import COARSE_ALIGNMENTS
-from strapdown.alignment.site import Site
 from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.catalogue import load_sensor
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.simulation import Origin, simulate_imu
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
 from strapdown.simulation.minimum_jerk import Track

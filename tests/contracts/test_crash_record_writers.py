@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from strapdown.errors import DataError
-from strapdown.formats.crash_csv_writer import write_crash_csv
 from strapdown.formats.crash_json import write_crash_json
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.formats.crash_records import read_crash_record
+from strapdown.formats.crash_table import write_crash_csv
 from strapdown.formats.mme_writer import write_mme
 
 KEPT = ("quantity", "axis", "unit", "sampling", "place", "body", "low_pass", "full_scale")

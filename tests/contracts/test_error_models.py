@@ -9,7 +9,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from strapdown.errors import ConfigError
-from strapdown.estimation.error_models import ERROR_MODELS
+from strapdown.estimation.error_model import ERROR_MODELS
 from strapdown.estimation.sensor_blocks import ERRORS_OF_SENSORS
 from strapdown.mechanization.wander_azimuth import WanderAzimuth
 from wander_runs import history_of, made_up, segment_of, start

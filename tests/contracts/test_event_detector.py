@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 
 from strapdown.crash.acceleration import Acceleration
-from strapdown.crash.event_detector import EventDetector
-from strapdown.crash.event_rule import PART_563, EventRule
-from strapdown.crash.events import detect_events
+from strapdown.crash.events import PART_563, EventDetector, EventRule, detect_events
 from strapdown.errors import DataError
 
 RULES = {

@@ -20,7 +20,7 @@ from one_file.staff import Staff
 from strapdown.aiding.aids import AIDS
 from strapdown.config.navigation_file import read_navigation_spec
 from strapdown.errors import ConfigError
-from strapdown.estimation.influences import INFLUENCES
+from strapdown.estimation.robust import INFLUENCES
 from strapdown.mechanization import MECHANIZATIONS
 from strapdown.systems.sins.run import run_navigation
 

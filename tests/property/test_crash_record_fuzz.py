@@ -11,10 +11,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from strapdown.errors import StrapdownError
-from strapdown.formats.crash_csv_writer import write_crash_csv
 from strapdown.formats.crash_json import write_crash_json
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.formats.crash_records import read_crash_record
+from strapdown.formats.crash_table import write_crash_csv
 from strapdown.formats.crash_triad import triad_of_channels
 from strapdown.formats.mme_writer import write_mme
 

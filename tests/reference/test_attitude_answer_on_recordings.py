@@ -10,7 +10,7 @@ import pytest
 from strapdown import rotation
 from strapdown.attitude import attitude_history, make_algorithm
 from strapdown.increments import increments_from_imu
-from strapdown.rotation.angles import unit_rotation_angle
+from strapdown.rotation.euler_angles import unit_rotation_angle
 from strapdown.systems.attitude_bench import bench_attitude
 from strapdown.tables import QUATERNION, THETA
 

@@ -25,16 +25,15 @@ import pytest
 
 from strapdown import rotation
 from strapdown.aiding.gnss import Gnss
-from strapdown.aiding.gnss_clock import time_offset
-from strapdown.aiding.gnss_delay import velocity_delay
+from strapdown.aiding.gnss_clock import time_offset, velocity_delay
 from strapdown.aiding.gnss_readiness import gnss_readiness
-from strapdown.aiding.no_slip import NoSlip
+from strapdown.aiding.vehicle import NoSlip
 from strapdown.alignment.levelling import level
-from strapdown.estimation.covariances import COVARIANCES
+from strapdown.estimation.covariance import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter
-from strapdown.estimation.rotation_vector_model import RotationVectorModel
+from strapdown.estimation.error_model import RotationVectorModel
 from strapdown.estimation.sensor_blocks import accel_bias, gyro_bias, gyro_drift
-from strapdown.evaluation.withheld import score_withheld, scores_table, spans_to_withhold
+from strapdown.evaluation.gnss_outages import score_withheld, scores_table, spans_to_withhold
 from strapdown.increments import motion_increments
 from strapdown.mechanization import MECHANIZATIONS
 from strapdown.nav_state import NavState

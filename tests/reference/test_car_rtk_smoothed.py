@@ -8,8 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from strapdown.evaluation.withheld import score_withheld, scores_table, spans_to_withhold
-from strapdown.evaluation.withheld_smoothed import score_withheld_smoothed
+from strapdown.evaluation.gnss_outages import (
+    score_withheld,
+    score_withheld_smoothed,
+    scores_table,
+    spans_to_withhold,
+)
 from strapdown.navigation.smoother import RauchTungStriebel
 
 sys.path.insert(0, str(Path(__file__).parent))

@@ -5,19 +5,17 @@ import pytest
 
 from strapdown.aiding.gnss import Gnss
 from strapdown.alignment.coarse_alignments import COARSE_ALIGNMENTS
-from strapdown.estimation.covariances import COVARIANCES
+from strapdown.estimation.covariance import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter
-from strapdown.estimation.rotation_vector_model import RotationVectorModel
+from strapdown.estimation.error_model import RotationVectorModel
 from strapdown.estimation.sensor_blocks import accel_bias, gyro_bias
 from strapdown.mechanization import MECHANIZATIONS
 from strapdown.navigation.navigator import Navigator, with_states
 from strapdown.navigation.recorder import IntervalRecorder
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
 from strapdown.systems.sins.chain import Chain
 from strapdown.systems.sins.drive import run_batch
-from strapdown.systems.sins.gaps import GapPolicy
-from strapdown.systems.sins.intake import Intake
+from strapdown.systems.sins.intake import GapPolicy, Intake
 from strapdown.systems.sins.modes import CoarseMode, Navigation, Until
 from strapdown.tables import gnss_table, imu_table
 

@@ -6,8 +6,7 @@ import pytest
 from strapdown.crash.acceleration import Acceleration
 from strapdown.crash.crash_type import classify_crash
 from strapdown.crash.delta_v import delta_v, event_delta_v
-from strapdown.crash.event_rule import EventRule
-from strapdown.crash.events import detect_events
+from strapdown.crash.events import EventRule, detect_events
 from strapdown.crash.pdof import pdof
 
 # The four accelerometers of the rear crossmember, forward; left and right, and their doubles.

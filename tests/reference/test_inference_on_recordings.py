@@ -113,7 +113,7 @@ def test_it_is_right_or_asks(recordings, name, gyro, accel, time, axes):
 @pytest.mark.parametrize("name", [NAMES[0], NAMES[4]])
 @pytest.mark.parametrize("axes", ["-x,-y,-z", "x,-y,z", "y,x,z"])
 def test_a_gyro_whose_axes_were_exchanged_is_never_called_right(recordings, name, axes):
-    from strapdown.formats.inference.turn import signed_permutations
+    from strapdown.formats.inference.rotation_rate import signed_permutations
 
     names, matrices = signed_permutations()
     log, is_gyro, _ = load(recordings, name)

@@ -20,10 +20,9 @@ from strapdown.crash.entry import Entry
 from strapdown.crash.unit_reconstruction import reconstruct_unit
 from strapdown.errors import DataError
 from strapdown.formats.nhtsa import read_nhtsa
-from strapdown.sensors.assumed import Assumed
 from strapdown.sensors.catalogue import load_sensor
-from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
-from strapdown.sensors.sensor_uncertainty import uncertainty_of
+from strapdown.sensors.crash_unit import Assumed, CrashUnit, Mounting, RecordedTriad
+from strapdown.sensors.uncertainty import uncertainty_of
 from strapdown.systems.crash_reconstruction import reconstruct_crash
 
 ENTRY = Entry.from_speed(57.09 / 3.6, 0.05)

@@ -12,7 +12,7 @@ import pytest
 
 from strapdown.config.alignment import LogTable
 from strapdown.config.navigation_file import navigation_spec
-from strapdown.evaluation.smoother_consistency import smoother_consistency
+from strapdown.evaluation.truth_comparison import smoother_consistency
 from strapdown.frames import place_difference
 from strapdown.systems.sins.proposal import propose
 from strapdown.systems.sins.run import run_navigation

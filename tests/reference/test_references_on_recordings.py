@@ -15,17 +15,24 @@ from scipy.io import loadmat
 from strapdown import read_log, rotation
 from strapdown.alignment.levelling import level
 from strapdown.attitude import Quaternion, run_attitude
-from strapdown.evaluation.dead_reckoning import dead_reckon
 from strapdown.evaluation.differences import attitude_at
-from strapdown.evaluation.reference_points import score_references
-from strapdown.evaluation.rest_references import same_pose_candidates, tilt_references
-from strapdown.evaluation.second_log import align_second_log
-from strapdown.evaluation.second_log_truth import truth_from_second_log
+from strapdown.evaluation.position_references import dead_reckon
+from strapdown.evaluation.reference_points import (
+    same_pose_candidates,
+    score_references,
+    tilt_references,
+)
+from strapdown.evaluation.second_log import align_second_log, truth_from_second_log
 from strapdown.increments import increments_from_imu
 from strapdown.results import AttitudeRun
-from strapdown.sensors.rest import find_rests, rest_between
-from strapdown.sensors.rest_bias import gyro_bias_from_rests, without_gyro_bias
-from strapdown.sensors.shaking_rest import find_rests_of_every_grade, find_shaking_rests
+from strapdown.sensors.rest import (
+    find_rests,
+    find_rests_of_every_grade,
+    find_shaking_rests,
+    gyro_bias_from_rests,
+    rest_between,
+    without_gyro_bias,
+)
 from strapdown.tables import GYRO, QUATERNION, imu_table
 
 TRIALS = [

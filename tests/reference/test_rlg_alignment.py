@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
-from strapdown.alignment.carry import carry
+from strapdown.alignment.alignment import Site
 from strapdown.alignment.fine import FineAlignment
 from strapdown.alignment.inertial_frame import InertialFrame
-from strapdown.alignment.known_heading import KnownHeading
-from strapdown.alignment.site import Site
+from strapdown.alignment.levelling import KnownHeading
+from strapdown.alignment.readiness import carry
 from strapdown.alignment.two_vector import TwoVector
 from strapdown.errors import DataError
 from strapdown.formats import read_log
 from strapdown.increments import motion_increments
 from strapdown.prefilter import PREFILTERS
 from strapdown.sensors.catalogue import load_sensor
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.sensors.uncertainty import ImuUncertainty
 
 SITE = Site(34.246048, 108.909664, 380.0)
 SENSORS = ImuUncertainty.of_sensor(load_sensor("fog-1000"))

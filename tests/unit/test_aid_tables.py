@@ -17,7 +17,7 @@ from strapdown.tables import (
     odometer_from_distance,
     odometer_table,
 )
-from strapdown.tables.barometer import standard_height, standard_slope
+from strapdown.tables.aiding import standard_height, standard_slope
 
 TIME = np.arange(6.0)
 GOOD = {

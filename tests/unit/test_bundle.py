@@ -167,7 +167,7 @@ def test_a_folder_that_is_no_bundle_is_never_touched(log, tmp_path, force):
 
 
 def test_a_large_input_is_referred_to_and_still_watched(log, tmp_path, monkeypatch):
-    monkeypatch.setattr("strapdown.bundle.manifest.COPY_LIMIT", 10)
+    monkeypatch.setattr("strapdown.bundle.writing.COPY_LIMIT", 10)
     source = shutil.copy(log, tmp_path / "mine.csv")
     seal = write_attitude(bench_attitude(source), tmp_path / "out")
     assert not (seal.path / "inputs").exists()

@@ -10,13 +10,15 @@ import pytest
 
 from strapdown.bundle import (
     configuration_paths,
-    manifest,
     read_manifest,
     seal,
     sha256,
     unsealed_changes,
     write_bundle,
     writing,
+)
+from strapdown.bundle import (
+    writing as manifest,
 )
 from strapdown.errors import DataError
 from strapdown.results import InputFiles

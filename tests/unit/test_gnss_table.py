@@ -9,7 +9,7 @@ from strapdown import tables
 from strapdown.errors import DataError
 from strapdown.simulation import Origin, car
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
-from strapdown.simulation.manoeuvres import Straight, Turn
+from strapdown.simulation.vehicles import Straight, Turn
 
 DRIVE = car(
     Origin(48.0, 11.0, 500.0),

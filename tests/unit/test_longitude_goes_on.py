@@ -8,7 +8,7 @@ from strapdown.evaluation.trajectory_differences import trajectory_differences
 from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS
 from strapdown.nav_state import NavState
 from strapdown.simulation import ImuErrors, Origin, SplineMotion, car, simulate_imu
-from strapdown.simulation.manoeuvres import Straight
+from strapdown.simulation.vehicles import Straight
 from strapdown.tables import places_of
 
 DRIVE = """[motion]

@@ -9,14 +9,20 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.aiding.aid import Epochs, TableAid
-from strapdown.aiding.checks import check_number, check_numbers
-from strapdown.aiding.view import DISPLACEMENT, ROTATION, View
-from strapdown.estimation.observation import Observation
+from strapdown.aiding.aid import (
+    DISPLACEMENT,
+    ROTATION,
+    Epochs,
+    TableAid,
+    View,
+    check_number,
+    check_numbers,
+)
+from strapdown.estimation.covariance import Observation
 from strapdown.estimation.sensor_blocks import gauss_markov, random_walk, unseen
 from strapdown.estimation.sensor_states import SensorStates
 from strapdown.rotation import cross_matrix
-from strapdown.tables.barometer import BAROMETER, check_barometer
+from strapdown.tables.aiding import BAROMETER, check_barometer
 from strapdown.tables.checks import index_of, values_of
 
 __all__ = ["Barometer"]

@@ -10,15 +10,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.aiding.aid import Epochs, TableAid
-from strapdown.aiding.checks import check_number
-from strapdown.aiding.view import ROTATION, View
-from strapdown.estimation.observation import Observation
+from strapdown.aiding.aid import ROTATION, Epochs, TableAid, View, check_number
+from strapdown.estimation.covariance import Observation
 from strapdown.estimation.sensor_blocks import unseen
 from strapdown.estimation.sensor_states import SensorStates
 from strapdown.rotation import cross_matrix
+from strapdown.tables.aiding import HEADING, check_heading
 from strapdown.tables.checks import index_of, values_of
-from strapdown.tables.heading import HEADING, check_heading
 
 __all__ = ["Heading"]
 

@@ -3,20 +3,43 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.aiding.aid import Epochs, WatchingAid
-from strapdown.aiding.checks import check_number
-from strapdown.aiding.standstill_detectors import STANDSTILL_DETECTORS
-from strapdown.aiding.standstill_thresholds import STANDSTILL_THRESHOLDS
-from strapdown.aiding.view import VELOCITY, View
+from strapdown._kernels.level import AXIS
+from strapdown.aiding.aid import (
+    ROTATION,
+    VELOCITY,
+    Epochs,
+    View,
+    WatchingAid,
+    check_number,
+    longer_by,
+)
+from strapdown.aiding.vehicle import rate_columns
+from strapdown.constants import MAD_TO_SD
 from strapdown.errors import ConfigError
+from strapdown.estimation.covariance import Observation
+from strapdown.estimation.error_model import PHYSICAL
+from strapdown.rotation import cross_matrix
 
-__all__ = ["StandstillAid", "Window"]
+__all__ = [
+    "STANDSTILL_DETECTORS",
+    "STANDSTILL_THRESHOLDS",
+    "StandstillAid",
+    "StandstillDetector",
+    "StandstillThreshold",
+    "Window",
+    "ZeroRate",
+    "ZeroVelocity",
+    "otsu",
+]
+
 
 Array = NDArray[np.float64]
 
@@ -193,3 +216,436 @@ class StandstillAid(WatchingAid):
         )
         told = [[count], rate.mean(axis=0), force.mean(axis=0), rate.var(axis=0, ddof=1)]
         return statistic, np.concatenate(told)
+
+
+# The one table of detectors of a standstill: what each makes of a window of samples.
+#
+# Skog, Händel, Nilsson and Rantakokko, Zero-velocity detection - an algorithm evaluation, IEEE
+# Trans. Biomedical Engineering 57 (2010) 2657: a generalised likelihood ratio test of rest
+# against any motion, and what becomes of it where less is known of the signals. Theirs are sums
+# of squares T, to be below a threshold; here each is divided by the number of squares whose
+# expectation is one at a quiet rest, and its root taken, so that it is one there and a threshold
+# is a number of standard deviations: ``gamma = n threshold²``, n as in
+# `StandstillDetector.squares`.
+
+
+@dataclass(frozen=True)
+class StandstillDetector:
+    """A statistic of a window of samples.
+
+    Attributes
+    ----------
+    summary : str
+    source : str
+    squares : int
+        Squares a sample with an expectation of one at rest.
+    of : callable
+        ``of(rate, force, gravity)`` with rates (w, 3) and forces (w, 3), each over the standard
+        deviation of its noise, and gravity over that of the force: the mean square a sample.
+    """
+
+    summary: str
+    source: str
+    squares: int
+    of: Callable[[Array, Array, float], float]
+
+    def statistic(
+        self, rate: Array, force: Array, rate_sd: float, force_sd: float, gravity: float
+    ) -> float:
+        """Return the statistic of a window: one at a quiet rest.
+
+        Parameters
+        ----------
+        rate : ndarray, (w, 3), rad/s
+        force : ndarray, (w, 3), m/s²
+        rate_sd, force_sd : float
+            Of the noise of a sample, in these units.
+        gravity : float, m/s²
+
+        Returns
+        -------
+        float
+        """
+        mean = self.of(rate / rate_sd, force / force_sd, gravity / force_sd)
+        return float(np.sqrt(mean / self.squares))
+
+
+def _rate_energy(rate: Array, force: Array, gravity: float) -> float:
+    return float((rate**2).sum() / len(rate))
+
+
+def _force_variance(rate: Array, force: Array, gravity: float) -> float:
+    return float(force.var(axis=0, ddof=1).sum())
+
+
+def _force_magnitude(rate: Array, force: Array, gravity: float) -> float:
+    size = np.sqrt((force**2).sum(axis=1))
+    return float(((size - gravity) ** 2).sum() / len(force))
+
+
+def _shoe(rate: Array, force: Array, gravity: float) -> float:
+    mean = force.sum(axis=0) / len(force)
+    up = mean * (gravity / np.sqrt((mean**2).sum()))
+    return float(((force - up) ** 2).sum() / len(force)) + _rate_energy(rate, force, gravity)
+
+
+def _variance(rate: Array, force: Array, gravity: float) -> float:
+    return float(rate.var(axis=0, ddof=1).sum()) + _force_variance(rate, force, gravity)
+
+
+def _force_spread(rate: Array, force: Array, gravity: float) -> float:
+    apart = np.median(np.abs(force - np.median(force, axis=0)), axis=0)
+    return float(((MAD_TO_SD * apart) ** 2).sum())
+
+
+SKOG = "Skog et al. (2010)"
+
+STANDSTILL_DETECTORS: dict[str, StandstillDetector] = {
+    "shoe": StandstillDetector(
+        "rates about zero, and a force as long as gravity that stays where it is (GLRT)",
+        f"{SKOG}, stance hypothesis optimal detector",
+        6,
+        _shoe,
+    ),
+    "rate_energy": StandstillDetector(
+        "rates about zero; needs gyros without bias",
+        f"{SKOG}, angular rate energy",
+        3,
+        _rate_energy,
+    ),
+    "force_variance": StandstillDetector(
+        "a force that stays where it is, whatever it is: biases and scale factors do not matter",
+        f"{SKOG}, acceleration moving variance",
+        3,
+        _force_variance,
+    ),
+    "force_magnitude": StandstillDetector(
+        "a force as long as gravity, whatever its direction",
+        f"{SKOG}, acceleration magnitude",
+        1,
+        _force_magnitude,
+    ),
+    "variance": StandstillDetector(
+        "a rate and a force that stay where they are: no bias matters",
+        f"{SKOG}, with unknown means of both",
+        6,
+        _variance,
+    ),
+    "force_spread": StandstillDetector(
+        "as force_variance by medians, so that a slammed door does not count",
+        "median absolute deviation (Hampel 1974)",
+        3,
+        _force_spread,
+    ),
+}
+
+
+# The one table of rules that say below which statistic a body stands.
+#
+# A statistic (`standstill_detectors`) is in standard deviations of the noise that is stated of a
+# rest. What is stated fits a vehicle whose engine was measured. On a shoe, how still a stance is
+# depends on the gait, the sole and the ground; then a rule finds the threshold while it goes. Each
+# sees statistics one by one and none that is later, so that pieces of a record give the same as the
+# whole.
+
+
+# Of the histogram of the logarithm of a statistic: first edge, width of a bin, number of bins.
+LOWEST, WIDTH, BINS = math.log(1e-3), 0.1, 200
+# A class has at least this share, and of two that are apart at least this part of the variance is
+# between them: 0.64 of one normal class cut in two, 0.75 of a uniform one.
+LEAST_SHARE, LEAST_BETWEEN = 0.1, 0.65
+# A motion is so many times a rest.
+LEAST_RATIO = 5.0
+# So much must have been seen, s, and after so much the split is made anew.
+SEEN, ANEW = 2.0, 0.25
+
+
+class StandstillThreshold(ABC):
+    """A rule for a threshold; what it remembers is a value that is never changed in place."""
+
+    summary: ClassVar[str]
+    source: ClassVar[str]
+
+    @abstractmethod
+    def begin(self, stated: float, scale: float) -> NamedTuple:
+        """Return what is remembered before the first statistic.
+
+        Parameters
+        ----------
+        stated : float
+            Threshold that is stated.
+        scale : float, s
+            Time of the rule: how long it remembers, or how long it is patient.
+        """
+
+    @abstractmethod
+    def next(self, memory: NamedTuple, time: float, statistic: float) -> tuple[NamedTuple, float]:
+        """Return the threshold for a statistic.
+
+        Parameters
+        ----------
+        memory : NamedTuple
+        time : float, s
+        statistic : float
+
+        Returns
+        -------
+        memory : NamedTuple
+        threshold : float
+            It rests, if the statistic is below.
+        """
+
+
+class Told(NamedTuple):
+    """What is stated, and nothing else."""
+
+    stated: float
+
+
+class Stated(StandstillThreshold):
+    """The threshold that is stated."""
+
+    summary: ClassVar[str] = "the threshold that is stated"
+    source: ClassVar[str] = "Skog et al. (2010)"
+
+    def begin(self, stated: float, scale: float) -> Told:
+        """Return what is stated."""
+        return Told(stated)
+
+    def next(self, memory: Told, time: float, statistic: float) -> tuple[Told, float]:  # type: ignore[override]
+        """Return what is stated."""
+        return memory, memory.stated
+
+
+class Split(NamedTuple):
+    """A histogram that fades.
+
+    Attributes
+    ----------
+    now : float
+        Threshold.
+    scale : float, s
+    counts : ndarray, (BINS,), s
+        Time spent in each bin of the logarithm of the statistic.
+    time, made : float, s
+        Of the newest statistic, and when the split was made; NaN before the first.
+    """
+
+    now: float
+    scale: float
+    counts: Array
+    time: float
+    made: float
+
+
+class Otsu(StandstillThreshold):
+    """Between the two classes of the statistics so far: stances and swings."""
+
+    summary: ClassVar[str] = (
+        "between the two classes of the statistics so far; until there are two, as stated"
+    )
+    source: ClassVar[str] = "Otsu (1979), of the logarithm"
+
+    def begin(self, stated: float, scale: float) -> Split:
+        """Return an empty histogram."""
+        return Split(stated, scale, np.zeros(BINS), math.nan, math.nan)
+
+    def next(self, memory: Split, time: float, statistic: float) -> tuple[Split, float]:  # type: ignore[override]
+        """Return the threshold of the newest split, this statistic taken in first."""
+        now, scale, counts, before, made = memory
+        if math.isnan(before):
+            return Split(now, scale, counts, time, time), now
+        step = time - before
+        counts = counts * math.exp(-step / scale)
+        at = (math.log(max(statistic, 1e-300)) - LOWEST) / WIDTH
+        counts[min(max(int(at), 0), BINS - 1)] += step
+        if time - made >= ANEW:
+            made = time
+            found = otsu(counts) if counts.sum() >= SEEN else None
+            now = now if found is None else math.exp(LOWEST + WIDTH * found)
+        return Split(now, scale, counts, time, made), now
+
+
+class Waiting(NamedTuple):
+    """Since when no rest was seen; NaN before the first statistic."""
+
+    stated: float
+    scale: float
+    since: float
+
+
+class Patience(StandstillThreshold):
+    """A missed rest costs the more, the longer ago the last one was: so the threshold grows.
+
+    The likelihood ratio of rest against any motion is ``exp(-n w s²/2)`` of a statistic s (n
+    squares, w samples), and Bayes' rule takes a rest where it is above the cost of a false alarm
+    over that of a missed one, times the odds. With a cost of a missed rest that grows with the
+    time since the last as ``exp(theta t)``, the bound of s² grows with t: here
+    ``threshold² = stated² (1 + t / scale)``, ``theta = n w stated²/(2 scale)``.
+    """
+
+    summary: ClassVar[str] = "as stated after a rest, and the wider the longer none was seen"
+    source: ClassVar[str] = "Wahlström et al. (2019), exponential cost of a missed rest"
+
+    def begin(self, stated: float, scale: float) -> Waiting:
+        """Return nothing seen."""
+        return Waiting(stated, scale, math.nan)
+
+    def next(self, memory: Waiting, time: float, statistic: float) -> tuple[Waiting, float]:  # type: ignore[override]
+        """Return the threshold, and count from here on, if this is a rest."""
+        since = time if math.isnan(memory.since) else memory.since
+        now = memory.stated * math.sqrt(1.0 + max(time - since, 0.0) / memory.scale)
+        if statistic < now:
+            since = time
+        return memory._replace(since=since), now
+
+
+def otsu(counts: Array) -> float | None:
+    """Return where two classes of a histogram part, in bins from its first edge.
+
+    Parameters
+    ----------
+    counts : ndarray, (m,)
+        Of bins of the logarithm, `WIDTH` wide.
+
+    Returns
+    -------
+    float or None
+        The edge for which the variance between the classes is the most; the middle of such edges,
+        where bins between the classes are empty. None where there are no two classes: one has
+        less than a tenth, their means are less than a factor of five apart, or what is between
+        them is less than 0.65 of the variance.
+
+    Notes
+    -----
+    Otsu, A threshold selection method from gray-level histograms, IEEE Trans. Systems, Man and
+    Cybernetics 9 (1979) 62, Eqs. (14) to (19).
+    """
+    p = counts / counts.sum()
+    bins = np.arange(len(p)) + 0.5
+    share, first = np.cumsum(p)[:-1], np.cumsum(p * bins)[:-1]
+    mean = float((p * bins).sum())
+    total = float((p * (bins - mean) ** 2).sum())
+    possible = (share >= LEAST_SHARE) & (share <= 1.0 - LEAST_SHARE)
+    if not possible.any() or not total > 0.0:
+        return None
+    weight = np.where(possible, share * (1.0 - share), 1.0)
+    between = np.where(possible, (mean * share - first) ** 2 / weight, -1.0)
+    most = float(between.max())
+    at = np.flatnonzero(between >= most * (1.0 - 1e-12))
+    k = int(at[len(at) // 2])
+    apart = (mean - first[k]) / (1.0 - share[k]) - first[k] / share[k]
+    if most < LEAST_BETWEEN * total or apart * WIDTH < math.log(LEAST_RATIO):
+        return None
+    return float(k + 1)
+
+
+STANDSTILL_THRESHOLDS: dict[str, StandstillThreshold] = {
+    "stated": Stated(),
+    "otsu": Otsu(),
+    "patience": Patience(),
+}
+
+
+# A body that stands: its velocity is zero.
+
+
+@dataclass(frozen=True)
+class ZeroVelocity(StandstillAid):
+    """Zero velocity relative to the Earth, where a detector says so.
+
+    Attributes
+    ----------
+    sd : float, m/s
+        Of the velocity of what is called a standstill, each component. What sways about a place
+        has a velocity whose mean soon is nothing, so that subsequent observations are no worse than
+        independent.
+    pivot : float, m
+        From the sensors to the point about which the body rolls while it is called still, as the
+        sole of a shoe does over the ground: the mean rate of the window times this is a velocity,
+        and its square adds to that of `sd`.
+    correlation_time : float, s
+        For so long the velocity of what is called a standstill lasts: its variance is more by
+        `correlated.longer_by`. A shoe that rolls over its sole does so all through a stance.
+    """
+
+    sd: float = field(default=0.02, metadata={"unit": "m_per_s"})
+    pivot: float = field(default=0.0, metadata={"unit": "m"})
+    correlation_time: float = field(default=0.0, metadata={"unit": "s"})
+
+    kind: ClassVar[str] = "zero_velocity"
+    summary: ClassVar[str] = "zero velocity at a standstill that is detected"
+    source: ClassVar[str] = "Skog et al. (2010)"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_number(self, "sd", low=0.0, above=True)
+        for name in ("pivot", "correlation_time"):
+            check_number(self, name, low=0.0)
+
+    @property
+    def lasts(self) -> bool:
+        """As `Aid.lasts`: where a correlation time is stated."""
+        return self.correlation_time > 0.0
+
+    def observe(self, view: View, values: Array) -> list[Observation]:
+        """Return the velocity, north, east, down, unless it is far from zero."""
+        if not self.near_rest(view):
+            return []
+        C_nl = view.C_ln.T
+        H = np.zeros((3, view.columns))
+        H[:, VELOCITY] = C_nl
+        rolls = self.pivot * float(np.linalg.norm(values[MEAN_RATE]))
+        interval = self.interval or self.window / float(values[COUNT])
+        R = np.full(3, (self.sd**2 + rolls**2) * longer_by(interval, self.correlation_time))
+        return [Observation(f"{self.name}.velocity", C_nl @ view.velocity, H, R, LABELS)]
+
+
+LABELS = ("VN, m/s", "VE, m/s", "VD, m/s")
+
+
+# A body that stands does not turn: what the gyros read is the Earth's rate and their errors.
+
+
+@dataclass(frozen=True)
+class ZeroRate(StandstillAid):
+    """No turn relative to the Earth, where a detector says so: the mean rate over the window.
+
+    Its variance is that of the samples in the window over their number, and `sd_deg_per_s` squared
+    beside it; where windows overlap, as much more as each sample is used more than once.
+
+    Attributes
+    ----------
+    sd_deg_per_s : float, deg/s
+        Of the mean rate of what is called a standstill, beyond the noise: a body that sways.
+    """
+
+    sd_deg_per_s: float = 0.005
+
+    kind: ClassVar[str] = "zero_rate"
+    summary: ClassVar[str] = "no turn at a standstill that is detected: bias of the gyros"
+    source: ClassVar[str] = "Groves (2013), sec. 15.2"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_number(self, "sd_deg_per_s", low=0.0, above=True)
+
+    def observe(self, view: View, values: Array) -> list[Observation]:
+        """Return the rate less the Earth's, body axes, unless the velocity is far from zero."""
+        if not self.near_rest(view):
+            return []
+        earth = view.ellipsoid.rotation_rate * view.level[AXIS : AXIS + 3]
+        C_bl = view.C_lb.T
+        # A scale factor is of the true rate, which at a rest is the Earth's: of what is read, that
+        # of an axis would be found to go with its bias.
+        readings = np.concatenate([values[MEAN_RATE], values[MEAN_FORCE]])
+        H = rate_columns(view, C_bl @ earth, view.without_errors(readings)[3:])
+        z = values[MEAN_RATE] - H[:, PHYSICAL:] @ view.sensors - C_bl @ earth
+        H[:, ROTATION] = -C_bl @ cross_matrix(earth)
+        count = float(values[COUNT])
+        used = max(self.window / self.interval, 1.0) if self.interval else count
+        R = used * (values[RATE_VARIANCE] / count + math.radians(self.sd_deg_per_s) ** 2)
+        return [Observation(f"{self.name}.rate", z, H, R, ZERO_RATE_LABELS)]
+
+
+ZERO_RATE_LABELS = ("x, rad/s", "y, rad/s", "z, rad/s")

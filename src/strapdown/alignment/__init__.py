@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 from strapdown.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
+    from strapdown.alignment.alignment import Site
     from strapdown.alignment.fine import FineAlignment
     from strapdown.alignment.fine_result import FineResult
-    from strapdown.alignment.site import Site
     from strapdown.alignment.two_vector import TwoVector
 
 __all__ = [
@@ -22,9 +22,9 @@ __all__ = [
 load_on_first_use(
     __name__,
     {
+        "alignment": "Site",
         "fine": "FineAlignment",
         "fine_result": "FineResult",
-        "site": "Site",
         "two_vector": "TwoVector",
     },
 )

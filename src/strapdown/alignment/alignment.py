@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
+from strapdown.earth import earth_rate, gravity, rows
+from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import Finding
 from strapdown.rotation.euler_angles import euler_sd
+from strapdown.sensors.uncertainty import ImuUncertainty
 
 Array = NDArray[np.float64]
 
@@ -100,3 +106,85 @@ class Alignment:
         carry[:, 3:6] = np.eye(3)
         carry[:, 6:9] = rotation.dcm_from_quaternion(self.q_nb) * seconds
         return euler_sd(self.roll_pitch_heading, carry @ self.joint @ carry.T)
+
+
+# Where a body stands while it is aligned.
+
+
+@dataclass(frozen=True)
+class Site:
+    """A place on the Earth.
+
+    Attributes
+    ----------
+    lat_deg, lon_deg : float, deg
+        Geodetic, north and east positive.
+    alt : float, m
+        Over the ellipsoid.
+    ellipsoid : Ellipsoid
+
+    Raises
+    ------
+    DataError
+        A latitude beyond 90 deg, a longitude of more than a turn, or no finite number.
+    """
+
+    lat_deg: float
+    lon_deg: float
+    alt: float = 0.0
+    ellipsoid: Ellipsoid = WGS84
+
+    def __post_init__(self) -> None:
+        rows(lat_deg=self.lat_deg, lon_deg=self.lon_deg, alt=self.alt)
+
+    @property
+    def gravity(self) -> Array:
+        """Normal gravity north, east, down, (3,), m/s²."""
+        return gravity(self.lat_deg, self.alt, ellipsoid=self.ellipsoid)
+
+    @property
+    def earth_rate(self) -> Array:
+        """Rate of the Earth north, east, down, (3,), rad/s."""
+        return earth_rate(self.lat_deg, ellipsoid=self.ellipsoid)
+
+
+# What every coarse alignment is: a method with options that makes an attitude of a record.
+
+
+@dataclass(frozen=True)
+class CoarseAlignment(ABC):
+    """A way to find the attitude from the sensors' outputs; it holds no state of its own."""
+
+    name: ClassVar[str]
+    summary: ClassVar[str]
+    source: ClassVar[str]
+
+    @abstractmethod
+    def align(
+        self,
+        imu: pd.DataFrame,
+        site: Site,
+        sensors: ImuUncertainty,
+        gnss: pd.DataFrame | None = None,
+    ) -> Alignment:
+        """Find the attitude.
+
+        Parameters
+        ----------
+        imu : DataFrame
+            Imu table of the time of alignment alone.
+        site : Site
+        sensors : ImuUncertainty
+        gnss : DataFrame, optional
+            Gnss table, for methods that need one.
+
+        Returns
+        -------
+        Alignment
+            At the last sample.
+
+        Raises
+        ------
+        DataError
+            The record cannot give the attitude: the message says what is in the way.
+        """

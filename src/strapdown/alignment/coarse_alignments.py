@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from strapdown.alignment.coarse import CoarseAlignment
+from strapdown.alignment.alignment import CoarseAlignment
 from strapdown.alignment.gnss_course import GnssCourse
 from strapdown.alignment.inertial_frame import InertialFrame
-from strapdown.alignment.known_heading import KnownHeading
-from strapdown.alignment.levelling_alone import Levelling
+from strapdown.alignment.levelling import KnownHeading, Levelling
 from strapdown.alignment.two_vector import TwoVector
 
 __all__ = ["COARSE_ALIGNMENTS"]

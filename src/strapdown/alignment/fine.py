@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -11,47 +12,42 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.alignment.alignment import Alignment
-from strapdown.alignment.claims import refuse_false_claims
-from strapdown.alignment.fine_epochs import (
-    MOST_HEADING,
-    epoch_ends,
-    initial_covariance,
-    prior_heading_sd,
-    settled,
-)
-from strapdown.alignment.fine_findings import fine_findings
-from strapdown.alignment.fine_record import telling_record
+from strapdown.alignment.alignment import Alignment, Site
 from strapdown.alignment.fine_result import Epochs, FineResult, alignment_of
-from strapdown.alignment.north import seems_in_deg_per_s
-from strapdown.alignment.site import Site
+from strapdown.alignment.record_checks import seems_in_deg_per_s
 from strapdown.alignment.stationary import (
     OBSERVATIONS,
     Standing,
     attitude_of_rest,
     home_of,
     measured_standing,
+    rate_observation,
+    still_observations,
+    velocity_of_noise,
     without_steady_turn,
 )
-from strapdown.constants import DEG_PER_HOUR
-from strapdown.errors import ConfigError, DataError, DivergenceError
-from strapdown.estimation.covariance import CovarianceForm
-from strapdown.estimation.covariances import COVARIANCES
-from strapdown.estimation.error_filter import ErrorFilter
-from strapdown.estimation.error_model import ErrorModel, Segment
-from strapdown.estimation.filter_state import FilterState
-from strapdown.estimation.resting_sensors import resting_states
-from strapdown.estimation.rotation_vector_model import RotationVectorModel
-from strapdown.estimation.update_rule import UpdateRule
+from strapdown.constants import DEG_PER_HOUR, STANDARD_GRAVITY
+from strapdown.errors import ConfigError, DataError, DivergenceError, Finding
+from strapdown.estimation.covariance import (
+    COVARIANCES,
+    CovarianceForm,
+    Innovations,
+    Observation,
+    UpdateRule,
+)
+from strapdown.estimation.error_filter import ErrorFilter, FilterState
+from strapdown.estimation.error_model import PHYSICAL, ErrorModel, RotationVectorModel, Segment
+from strapdown.estimation.sensor_blocks import resting_states
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown, run_mechanization
 from strapdown.mechanization.mechanization import Mechanization
 from strapdown.nav_state import NavState
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GYRO, MOTION
 from strapdown.tables.checks import is_number, source_of, values_of
 
-__all__ = ["FineAlignment"]
+__all__ = ["FineAlignment", "heading_floor_deg", "refuse_false_claims", "telling_record"]
+
 
 Array = NDArray[np.float64]
 
@@ -330,3 +326,357 @@ def _within(increments: pd.DataFrame, imu: pd.DataFrame) -> pd.DataFrame:
             last=last,
         )
     return part
+
+
+# The epochs of a fine alignment: where it begins, and how it goes from one to the next.
+
+
+# Tilt and heading before the filter: much more than a coarse alignment leaves, for it was made of
+# the same rests, by the same biases, and says nothing that the filter does not find by itself.
+WIDER = 10.0
+LEAST_TILT, LEAST_HEADING = math.radians(0.1), math.radians(1.0)
+MOST_TILT, MOST_HEADING = math.radians(5.0), math.radians(20.0)
+Seen = dict[str, tuple[Observation, Innovations]]
+
+
+def settled_epoch(
+    filter_: ErrorFilter,
+    state: FilterState,
+    time: Array,
+    rows: Array,
+    home: NavState,
+    standing: Standing,
+    observe: tuple[str, ...],
+) -> tuple[FilterState, Seen]:
+    """Go over one epoch of a rest: predict, and take what is known at its end."""
+    seen: Seen = {}
+    if "rate" in observe:
+        made: list[Observation] = []
+
+        def turn(segment: Segment) -> Observation:
+            made.append(rate_observation(filter_, segment, home, standing))
+            return made[0]
+
+        state, _, innovations = filter_.predict_observing(state, time, rows, turn)
+        seen["rate"] = (made[0], innovations)
+    else:
+        state, _ = filter_.predict(state, time, rows)
+    others = still_observations(filter_, state, home, standing, observe)
+    state, _, several = filter_.observe(state, others)
+    seen |= {one.name: (one, of) for one, of in zip(others, several, strict=True)}
+    return state, seen
+
+
+def settled(
+    filter_: ErrorFilter,
+    state: FilterState,
+    time: Array,
+    rows: Array,
+    ends: NDArray[np.int64],
+    home: NavState,
+    standing: Standing,
+    observe: tuple[str, ...],
+) -> Iterator[tuple[FilterState, Seen]]:
+    """Go from epoch to epoch over a rest.
+
+    Parameters
+    ----------
+    filter_ : ErrorFilter
+    state : FilterState
+    time : ndarray, (k,), s
+        Ends of the steps.
+    rows : ndarray, (k, 10)
+        Motion increments.
+    ends : ndarray of int
+        Number of steps before the end of each epoch.
+    home : NavState
+        The place of alignment and the attitude of rest.
+    standing : Standing
+    observe : tuple of str
+
+    Yields
+    ------
+    state : FilterState
+    seen : dict
+        By name, each observation and its innovations.
+    """
+    at = 0
+    for end in ends.tolist():
+        state, seen = settled_epoch(
+            filter_, state, time[at:end], rows[at:end], home, standing, observe
+        )
+        yield state, seen
+        at = end
+
+
+def epoch_ends(begin: float, time: Array, interval: float) -> NDArray[np.int64]:
+    """Number of steps before the end of each whole interval, (m,)."""
+    count = math.floor((float(time[-1]) - begin) / interval + 1e-6)
+    wanted = begin + interval * np.arange(1, count + 1)
+    half = 0.5 * float(np.median(np.diff(time))) if time.size > 1 else 0.0
+    return np.unique(np.searchsorted(time, wanted - half) + 1).clip(max=time.size)
+
+
+def prior_heading_sd(coarse: Alignment) -> float:
+    """Standard deviation of the heading before the first epoch, rad."""
+    heading = float(np.sqrt(coarse.covariance[2, 2]))
+    if coarse.heading_given:
+        return heading
+    return min(max(WIDER * heading, LEAST_HEADING), MOST_HEADING)
+
+
+def initial_covariance(filter_: ErrorFilter, coarse: Alignment, standing: Standing) -> Array:
+    """Covariance of the physical errors before the first epoch, in north-east-down."""
+    P = np.zeros((filter_.model.physical_size,) * 2)
+    P[0:3, 0:3] = np.diag(standing.position**2)
+    P[3:6, 3:6] = np.diag(standing.velocity**2)
+    tilt = float(np.sqrt(np.diagonal(coarse.covariance)[:2].max()))
+    P[6, 6] = P[7, 7] = min(max(WIDER * tilt, LEAST_TILT), MOST_TILT) ** 2
+    P[8, 8] = prior_heading_sd(coarse) ** 2
+    at = PHYSICAL
+    for block in filter_.model.sensors:
+        end = at + len(block.block)
+        P[at:end, at:end] = np.diag(block.sd**2)
+        at = end
+    return P
+
+
+# What no rest can tell, and a filter must not claim: where errors are too large for it.
+
+
+#: Part of the least standard deviation below which a heading is claimed and not found. Rocking, by
+#: which the drifts go through other directions, gains less.
+CLAIMED = 0.7
+#: A body that turns by more than this does not rest at one attitude, and its drifts show.
+TURNED_DEG = 30.0
+#: So many standard deviations from what it was before, a heading was wrong before.
+BEYOND = 4.0
+CLAIMS_DEG_PER_HOUR = math.degrees(3600.0)
+
+
+def heading_floor_deg(result: FineResult, site: Site) -> float:
+    """Least standard deviation of a heading that a rest can give, however long it is.
+
+    A heading and an east drift look alike, ``b_E = omega cos(lat) psi``, and so the information on
+    the heading is what was known before and what is known of the drift:
+    ``1/s^2 = 1/s_0^2 + (omega cos(lat) / s_E)^2``.
+
+    Parameters
+    ----------
+    result : FineResult
+    site : Site
+
+    Returns
+    -------
+    float, deg
+    """
+    gyro = np.asarray(result.filter.model.sensors[0].sd[:3], dtype=np.float64)
+    east = float(np.linalg.norm(rotation.dcm_from_quaternion(result.alignment.q_nb)[1] * gyro))
+    across = float(np.linalg.norm(site.earth_rate[:2]))
+    before = 1.0 / math.radians(result.prior_heading_sd_deg) ** 2
+    found = (across / east) ** 2 if east > 0.0 else math.inf
+    return math.degrees(1.0 / math.sqrt(before + found))
+
+
+def refuse_false_claims(result: FineResult, site: Site) -> None:
+    """Refuse a heading that is stated to be better known than the sensors can tell.
+
+    A filter is linear: where biases are so large that the second order of tilt, heading and bias
+    is beyond the noise, it takes that for knowledge.
+
+    Parameters
+    ----------
+    result : FineResult
+    site : Site
+
+    Raises
+    ------
+    DataError
+    """
+    heading = result.history["heading"].to_numpy()
+    moved = float(heading[-1] - heading[0])
+    if result.heading_given and abs(moved) > BEYOND * result.prior_heading_sd_deg:
+        raise DataError(
+            "alignment.heading-contradicted-by-gyros",
+            file=result.source,
+            quantity="heading",
+            moved=moved,
+            prior_heading_sd_deg=result.prior_heading_sd_deg,
+        )
+    if float(np.ptp(heading[len(heading) // 10 :])) > TURNED_DEG:
+        return
+    floor = heading_floor_deg(result, site)
+    sd = float(result.alignment.sd_deg[2])
+    if not sd < CLAIMED * floor:
+        return
+    gyro = CLAIMS_DEG_PER_HOUR * float(np.max(result.filter.model.sensors[0].sd[:3]))
+    raise DataError(
+        "alignment.heading-claimed-beyond-gyros",
+        file=result.source,
+        quantity="heading",
+        sd=sd,
+        gyro=gyro,
+        floor=floor,
+    )
+
+
+# What is said of the record of a fine alignment that cannot be carried through.
+
+
+GAPS = ("mechanization.gap-before-body-did-not", "mechanization.gap-body-did-not-known")
+
+
+@contextmanager
+def telling_record(imu: pd.DataFrame) -> Iterator[None]:
+    """Say of a gap what can be done at a command; of a divergence, what the gyros read.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        Imu table that is aligned inside.
+    """
+    try:
+        yield
+    except DataError as error:
+        f = error.finding
+        # The remedy of the mechanization is an argument that an alignment does not have.
+        if f.code not in GAPS:
+            raise
+        raise DataError(
+            "alignment.gap-in-fine-record", file=f.file, row=f.row, quantity="time", reason=f
+        ) from None
+    except DivergenceError as error:
+        f = error.finding
+        rate = float(np.linalg.norm(values_of(imu, GYRO).mean(axis=0)))
+        raise DivergenceError(
+            "alignment.fine-alignment-diverged",
+            file=imu.attrs.get("source"),
+            row=f.row,
+            quantity=f.quantity,
+            reason=f,
+            rate_deg=math.degrees(3600.0 * rate),
+        ) from None
+
+
+# What a person should know of a fine alignment.
+
+
+#: Code of the finding of a body that rocks: no fault, where a coarse alignment lets it.
+ROCKS = "alignment.body-rocks"
+#: Code of the finding of a bias that is beyond what the data sheet allows; data `sensor`.
+BIASED = "alignment.bias-beyond-data-sheet"
+# A heading less sure than this is no north.
+NO_NORTH = 5.0  # deg
+# Of what it was before, where a filter has found nothing.
+UNCHANGED = 0.5
+# What people, wind and an engine do to a parked vehicle stays below.
+MOST_VELOCITY = 0.05  # m/s
+MOST_TURN = 0.5  # deg from epoch to epoch
+# Over what the noise of the sensors makes of a body that stands still.
+OVER_NOISE = 3.0
+# Mean square of the innovations over what was expected; by epochs that are not all independent.
+INCONSISTENT = 3.0
+
+
+def fine_findings(result: FineResult, site: Site) -> tuple[Finding, ...]:
+    """Say what does not hold, and what the sensors could not tell.
+
+    Parameters
+    ----------
+    result : FineResult
+    site : Site
+
+    Returns
+    -------
+    tuple of Finding
+    """
+    return (
+        *_north(result, site),
+        *_stands(result),
+        *_fits(result),
+        *_biases(result),
+    )
+
+
+def _north(result: FineResult, site: Site) -> Iterator[Finding]:
+    sd = float(result.alignment.sd_deg[2])
+    if sd > min(NO_NORTH, UNCHANGED * result.prior_heading_sd_deg) and not result.heading_given:
+        east = float(np.linalg.norm(site.earth_rate[:2])) * DEG_PER_HOUR
+        yield Finding(
+            "alignment.heading-hardly-observable",
+            file=result.source,
+            quantity="heading",
+            sd=sd,
+            lat_deg=site.lat_deg,
+            east=east,
+        )
+
+
+def _stands(result: FineResult) -> Iterator[Finding]:
+    velocity = float(result.standing.velocity.max())
+    turn = float(np.degrees(result.standing.turn.max()))
+    model = result.filter.model
+    noise = velocity_of_noise(
+        model.gyro_noise, model.accel_noise, result.interval, len(result.history) - 1
+    )
+    moves = velocity > max(MOST_VELOCITY, OVER_NOISE * noise)
+    if not moves and turn > MOST_TURN:
+        yield Finding(
+            ROCKS,
+            file=result.source,
+            quantity="rocking",
+            turn=turn,
+            velocity=velocity,
+            in_bound=True,
+        )
+    elif moves:
+        yield Finding(
+            "alignment.body-moves-between-epochs",
+            file=result.source,
+            quantity="time",
+            velocity=velocity,
+            turn=turn,
+        )
+
+
+def _fits(result: FineResult) -> Iterator[Finding]:
+    for name, table in result.innovations.items():
+        # The first tenth is where the filter settles.
+        late = table.iloc[len(table) // 10 :]
+        parts = len(table.columns) // 3
+        nu, s = late.iloc[:, :parts].to_numpy(), late.iloc[:, parts : 2 * parts].to_numpy()
+        share = np.square(nu) / s
+        worst = int(share.mean(axis=0).argmax())
+        mean = float(share[:, worst].mean())
+        if mean > INCONSISTENT:
+            at = float(late.index[int(share[:, worst].argmax())])
+            yield Finding(
+                "alignment.innovations-inconsistent",
+                file=result.source,
+                quantity=str(table.columns[worst]).removeprefix("nu "),
+                name=name,
+                mean=mean,
+                at=at,
+            )
+
+
+def _biases(result: FineResult) -> Iterator[Finding]:
+    gyro, accel = result.filter.model.sensors[:2]
+    for block, found, unit, scale in (
+        (gyro, result.alignment.gyro_bias, "deg/h", DEG_PER_HOUR),
+        (accel, result.alignment.accel_bias, "mg", 1e3 / STANDARD_GRAVITY),
+    ):
+        assert found is not None
+        for axis, value, sd in zip("xyz", found.tolist(), block.sd.tolist(), strict=True):
+            if abs(value) > BEYOND * sd:
+                sensor = block.block.name.split("_")[0]
+                yield Finding(
+                    BIASED,
+                    file=result.source,
+                    quantity=f"{sensor}_{axis}",
+                    sensor=sensor,
+                    axis=axis,
+                    scale=value * scale,
+                    unit=unit,
+                    sd=sd * scale,
+                )

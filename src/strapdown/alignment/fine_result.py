@@ -12,11 +12,9 @@ from numpy.typing import NDArray
 from strapdown.alignment.alignment import Alignment
 from strapdown.alignment.stationary import Standing
 from strapdown.errors import Finding
-from strapdown.estimation.covariance import Innovations
-from strapdown.estimation.error_filter import ErrorFilter
+from strapdown.estimation.covariance import Innovations, Observation
+from strapdown.estimation.error_filter import ErrorFilter, FilterState
 from strapdown.estimation.error_model import PHYSICAL
-from strapdown.estimation.filter_state import FilterState
-from strapdown.estimation.observation import Observation
 from strapdown.tables import EULER
 
 __all__ = ["FINE_COLUMNS", "Epochs", "FineResult", "alignment_of"]

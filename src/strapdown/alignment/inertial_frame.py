@@ -10,30 +10,45 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.alignment.alignment import Alignment
-from strapdown.alignment.body_turn import turn_findings
-from strapdown.alignment.coarse import CoarseAlignment
-from strapdown.alignment.inertial_fit import InertialFit, fit_inertially
-from strapdown.alignment.inertial_sums import InertialSums, sum_inertially
-from strapdown.alignment.north import (
+from strapdown.alignment.alignment import Alignment, CoarseAlignment, Site
+from strapdown.alignment.inertial_sums import InertialSums, moments, sum_inertially
+from strapdown.alignment.mean_errors import CHANCE, mean_of_drift, sensor_covariance, sensor_noise
+from strapdown.alignment.record_checks import (
+    CONTRADICTION,
     LARGEST_SD,
+    check_gravity,
+    check_record,
+    gravity_findings,
     latitude_findings,
     north_findings,
     seems_in_deg_per_s,
+    still_by_gnss,
 )
-from strapdown.alignment.propagated_errors import sensor_covariance, sensor_noise
-from strapdown.alignment.record_checks import check_gravity, check_record, gravity_findings
-from strapdown.alignment.residual_noise import ResidualNoise, residual_noise
-from strapdown.alignment.site import Site
-from strapdown.alignment.still import still_by_gnss
+from strapdown.constants import DEG_PER_HOUR
+from strapdown.dsp.chi_square import chi_square_exceeded
+from strapdown.earth import earth_rate
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import GYRO
 from strapdown.tables.checks import source_of
 
-Array = NDArray[np.float64]
+__all__ = [
+    "DEGREES",
+    "EPOCHS",
+    "FIRST_FREE",
+    "KINDS",
+    "InertialFit",
+    "InertialFrame",
+    "ResidualNoise",
+    "Response",
+    "fit_inertially",
+    "heading_rate",
+    "residual_noise",
+    "turn_findings",
+]
 
-__all__ = ["EPOCHS", "InertialFrame"]
+
+Array = NDArray[np.float64]
 
 EPOCHS = ("end", "start")
 
@@ -188,3 +203,426 @@ def _left_over(noise: ResidualNoise, sd: float, length: float, source: str | Non
         sway=noise.sway,
         sd_deg=np.degrees(sd),
     )
+
+
+# The attitude that lays the specific force of a record on the gravity of its place.
+#
+# In the axes of the body at the first instant, held still in inertial space, the second integral of
+# the specific force is ``S(t) = s0 + v0 t + C_bn W(t) + e(t)``, and in those of the local level at
+# that instant, held still likewise, that of minus gravity is known:
+# ``W(t) = -∫∫ exp([ω t x]) g``. Both are expanded in Legendre polynomials of the time; what is of
+# degree zero and one is place and velocity, which nobody asks for. The others make Wahba's problem.
+#
+# A body that rocks and sways stays near its place, so that ``e`` is bounded by its excursion and
+# does not grow, while ``W`` grows as ``g t²/2``: for the mean force the fit is a weight
+# ``30 t² (T - t)²/T⁵`` that vanishes at both ends with its slope. On white noise of the
+# accelerometers it costs a fifth of the standard deviation against the plain mean.
+
+
+# Degrees 0 and 1 are nuisance and 2 and 3 hold the attitude; the noise is judged by those above,
+# ten periods over the record at the most.
+DEGREES = 21
+FIRST_FREE = 4
+_STEP = 1e-4  # rad of latitude, for a derivative that is a sine
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """What an error in a node does to the answer, (m, 5, 3) each.
+
+    The answer is: error of the attitude at the first instant (3, north-east-down, rad), that of
+    the latitude (rad) and of the size of gravity (relative). An error is a vector in the body's
+    axes at the first instant.
+
+    Attributes
+    ----------
+    turn : ndarray, (m, 5, 3), per rad
+        Of an error of the angle within the node.
+    push : ndarray, (m, 5, 3), per m/s
+        Of an error of the velocity gained within the node.
+    place : ndarray, (m, 5, 3), per m s
+        Of an error of the second integral, times the length of the node.
+    """
+
+    turn: Array
+    push: Array
+    place: Array
+
+
+@dataclass(frozen=True, eq=False)
+class InertialFit:
+    """The attitude at the first instant, and what is left over.
+
+    Attributes
+    ----------
+    C_nb : ndarray, (3, 3)
+        Body to local level at the first instant.
+    measured, known : ndarray, (DEGREES, 3), m
+        Coefficients of S in north-east-down by that attitude, and of W.
+    latitude_change : float, rad
+        Measured latitude less the site's: from the Earth's rate across the vertical.
+    gravity_change : float
+        Measured gravity less the site's, relative.
+    response : Response
+    """
+
+    C_nb: Array
+    measured: Array
+    known: Array
+    latitude_change: float
+    gravity_change: float
+    response: Response
+
+    @property
+    def residual(self) -> Array:
+        """Measured less known, (DEGREES, 3), m; degrees 0 and 1 mean nothing."""
+        return self.measured - self.known
+
+
+def turning_gravity(stamps: Array, rate: float) -> Array:
+    """Second integrals of 1, sin(w t)/w and (1 - cos(w t))/w²; (n, 3).
+
+    Minus gravity of an Earth that turns by the vector w is
+    ``-(g + sin(w t)/w (w x g) + (1 - cos(w t))/w² w x (w x g))``.
+    """
+    t = stamps
+    plain = 0.5 * t * t
+    once = (t - np.sin(rate * t) / rate) / rate**2
+    twice = (plain - 2.0 * np.square(np.sin(0.5 * rate * t) / rate)) / rate**2
+    return np.column_stack([plain, once, twice])
+
+
+def fallen_gravity(basis: Array, gravity: Array, rate: Array) -> Array:
+    """W, second integral of minus gravity, from (..., 3) of `turning_gravity`; (..., 3), m."""
+    across = np.cross(rate, gravity)
+    return np.asarray(-basis @ np.vstack([gravity, across, np.cross(rate, across)]))
+
+
+def _wahba(measured: Array, known: Array, weights: Array) -> Array:
+    """C with the least sum of weighted squares of ``C measured - known`` (Markley 1988)."""
+    product = (known * weights[:, None]).T @ measured
+    u, _, vt = np.linalg.svd(product)
+    sign = np.linalg.det(u) * np.linalg.det(vt)
+    return np.asarray(u @ np.diag([1.0, 1.0, sign]) @ vt)
+
+
+def fit_inertially(sums: InertialSums, site: Site) -> InertialFit:
+    """Fit the attitude.
+
+    Parameters
+    ----------
+    sums : InertialSums
+    site : Site
+
+    Returns
+    -------
+    InertialFit
+
+    Notes
+    -----
+    Wahba's problem by the singular value decomposition (Markley, J. Astronaut. Sci. 36 (1988)
+    245): north, east and down are told by ``g`` and by ``ω x g``, which the second and third
+    powers of the time carry.
+    """
+    gravity, rate = site.gravity, site.earth_rate
+    basis = turning_gravity(sums.stamps, float(np.sqrt(rate @ rate)))
+    both = moments(sums.stamps, np.hstack([sums.fallen, basis]), DEGREES)
+    measured_b, basis = both[:, :3], both[:, 3:]
+    known = fallen_gravity(basis, gravity, rate)
+    weights: Array = np.asarray(2.0 / (2.0 * np.arange(DEGREES) + 1.0), dtype=np.float64)
+    weights[:2] = 0.0
+    C_nb = _wahba(measured_b, known, weights)
+    measured = measured_b @ C_nb.T
+
+    lat = np.degrees(_STEP)
+    ahead, behind = (_rate_at(site, site.lat_deg + side * lat) for side in (1.0, -1.0))
+    by_latitude = (
+        fallen_gravity(basis, gravity, ahead) - fallen_gravity(basis, gravity, behind)
+    ) / (2.0 * _STEP)
+    cross = np.array([rotation.cross_matrix(x) for x in known])
+    design = np.concatenate([-cross, by_latitude[:, :, None], known[:, :, None]], axis=2)
+    normal = np.einsum("d,dik,dil->kl", weights, design, design)
+    # The estimate turns so as to undo an error: C d + phi x W = 0. Latitude and gravity tell it.
+    gain3 = -np.linalg.solve(normal[:3, :3], _rows(design[:, :, :3], weights))
+    gain5 = _solve(normal, _rows(design, weights))
+    gain = np.concatenate([gain3, gain5[3:]]).reshape(5, DEGREES, 3)
+    change = np.einsum("kdi,di->k", gain[3:], measured - known)
+    return InertialFit(
+        C_nb,
+        measured,
+        known,
+        float(change[0]),
+        float(change[1]),
+        _response(sums, gain, C_nb),
+    )
+
+
+def _rate_at(site: Site, lat_deg: float) -> Array:
+    """Rate of the Earth in the local level, continued beyond the poles."""
+    at_equator = earth_rate(0.0, ellipsoid=site.ellipsoid)
+    size = float(np.sqrt(at_equator @ at_equator))
+    lat = np.radians(lat_deg)
+    return size * np.array([np.cos(lat), 0.0, -np.sin(lat)])
+
+
+def _rows(design: Array, weights: Array) -> Array:
+    return np.asarray(np.einsum("d,dik->kdi", weights, design).reshape(design.shape[2], -1))
+
+
+def _solve(normal: Array, rows: Array) -> Array:
+    """Solve where a direction may be unseen, as the latitude at the equator: it gets nothing."""
+    scale = np.sqrt(np.diagonal(normal))
+    scale = np.where(scale > 0.0, scale, 1.0)
+    inner = np.linalg.pinv(normal / np.outer(scale, scale), rcond=1e-12)
+    return np.asarray((inner @ (rows / scale[:, None])) / scale[:, None])
+
+
+def functionals(sums: InertialSums) -> tuple[Array, Array]:
+    """Coefficients per second integral times time in a node, and per velocity gained in it.
+
+    Parameters
+    ----------
+    sums : InertialSums
+
+    Returns
+    -------
+    place, push : ndarray, (DEGREES, m)
+        Exact for what is constant within a node: by integrals of the polynomials from the end.
+    """
+    from numpy.polynomial import legendre
+
+    ends = np.concatenate([[0.0], np.cumsum(sums.node_length)])
+    u = 2.0 * ends / ends[-1] - 1.0
+    place, push = (np.empty((DEGREES, len(u) - 1)) for _ in range(2))
+    for d in range(DEGREES):
+        once = legendre.legint(np.eye(d + 1)[d], lbnd=1)
+        # The second is the integral of P_d(s) (s - u) from u to the end.
+        thrice = legendre.legint(once, m=2, lbnd=1)
+        for out, whole in ((place, once), (push, thrice)):
+            out[d] = (2 * d + 1) / sums.length * np.diff(legendre.legval(u, whole)) / np.diff(u)
+    return place, push * (0.5 * sums.length) ** 2
+
+
+def _response(sums: InertialSums, gain: Array, C_nb: Array) -> Response:
+    place, push = functionals(sums)
+    # Errors come in the body's first axes; the gain wants north, east, down.
+    gain_b = gain @ C_nb
+    of_place = np.einsum("kdi,dm->mki", gain_b, place)
+    of_push = np.einsum("kdi,dm->mki", gain_b, push)
+    # An angle error d turns what comes after it: d x dv = -[dv x] d; half of its own node.
+    crosses = np.array([rotation.cross_matrix(v) for v in sums.node_velocity])
+    turned = -of_push @ crosses
+    after = np.cumsum(turned[::-1], axis=0)[::-1]
+    return Response(after - 0.5 * turned, of_push, of_place)
+
+
+# Whether a body turned against the local level, or the gyros' vertical and the latitude differ.
+
+
+BLOCKS = 10
+
+
+def heading_rate(
+    sums: InertialSums, C_nb: Array, site: Site, sensors: ImuUncertainty
+) -> tuple[float, float]:
+    """Rate at which the body turns about the vertical against the local level.
+
+    Parameters
+    ----------
+    sums : InertialSums
+    C_nb : ndarray, (3, 3)
+        At the first sample.
+    site : Site
+    sensors : ImuUncertainty
+
+    Returns
+    -------
+    rate, sd : float, rad/s
+        Slope of the line through the turn. To the sensors' errors it adds the scatter of the
+        turn about the line, ``12 s²/(m T²)`` with s that of the means of m = 10 parts.
+    """
+    picked = np.unique(np.linspace(0, len(sums.stamps) - 1, 50 * BLOCKS).astype(np.int64))
+    time = sums.stamps[picked]
+    turned = rotation.dcm_from_quaternion(sums.turned[picked])
+    level = rotation.dcm_from_rotation_vector(-site.earth_rate * time[:, None])
+    turn = level @ (C_nb @ turned @ C_nb.T)
+    angle = np.unwrap(np.arctan2(turn[:, 1, 0], turn[:, 0, 0]))
+    off = time - time.mean()
+    slope = float(off @ angle) / float(off @ off)
+    left = angle - angle.mean() - slope * off
+    means = np.array([part.mean() for part in np.array_split(left, BLOCKS)])
+    scatter = 12.0 * means.var(ddof=2) / (BLOCKS * sums.length**2)
+    gyro = sensors.gyro
+    # A line through a walk is known to 6/5 of what its end tells.
+    noise = 1.2 * np.square(gyro.axis("noise_density")) / sums.length
+    own = np.square(gyro.axis("bias")) + mean_of_drift(sensors.gyro_drift, sums.length) + noise
+    across = np.square(gyro.axis("misalignment")) + np.square(gyro.axis("scale"))
+    own = own + across * float(site.earth_rate @ site.earth_rate)
+    own = own + np.square(gyro.axis("g_sensitivity")) * 9.8**2
+    return slope, float(np.sqrt(own.max() + scatter))
+
+
+def turn_findings(
+    sums: InertialSums, C_nb: Array, site: Site, sensors: ImuUncertainty, source: str | None
+) -> tuple[Finding, ...]:
+    """Say where a body turned about the vertical; parameters as of `heading_rate`.
+
+    Returns
+    -------
+    tuple of Finding
+        One, where the rate is more than five standard deviations from zero. It does no harm to
+        an inertial-frame alignment of a body that turned; it does where the body stood.
+    """
+    rate, sd = heading_rate(sums, C_nb, site, sensors)
+    if not abs(rate) > CONTRADICTION * sd:
+        return ()
+    vertical = -float(site.earth_rate[2])
+    size = float(np.sqrt(site.earth_rate @ site.earth_rate))
+    mirrored = abs(rate + 2.0 * -vertical) < abs(rate) / 10.0
+    # Against the level of a latitude, a body that stands turns by what that has too much.
+    sine = (vertical - rate) / size
+    measured = float(np.degrees(np.arcsin(np.clip(sine, -1.0, 1.0))))
+    if mirrored:
+        code = "alignment.turns-about-vertical-latitude-mirrored"
+    elif abs(sine) <= 1.0:
+        code = "alignment.turns-about-vertical-as-elsewhere"
+    else:
+        code = "alignment.turns-about-vertical"
+    return (
+        Finding(
+            code,
+            file=source,
+            quantity="gyro",
+            rate=rate * DEG_PER_HOUR,
+            sd=sd * DEG_PER_HOUR,
+            lat_deg=site.lat_deg,
+            measured_deg=measured,
+        ),
+    )
+
+
+# Slow noise in a record that its sensors do not explain, from what an inertial fit leaves over.
+#
+# The fit lives on the Legendre degrees 2 and 3 of the second integral of the specific force. The
+# degrees above hold noise alone: from 4 to 20, two horizontal axes each, their energies tell how
+# much there is and how it falls with the frequency, and so what it is at degrees 2 and 3.
+
+
+#: White in the place, in the velocity, in the force, and in the force's derivative.
+KINDS = ("place", "velocity", "force", "walk")
+_ROUNDS = 300
+
+
+@dataclass(frozen=True, eq=False)
+class ResidualNoise:
+    """Excess over the noise of the sensors.
+
+    Attributes
+    ----------
+    ratio : float
+        Root of the mean ratio of energies: measured over what the sensors explain.
+    significant : bool
+        Whether chance gives so much less often than one time in a million.
+    excess : ndarray, (4,)
+        Spectral densities of `KINDS`: m²/Hz, (m/s)²/Hz, (m/s²)²/Hz, (m/s³)²/Hz; zero where it
+        is not significant.
+    sway : float, m
+        Root mean square of the horizontal excursion that no fit takes away.
+    """
+
+    ratio: float
+    significant: bool
+    excess: Array
+    sway: float
+
+    def covariance(self, sums: InertialSums, push: Array, place: Array) -> Array:
+        """Covariance of an answer to errors of velocity gain and place; as `Response`.
+
+        Parameters
+        ----------
+        sums : InertialSums
+        push, place : ndarray, (m, k, 3)
+
+        Returns
+        -------
+        ndarray, (k, k)
+        """
+        dt = sums.node_length
+        by_place, by_force = place, push
+        by_velocity = _onward(place * dt[:, None, None])
+        by_walk = _onward(push * dt[:, None, None])
+        total = np.zeros((push.shape[1], push.shape[1]))
+        for density, response in zip(
+            self.excess, (by_place, by_velocity, by_force, by_walk), strict=True
+        ):
+            total += density * np.einsum("mki,mli,m->kl", response, response, dt)
+        return total
+
+
+def _onward(response: Array) -> Array:
+    """Sum over all later nodes, and half of the own."""
+    return np.asarray(np.cumsum(response[::-1], axis=0)[::-1] - 0.5 * response)
+
+
+def residual_noise(sums: InertialSums, fit: InertialFit, sensors: ImuUncertainty) -> ResidualNoise:
+    """Judge what a fit leaves over.
+
+    Parameters
+    ----------
+    sums : InertialSums
+    fit : InertialFit
+    sensors : ImuUncertainty
+
+    Returns
+    -------
+    ResidualNoise
+
+    Notes
+    -----
+    The energies of a degree are exponentially distributed about the sum of what each kind of
+    noise makes of it; densities of the greatest likelihood are found by steps that keep them
+    positive and never lose likelihood (Févotte and Idier 2011, doi:10.1162/NECO_a_00168, the
+    Itakura-Saito divergence with exponent 1/2).
+    """
+    shapes = _energies(sums)[:, FIRST_FREE:]
+    g = float(np.linalg.norm(sums.node_velocity.sum(axis=0))) / sums.length
+    drift = sensors.accel_drift
+    known = max(sensors.accel.axis("noise_density")) ** 2 * shapes[2]
+    walk = (g * max(sensors.gyro.axis("noise_density"))) ** 2
+    walk += 2.0 * max(drift.triad) ** 2 / drift.correlation_time
+    known = known + walk * shapes[3]
+    energy = np.square(fit.residual[FIRST_FREE:, :2]).sum(axis=1)
+    # What rounding leaves of a second integral of some 1e6 m.
+    known = known + (1e-14 * float(np.abs(sums.fallen[-1]).max())) ** 2
+    axes = 2 * len(energy)
+    statistic = float((energy / known).sum())
+    significant = statistic > chi_square_exceeded(CHANCE, axes)
+    excess = np.zeros(len(KINDS))
+    if significant:
+        excess = _likeliest(energy, known, shapes)
+    degrees = np.arange(FIRST_FREE, DEGREES)
+    slow = float((np.square(fit.residual[FIRST_FREE:, :2]).T / (2.0 * degrees + 1.0)).sum())
+    return ResidualNoise(
+        float(np.sqrt(statistic / axes)), significant, excess, float(np.sqrt(slow))
+    )
+
+
+def _energies(sums: InertialSums) -> Array:
+    """Variance of each degree per unit density of each kind, (4, DEGREES)."""
+    place, push = functionals(sums)
+    dt = sums.node_length
+    later = np.triu(np.ones((len(dt), len(dt))), 1).T + 0.5 * np.eye(len(dt))
+    velocity, walk = (place * dt) @ later, (push * dt) @ later
+    return np.array([(np.square(x) * dt).sum(axis=1) for x in (place, velocity, push, walk)])
+
+
+def _likeliest(energy: Array, known: Array, shapes: Array) -> Array:
+    scale = energy.mean() / np.maximum(shapes.mean(axis=1), 1e-300)
+    density = scale / len(shapes)
+    for _ in range(_ROUNDS):
+        model = known + density @ shapes
+        # Two axes share a degree: its energy is twice the variance on average.
+        up = shapes @ (0.5 * energy / model**2)
+        down = shapes @ (1.0 / model)
+        density = density * np.sqrt(up / np.maximum(down, 1e-300))
+    return np.asarray(density)

@@ -2,12 +2,37 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
 import numpy as np
-from numpy.typing import ArrayLike
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
 
-from strapdown.errors import DataError
+from strapdown import rotation
+from strapdown.alignment.alignment import Alignment, CoarseAlignment, Site
+from strapdown.alignment.mean_errors import (
+    block_means,
+    excursion,
+    force_covariance,
+    gravity_change,
+    of_mean,
+    unexplained,
+)
+from strapdown.alignment.record_checks import check_gravity, check_record, gravity_findings
+from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.sensors.uncertainty import ImuUncertainty
+from strapdown.tables.checks import is_number, source_of
 
-__all__ = ["level"]
+__all__ = [
+    "UNKNOWN_HEADING",
+    "KnownHeading",
+    "Levelling",
+    "error_of_force_and_heading",
+    "level",
+    "level_at_rest",
+]
 
 
 def level(accel_mean: ArrayLike) -> tuple[float, float]:
@@ -43,3 +68,241 @@ def level(accel_mean: ArrayLike) -> tuple[float, float]:
     roll = float(np.degrees(np.arctan2(0.0 - f[1], -f[2])))
     pitch = float(np.degrees(np.arctan2(f[0], np.hypot(f[1], f[2]))))
     return roll, pitch
+
+
+# Roll and pitch alone: the heading stays open.
+
+
+#: Standard deviation of a heading of which nothing is known: uniform over a turn, rad.
+UNKNOWN_HEADING = math.pi / math.sqrt(3.0)
+
+
+@dataclass(frozen=True)
+class Levelling(CoarseAlignment):
+    """Mean specific force at rest is up; of the heading nothing is known."""
+
+    name: ClassVar[str] = "levelling"
+    summary: ClassVar[str] = "roll and pitch from the mean specific force at rest; no heading"
+    source: ClassVar[str] = "f_b = C_bn (0, 0, -g)"
+
+    def align(
+        self,
+        imu: pd.DataFrame,
+        site: Site,
+        sensors: ImuUncertainty,
+        gnss: pd.DataFrame | None = None,
+    ) -> Alignment:
+        """As `CoarseAlignment.align`; heading 0 stands for any.
+
+        Raises
+        ------
+        DataError
+            As `rest_level.level_at_rest`.
+        """
+        found = level_at_rest(self.name, imu, site, sensors, 0.0, UNKNOWN_HEADING)
+        unknown = Finding(
+            "alignment.heading-not-known",
+            file=source_of(imu),
+            quantity="heading",
+            unknown_heading_deg=math.degrees(UNKNOWN_HEADING),
+        )
+        return replace(found, findings=(*found.findings, unknown))
+
+
+# Levelling with a heading that somebody knows.
+
+
+@dataclass(frozen=True)
+class KnownHeading(CoarseAlignment):
+    """Roll and pitch from the mean specific force at rest; the heading as stated.
+
+    Attributes
+    ----------
+    heading_deg : float, deg
+        Of the body's forward axis at the last sample, from true north, clockwise.
+    sd_deg : float, deg
+        Its standard deviation, above zero.
+
+    Raises
+    ------
+    ConfigError
+        The heading is not a number, or its standard deviation not one above zero and below 104.
+    """
+
+    name: ClassVar[str] = "known_heading"
+    summary: ClassVar[str] = "roll and pitch from the mean specific force at rest; stated heading"
+    source: ClassVar[str] = "f_b = C_bn (0, 0, -g)"
+
+    heading_deg: float
+    sd_deg: float
+
+    def __post_init__(self) -> None:
+        if not (is_number(self.heading_deg) and math.isfinite(self.heading_deg)):
+            raise ConfigError(
+                "alignment.heading-not-finite", quantity="heading_deg", heading_deg=self.heading_deg
+            )
+        if not (is_number(self.sd_deg) and 0.0 < self.sd_deg < math.degrees(UNKNOWN_HEADING)):
+            raise ConfigError(
+                "alignment.heading-sd-not-positive", quantity="sd_deg", sd_deg=self.sd_deg
+            )
+
+    def align(
+        self,
+        imu: pd.DataFrame,
+        site: Site,
+        sensors: ImuUncertainty,
+        gnss: pd.DataFrame | None = None,
+    ) -> Alignment:
+        """As `CoarseAlignment.align`.
+
+        Raises
+        ------
+        DataError
+            As `rest_level.level_at_rest`.
+        """
+        found = level_at_rest(
+            self.name, imu, site, sensors, self.heading_deg, math.radians(self.sd_deg)
+        )
+        return replace(found, heading_given=True)
+
+
+# Roll and pitch of a body at rest with what is known of them, for a heading that is stated.
+
+
+Array = NDArray[np.float64]
+
+BLOCKS = 10
+
+
+def level_at_rest(
+    method: str,
+    imu: pd.DataFrame,
+    site: Site,
+    sensors: ImuUncertainty,
+    heading_deg: float,
+    heading_sd: float,
+) -> Alignment:
+    """Level a record of rest.
+
+    Parameters
+    ----------
+    method : str
+        To be named in the result.
+    imu : DataFrame
+    site : Site
+    sensors : ImuUncertainty
+    heading_deg : float, deg
+    heading_sd : float, rad
+
+    Returns
+    -------
+    Alignment
+        At the last sample. Where the force scatters more than by noise, that scatter and the
+        angles by which the body swings are in the covariance, and a finding says so.
+
+    Notes
+    -----
+    `levelling.level` takes gravity for vertical; above the ellipsoid its north component is
+    ``8e-9 alt sin(2 lat)`` m/s², a microradian of tilt at 1200 m, which is not taken off.
+
+    Raises
+    ------
+    DataError
+        As `record_checks.check_record` and `check_gravity`; the body points to the zenith or
+        the nadir.
+    """
+    source = source_of(imu)
+    findings = [*check_record(imu)]
+    means = block_means(imu, BLOCKS)
+    findings += check_gravity(means.whole_force, source)
+    roll, pitch = level(means.whole_force)
+    q_nb = rotation.quaternion_from_euler([roll, pitch, heading_deg])
+    C_nb = rotation.dcm_from_quaternion(q_nb)
+    force = force_covariance(sensors, means.length, means.whole_force)
+    loud = unexplained(
+        means.force, means.length, sensors.accel.axis("noise_density"), sensors.accel_drift
+    )
+    swing = np.zeros((3, 3))
+    turning = unexplained(
+        means.rate, means.length, sensors.gyro.axis("noise_density"), sensors.gyro_drift
+    )
+    if loud > 1.0 or turning > 1.0:
+        force = force + (of_mean(means.force) if loud > 1.0 else 0.0)
+        swing = excursion(imu, sensors.gyro.axis("noise_density"))
+        findings.append(_disturbed(means.length, loud, turning, swing, source))
+    change = gravity_change(means.whole_force, force, site.gravity)
+    findings += gravity_findings(*change, source)
+    by_force, by_heading = error_of_force_and_heading(-site.gravity, pitch, heading_deg, source)
+    # A stated heading is that of the last sample: a swing about the vertical is not in it.
+    by_swing = by_force @ rotation.cross_matrix(site.gravity) @ C_nb
+    to_ned = by_force @ C_nb
+    covariance = to_ned @ force @ to_ned.T + by_swing @ swing @ by_swing.T
+    covariance += heading_sd**2 * np.outer(by_heading, by_heading)
+    return Alignment(method, float(imu.index[-1]), q_nb, covariance, findings=tuple(findings))
+
+
+def _disturbed(
+    length: float, loud: float, turning: float, swing: Array, source: str | None
+) -> Finding:
+    return Finding(
+        "alignment.specific-force-scatters",
+        file=source,
+        quantity="accel",
+        blocks=BLOCKS,
+        length=length / BLOCKS,
+        loud=loud,
+        turning=turning,
+        in_bound=True,
+        swing_deg=np.degrees(np.sqrt(np.trace(swing))),
+    )
+
+
+# Attitude errors where a force is known in both frames, and the heading is stated.
+
+
+#: Beyond this pitch, deg, heading and roll turn about one axis to within a minute of arc.
+STEEPEST = 89.9
+
+
+def error_of_force_and_heading(
+    force: Array, pitch_deg: float, heading_deg: float, source: str | None = None
+) -> tuple[Array, Array]:
+    """Sensitivities of an attitude that lays a force on a force and has a stated heading.
+
+    Parameters
+    ----------
+    force : ndarray, (3,), m/s²
+        North-east-down, as known: minus gravity at rest.
+    pitch_deg, heading_deg : float, deg
+    source : str, optional
+        For messages.
+
+    Returns
+    -------
+    by_force : ndarray, (3, 3), rad per m/s²
+        Of ``phi`` per error of the known force less that of the measured one, north-east-down.
+    by_heading : ndarray, (3,), rad/rad
+
+    Raises
+    ------
+    DataError
+        The body points to the zenith or the nadir: it has no heading.
+
+    Notes
+    -----
+    ``phi x F = e`` leaves the turn about F free: ``phi = F x e/F² + l F``. The heading turns by
+    ``phi_D + tan(pitch) (cos(heading) phi_N + sin(heading) phi_E)``, which gives l. At rest this
+    is ``phi_N = -df_E/g``, ``phi_E = df_N/g``.
+    """
+    if not abs(pitch_deg) <= STEEPEST:
+        raise DataError(
+            "alignment.pitch-vertical",
+            file=source,
+            quantity="pitch",
+            pitch_deg=pitch_deg,
+        )
+    steep, heading = np.tan(np.radians(pitch_deg)), np.radians(heading_deg)
+    row = np.array([steep * np.cos(heading), steep * np.sin(heading), 1.0])
+    along = force / (row @ force)
+    by_force = (np.eye(3) - np.outer(along, row)) @ rotation.cross_matrix(force) / (force @ force)
+    return np.asarray(by_force), np.asarray(along)

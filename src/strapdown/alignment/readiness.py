@@ -2,25 +2,44 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.alignment.alignment import Alignment
-from strapdown.alignment.coarse import CoarseAlignment
-from strapdown.alignment.site import Site
+from strapdown.alignment.alignment import Alignment, CoarseAlignment, Site
+from strapdown.alignment.fine import settled_epoch
+from strapdown.alignment.fine_result import FineResult, alignment_of
+from strapdown.alignment.inertial_sums import sum_inertially
+from strapdown.alignment.mean_errors import sensor_covariance, sensor_noise
+from strapdown.alignment.stationary import home_of
+from strapdown.attitude import Quaternion, run_attitude
 from strapdown.errors import ConfigError, DataError
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
-from strapdown.tables import EULER, QUATERNION, check_attitude
-from strapdown.tables.checks import source_of
+from strapdown.estimation.error_filter import FilterState
+from strapdown.increments import increments_from_imu
+from strapdown.sensors.uncertainty import ImuUncertainty
+from strapdown.tables import EULER, GYRO, QUATERNION, attitude_table, check_attitude, check_imu
+from strapdown.tables.checks import source_of, values_of
+
+__all__ = [
+    "READINESS",
+    "Manoeuvre",
+    "Readiness",
+    "carried_attitude",
+    "carry",
+    "coarse_readiness",
+    "durations_of",
+    "manoeuvres_after",
+    "null_space",
+    "readiness",
+]
+
 
 Array = NDArray[np.float64]
-
-__all__ = ["READINESS", "Readiness", "coarse_readiness", "durations_of", "readiness"]
 
 SD = [f"{angle}_sd" for angle in EULER]
 ERROR = [f"{angle}_error" for angle in EULER]
@@ -190,3 +209,305 @@ def _row(
         errors = rotation.within_half_turn(found.roll_pitch_heading - true)
     numbers = [found.time, *found.roll_pitch_heading, *found.sd_deg, *errors]
     return [*numbers, len(found.findings), None]
+
+
+# What a rest cannot tell, and which turn of the body would tell it.
+
+
+# A turn by hand or by a vehicle, and the length of a step of the forecast.
+TURN_TIME, STEP = 20.0, 0.1  # s
+#: What a body can be asked to do: a rotation vector in its own axes, deg.
+TURNS: dict[str, tuple[float, float, float]] = {
+    "turn it by 90° about the vertical": (0.0, 0.0, 90.0),
+    "turn it by 180° about the vertical": (0.0, 0.0, 180.0),
+    "roll it by 90° onto its side": (90.0, 0.0, 0.0),
+    "pitch it by 90° onto its nose": (0.0, -90.0, 0.0),
+}
+STAY = "leave it as it stands"
+
+
+@dataclass(frozen=True, eq=False)
+class Manoeuvre:
+    """What would be known after a turn and a further rest.
+
+    Attributes
+    ----------
+    name : str
+        What to do.
+    rest : float, s
+        How long it rests afterwards.
+    sd_deg : ndarray, (3,), deg
+        Of the tilts about north and east and of the heading.
+    gyro_bias_sd, accel_bias_sd : ndarray, (3,), rad/s and m/s²
+    """
+
+    name: str
+    rest: float
+    sd_deg: Array
+    gyro_bias_sd: Array
+    accel_bias_sd: Array
+
+
+def null_space(lat_deg: float, q_nb: Array, gravity: float, earth_rate: float) -> Array:
+    """Return the errors that leave no trace in any observation of a rest.
+
+    Any constant rotation psi of the computed attitude, with ``C_nb b_a = f x psi`` and
+    ``C_nb b_g = omega_ie x psi``: velocity and attitude relative to the Earth then stay at rest. So
+    a horizontal bias cannot be told from a tilt, nor an east drift from the heading.
+
+    Parameters
+    ----------
+    lat_deg : float, deg
+    q_nb : ndarray, (4,)
+    gravity : float, m/s²
+    earth_rate : float, rad/s
+
+    Returns
+    -------
+    ndarray, (15, 3)
+        Columns of physical errors in north-east-down and body axes: displacement, velocity,
+        rotation, gyro bias, accelerometer bias; one for a rotation about each of north, east, down.
+    """
+    lat = math.radians(lat_deg)
+    spin = earth_rate * np.array([math.cos(lat), 0.0, -math.sin(lat)])
+    force = np.array([0.0, 0.0, -gravity])
+    C = rotation.dcm_from_quaternion(q_nb)
+    out = np.zeros((15, 3))
+    for i in range(3):
+        psi = np.eye(3)[i]
+        out[6:9, i] = psi
+        out[9:12, i] = C.T @ np.cross(spin, psi)
+        out[12:15, i] = C.T @ np.cross(force, psi)
+    return out
+
+
+def manoeuvres_after(
+    result: FineResult, site: Site, rest: float | None = None
+) -> tuple[Manoeuvre, ...]:
+    """Forecast what a turn of the body and a further rest would make known.
+
+    The filter's covariance goes on over the increments that error-free sensors would give, with the
+    observations of the same rest; nothing else of the result is used. Scale factors and
+    misalignments are a part of the biases here, and stay so; as a turn out of the level changes
+    what they do, the forecast of such a turn is the best that could come of it.
+
+    Parameters
+    ----------
+    result : FineResult
+    site : Site
+    rest : float, s, optional
+        After the turn; as long as the record was, if not given.
+
+    Returns
+    -------
+    tuple of Manoeuvre
+        The best heading first; to stay as it stands is among them.
+    """
+    history = result.history
+    length = float(history.index[-1] - history.index[0]) if rest is None else rest
+    turns = {STAY: (0.0, 0.0, 0.0), **TURNS}
+    found = [
+        _forecast(result, site, name, np.radians(turn), length) for name, turn in turns.items()
+    ]
+    return tuple(sorted(found, key=lambda one: float(one.sd_deg[2])))
+
+
+def _forecast(result: FineResult, site: Site, name: str, turn: Array, rest: float) -> Manoeuvre:
+    filter_ = result.filter
+    # A body at rest without errors: only the covariance is wanted.
+    home = home_of(site, result.state.time)
+    used = filter_.mechanization
+    here = used.nav_state(result.state.mechanization, result.state.time)
+    begun = used.begin(replace(home, q_nb=here.q_nb))
+    state = FilterState(
+        home.time,
+        begun,
+        used.history_row(begun),
+        np.zeros_like(result.state.sensors),
+        result.state.covariance,
+    )
+    q_nb = np.asarray(here.q_nb)
+    moving = max(1, round(TURN_TIME / STEP))
+    steps = round(TURN_TIME)
+    if np.any(turn):
+        rows, q_nb = _turning(site, q_nb, turn, moving)
+        each = len(rows) // steps
+        for k in range(steps):
+            part = rows[k * each : (k + 1) * each]
+            time = state.time + STEP * np.arange(1.0, each + 1)
+            state, _ = filter_.predict(state, np.asarray(time), part)
+    home = replace(home, q_nb=q_nb)
+    each = round(result.interval / STEP)
+    rows = np.tile(_resting(site, q_nb), (each, 1))
+    for _ in range(max(1, math.floor(rest / result.interval))):
+        time = state.time + STEP * np.arange(1.0, each + 1)
+        state, _ = settled_epoch(
+            filter_,
+            state,
+            np.asarray(time),
+            rows,
+            home,
+            result.standing,
+            tuple(result.innovations),
+        )
+    after = alignment_of(filter_, state)
+    assert after.gyro_bias_sd is not None and after.accel_bias_sd is not None
+    return Manoeuvre(
+        name,
+        rest,
+        np.degrees(np.sqrt(np.diagonal(after.covariance))),
+        after.gyro_bias_sd,
+        after.accel_bias_sd,
+    )
+
+
+def _resting(site: Site, q_nb: Array) -> Array:
+    """Motion increments of one step of a body that stands, (10,)."""
+    C = rotation.dcm_from_quaternion(q_nb)
+    rate, force = C.T @ site.earth_rate, -(C.T @ site.gravity)
+    return np.concatenate([[STEP], rate * STEP, force * STEP, 0.5 * force * STEP**2])
+
+
+def _turning(site: Site, q_nb: Array, turn: Array, steps: int) -> tuple[Array, Array]:
+    """Motion increments of a turn at constant rate about an axis of the body, and its end."""
+    rows = np.empty((steps, 10))
+    step = rotation.quaternion_from_rotation_vector(turn / steps)
+    for i in range(steps):
+        # Force is constant in level: over the step it is met from halfway.
+        half = rotation.quaternion_from_rotation_vector(0.5 * turn / steps)
+        rows[i] = _resting(site, rotation.compose(q_nb, half))
+        rows[i, 4:10] = np.concatenate(
+            [rotation.rotate(half, v) for v in rows[i, 4:10].reshape(2, 3)]
+        )
+        rows[i, 1:4] += turn / steps
+        q_nb = rotation.compose(q_nb, step)
+    return rows, q_nb
+
+
+# An alignment taken to another instant, or over its whole record, by the gyros.
+
+
+def carry(
+    imu: pd.DataFrame,
+    alignment: Alignment,
+    to: float,
+    site: Site,
+    sensors: ImuUncertainty | None = None,
+) -> Alignment:
+    """Carry an attitude forward or backward in time.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        Imu table with specific force that holds both instants; the samples nearest to them
+        count.
+    alignment : Alignment
+        A gyro bias that it tells is taken off.
+    to : float, s
+    site : Site
+        The local level turns with the Earth here; a vehicle that goes at 10 m/s turns it by
+        another 0.3 deg/h, which is not in it.
+    sensors : ImuUncertainty, optional
+        What the gyros add to the covariance; without it nothing. It is taken as independent of
+        what is in the covariance already: of `InertialFrame`, which has used the same gyros,
+        ask for the attitude at the start or the end directly.
+
+    Returns
+    -------
+    Alignment
+        At the sample nearest to `to`, of the same method and findings.
+
+    Raises
+    ------
+    DataError
+        As `tables.check_imu`; one of the instants is not in the record.
+    """
+    check_imu(imu)
+    stamps = imu.index.to_numpy(dtype=np.float64)
+    here, there = (_sample(stamps, t, imu) for t in (alignment.time, to))
+    if here == there:
+        return alignment
+    first, last = min(here, there), max(here, there)
+    piece = _without_gyro_bias(imu.iloc[first : last + 1], alignment)
+    sums = sum_inertially(piece)
+    forward = there > here
+    level = rotation.dcm_from_rotation_vector(
+        site.earth_rate * (-sums.length if forward else sums.length)
+    )
+    turned = rotation.dcm_from_quaternion(sums.turned[-1])
+    C_here = rotation.dcm_from_quaternion(alignment.q_nb)
+    C_there = level @ C_here @ (turned if forward else turned.T)
+    covariance = level @ alignment.covariance @ level.T
+    if sensors is not None:
+        # Angle errors come in the axes at the first sample of the piece.
+        axes = level @ C_here if forward else C_there
+        turn = np.tile(axes, (len(sums.node_length), 1, 1))
+        none = np.zeros_like(turn)
+        covariance = covariance + sensor_covariance(sums, turn, none, sensors)
+        covariance = covariance + sensor_noise(sums, turn, none, sensors)
+    return replace(
+        alignment,
+        time=float(stamps[there]),
+        q_nb=rotation.quaternion_from_dcm(C_there),
+        covariance=np.asarray(covariance),
+    )
+
+
+def carried_attitude(alignment: Alignment, imu: pd.DataFrame, site: Site) -> pd.DataFrame:
+    """Carry an attitude over the record that it was found in.
+
+    Parameters
+    ----------
+    alignment : Alignment
+        At an instant of the record; its gyro bias, where it has one, is taken off.
+    imu : DataFrame
+        Imu table of a body that stays at its place.
+    site : Site
+
+    Returns
+    -------
+    DataFrame
+        Attitude table: ``q_nb(t) = q_n(t)n(T) q_nb(T) q_b(T)b(t)``, the body's turn in inertial
+        space by the gyros and that of the level by the Earth's rate. One sample of a mean rate
+        has no step before it and is that of the first whole interval's start.
+
+    Raises
+    ------
+    DataError
+        The instant of the alignment is not in the record.
+    """
+    clean = _without_gyro_bias(imu, alignment)
+    run = run_attitude(Quaternion(), increments_from_imu(clean)).attitude
+    time = run.index.to_numpy(dtype=np.float64)
+    turned = values_of(run, QUATERNION)
+    at = int(np.argmin(np.abs(time - alignment.time)))
+    back = rotation.conjugate(turned[at])
+    level = rotation.quaternion_from_rotation_vector(
+        np.outer(time - alignment.time, -site.earth_rate)
+    )
+    here = rotation.compose(alignment.q_nb, back)
+    q_nb = rotation.compose(level, rotation.compose(here, turned))
+    return attitude_table(time, q_nb, source=source_of(imu))
+
+
+def _without_gyro_bias(imu: pd.DataFrame, alignment: Alignment) -> pd.DataFrame:
+    if alignment.gyro_bias is None:
+        return imu
+    clean = imu.copy()
+    clean[GYRO] = values_of(imu, GYRO) - alignment.gyro_bias
+    clean.attrs = dict(imu.attrs)
+    return clean
+
+
+def _sample(stamps: Array, time: float, imu: pd.DataFrame) -> int:
+    slack = 0.5 * float(np.median(np.diff(stamps))) * (1.0 + 1e-6)
+    if not stamps[0] - slack <= time <= stamps[-1] + slack:
+        raise DataError(
+            "alignment.instant-outside-record",
+            file=source_of(imu),
+            quantity="time",
+            time=time,
+            stamps=stamps[0],
+            stamps_2=stamps[-1],
+        )
+    return int(np.argmin(np.abs(stamps - time)))

@@ -6,16 +6,31 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.alignment.north import CONTRADICTION
-from strapdown.alignment.outliers import outlier_findings
-from strapdown.constants import STANDARD_GRAVITY
+from strapdown.alignment.alignment import Site
+from strapdown.constants import DEG_PER_HOUR, STANDARD_GRAVITY
+from strapdown.earth import radii_of_curvature
 from strapdown.errors import DataError, Finding
-from strapdown.tables import ACCEL, GYRO, check_imu, find_gaps
+from strapdown.sensors.uncertainty import ImuUncertainty
+from strapdown.tables import ACCEL, GYRO, VELOCITY, VELOCITY_SD, check_gnss, check_imu, find_gaps
 from strapdown.tables.checks import source_of
 
-Array = NDArray[np.float64]
+__all__ = [
+    "CONTRADICTION",
+    "HIGH_LATITUDE",
+    "LARGEST_SD",
+    "LEAST_SAMPLES",
+    "check_gravity",
+    "check_record",
+    "gravity_findings",
+    "latitude_findings",
+    "north_findings",
+    "outlier_findings",
+    "seems_in_deg_per_s",
+    "still_by_gnss",
+]
 
-__all__ = ["LEAST_SAMPLES", "check_gravity", "check_record", "gravity_findings"]
+
+Array = NDArray[np.float64]
 
 # As levelling has it: what no bias, scale or rocking makes of gravity.
 NEAR_GRAVITY = 0.2
@@ -169,5 +184,249 @@ def _gaps(time: Array, source: str | None) -> tuple[Finding, ...]:
             length=worst.length,
             start=worst.start,
             usual=worst.usual,
+        ),
+    )
+
+
+# Samples that stand out of a record that is to be aligned.
+
+
+#: Share of the steps from sample to sample that are taken for usual, and how many times as large
+#: a step stands out: 36 standard deviations of white noise, 10 times the steepest of a swing.
+USUAL = 0.99
+FACTOR = 10.0
+
+
+def outlier_findings(values: Array, columns: list[str], source: str | None) -> tuple[Finding, ...]:
+    """Find jumps that neither noise nor rocking makes.
+
+    Parameters
+    ----------
+    values : ndarray, (n, k)
+    columns : list of str
+        Their names.
+    source : str, optional
+
+    Returns
+    -------
+    tuple of Finding
+        At most one, of the channel that jumps most, with the row of its largest jump. A channel
+        whose usual step is zero (a coarse converter) is not judged.
+    """
+    steps = np.abs(np.diff(values, axis=0))
+    place = int(USUAL * (len(steps) - 1))
+    usual = np.partition(steps, place, axis=0)[place]
+    ratio = np.divide(steps.max(axis=0), usual, out=np.zeros_like(usual), where=usual > 1e-12)
+    if not ratio.max(initial=0.0) > FACTOR:
+        return ()
+    channel = int(np.argmax(ratio))
+    large = np.flatnonzero(steps[:, channel] > FACTOR * usual[channel])
+    row = int(np.argmax(steps[:, channel])) + 1
+    return (
+        Finding(
+            "alignment.outlier-or-shock" if len(large) == 1 else "alignment.outliers-or-shocks",
+            file=source,
+            row=row + 1,
+            quantity=columns[channel],
+            count=len(large),
+            factor=FACTOR,
+            ratio=ratio[channel],
+            values=values[row, channel],
+        ),
+    )
+
+
+# Whether a satellite receiver says that a vehicle stood.
+
+
+#: A velocity that errs by more than this many standard deviations is a velocity.
+CLEAR = 5.0
+
+
+def still_by_gnss(
+    gnss: pd.DataFrame | None, imu: pd.DataFrame, site: Site, heading_sd: float
+) -> tuple[Finding, ...]:
+    """Refuse a steady motion, which inertial sensors cannot tell from rest.
+
+    Parameters
+    ----------
+    gnss : DataFrame, optional
+        Gnss table; without one nothing is said.
+    imu : DataFrame
+    site : Site
+    heading_sd : float, rad
+        What is stated; an error that is small against it is borne.
+
+    Returns
+    -------
+    tuple of Finding
+        One, where the vehicle moves and the heading bears it.
+
+    Raises
+    ------
+    DataError
+        The vehicle moves, and the heading found as if it stood errs by more than its standard
+        deviation: the level of a vehicle that goes north turns like one on an Earth that turns
+        faster about east, by ``v_N/(R w cos(lat))``.
+    """
+    if gnss is None:
+        return ()
+    check_gnss(gnss)
+    time = gnss.index.to_numpy(dtype=np.float64)
+    during = (time >= imu.index[0]) & (time <= imu.index[-1])
+    good = during & (gnss["quality"].to_numpy() > 0.0)
+    velocity = gnss.loc[good, VELOCITY].to_numpy(dtype=np.float64)[:, :2]
+    sd = gnss.loc[good, VELOCITY_SD].to_numpy(dtype=np.float64)[:, :2]
+    told = np.isfinite(sd).all(axis=1)
+    if not told.any():
+        return ()
+    # Errors of fixes are not independent: the mean is taken for no better than one of them.
+    mean, spread = velocity[told].mean(axis=0), float(sd[told].mean())
+    speed = float(np.hypot(*mean))
+    if not speed > CLEAR * max(spread, 1e-3):
+        return ()
+    meridian, _ = radii_of_curvature(site.lat_deg, ellipsoid=site.ellipsoid)
+    rate = float(np.hypot(*mean)) / (float(meridian) + site.alt)
+    error = rate / max(float(abs(site.earth_rate[0])), 1e-12)
+    moves = Finding(
+        "alignment.vehicle-moves",
+        file=source_of(gnss),
+        row=int(np.flatnonzero(good)[0]) + 1,
+        quantity="VN, VE",
+        speed=speed,
+        fixes=int(told.sum()),
+        heading_deg=np.degrees(error),
+    )
+    if error > heading_sd:
+        raise DataError(moves)
+    return (moves,)
+
+
+# Whether gyros can find north, and what they say of the latitude.
+
+
+#: A heading that is less well known than this, in rad, is no heading: a uniform one has 1.81.
+LARGEST_SD = 1.0
+#: Beyond this latitude, in deg, less than a third of the Earth's rate is horizontal.
+HIGH_LATITUDE = 70.0
+#: So many standard deviations are no chance: one in two million.
+CONTRADICTION = 5.0
+
+
+def north_findings(
+    site: Site, sd: float, sensors: ImuUncertainty, source: str | None
+) -> tuple[Finding, ...]:
+    """Say how well north is known.
+
+    Parameters
+    ----------
+    site : Site
+    sd : float, rad
+        Of the heading.
+    sensors : ImuUncertainty
+    source : str, optional
+        Of the record, for messages.
+
+    Returns
+    -------
+    tuple of Finding
+        Where the latitude is high.
+
+    Raises
+    ------
+    DataError
+        The standard deviation exceeds 1 rad, or the place is so near to a pole that it is not a
+        number.
+    """
+    rate = site.earth_rate
+    size, across = float(np.sqrt(rate @ rate)), float(abs(rate[0]))
+    bias = max(sensors.gyro.axis("bias"))
+    bias = float(np.hypot(bias, max(sensors.gyro_drift.triad)))
+    if not sd <= LARGEST_SD:
+        told = f"{np.degrees(sd):.3g} deg" if sd < 1e3 else "without bound"
+        raise DataError(
+            "alignment.no-north-near-pole" if across < 0.02 * size else "alignment.no-north",
+            file=source,
+            quantity="heading",
+            told=told,
+            largest_sd_deg=np.degrees(LARGEST_SD),
+            lat_deg=site.lat_deg,
+            rounded=_rounded(across * DEG_PER_HOUR),
+            bias=bias * DEG_PER_HOUR,
+        )
+    if abs(site.lat_deg) <= HIGH_LATITUDE:
+        return ()
+    return (
+        Finding(
+            "alignment.high-latitude",
+            file=source,
+            quantity="heading",
+            lat_deg=site.lat_deg,
+            across=100.0 * across / size,
+            sd_deg=np.degrees(sd),
+            size=size / across,
+        ),
+    )
+
+
+def seems_in_deg_per_s(rate: Array, site: Site) -> bool:
+    """Whether the mean rate of a body at rest is 57 times the Earth's.
+
+    Parameters
+    ----------
+    rate : ndarray, (3,), rad/s
+    site : Site
+
+    Returns
+    -------
+    bool
+    """
+    size, earth = (float(np.sqrt(x @ x)) for x in (rate, site.earth_rate))
+    return abs(size / earth / float(np.degrees(1.0)) - 1.0) < 0.1
+
+
+def _rounded(rate: float) -> str:
+    """A rate in deg/h; what rounding leaves of none is none."""
+    return f"{rate:.3g}" if rate > 1e-9 else "0"
+
+
+def latitude_findings(
+    site: Site, measured_deg: float, sd_deg: float, source: str | None
+) -> tuple[Finding, ...]:
+    """Compare the latitude that the sensors tell with the site's.
+
+    Parameters
+    ----------
+    site : Site
+    measured_deg, sd_deg : float, deg
+        From the angle between gravity and the Earth's rate.
+    source : str, optional
+
+    Returns
+    -------
+    tuple of Finding
+        One, where they differ by more than five standard deviations.
+    """
+    off = measured_deg - site.lat_deg
+    if not abs(off) > CONTRADICTION * sd_deg:
+        return ()
+    if abs(measured_deg) > 90.0 + CONTRADICTION * sd_deg:
+        return (
+            Finding(
+                "alignment.no-latitude-fits",
+                file=source,
+                quantity="latitude",
+                lat_deg=site.lat_deg,
+            ),
+        )
+    return (
+        Finding(
+            "alignment.measured-latitude-contradicts-site",
+            file=source,
+            quantity="latitude",
+            measured_deg=measured_deg,
+            sd_deg=sd_deg,
+            lat_deg=site.lat_deg,
+            off=abs(off) / sd_deg,
         ),
     )

@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown._kernels.earth import RATE
 from strapdown._kernels.level import AXIS, OMEGA_EL, Q_LB, V_L
-from strapdown.alignment.site import Site
+from strapdown.alignment.alignment import Site
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import find_ellipsoid
-from strapdown.estimation.error_filter import ErrorFilter
+from strapdown.estimation.covariance import Observation
+from strapdown.estimation.error_filter import ErrorFilter, FilterState
 from strapdown.estimation.error_model import PHYSICAL, Segment
-from strapdown.estimation.filter_state import FilterState
-from strapdown.estimation.observation import Observation
 from strapdown.mechanization.mechanization import Mechanization
 from strapdown.mechanization.state_error import displacement_between
 from strapdown.nav_state import NavState

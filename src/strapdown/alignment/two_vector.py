@@ -10,29 +10,31 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.alignment.alignment import Alignment
-from strapdown.alignment.block_means import (
+from strapdown.alignment.alignment import Alignment, CoarseAlignment, Site
+from strapdown.alignment.mean_errors import (
     BlockMeans,
     block_means,
     excursion,
+    force_covariance,
+    gravity_change,
     of_mean,
+    rate_covariance,
     unexplained,
 )
-from strapdown.alignment.coarse import CoarseAlignment
-from strapdown.alignment.mean_errors import force_covariance, gravity_change, rate_covariance
-from strapdown.alignment.north import (
+from strapdown.alignment.record_checks import (
     CONTRADICTION,
     LARGEST_SD,
+    check_gravity,
+    check_record,
+    gravity_findings,
     latitude_findings,
     north_findings,
     seems_in_deg_per_s,
+    still_by_gnss,
 )
-from strapdown.alignment.record_checks import check_gravity, check_record, gravity_findings
-from strapdown.alignment.site import Site
-from strapdown.alignment.still import still_by_gnss
 from strapdown.constants import DEG_PER_HOUR
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables.checks import source_of
 
 Array = NDArray[np.float64]

@@ -23,11 +23,9 @@ from strapdown.api.reading import (
     moved_paths,
     table_input,
 )
-from strapdown.bundle.destination import check_destination
-from strapdown.bundle.seal import Seal
+from strapdown.bundle.seal import Seal, check_destination
 from strapdown.config.alignment import AlignmentSpec, LogTable
-from strapdown.config.alignment_checks import NOT_BEFORE_FINE
-from strapdown.config.alignment_file import alignment_spec, read_alignment_spec
+from strapdown.config.alignment_file import NOT_BEFORE_FINE, alignment_spec, read_alignment_spec
 from strapdown.config.coast import CoastSpec, coast_spec
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.navigation_file import navigation_spec

@@ -22,8 +22,7 @@ from strapdown.api.reading import (
     moved_paths,
     table_input,
 )
-from strapdown.bundle.destination import check_destination
-from strapdown.bundle.seal import Seal
+from strapdown.bundle.seal import Seal, check_destination
 from strapdown.config.alignment import LogTable
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.navigation_file import navigation_spec, read_navigation_spec
@@ -33,8 +32,7 @@ from strapdown.formats.clocks import on_clock_of
 from strapdown.report.navigation import write_navigation
 from strapdown.systems.progress import Progress, silent
 from strapdown.systems.sins.proposal import CODE_RECEIVER, propose
-from strapdown.systems.sins.result import NavigationResult
-from strapdown.systems.sins.run import run_navigation
+from strapdown.systems.sins.run import NavigationResult, run_navigation
 from strapdown.systems.sins.trust import Trust
 from strapdown.tables import EULER, GEODETIC, VELOCITY
 

@@ -25,7 +25,7 @@ from strapdown.attitude.runge_kutta import RungeKutta
 from strapdown.attitude.tracker import AttitudeTracker
 from strapdown.errors import ConfigError, DivergenceError
 from strapdown.plugins import plugin
-from strapdown.results.runs import AttitudeRun
+from strapdown.results.attitude_bench import AttitudeRun
 from strapdown.tables import attitude_table
 
 __all__ = [

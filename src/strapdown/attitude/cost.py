@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
 from strapdown._kernels import arithmetic
-from strapdown.attitude.algorithm import AttitudeAlgorithm
+from strapdown._kernels.arithmetic import single_precision
+from strapdown.attitude.algorithm import Array, AttitudeAlgorithm
 from strapdown.constants import CORTEX_M4F_CYCLES
-from strapdown.results.answer import Cost
+from strapdown.results.attitude_bench import Cost
+from strapdown.tables import GYRO
 
 STEPS = 12
 TURN = 0.01
@@ -112,3 +116,119 @@ def count_cost(algorithm: AttitudeAlgorithm, dt: ArrayLike | None = None) -> Cos
         cycles=sum(operations[kind] * weight for kind, weight in CORTEX_M4F_CYCLES.items()),
         memory=state.used,
     )
+
+
+# How long a sample takes an algorithm on the machine at hand.
+
+
+COLUMNS = ["algorithm", "float64_ns", "float32_ns"]
+_STEPS = 20_000
+_ROUNDS = 5
+
+
+def time_algorithms(algorithms: Sequence[AttitudeAlgorithm]) -> pd.DataFrame:
+    """Measure the time of a sample, in double and in single precision.
+
+    Parameters
+    ----------
+    algorithms : sequence of AttitudeAlgorithm
+
+    Returns
+    -------
+    DataFrame
+        ``algorithm``, ``float64_ns``, ``float32_ns``: of one step in a batch of 20 000, the best
+        of five. A figure of this machine at this moment, which is why no sealed result holds
+        it.
+    """
+    rng = np.random.default_rng(0)
+    theta = rng.normal(0.0, 0.01, (_STEPS, 3))
+    dt, change = np.full(_STEPS, 0.01), 0.1 * theta
+    rows = []
+    for algorithm in algorithms:
+        begun = algorithm.begin(np.array([1.0, 0.0, 0.0, 0.0]))
+        row: dict[str, str | float] = {"algorithm": algorithm.label}
+        kernels = {"float64_ns": type(algorithm).advance_kernel, "float32_ns": None}
+        for column, kernel in kernels.items():
+            kind = np.float64 if kernel is not None else np.float32
+            run = kernel if kernel is not None else single_kernel(algorithm)
+            history = np.empty((_STEPS, algorithm.width), kind)
+            inputs = [a.astype(kind) for a in (dt, theta, change)]
+            options = [kind(option) for option in algorithm.kernel_options()]
+            best = np.inf
+            for _ in range(_ROUNDS):
+                state = begun.astype(kind)
+                start = perf_counter()
+                run(state, *inputs, history, *options)
+                best = min(best, perf_counter() - start)
+            row[column] = best / _STEPS * 1e9
+        rows.append(row)
+    return pd.DataFrame(rows, columns=COLUMNS)
+
+
+# An attitude algorithm in single precision, as an embedded processor runs it.
+
+
+Single = NDArray[np.float32]
+
+
+def single_increments(imu: pd.DataFrame, interpolation: str = "linear") -> tuple[Single, ...]:
+    """Form increments in single precision from rates that a device reads as floats.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        An Imu table. The steps are differences of its stamps, rounded once: a device counts
+        its clock in whole numbers.
+    interpolation : {'linear', 'cubic'}
+
+    Returns
+    -------
+    dt, theta, dtheta : ndarray of float32
+        (n,) s, (n, 3) rad, (n, 3) rad.
+    """
+    kernel = single_precision("increments")
+    dt = np.diff(imu.index.to_numpy(dtype=np.float64)).astype(np.float32)
+    rate = np.ascontiguousarray(imu[GYRO].to_numpy(dtype=np.float32))
+    theta = np.empty((len(dt), 3), np.float32)
+    dtheta = np.empty_like(theta)
+    mean = imu.attrs["sampling"] == "mean"
+    if interpolation == "cubic" and not mean:
+        kernel.increments_cubic(dt, rate, theta, dtheta)
+    else:
+        kernel.increments(dt, rate, mean, theta, dtheta)
+    return dt, theta, dtheta
+
+
+def single_kernel(algorithm: AttitudeAlgorithm) -> Any:
+    """Return the loop of an algorithm over many steps, compiled in single precision."""
+    function = type(algorithm).advance_kernel.py_func
+    module = single_precision(function.__module__.rpartition(".")[2])
+    return getattr(module, function.__name__)
+
+
+def run_single(
+    algorithm: AttitudeAlgorithm, increments: tuple[Single, ...], q_nb: ArrayLike
+) -> Array:
+    """Run an algorithm with every operation in single precision.
+
+    Parameters
+    ----------
+    algorithm : AttitudeAlgorithm
+    increments : tuple of ndarray
+        From `single_increments`.
+    q_nb : array_like, (4,)
+        Attitude at the start, body to local level.
+
+    Returns
+    -------
+    ndarray, (n+1, 4)
+        Quaternions at the start and after each step, read from the algorithm's own numbers in
+        double precision.
+    """
+    dt, theta, dtheta = increments
+    state = algorithm.begin(rotation.normalise(q_nb)).astype(np.float32)
+    first = state[None, : algorithm.width].astype(np.float64)
+    history = np.empty((len(dt), algorithm.width), np.float32)
+    options = (np.float32(option) for option in algorithm.kernel_options())
+    single_kernel(algorithm)(state, dt, theta, dtheta, history, *options)
+    return algorithm.quaternions(np.vstack([first, history.astype(np.float64)]))

@@ -10,8 +10,7 @@ from __future__ import annotations
 
 from strapdown.bundle.configuration_paths import resolved
 from strapdown.bundle.reading import read_manifest, unsealed_changes
-from strapdown.bundle.seal import Seal, sha256
-from strapdown.bundle.timing import write_latency, write_timing
+from strapdown.bundle.seal import Seal, sha256, write_latency, write_timing
 from strapdown.bundle.writing import write_bundle
 
 __all__ = [

@@ -3,10 +3,30 @@
 from __future__ import annotations
 
 import hashlib
+import json
+import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-__all__ = ["LATENCY", "MANIFEST", "SCHEMA", "TIMING", "UNSEALED", "Seal", "files_of", "sha256"]
+from strapdown.errors import ConfigError
+
+__all__ = [
+    "LATENCY",
+    "MANIFEST",
+    "SCHEMA",
+    "TIMING",
+    "UNSEALED",
+    "Seal",
+    "check_destination",
+    "files_of",
+    "sha256",
+    "to_json",
+    "write_latency",
+    "write_timing",
+]
+
 
 MANIFEST = "manifest.json"
 TIMING = "timing.json"
@@ -42,3 +62,81 @@ def files_of(root: Path) -> list[str]:
     """Everything but folders; a link to one is no folder of the bundle."""
     found = (p for p in root.rglob("*") if p.is_symlink() or not p.is_dir())
     return sorted(p.relative_to(root).as_posix() for p in found)
+
+
+# Where a bundle may be written, told before the run that it is for.
+
+
+def check_destination(out: Path, force: bool) -> None:
+    """Refuse a folder that may not be written.
+
+    Parameters
+    ----------
+    out : Path
+    force : bool
+        Allow a bundle, or an empty folder, to be replaced.
+
+    Raises
+    ------
+    ConfigError
+    """
+    if not out.exists():
+        _refuse_unwritable(out)
+        return
+    if out.is_dir() and not any(out.iterdir()):
+        return
+    if not force:
+        raise ConfigError("bundle.folder-exists", file=str(out), quantity="--out")
+    if not (out.is_dir() and (out / MANIFEST).is_file()):
+        raise ConfigError("bundle.not-a-bundle", file=str(out), quantity="--out")
+
+
+def _refuse_unwritable(out: Path) -> None:
+    """Say before a long run what would fail after it."""
+    parent = next(p for p in out.absolute().parents if p.exists())
+    if not parent.is_dir() or not os.access(parent, os.W_OK):
+        raise ConfigError("bundle.not-writable", file=str(out), quantity="--out", parent=parent)
+
+
+# What is put beside a seal, because clocks differ.
+
+
+def write_timing(
+    seal: Seal, seconds: dict[str, float], sample_ns: dict[str, dict[str, float]] | None = None
+) -> None:
+    """Put the times that a run took beside its bundle's seal.
+
+    Parameters
+    ----------
+    seal : Seal
+    seconds : dict of str to float
+        Stage to seconds.
+    sample_ns : dict of str to dict, optional
+        Algorithm to nanoseconds of a sample in each precision.
+    """
+    timing: dict[str, Any] = {"seconds": {stage: round(t, 4) for stage, t in seconds.items()}}
+    if sample_ns:
+        timing["sample_ns"] = sample_ns
+    (seal.path / TIMING).write_text(to_json(timing), encoding="utf-8", newline="\n")
+
+
+def write_latency(seal: Seal, latency: Mapping[str, Any]) -> None:
+    """Put what each sample took beside its bundle's seal.
+
+    Parameters
+    ----------
+    seal : Seal
+    latency : mapping
+        As JSON.
+    """
+    (seal.path / LATENCY).write_text(to_json(latency), encoding="utf-8", newline="\n")
+
+
+# JSON as bundles hold it.
+
+
+def to_json(content: Any) -> str:
+    """JSON as bundles hold it: readable, in the order given, the same bytes every time."""
+    text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    # Names of files need not be text; what is not is shown as a question mark.
+    return text.encode("utf-8", "replace").decode("utf-8")

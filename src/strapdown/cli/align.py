@@ -103,8 +103,7 @@ def align(
     it was known.
     """
     from strapdown.api.alignment import run_specified
-    from strapdown.bundle.destination import check_destination
-    from strapdown.bundle.timing import write_timing
+    from strapdown.bundle.seal import check_destination, write_timing
     from strapdown.cli.align_options import refuse_beside_file, spec_of_flags
     from strapdown.cli.align_tables import print_alignment
     from strapdown.cli.console import WORDS, Stopwatch, print_findings, print_seal, progress

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from strapdown.cli.console import console, print_block
-from strapdown.report.alignment_tables import answer_table, bias_table, readiness_table
+from strapdown.report.alignment_document import (
+    answer_table,
+    bias_table,
+    headline,
+    limits,
+    readiness_table,
+)
 from strapdown.report.alignment_trust import trust
-from strapdown.report.alignment_words import headline, limits
-from strapdown.report.crash_values import spaced
+from strapdown.report.values import spaced
 from strapdown.systems.alignment_run import AlignmentResult
 
 __all__ = ["print_alignment"]

@@ -173,15 +173,13 @@ def attitude(
     """
     from strapdown.api.attitude import compare_attitude
     from strapdown.attitude import make_algorithm
-    from strapdown.attitude.speed import time_algorithms
-    from strapdown.bundle.destination import check_destination
-    from strapdown.bundle.timing import write_timing
+    from strapdown.attitude.cost import time_algorithms
+    from strapdown.bundle.seal import check_destination, write_timing
     from strapdown.cli.attitude_tables import print_bench, print_speed
     from strapdown.cli.console import Stopwatch, console, print_findings, print_seal, progress
     from strapdown.cli.result_folder import default_folder, refuse_result
     from strapdown.formats.columns import parse_column_option
-    from strapdown.report.attitude import attitude_json
-    from strapdown.report.attitude_c import check_c, chosen_for_c, write_c
+    from strapdown.report.attitude import attitude_json, check_c, chosen_for_c, write_c
 
     for source in sources:
         refuse_result(source, "log")

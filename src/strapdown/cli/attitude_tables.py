@@ -25,7 +25,7 @@ def print_bench(bench: AttitudeBench) -> None:
     from strapdown.cli.console import console, print_table
     from strapdown.report import attitude_tables as tables
     from strapdown.report import attitude_words as words
-    from strapdown.report.attitude_places import offer_lines, place_table
+    from strapdown.report.attitude_tables import offer_lines, place_table
 
     page = console()
     if bench.trials is not None:

@@ -150,8 +150,7 @@ def coast(
     navigation the filter's own state is taken, and the drifts that came are laid over the forecast.
     """
     from strapdown.api.alignment import run_outage
-    from strapdown.bundle.destination import check_destination
-    from strapdown.bundle.timing import write_timing
+    from strapdown.bundle.seal import check_destination, write_timing
     from strapdown.cli.coast_options import coast_of_flags
     from strapdown.cli.coast_tables import print_coast
     from strapdown.cli.console import WORDS, Stopwatch, print_findings, print_seal, progress

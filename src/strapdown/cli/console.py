@@ -168,7 +168,7 @@ def print_table(
 
 def print_block(block: TableBlock) -> None:
     """Print a table of a report, its lines unbroken where the page has no break either."""
-    from strapdown.report.crash_values import spaced
+    from strapdown.report.values import spaced
 
     rows = [[spaced(cell) for cell in row] for row in block.rows]
     columns = [spaced(name) for name in block.columns]

@@ -27,8 +27,7 @@ def crash(
     figures, sealed so that any change is found.
     """
     from strapdown.api.crash import reconstruct
-    from strapdown.bundle.destination import check_destination
-    from strapdown.bundle.timing import write_timing
+    from strapdown.bundle.seal import check_destination, write_timing
     from strapdown.cli.console import (
         WORDS,
         Stopwatch,

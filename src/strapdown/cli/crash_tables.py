@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from strapdown.cli.console import console, print_block
-from strapdown.report.crash_check_tables import comparison_table
 from strapdown.report.crash_limits import limitations
-from strapdown.report.crash_tables import answers_table, path_table
-from strapdown.report.crash_values import spaced
+from strapdown.report.crash_tables import answers_table, comparison_table, path_table
 from strapdown.report.crash_words import headline
+from strapdown.report.values import spaced
 from strapdown.systems.crash_case import CaseResult
 
 __all__ = ["print_crash"]

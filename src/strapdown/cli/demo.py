@@ -76,7 +76,7 @@ def _part_of(show: Progress, title: str, begin: float, share: float) -> Progress
 
 def _check(out: Path, names: list[str], force: bool) -> None:
     """Refuse before the first run what a later one would be refused for."""
-    from strapdown.bundle.destination import check_destination
+    from strapdown.bundle.seal import check_destination
     from strapdown.errors import ConfigError
 
     for name in (*names, _PAGE):

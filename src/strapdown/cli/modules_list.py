@@ -7,11 +7,10 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from strapdown.aiding.aid import Aid
-from strapdown.aiding.standstill_detectors import STANDSTILL_DETECTORS
-from strapdown.aiding.standstill_thresholds import STANDSTILL_THRESHOLDS
+from strapdown.aiding.standstill import STANDSTILL_DETECTORS, STANDSTILL_THRESHOLDS
 from strapdown.attitude import ALGORITHMS, AttitudeAlgorithm
+from strapdown.config.choice import SLOTS, Slot, options_of
 from strapdown.config.motions import KINDS
-from strapdown.config.slots import SLOTS, Slot, options_of
 from strapdown.ellipsoids import ELLIPSOIDS
 from strapdown.errors import Finding
 from strapdown.formats import READERS, Reader

@@ -145,8 +145,7 @@ def navigate(
 ) -> None:
     """Find place, velocity and attitude over a record, from inertial sensors and what aids them."""
     from strapdown.api.navigation import run_specified, smoothed_too
-    from strapdown.bundle.destination import check_destination
-    from strapdown.bundle.timing import write_latency, write_timing
+    from strapdown.bundle.seal import check_destination, write_latency, write_timing
     from strapdown.cli.align_options import flag_of, refuse_beside_file
     from strapdown.cli.console import WORDS, Stopwatch, print_findings, print_seal, progress
     from strapdown.cli.latency_table import print_latency

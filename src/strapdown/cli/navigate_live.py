@@ -13,16 +13,14 @@ from typing import Any
 import typer
 
 from strapdown.bundle.reading import read_manifest
-from strapdown.bundle.seal import Seal
-from strapdown.bundle.timing import write_latency, write_timing
+from strapdown.bundle.seal import Seal, write_latency, write_timing
 from strapdown.cli.console import WORDS, Stopwatch, print_seal, progress
 from strapdown.cli.latency_table import print_latency
 from strapdown.cli.navigate_tables import print_navigation
 from strapdown.config.navigation_file import read_navigation_spec
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
 from strapdown.live.clock import MachineClock
-from strapdown.live.received import live_spec
-from strapdown.live.run import LiveRun, receive, result_of
+from strapdown.live.run import LiveRun, live_spec, receive, result_of
 from strapdown.live.sources import open_source
 from strapdown.report.navigation import write_navigation
 

@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from strapdown.cli.console import console, print_block
-from strapdown.report.crash_values import spaced
 from strapdown.report.document import TableBlock
-from strapdown.report.navigation_found import examine
-from strapdown.report.navigation_result import told_of
+from strapdown.report.navigation_found import examine, told_of
 from strapdown.report.navigation_tables import (
     end_table,
     error_table,
@@ -19,10 +17,10 @@ from strapdown.report.navigation_tables import (
     withheld_table,
 )
 from strapdown.report.navigation_trust import trust
-from strapdown.report.navigation_values import duration_words
 from strapdown.report.navigation_words import cautions, headline
+from strapdown.report.values import duration_words, spaced
 from strapdown.report.verdict_words import terminal_lines
-from strapdown.systems.sins.result import NavigationResult
+from strapdown.systems.sins.run import NavigationResult
 
 __all__ = ["print_navigation"]
 

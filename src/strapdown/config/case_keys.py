@@ -6,11 +6,9 @@ from collections.abc import Iterator
 from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
-from strapdown.config.quantities import base_of, converted, keys_of
-from strapdown.config.shown import shown, shown_key
 from strapdown.config.spec import TableSpec
-from strapdown.config.toml_file import TomlFile
-from strapdown.config.toml_lines import KeyPath
+from strapdown.config.toml_file import KeyPath, TomlFile, shown, shown_key
+from strapdown.config.wanted import base_of, converted, keys_of
 from strapdown.errors import ConfigError
 
 __all__ = ["canonical"]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from strapdown.config.shown import shown, shown_key
 from strapdown.config.spec import Spec
+from strapdown.config.toml_file import shown, shown_key
 
 __all__ = ["changed_options"]
 

@@ -7,9 +7,8 @@ from typing import Any
 
 from pydantic import Field, StrictInt, ValidationError, create_model
 
-from strapdown.config.choice import ChoiceSpec, choice_form
+from strapdown.config.choice import SLOTS, ChoiceSpec, choice_form
 from strapdown.config.crash_case import FileName, NotNegative, Number, Positive
-from strapdown.config.slots import SLOTS
 from strapdown.config.spec import TableSpec, misfit
 from strapdown.errors import ConfigError
 

@@ -7,9 +7,8 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, StrictBool, StrictInt
 
-from strapdown.config.shown import shown
-from strapdown.config.spec import TableSpec, refuse
-from strapdown.config.words import file_name, word, words
+from strapdown.config.spec import TableSpec, file_name, refuse, word, words
+from strapdown.config.toml_file import shown
 
 # A number in quotation marks, or true for 1, is a slip and not a number.
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]

@@ -8,12 +8,11 @@ from pydantic import ValidationError
 
 from strapdown.config.case_keys import canonical
 from strapdown.config.case_paths import with_absolute_paths
-from strapdown.config.case_wanted import what_to_write
 from strapdown.config.crash_case import CaseSpec
 from strapdown.config.crash_checks import Written, check_case
-from strapdown.config.explain import explained
-from strapdown.config.placeholders import refuse_placeholders
+from strapdown.config.filled_form import explained, refuse_placeholders
 from strapdown.config.toml_file import read_toml
+from strapdown.config.wanted import what_to_write
 
 __all__ = ["read_case_spec"]
 

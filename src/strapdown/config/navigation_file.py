@@ -3,16 +3,29 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import BaseModel, create_model
 
+from strapdown.aiding.aid import TableAid
 from strapdown.config.alignment import PrefilterSpec
-from strapdown.config.choice import ChoiceSpec, as_table, choice_form, field_of, with_kinds
-from strapdown.config.filled_form import filled_form, read_named_toml
+from strapdown.config.alignment_file import MOST_SAMPLES, NEEDS_GNSS, NOT_BEFORE_FINE, SourceChecks
+from strapdown.config.choice import (
+    SLOTS,
+    ChoiceSpec,
+    as_table,
+    choice_form,
+    field_of,
+    make_choice,
+    with_kinds,
+)
+from strapdown.config.crash_checks import Written
+from strapdown.config.filled_form import filled_form, read_named_toml, together
 from strapdown.config.motions import KINDS, MANOEUVRES
 from strapdown.config.navigation import (
     AidSpec,
@@ -26,17 +39,36 @@ from strapdown.config.navigation import (
     ReceiverTable,
     RecorderSpec,
     SmootherSpec,
+    aids_of,
+    receivers_of,
 )
-from strapdown.config.navigation_checks import check_navigation
-from strapdown.config.navigation_wanted import NAVIGATION_WANTED
-from strapdown.config.slots import SLOTS
+from strapdown.config.navigation_modules import (
+    StatesTable,
+    given_of,
+    make_aid,
+    make_aids,
+    make_filter,
+    sensors_of,
+)
 from strapdown.config.spec import TableSpec
-from strapdown.config.state_tables import StatesTable
-from strapdown.config.toml_file import TomlFile, place_of
-from strapdown.config.toml_lines import KeyPath
+from strapdown.config.toml_file import KeyPath, TomlFile, place_of
+from strapdown.config.wanted import NAVIGATION_WANTED
+from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import ConfigError, Finding
+from strapdown.estimation.error_filter import ErrorFilter
+from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS
+from strapdown.nav_state import NavState
+from strapdown.navigation.navigator import with_states
 
-__all__ = ["NAVIGATION_STAGES", "navigation_spec", "read_navigation_spec", "stage_default"]
+__all__ = [
+    "NAVIGATION_STAGES",
+    "TRAJECTORY_FILES",
+    "check_navigation",
+    "navigation_spec",
+    "read_navigation_spec",
+    "stage_default",
+]
+
 
 #: Stages that are modules, by table: what the table has beside the options, the kind that stands
 #: there where none is named, and whether a chain can do without it, by the kind ``none``.
@@ -221,3 +253,255 @@ def _with_kinds(table: Mapping[str, Any]) -> dict[str, Any]:
             for name, aid in aiding.items()
         }
     return out
+
+
+# What a run of navigation says against itself, or a module refuses: told before anything runs.
+#
+# Everything is looked at, and everything that does not fit is told at once.
+
+
+#: Forms of a trajectory that a run can write.
+TRAJECTORY_FILES = tuple(TRAJECTORY_WRITERS)
+#: Stages that are modules.
+STAGES = (
+    "prefilter",
+    "coarse",
+    "fine",
+    "mechanization",
+    "filter",
+    "damping",
+    "smoother",
+    "recorder",
+)
+#: Keys that end an alignment.
+ENDS = ("duration_s", "until_heading_sd_deg", "until_tilt_sd_deg", "window_s")
+#: Aids that observe a height.
+HEIGHTS = ("barometer",)
+
+
+def check_navigation(spec: NavigationSpec, written: Written | None = None) -> None:
+    """Refuse what cannot be meant.
+
+    Parameters
+    ----------
+    spec : NavigationSpec
+    written : Written, optional
+        The file that it was read from, for lines in messages.
+
+    Raises
+    ------
+    ConfigError
+        A module refuses an option, modules do not go together, the place is none, or a sensor is
+        not known or says too little: all of it in one message, each with its line.
+    """
+    check = _Checks(written)
+    found: list[ConfigError] = []
+    for one in check.all(spec):
+        try:
+            one()
+        except ConfigError as error:
+            found.append(error)
+    if found:
+        raise together(found)
+
+
+class _Checks(SourceChecks):
+    def all(self, spec: NavigationSpec) -> Iterator[Callable[[], None]]:
+        yield partial(self.earth, spec)
+        yield partial(self.axes, spec.axes)
+        yield partial(self.log, spec.log)
+        missing = "config.no-sensor-for-navigation"
+        yield partial(self.sensors, spec.sensors, spec.simulation, missing)
+        yield partial(self.times, spec)
+        yield partial(self.begins, spec)
+        for name in STAGES:
+            yield partial(self.stage, spec, name)
+        yield partial(self.height, spec)
+        yield partial(self.modes, spec)
+        yield partial(self.gaps, spec)
+        yield partial(self.alignment, spec)
+        for name in aids_of(spec):
+            yield partial(self.aid, spec, name)
+        for name, receiver in receivers_of(spec).items():
+            yield partial(self.receiver, name, receiver)
+        yield partial(self.withhold, spec)
+        yield partial(self.output, spec)
+        yield partial(self.chain, spec)
+
+    def earth(self, spec: NavigationSpec) -> None:
+        self.told(("ellipsoid",), lambda: find_ellipsoid(spec.ellipsoid))
+
+    def times(self, spec: NavigationSpec) -> None:
+        longest = self.span(spec.log)
+        if longest is None:
+            return
+        for stage in ("coarse", "fine"):
+            duration = getattr(spec, stage).duration_s
+            if duration is not None and duration > longest:
+                raise self.refuse(
+                    (stage, "duration_s"), "config.longer-than-record", longest=longest
+                )
+
+    def begins(self, spec: NavigationSpec) -> None:
+        """Where it begins."""
+        for name in ("start", "site"):
+            table = getattr(spec, name)
+            if table is not None:
+                self.place(name, table.lat_deg, table.lon_deg, table.alt_m)
+                for key in ("position_sd_m", "velocity_sd_m_per_s"):
+                    if np.min(getattr(table, key)) < 0.0:
+                        raise self.refuse((name, key), "config.negative-start-sd")
+        if spec.start is not None:
+            if abs(spec.start.heading_deg) > 360.0:
+                raise self.refuse(("start", "heading_deg"), "config.heading-beyond-turn")
+            for stage in ("coarse", "fine"):
+                if getattr(spec, stage).kind != "none":
+                    raise self.refuse((stage, "kind"), "config.start-and-alignment", stage=stage)
+            if spec.site is not None:
+                raise self.refuse(("site", "lat_deg"), "config.start-and-site")
+        elif spec.coarse.kind == "none":
+            raise self.refuse(("start", "lat_deg"), "config.no-start")
+
+    def stage(self, spec: NavigationSpec, name: str) -> None:
+        self.told((name,), partial(make_choice, getattr(spec, name), SLOTS[name], given_of(spec)))
+
+    def height(self, spec: NavigationSpec) -> None:
+        """A height that is damped has a loop of its own."""
+        if getattr(spec.mechanization, "height", "") == "damped":
+            raise self.refuse(("mechanization", "height"), "config.damped-height-without-states")
+
+    def modes(self, spec: NavigationSpec) -> None:
+        """What ends each alignment, and what is said of one that is not there."""
+        if spec.start is not None:
+            return
+        for stage in ("coarse", "fine"):
+            given = getattr(spec, stage)
+            ends = [n for n in ENDS if getattr(given, n, None) is not None]
+            if given.kind == "none" and ends:
+                raise self.refuse((stage, ends[0]), "config.alignment-end-without-alignment")
+            commanded = any(one.mode != "navigation" or stage == "fine" for one in spec.commands)
+            if given.kind != "none" and not [n for n in ends if n != "window_s"]:
+                if commanded or spec.live is not None:
+                    continue
+                raise self.refuse((stage, "duration_s"), "config.alignment-never-ends")
+
+    def alignment(self, spec: NavigationSpec) -> None:
+        """What coarse and fine alignment need of one another, and of the aids."""
+        kind = spec.coarse.kind
+        if kind in NEEDS_GNSS and not _fixes(spec):
+            raise self.refuse(("coarse", "kind"), "config.course-without-fixes-in-run")
+        if kind in NOT_BEFORE_FINE and spec.fine.kind != "none":
+            raise self.refuse(("coarse", "kind"), NOT_BEFORE_FINE[kind])
+        if spec.start is None and spec.site is None and not _fixes(spec):
+            raise self.refuse(("site", "lat_deg"), "config.no-initial-position")
+
+    def aid(self, spec: NavigationSpec, name: str) -> None:
+        """One aid: its options, and whether it has what it observes by."""
+        given = aids_of(spec)[name]
+        entry = SLOTS["aiding"].entries[given.kind]
+        self.told(("aiding", name), partial(make_aid, spec, name))
+        takes = issubclass(entry, TableAid)
+        if not takes and given.path is not None:
+            raise self.refuse(
+                ("aiding", name, "path"),
+                "config.aid-takes-no-file",
+                kind=given.kind,
+            )
+        sent = name in receivers_of(spec) or spec.live is not None
+        if takes and given.path is None and not sent:
+            raise self.refuse(("aiding", name, "path"), "config.aid-file-missing", kind=given.kind)
+        for key in ("position_sd_m", "velocity_sd_m_per_s"):
+            if getattr(given, key) is not None and given.kind != "gnss":
+                raise self.refuse(
+                    ("aiding", name, key), "config.fix-sd-of-other-aid", kind=given.kind
+                )
+        height = getattr(spec.mechanization, "height", None)
+        if given.kind in HEIGHTS and height == "held":
+            raise self.refuse(("aiding", name, "kind"), "config.height-aid-with-held-height")
+
+    def gaps(self, spec: NavigationSpec) -> None:
+        if spec.gaps.beyond == "align" and spec.start is not None:
+            raise self.refuse(("gaps", "beyond"), "config.no-alignment-to-repeat")
+
+    def receiver(self, name: str, receiver: ReceiverTable) -> None:
+        """A receiver that is simulated."""
+        for key in ("position_noise_m", "position_drift_m", "velocity_noise_m_per_s"):
+            if np.min(getattr(receiver, key)) < 0.0:
+                raise self.refuse(("simulation", "gnss", name, key), "config.negative-receiver-sd")
+        for begin, end in receiver.outages_s:
+            if not begin < end:
+                raise self.refuse(
+                    ("simulation", "gnss", name, "outages_s"),
+                    "config.receiver-outage-empty",
+                    begin=begin,
+                    end=end,
+                )
+
+    def withhold(self, spec: NavigationSpec) -> None:
+        """Which fixes are kept back, and when."""
+        given = spec.withhold
+        if given is None:
+            return
+        if given.aid is None and not _fixes(spec):
+            raise self.refuse(("withhold", "aid"), "config.no-aid-to-withhold")
+        if given.aid is not None and given.aid not in _fixes(spec):
+            raise self.refuse(
+                ("withhold", "aid"),
+                "config.unknown-aid-to-withhold",
+                word=given.aid,
+                known=_fixes(spec),
+            )
+        if bool(given.spans_s) == bool(given.lengths_s):
+            raise self.refuse(
+                ("withhold", "spans_s"),
+                "config.outage-without-span"
+                if not given.spans_s
+                else "config.outage-spans-and-lengths",
+            )
+        for begin, end in given.spans_s:
+            if not begin < end:
+                raise self.refuse(
+                    ("withhold", "spans_s"), "config.outage-span-empty", begin=begin, end=end
+                )
+
+    def output(self, spec: NavigationSpec) -> None:
+        for form in spec.output.files:
+            if form not in TRAJECTORY_FILES:
+                raise self.refuse(
+                    ("output", "files"),
+                    "config.unknown-trajectory-form",
+                    form=form,
+                    known=TRAJECTORY_FILES,
+                )
+        simulation = spec.simulation
+        if simulation is not None and simulation.rate_hz > MOST_SAMPLES:
+            raise self.refuse(("simulation", "rate_hz"), "config.rate-too-high")
+
+    def chain(self, spec: NavigationSpec) -> None:
+        """Begin the filter, which refuses parts that do not go together."""
+        try:
+            made = make_filter(spec, sensors_of(spec))
+            aids = make_aids(spec)
+        except ConfigError as error:
+            # Options of modules are told by themselves, and with their own keys.
+            about = error.finding.quantity or ""
+            if about == "states":
+                self.told(("sensors",), partial(_raise, error))
+            elif about.startswith("states"):
+                self.told(("states",), partial(_raise, error))
+            return
+        self.told(("filter",), partial(_begun, spec, with_states(made, aids)))
+
+
+def _raise(error: ConfigError) -> None:
+    raise error
+
+
+def _fixes(spec: NavigationSpec) -> list[str]:
+    """Names of the aids that give fixes."""
+    return [name for name, aid in aids_of(spec).items() if aid.kind == "gnss"]
+
+
+def _begun(spec: NavigationSpec, filter_: ErrorFilter) -> None:
+    start = NavState.from_degrees(min(80.0, filter_.mechanization.latitude_limit_deg), 0.0)
+    filter_.begin(start, np.zeros((filter_.model.physical_size,) * 2))

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import unicodedata
 from typing import Any, ClassVar, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
-from strapdown.config.shown import shown
+from strapdown.config.toml_file import shown
 from strapdown.errors import ConfigError, Finding
 
-__all__ = ["Spec", "TableSpec", "misfit", "refuse", "specify"]
+__all__ = ["Spec", "TableSpec", "file_name", "misfit", "refuse", "specify", "word", "words"]
 
 
 class Spec(BaseModel):
@@ -114,3 +115,45 @@ def specify(form: type[S], **values: Any) -> S:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])
         raise ConfigError(misfit(first), quantity=place) from None
+
+
+# Text that stands in a title, a table or the name of a file, and what may not be in it.
+
+
+#: Characters that a title or a name, and the path of a file, may have.
+LONGEST_NAME = 200
+LONGEST_PATH = 4096
+# Control characters, halves of pairs, ends of lines and of paragraphs.
+_CONTROL = {"Cc", "Cs", "Zl", "Zp"}
+# They turn the order of what follows: a name could show as another one.
+_TURNING = frozenset("\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
+
+
+def words(text: str) -> str:
+    """Check text of one line, which may be empty."""
+    return _checked(text, LONGEST_NAME, "config.unprintable-character")
+
+
+def word(text: str) -> str:
+    """Check text of one line that may not be empty."""
+    return words(_filled(text))
+
+
+def file_name(text: str) -> str:
+    """Check the path of a file."""
+    return _checked(_filled(text), LONGEST_PATH, "config.unprintable-character-in-path")
+
+
+def _filled(text: str) -> str:
+    if not text.strip():
+        raise refuse("", "config.text-empty")
+    return text
+
+
+def _checked(text: str, longest: int, unprintable: str) -> str:
+    if len(text) > longest:
+        raise refuse("", "config.text-too-long", length=len(text), longest=longest)
+    for k, char in enumerate(text):
+        if unicodedata.category(char) in _CONTROL or char in _TURNING:
+            raise refuse("", unprintable, position=k + 1, character=ascii(char))
+    return text

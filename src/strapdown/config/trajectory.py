@@ -7,11 +7,10 @@ from typing import Any, ClassVar
 
 from pydantic import Field, FiniteFloat, ValidationError, field_validator
 
-from strapdown.config.explain import explained
+from strapdown.config.filled_form import explained
 from strapdown.config.motions import KINDS, MANOEUVRES, MotionSpec
 from strapdown.config.spec import TableSpec
-from strapdown.config.toml_file import place_of, read_toml
-from strapdown.config.toml_lines import KeyPath
+from strapdown.config.toml_file import KeyPath, place_of, read_toml
 
 __all__ = ["TrajectorySpec", "read_trajectory_spec"]
 

@@ -10,17 +10,22 @@ if TYPE_CHECKING:
     from strapdown.crash.acceleration import Acceleration
     from strapdown.crash.at_point import at_point
     from strapdown.crash.delta_v import delta_v, trailing_delta_v
-    from strapdown.crash.delta_v_bound import body_delta_v_bound, resolved_delta_v_bound
+    from strapdown.crash.delta_v_bound import (
+        EventChanges,
+        VelocityChange,
+        body_delta_v_bound,
+        resolved_delta_v_bound,
+        velocity_change,
+    )
     from strapdown.crash.entry import Entry
-    from strapdown.crash.entry_priors import FixCorrelation
+    from strapdown.crash.entry_sensitivity import FixCorrelation
     from strapdown.crash.events import detect_events
-    from strapdown.crash.gnss_start import GnssEntry
+    from strapdown.crash.gnss_entry import GnssEntry
     from strapdown.crash.monte_carlo import sample_paths
     from strapdown.crash.pdof import NedPdof, Pdof, ned_pdof, pdof
     from strapdown.crash.prepare import prepare_unit
     from strapdown.crash.reference_path import PathComparison, compare_with_reference
     from strapdown.crash.unit_reconstruction import UnitReconstruction, reconstruct_unit
-    from strapdown.crash.velocity_change import EventChanges, VelocityChange, velocity_change
 
 __all__ = [
     "Acceleration",
@@ -54,16 +59,16 @@ load_on_first_use(
         "acceleration": "Acceleration",
         "at_point": "at_point",
         "delta_v": "delta_v trailing_delta_v",
-        "delta_v_bound": "body_delta_v_bound resolved_delta_v_bound",
+        "delta_v_bound": "EventChanges VelocityChange velocity_change "
+        "body_delta_v_bound resolved_delta_v_bound",
         "entry": "Entry",
-        "entry_priors": "FixCorrelation",
+        "entry_sensitivity": "FixCorrelation",
         "events": "detect_events",
-        "gnss_start": "GnssEntry",
+        "gnss_entry": "GnssEntry",
         "monte_carlo": "sample_paths",
         "pdof": "NedPdof Pdof ned_pdof pdof",
         "prepare": "prepare_unit",
         "reference_path": "PathComparison compare_with_reference",
         "unit_reconstruction": "UnitReconstruction reconstruct_unit",
-        "velocity_change": "EventChanges VelocityChange velocity_change",
     },
 )

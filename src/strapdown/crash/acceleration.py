@@ -12,17 +12,18 @@ from numpy.typing import ArrayLike, NDArray
 from strapdown import rotation
 from strapdown.errors import ConfigError, DataError
 from strapdown.tables.checks import (
+    ACCEL,
+    Gap,
     as_array,
     check_columns,
     check_rows,
     check_same_length,
     check_time,
+    find_gaps,
     index_of,
     source_of,
     values_of,
 )
-from strapdown.tables.columns import ACCEL
-from strapdown.tables.gaps import Gap, find_gaps
 from strapdown.tables.imu import SAMPLINGS
 
 Array = NDArray[np.float64]

@@ -11,11 +11,10 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.crash.acceleration import force_at_rest
-from strapdown.crash.sample_effects import SampleEffects
-from strapdown.crash.unit_effects import unit_effects
+from strapdown.crash.unit_effects import SampleEffects, unit_effects
 from strapdown.results.rests import RestStretch
 from strapdown.sensors.lever_arm import MovedImu, move_unit
-from strapdown.sensors.prepared_unit import Levelling, PreparedUnit
+from strapdown.sensors.pre_crash import Levelling, PreparedUnit
 from strapdown.sensors.unmeasured import axis_names, unmeasured_axes, unmeasured_turns
 from strapdown.tables import ACCEL, GYRO
 

@@ -5,27 +5,23 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.crash.at_point import AtPoint
-from strapdown.crash.clipped_samples import clipped_pieces
-from strapdown.crash.lever_arm_check import LeverArmCheck, check_lever_arm, lever_arm_findings
-from strapdown.crash.match_axes import AxisMatch, axis_findings, match_axes
-from strapdown.crash.measured_directions import (
-    chi_square_along,
-    measured_axes,
-    measured_by_all,
-    measured_by_any,
-)
-from strapdown.crash.mounting_rotation import (
+from strapdown.crash.mounting_checks import (
+    AxisMatch,
+    LeverArmCheck,
     MountingRotation,
+    axis_findings,
+    check_lever_arm,
+    lever_arm_findings,
+    match_axes,
     mounting_rotation,
     rotation_findings,
 )
-from strapdown.crash.unit_comparison import UnitAgainstAll, UnitComparison, UnitPair
 from strapdown.crash.unit_differences import (
     VelocityIncrements,
     chi_square_tail,
@@ -37,10 +33,22 @@ from strapdown.crash.unit_differences import (
 )
 from strapdown.errors import ConfigError, Finding
 
+__all__ = [
+    "UnitAgainstAll",
+    "UnitComparison",
+    "UnitPair",
+    "chi_square_along",
+    "clipped_axes",
+    "clipped_pieces",
+    "compare_units",
+    "measured_axes",
+    "measured_by_all",
+    "measured_by_any",
+]
+
+
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-
-__all__ = ["compare_units"]
 
 AXES = ("forward", "right", "down")
 # Variance of what a unit assumes, of the largest there is: none beside what is measured.
@@ -349,3 +357,226 @@ def _odd_one(units: Sequence[AtPoint], pairs: Sequence[UnitPair]) -> list[Findin
     if len(odd) != 1:
         return []
     return [Finding("crash.others-agree-another-not", file=odd[0], quantity="delta-V")]
+
+
+# How units on one vehicle compare: what a comparison found.
+
+
+@dataclass(frozen=True, eq=False)
+class UnitPair:
+    """Two units at their common point.
+
+    Attributes
+    ----------
+    first, second : str
+    edges : ndarray, (m + 1,), s
+    difference : ndarray, (m + 1, 3), m/s
+        Integral of the first one's specific force minus that of the second's, vehicle axes,
+        from the first edge; pieces in which either was at the end of its range add nothing.
+    sd : ndarray, (m + 1, 3), m/s
+        As both state it. NaN along axes that either assumes, here and in what follows.
+    force_difference, force_sd : ndarray, (m, 3), m/s²
+        Means over each piece; NaN in pieces in which either was at the end of its range.
+    chi_square, freedom : float, int
+        Of all other pieces and axes together, with their covariance; of those axes that both
+        measure. Zero, where there is none.
+    probability : float
+        Of a chi-square as large or larger, where the statements are right.
+    agree : bool
+    axes : AxisMatch
+    turned : MountingRotation
+    lever_arm : LeverArmCheck
+        These three tell nothing where either assumes an axis or the turning.
+    findings : tuple of Finding
+    """
+
+    first: str
+    second: str
+    edges: Array = field(repr=False)
+    difference: Array = field(repr=False)
+    sd: Array = field(repr=False)
+    force_difference: Array = field(repr=False)
+    force_sd: Array = field(repr=False)
+    chi_square: float
+    freedom: int
+    probability: float
+    agree: bool
+    axes: AxisMatch = field(repr=False)
+    turned: MountingRotation = field(repr=False)
+    lever_arm: LeverArmCheck = field(repr=False)
+    findings: tuple[Finding, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class UnitAgainstAll:
+    """One unit against the combination of all.
+
+    Attributes
+    ----------
+    name : str
+    difference, sd : ndarray, (m + 1, 3), m/s
+        Its delta-V minus the combination's, and as stated: what it shares with the combination
+        is taken into account. NaN along axes that it, or that all, assume.
+    chi_square, freedom, probability
+        As `UnitPair`.
+    """
+
+    name: str
+    difference: Array = field(repr=False)
+    sd: Array = field(repr=False)
+    chi_square: float
+    freedom: int
+    probability: float
+
+
+@dataclass(frozen=True, eq=False)
+class UnitComparison:
+    """All units of a vehicle at one point.
+
+    Attributes
+    ----------
+    edges : ndarray, (m + 1,), s
+    pairs : tuple of UnitPair
+    combined : ndarray, (m + 1, 3), m/s
+        Delta-V of the best weighted combination, gravity still in it, body axes; NaN along axes
+        that all units assume.
+    combined_sd : ndarray, (m + 1, 3), m/s
+    against : tuple of UnitAgainstAll
+    chi_square, freedom, probability
+        Of all units against the combination.
+    agree : bool
+    findings : tuple of Finding
+    """
+
+    edges: Array = field(repr=False)
+    pairs: tuple[UnitPair, ...]
+    combined: Array = field(repr=False)
+    combined_sd: Array = field(repr=False)
+    against: tuple[UnitAgainstAll, ...]
+    chi_square: float
+    freedom: int
+    probability: float
+    agree: bool
+    findings: tuple[Finding, ...]
+
+
+# Directions that units measure, where some of them assume others.
+
+
+# Of squared cosines: a direction is within what is measured, or has nothing of it.
+ROUNDING = 1e-9
+# An axis is measured where so much of it is (squared cosine): 18 deg.
+MOST = 0.9
+
+
+def measured_by_all(units: Sequence[AtPoint]) -> Array:
+    """Orthonormal columns of the directions along which each of the units measures, (3, r)."""
+    total = sum((_unmeasured(u) for u in units), np.zeros((3, 3)))
+    if not total.any():
+        return np.eye(3)
+    values, vectors = np.linalg.eigh(total)
+    return np.asarray(vectors[:, values < ROUNDING])
+
+
+def measured_by_any(units: Sequence[AtPoint]) -> Array:
+    """Orthonormal columns of the directions along which at least one of them measures, (3, r)."""
+    measured = np.mean([np.eye(3) - _unmeasured(u) for u in units], axis=0)
+    values, vectors = np.linalg.eigh(measured)
+    return np.asarray(vectors[:, values > ROUNDING])
+
+
+def measured_axes(basis: Array) -> NDArray[np.bool_]:
+    """Which of the vehicle's axes lie within these directions, (3,)."""
+    return np.asarray((basis**2).sum(axis=1) > MOST)
+
+
+def chi_square_along(basis: Array, difference: Array, covariance: Array) -> tuple[float, int]:
+    """Chi-square of a difference along some directions, and its degrees of freedom.
+
+    Parameters
+    ----------
+    basis : ndarray, (3, r)
+        Orthonormal columns.
+    difference : ndarray, (3 m,)
+        By piece, then axis.
+    covariance : ndarray, (3 m, 3 m)
+    """
+    if basis.shape[1] < 3:
+        along = np.kron(np.eye(difference.size // 3), basis)
+        difference, covariance = along.T @ difference, along.T @ covariance @ along
+    if not difference.size:
+        return 0.0, 0
+    return float(difference @ np.linalg.solve(floored(covariance), difference)), difference.size
+
+
+def _unmeasured(unit: AtPoint) -> Array:
+    return np.zeros((3, 3)) if unit.unmeasured is None else unit.unmeasured
+
+
+# Where a unit was at the end of its range with nothing behind it.
+
+
+# Of a squared cosine: an axis of the sensor within 6 deg of across does not count in one.
+LEAST_SHARE = 0.01
+
+
+def clipped_axes(unit: AtPoint, window: tuple[float, float]) -> Flags:
+    """Along which of the vehicle's axes a unit was clipped in a window.
+
+    Parameters
+    ----------
+    unit : AtPoint
+    window : (float, float), s
+
+    Returns
+    -------
+    ndarray of bool, (3,)
+        False all, for a mean of several. A clipped gyro turns all axes, and is not told here.
+    """
+    prepared = unit.prepared
+    if prepared is None:
+        return np.zeros(3, dtype=bool)
+    time = prepared.imu.index.to_numpy(dtype=np.float64)
+    within = (time >= window[0]) & (time <= window[1])
+    cut = prepared.clipped[within].any(axis=0)
+    share = prepared.unit.mounting.C_vs**2 > LEAST_SHARE
+    return np.asarray((share & cut).any(axis=1))
+
+
+def clipped_pieces(unit: AtPoint, edges: Array) -> Flags:
+    """In which pieces of time a unit's readings are not what it felt.
+
+    Parameters
+    ----------
+    unit : AtPoint
+    edges : ndarray, (m + 1,), s
+
+    Returns
+    -------
+    ndarray of bool, (m,)
+        Whether a clipped sample of the accelerometers or the gyro, or a neighbour of one, counts
+        in a piece. Neighbours: as many as make an angular acceleration of the gyro's samples, and
+        the one into which a line is drawn of the accelerometers'.
+    """
+    prepared = unit.prepared
+    if prepared is None:
+        return np.zeros(len(edges) - 1, dtype=bool)
+    time = prepared.imu.index.to_numpy(dtype=np.float64)
+    arm = unit.moved is not None and bool(unit.moved.lever_arm.any())
+    wide = unit.moved.slope.slope.shape[1] // 2 if arm and unit.moved is not None else 0
+    cut = _spread(_any(prepared.clipped), 1)
+    # What one reads along axes that turned unseen is not affected, but where an arm moves it.
+    cut |= _spread(_any(prepared.gyro_clipped), wide + 1) if arm else False
+    at = time[cut]
+    return np.asarray(
+        np.searchsorted(at, edges[1:], side="right") > np.searchsorted(at, edges[:-1], side="left")
+    )
+
+
+def _any(flags: Flags) -> Flags:
+    return np.asarray(flags.any(axis=1))
+
+
+def _spread(flags: Flags, by: int) -> Flags:
+    """Flags and so many neighbours on either side."""
+    return np.asarray(np.convolve(flags, np.ones(2 * by + 1), mode="same") > 0.5)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,21 +11,28 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.crash.acceleration import Acceleration
-from strapdown.crash.crash_event import CrashEvent
-from strapdown.crash.velocity_course import VelocityCourse
+from strapdown.crash.events import CrashEvent
 from strapdown.crash.window_weights import check_within, window_weights
+from strapdown.dsp.running_integral import running_integral
 from strapdown.errors import ConfigError, DataError
-
-Array = NDArray[np.float64]
+from strapdown.tables.checks import VELOCITY, index_of, source_of, values_of
+from strapdown.tables.trajectory import check_trajectory
 
 __all__ = [
     "DeltaV",
+    "MaximumDeltaV",
     "TrailingDeltaV",
     "cumulative_delta_v",
     "delta_v",
     "event_delta_v",
+    "maximum_delta_v",
+    "recorder_delta_v",
     "trailing_delta_v",
+    "trajectory_delta_v",
 ]
+
+
+Array = NDArray[np.float64]
 
 #: The window of Tadic and Vukajlovic (2016), section 4.
 WINDOW = 0.030
@@ -285,3 +293,266 @@ def trailing_delta_v(
     best = course.largest_change(low, high, window)
     peak = delta_v(acceleration, max(best - window, acceleration.begin), best, across_gaps=True)
     return TrailingDeltaV(window, at, vector, peak, acceleration.frame)
+
+
+# Velocity at any instant of a record, and where its change is largest.
+
+
+#: Value, slope and half the curvature of each component at some instants, (m, k) each.
+Polynomials = tuple[Array, Array, Array]
+
+
+class VelocityCourse:
+    """Integral of an acceleration since its first stamp.
+
+    Parameters
+    ----------
+    acceleration : Acceleration
+        Between instantaneous samples it is a line, over the interval of a mean a constant; so is
+        the velocity here the same as `window_weights` gives.
+    """
+
+    def __init__(self, acceleration: Acceleration) -> None:
+        self._time, values = acceleration.time, acceleration.values
+        # The acceleration just after each step's start, and its slope over the step.
+        steps = np.diff(self._time)[:, None]
+        mean = acceleration.sampling == "mean"
+        self._first = values[1:] if mean else values[:-1]
+        self._slope = (values[1:] - self._first) / steps
+        self._velocity = running_integral(self._time, values, means=mean)
+
+    def _place(self, instants: Array) -> tuple[NDArray[np.int64], Array]:
+        time = self._time
+        k = np.clip(np.searchsorted(time, instants, side="right") - 1, 0, len(time) - 2)
+        return k.astype(np.int64), (instants - time[k])[:, None]
+
+    def velocity(self, instants: Array) -> Array:
+        """Velocity at instants, (m, 3), m/s, zero at the first stamp."""
+        k, u = self._place(instants)
+        moved: Array = self._velocity[k] + u * (self._first[k] + 0.5 * u * self._slope[k])
+        return moved
+
+    def rate(self, instants: Array) -> Array:
+        """Acceleration at instants, (m, 3), m/s²."""
+        k, u = self._place(instants)
+        rate: Array = self._first[k] + u * self._slope[k]
+        return rate
+
+    def slope(self, instants: Array) -> Array:
+        """Slope of the acceleration at instants between stamps, (m, 3), m/s³."""
+        k, _ = self._place(instants)
+        slope: Array = self._slope[k]
+        return slope
+
+    def largest_change(
+        self, low: float, high: float, window: float, axes: Sequence[int] = (0, 1, 2)
+    ) -> float:
+        """End in [low, high] of the window in which the velocity changes most, s."""
+        time, columns, begin = self._time, list(axes), self._time[0]
+
+        def course(at: Array) -> Polynomials:
+            before = np.maximum(at - window, begin)
+            return (
+                (self.velocity(at) - self.velocity(before))[:, columns],
+                (self.rate(at) - self.rate(before))[:, columns],
+                0.5 * (self.slope(at) - self.slope(before))[:, columns],
+            )
+
+        # Between these the change is one polynomial.
+        return _largest(course, np.r_[time, time + window], low, high)
+
+    def largest_since(self, start: float, end: float, axes: Sequence[int]) -> float:
+        """Instant in [start, end] at which the change since `start` is largest, s."""
+        columns = list(axes)
+        origin = self.velocity(np.array([start]))
+
+        def course(at: Array) -> Polynomials:
+            return (
+                (self.velocity(at) - origin)[:, columns],
+                self.rate(at)[:, columns],
+                0.5 * self.slope(at)[:, columns],
+            )
+
+        return _largest(course, self._time, start, end)
+
+
+def _largest(
+    course: Callable[[Array], Polynomials], breaks: Array, low: float, high: float
+) -> float:
+    """Where the length of a vector of quadratics is largest in an interval.
+
+    Parameters
+    ----------
+    course : callable
+        Value, slope and half the curvature at instants between breaks.
+    breaks : ndarray
+    low, high : float
+    """
+    nodes = np.unique(np.r_[low, breaks[(breaks > low) & (breaks < high)], high])
+    sizes = np.sqrt((course(nodes)[0] ** 2).sum(axis=1))
+    best = int(np.argmax(sizes))
+    at, most = float(nodes[best]), float(sizes[best])
+    if len(nodes) < 2:
+        return at
+    # About the middles, where no rounding of a break takes the neighbour's polynomial.
+    middle, half = 0.5 * (nodes[1:] + nodes[:-1]), 0.5 * np.diff(nodes)
+    c0, c1, c2 = course(middle)
+    # No point of a piece is further from one of its ends than half its length times the
+    # greatest slope, and that is at an end.
+    steep = np.sqrt(
+        np.maximum(
+            ((c1 - 2.0 * c2 * half[:, None]) ** 2).sum(axis=1),
+            ((c1 + 2.0 * c2 * half[:, None]) ** 2).sum(axis=1),
+        )
+    )
+    reach = np.maximum(sizes[1:], sizes[:-1]) + half * steep
+    for k in np.flatnonzero(reach > most).tolist():
+        a, b, c = c0[k], c1[k], c2[k]
+        # Derivative of half the squared length: a cubic.
+        cubic = [2.0 * c @ c, 3.0 * b @ c, b @ b + 2.0 * a @ c, a @ b]
+        roots = np.roots(cubic)
+        for u in roots[np.abs(roots.imag) <= 1e-6 * half[k]].real:
+            if abs(u) <= half[k]:
+                found = float(np.sqrt((((c * u + b) * u + a) ** 2).sum()))
+                # A plateau is met where it begins, whatever its rounding.
+                if found > most * (1.0 + 1e-12):
+                    at, most = float(middle[k] + u), found
+    return at
+
+
+# What 49 CFR Part 563 has a recorder say of an event's change of velocity.
+
+
+#: 563.7, Table I: delta-V every 10 ms, for 250 ms or to 30 ms after the end of the event, whichever
+#: is shorter; its maximum is looked for over 300 ms or the same (563.8, Table III).
+RECORDED, SEARCHED, BEYOND_END, EVERY = 0.250, 0.300, 0.030, 0.010
+
+
+@dataclass(frozen=True)
+class MaximumDeltaV:
+    """Largest cumulative changes of velocity of an event (49 CFR 563.5(b)).
+
+    Attributes
+    ----------
+    longitudinal, lateral : float, m/s
+        Signed.
+    resultant : float, m/s
+        Largest of the vector sum of the two at one instant.
+    longitudinal_time, lateral_time, resultant_time : float, s
+        From time zero.
+    searched : float, s
+        How far from time zero was looked.
+    """
+
+    longitudinal: float
+    lateral: float
+    resultant: float
+    longitudinal_time: float
+    lateral_time: float
+    resultant_time: float
+    searched: float
+
+
+def recorder_delta_v(acceleration: Acceleration, event: CrashEvent) -> pd.DataFrame:
+    """Cumulative change of velocity as a recorder keeps it.
+
+    Parameters
+    ----------
+    acceleration : Acceleration
+        In the frame ``body`` or ``impact``.
+    event : CrashEvent
+
+    Returns
+    -------
+    DataFrame
+        As `cumulative_delta_v`, every 10 ms from time zero: for 250 ms, to 30 ms after the end of
+        the event, or to the end of the record, whichever is least. Unrounded, where a recorder
+        rounds to 1 km/h.
+
+    Raises
+    ------
+    DataError
+        Time zero is not within the record.
+    """
+    zero = event.time_zero
+    stop = min(zero + RECORDED, event.end + BEYOND_END, acceleration.end)
+    return cumulative_delta_v(acceleration, zero, stop, every=EVERY)
+
+
+def maximum_delta_v(acceleration: Acceleration, event: CrashEvent) -> MaximumDeltaV:
+    """Largest cumulative change of velocity since time zero, and the time to it.
+
+    Parameters
+    ----------
+    acceleration : Acceleration
+        In the frame ``body`` or ``impact``.
+    event : CrashEvent
+
+    Returns
+    -------
+    MaximumDeltaV
+        Looked for over 300 ms, to 30 ms after the end of the event, or to the end of the
+        record, whichever is least (49 CFR 563.5(b), 563.8 Table III).
+
+    Raises
+    ------
+    DataError
+        Time zero is not within the record.
+    """
+    zero = event.time_zero
+    check_within(acceleration.time, zero, zero, acceleration.source)
+    stop = min(zero + SEARCHED, event.end + BEYOND_END, acceleration.end)
+    course = VelocityCourse(acceleration)
+    at = np.array([course.largest_since(zero, stop, axes) for axes in ((0,), (1,), (0, 1))])
+    change = course.velocity(at) - course.velocity(np.array([zero]))
+    return MaximumDeltaV(
+        float(change[0, 0]),
+        float(change[1, 1]),
+        math.hypot(float(change[2, 0]), float(change[2, 1])),
+        float(at[0]) - zero,
+        float(at[1]) - zero,
+        float(at[2]) - zero,
+        stop - zero,
+    )
+
+
+# Change of velocity of a navigated trajectory.
+
+
+def trajectory_delta_v(trajectory: pd.DataFrame, start: float, end: float) -> DeltaV:
+    """Change of velocity between two instants of a navigated trajectory.
+
+    Parameters
+    ----------
+    trajectory : DataFrame
+        Trajectory table, at the reference point; gravity is out of its velocities already.
+    start, end : float, s
+        Within it; between stamps the velocity is taken for a line.
+
+    Returns
+    -------
+    DeltaV
+        In the frame ``ned``; the weights are those of the velocities.
+
+    Raises
+    ------
+    DataError
+        The window is empty or reaches beyond the trajectory.
+    """
+    check_trajectory(trajectory)
+    time, source = index_of(trajectory), source_of(trajectory)
+    check_within(time, start, end, source)
+    if not end > start:
+        raise DataError("crash.window-empty", file=source, quantity="time", start=start, end=end)
+    velocity = values_of(trajectory, VELOCITY)
+    weights = np.zeros(len(time))
+    rates = []
+    for instant, sign in ((start, -1.0), (end, 1.0)):
+        k = int(np.clip(np.searchsorted(time, instant, side="right"), 1, len(time) - 1))
+        step = time[k] - time[k - 1]
+        u = (instant - time[k - 1]) / step
+        weights[k - 1] += sign * (1.0 - u)
+        weights[k] += sign * u
+        rates.append((velocity[k] - velocity[k - 1]) / step)
+    vector = weights @ velocity
+    return DeltaV(float(start), float(end), vector, "ned", weights, rates[0], rates[1])

@@ -12,14 +12,19 @@ It concerns the standard deviations alone: the estimate itself solves the full e
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.dsp.running_integral import running_integral
+from strapdown.errors import ConfigError, Finding
+from strapdown.mechanization import NavigationRun
 from strapdown.rotation import cross_matrix
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.sensors.triad_errors import ZERO, Triad
+from strapdown.sensors.uncertainty import TriadUncertainty
 
 Array = NDArray[np.float64]
 
@@ -183,3 +188,232 @@ def between(time: Array, values: Array, instants: Array) -> Array:
     share = (instants - time[after - 1]) / (time[after] - time[after - 1])
     share = share.reshape((-1,) + (1,) * (values.ndim - 1))
     return np.asarray(values[after - 1] * (1.0 - share) + values[after] * share)
+
+
+# What is known before the fixes are used: of the sensors, the vehicle and the receiver.
+
+
+def _positive(value: float, name: str, code: str) -> None:
+    if not (math.isfinite(value) and value > 0.0):
+        raise ConfigError(code, quantity=name, value=value)
+
+
+@dataclass(frozen=True)
+class FixCorrelation:
+    """How much of a fix's error is still there at the next.
+
+    Attributes
+    ----------
+    share : float
+        Of the variance that the receiver states, 0 to 1, which a Gauss-Markov process has; the
+        rest is new with each fix.
+    time : float, s
+        In which its correlation falls to 1/e.
+
+    Raises
+    ------
+    ConfigError
+        A number is out of range.
+    """
+
+    share: float
+    time: float
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.share <= 1.0:
+            raise ConfigError("crash.no-share", quantity="share", share=self.share)
+        _positive(self.time, "time", "crash.correlation-time-not-positive")
+
+
+@dataclass(frozen=True)
+class EntryPriors:
+    """Priors of an entry state. All are normal, independent, and standard deviations of zero mean.
+
+    Attributes
+    ----------
+    gyro, accel : TriadUncertainty
+        Of the Imu table, in vehicle axes: noise and biases that are left in it, scale,
+        misalignment, g-sensitivity. Nonlinearity, vibration rectification and the range play no
+        part at what a vehicle feels before a crash.
+    roll_deg, pitch_deg, tilt_sd_deg : float, deg
+        Of the vehicle at the anchor; a road's slope and more, where nothing is known.
+    heading_deg, heading_sd_deg : float, deg, optional
+        From elsewhere, as from marks on the road; both or neither.
+    side_slip_sd_deg : float, deg, optional
+        The vehicle travels along its forward axis, within this: of the side-slip angle at
+        `no_slip_point`, once for the whole window and once more from fix to fix, where the
+        vehicle is faster than 3 m/s and its acceleration to the side, speed times yaw rate, is
+        below 2 m/s²: tyres slip where they hold. Without it the heading comes from
+        accelerations alone.
+    no_slip_point : triad, m
+        In vehicle axes; of a car the middle of the rear axle.
+    antenna_sd : float, m
+        Of each coordinate of the antenna.
+    time_offset, time_offset_sd : float, s
+        A fix that is stamped t is of the instant ``t - time_offset``.
+    position_correlation, velocity_correlation : FixCorrelation
+        Places of a receiver that stands alone wander over a minute with most of their error; the
+        defaults say so. Velocities are new each time, unless the receiver filters them.
+
+    Raises
+    ------
+    ConfigError
+        A number is out of range.
+    """
+
+    gyro: TriadUncertainty
+    accel: TriadUncertainty
+    roll_deg: float = 0.0
+    pitch_deg: float = 0.0
+    tilt_sd_deg: float = 30.0
+    heading_deg: float | None = None
+    heading_sd_deg: float | None = None
+    side_slip_sd_deg: float | None = None
+    no_slip_point: Triad = ZERO
+    antenna_sd: float = 0.0
+    time_offset: float = 0.0
+    time_offset_sd: float = 0.0
+    position_correlation: FixCorrelation = FixCorrelation(0.9, 60.0)
+    velocity_correlation: FixCorrelation = FixCorrelation(0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        if (self.heading_deg is None) != (self.heading_sd_deg is None):
+            raise ConfigError(
+                "crash.heading-worth-something-only-standard",
+                quantity="heading_deg, heading_sd_deg",
+            )
+        for name in ("roll_deg", "pitch_deg", "heading_deg", "time_offset"):
+            value = getattr(self, name)
+            if value is not None and not math.isfinite(value):
+                raise ConfigError("crash.not-finite-number", quantity=name, value=value)
+        for name in ("tilt_sd_deg", "heading_sd_deg", "side_slip_sd_deg"):
+            if getattr(self, name) is not None:
+                _positive(getattr(self, name), name, "crash.standard-deviation-not-positive")
+        for name in ("antenna_sd", "time_offset_sd"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ConfigError("crash.standard-deviation-negative", quantity=name, value=value)
+        if len(self.no_slip_point) != 3 or not all(map(math.isfinite, self.no_slip_point)):
+            raise ConfigError(
+                "crash.no-slip-point-not-three-numbers",
+                quantity="no_slip_point",
+                no_slip_point=self.no_slip_point,
+            )
+
+
+# Which fixes before a crash are to be believed, from what the inertial sensors felt.
+
+
+#: Beyond these a receiver is not believed: m/s², without gravity, and m/s³.
+LARGEST_ACCELERATION = 50.0
+LARGEST_JERK = 20.0
+#: Acceleration is the mean over this many seconds, jerk the change between two such means that
+#: follow one another, over their distance: first and second difference of the velocity.
+AVERAGED = 0.05
+#: For so long, s, after an excess nothing is believed either.
+RECOVERY = 1.0
+
+
+def strain(run: NavigationRun) -> tuple[Array, Array]:
+    """Acceleration and jerk of a run, free of gravity.
+
+    Parameters
+    ----------
+    run : NavigationRun
+        Its heading and velocity may be anything: only changes of the velocity count.
+
+    Returns
+    -------
+    acceleration, jerk : ndarray, (n,), m/s², m/s³
+        At each stamp, from the samples up to it: lengths of ``(v(t) - v(t-h)) / h`` and of
+        ``(v(t) - 2 v(t-h) + v(t-2h)) / h²`` with h = 50 ms; zero where the run begins later.
+        White noise of density N makes ``√(2/h) N/h`` of jerk on each axis: 3.6 m/s³ for
+        0.028 m/s²/√Hz. The first zero of the mean is at 20 Hz.
+    """
+    time, velocity = run.time, run.history[:, 3:6]
+
+    def at(t: Array) -> Array:
+        return np.column_stack([np.interp(t, time, v) for v in velocity.T])
+
+    once, twice = at(time - AVERAGED), at(time - 2.0 * AVERAGED)
+    acceleration = np.linalg.norm(velocity - once, axis=1) / AVERAGED
+    jerk = np.linalg.norm(velocity - 2.0 * once + twice, axis=1) / AVERAGED**2
+    acceleration[time < time[0] + AVERAGED] = 0.0
+    jerk[time < time[0] + 2.0 * AVERAGED] = 0.0
+    return acceleration, jerk
+
+
+def judge_fixes(
+    instants: Array, quality: Array, run: NavigationRun, impact: float, anchor: float, slack: float
+) -> list[tuple[Finding, ...]]:
+    """Find out of each fix why it is not believed.
+
+    Parameters
+    ----------
+    instants : ndarray, (m,), s
+        To which the fixes belong, from the beginning of the run on.
+    quality : ndarray, (m,)
+    run : NavigationRun
+        Up to the anchor.
+    impact, anchor : float, s
+    slack : float, s
+        How far an instant may be wrong.
+
+    Returns
+    -------
+    list of tuple of Finding
+        Empty where there is nothing against it.
+    """
+    acceleration, jerk = strain(run)
+    hard, rough = acceleration > LARGEST_ACCELERATION, jerk > LARGEST_JERK
+    strained = np.flatnonzero(hard | rough)
+    why: list[tuple[Finding, ...]] = []
+    for t, q in zip(instants, quality, strict=True):
+        if t >= impact:
+            why.append((_reason("crash.fix-after-impact"),))
+        elif t >= impact - slack:
+            why.append((_reason("crash.fix-perhaps-after-impact"),))
+        elif t > anchor:
+            why.append((_reason("crash.fix-after-anchor"),))
+        elif q == 0:
+            why.append((_reason("crash.fix-without-quality"),))
+        else:
+            recent = strained[
+                (run.time[strained] >= t - RECOVERY) & (run.time[strained] <= t + slack)
+            ]
+            why.append(_excess(run.time, acceleration, jerk, recent))
+    return why
+
+
+def _reason(code: str, **values: float) -> Finding:
+    return Finding(code, severity="note", data=values)
+
+
+def _excess(
+    time: Array, acceleration: Array, jerk: Array, at: NDArray[np.intp]
+) -> tuple[Finding, ...]:
+    """What exceeded a limit at these stamps, and when it last did."""
+    if not at.size:
+        return ()
+    most, roughest = float(acceleration[at].max()), float(jerk[at].max())
+    said = {"acceleration": most, "jerk": roughest, "last": float(time[at[-1]])}
+    if most > LARGEST_ACCELERATION and roughest > LARGEST_JERK:
+        return (_reason("crash.fix-under-acceleration-and-jerk", **said),)
+    hard = most > LARGEST_ACCELERATION
+    return (_reason("crash.fix-under-acceleration" if hard else "crash.fix-under-jerk", **said),)
+
+
+def record_of_fixes(stamps: Array, why: list[tuple[Finding, ...]]) -> pd.DataFrame:
+    """Begin the record of the fixes: all that are not believed have no weight."""
+    used = np.array([not w for w in why], dtype=np.bool_)
+    return pd.DataFrame(
+        {
+            "used": used,
+            "why": pd.Series(why, index=stamps, dtype=object),
+            "position_weight": used.astype(np.float64),
+            "velocity_weight": used.astype(np.float64),
+            "position_misfit": np.full(len(why), np.nan),
+            "velocity_misfit": np.full(len(why), np.nan),
+        },
+        index=pd.Index(stamps, name="time"),
+    )

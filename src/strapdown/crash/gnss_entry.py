@@ -2,28 +2,55 @@
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.crash.entry_checks import check_arguments, check_enough
-from strapdown.crash.entry_estimate import Fixes, estimate
-from strapdown.crash.entry_findings import findings, say_outliers, unlikely
-from strapdown.crash.entry_priors import EntryPriors
-from strapdown.crash.entry_start import first_guesses
-from strapdown.crash.entry_state import EntryState
-from strapdown.crash.entry_trust import AVERAGED, RECOVERY, judge_fixes, record_of_fixes
-from strapdown.errors import DataError
+from strapdown import rotation
+from strapdown.crash.at_point import AtPoint
+from strapdown.crash.entry import (
+    ACCEL_BIAS,
+    ATTITUDE,
+    GYRO_BIAS,
+    Entry,
+    EntryState,
+)
+from strapdown.crash.entry import (
+    VELOCITY as VELOCITY_COLUMNS,
+)
+from strapdown.crash.entry_estimate import Estimate, Fixes, estimate
+from strapdown.crash.entry_sensitivity import (
+    AVERAGED,
+    RECOVERY,
+    EntryPriors,
+    between,
+    judge_fixes,
+    record_of_fixes,
+)
+from strapdown.ellipsoids import WGS84
+from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.evaluation.control_points import rigid_fit
+from strapdown.frames import geodetic_from_ned, place_difference
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NavigationRun, NorthEastDown, run_mechanization
 from strapdown.nav_state import NavState
+from strapdown.sensors.borrowed_gyro import turned_uncertainty
+from strapdown.sensors.triad_errors import finite, triple
+from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.tables import (
+    ACCEL,
     GEODETIC,
     POSITION_SD,
     VELOCITY,
     VELOCITY_SD,
+    check_gnss,
+    check_imu,
 )
 from strapdown.tables.checks import index_of, values_of
 
@@ -192,3 +219,449 @@ def _turn_only(
     at = gnss[GEODETIC].median()
     start = NavState.from_degrees(at["lat"], at["lon"], at["alt"], time=begin)
     return run_mechanization(mechanization, start, increments)
+
+
+# A path that is tied to what a satellite receiver said before the crash.
+
+
+CONTRIBUTOR = "entry from GNSS"
+# What the entry state has instead: lines of the error budget.
+BIASES = ("accelerometer bias", "gyro bias", "levelling")
+OTHER_PRIORS = tuple(f.name for f in fields(EntryPriors) if f.name not in ("gyro", "accel"))
+
+
+@dataclass(frozen=True, eq=False)
+class GnssEntry:
+    """Fixes before the crash, from which every unit finds its own entry state and biases.
+
+    Attributes
+    ----------
+    fixes : DataFrame
+        Gnss table, time from the common trigger.
+    impact : float, s
+        Nothing from there on is used.
+    window : float, s
+        Length of the record before the impact that is used.
+    before : float, s
+        How long before the impact the path is tied: the first sample of the crash already has
+        its jerk.
+    antenna : sequence of float, (3,), m
+        Vehicle axes, from the vehicle's origin.
+    priors : dict
+        Attributes of `EntryPriors` other than the sensors', which are the unit's own.
+
+    Raises
+    ------
+    ConfigError
+        A number is none, or a prior is unknown or out of range.
+    """
+
+    fixes: pd.DataFrame = field(repr=False)
+    impact: float = 0.0
+    window: float = 10.0
+    before: float = 0.02
+    antenna: Sequence[float] = (0.0, 0.0, 0.0)
+    priors: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in ("impact", "window", "before"):
+            if not finite(getattr(self, name)):
+                raise ConfigError(
+                    "crash.gnss-entry-not-a-number",
+                    quantity=f"GNSS entry, {name}",
+                    value=getattr(self, name),
+                )
+        triple(self.antenna, "GNSS entry, antenna", "sensors.point-not-three-numbers")
+        for name in self.priors:
+            if name not in OTHER_PRIORS:
+                raise ConfigError(
+                    "crash.no-prior",
+                    quantity="GNSS entry, priors",
+                    name=name,
+                    word=str(name),
+                    known=OTHER_PRIORS,
+                )
+        EntryPriors(gyro=TriadUncertainty(), accel=TriadUncertainty(), **self.priors)
+
+
+def start_from_gnss(
+    at: AtPoint, given: GnssEntry, point: Sequence[float]
+) -> tuple[AtPoint, Entry, EntryState]:
+    """Find the entry of a unit and take off the biases that were found with it.
+
+    Parameters
+    ----------
+    at : AtPoint
+    given : GnssEntry
+    point : sequence of float, (3,), m
+        Where the unit was moved to, vehicle axes from the vehicle's origin.
+
+    Returns
+    -------
+    at : AtPoint
+        Without the biases. Of its unknowns, those of the biases are gone, and each other one
+        counts only as far as it adds something else than it did on average over the window:
+        that much the biases have taken in. How the unit is turned in roll and pitch is taken in
+        by the attitude, too, and counts all the same: the bound is on the safe side there.
+    entry : Entry
+        With the joint covariance of attitude, velocity and biases.
+    state : EntryState
+        As it was estimated, with every fix and why it was used or not.
+
+    Raises
+    ------
+    DataError, ConfigError, DivergenceError
+        As `entry_state_from_gnss`; or an axis or the turning of the unit is assumed.
+    """
+    unit = None if at.prepared is None else at.prepared.unit
+    if unit is None or unit.gyro is None:
+        raise DataError("crash.mean-several-units-no-sensors", file=at.name, quantity="entry")
+    if at.assumed_axes:
+        raise DataError(
+            "crash.assumed-not-measured-nothing-carries",
+            file=at.name,
+            quantity="entry",
+            assumed_axes=at.assumed_axes,
+        )
+    C_vs = unit.mounting.C_vs
+    anchor = given.impact - given.before
+    state = entry_state_from_gnss(
+        at.imu,
+        given.fixes,
+        impact=given.impact,
+        anchor=anchor,
+        window=given.window,
+        antenna=tuple(float(a - p) for a, p in zip(given.antenna, point, strict=True)),
+        priors=EntryPriors(
+            gyro=turned_uncertainty(unit.gyro.uncertainty, C_vs),
+            accel=turned_uncertainty(unit.accelerometers[0].uncertainty, C_vs),
+            **given.priors,
+        ),
+    )
+    return _without_biases(at, state, anchor - given.window), _entry(state), state
+
+
+def _entry(state: EntryState) -> Entry:
+    order = np.r_[ATTITUDE, VELOCITY_COLUMNS, GYRO_BIAS, ACCEL_BIAS]
+    values, vectors = np.linalg.eigh(state.covariance[np.ix_(order, order)])
+    columns = (vectors * np.sqrt(np.maximum(values, 0.0))).T
+    roll, pitch, heading = (float(x) for x in state.roll_pitch_heading)
+    north, east, down = (float(v) for v in state.state.v_n)
+    nothing = np.zeros(3)
+    return Entry(
+        time=state.state.time,
+        velocity=(north, east, down),
+        heading_deg=heading % 360.0,
+        unknowns=tuple(
+            # A bias that is larger than was found leaves less for the motion.
+            (
+                f"{CONTRIBUTOR} {k + 1}",
+                CONTRIBUTOR,
+                (*np.r_[c[:6], nothing, -c[6:]].tolist(),),
+            )
+            for k, c in enumerate(columns)
+        ),
+        attitude_deg=(roll, pitch),
+        lat_deg=float(np.degrees(state.state.lat)),
+        lon_deg=float(np.degrees(state.state.lon)),
+        alt=state.state.alt,
+        source="GNSS before the crash",
+    )
+
+
+def _without_biases(at: AtPoint, state: EntryState, begin: float) -> AtPoint:
+    effects = at.effects
+    time = at.imu.index.to_numpy(dtype=np.float64)
+    window = (time >= begin) & (time <= state.state.time)
+    keep = [k for k, c in enumerate(effects.contributors) if c not in BIASES]
+    force = effects.force[keep] - effects.force[keep][:, window].mean(axis=1, keepdims=True)
+    rate = effects.rate[keep] - effects.rate[keep][:, window].mean(axis=1, keepdims=True)
+    return replace(
+        at,
+        imu=state.with_biases_off(at.imu),
+        effects=replace(
+            effects,
+            names=tuple(effects.names[k] for k in keep),
+            contributors=tuple(effects.contributors[k] for k in keep),
+            force=force,
+            rate=rate,
+            rest_force=np.zeros((len(keep), 3)),
+            tilt=np.zeros((len(keep), 3)),
+        ),
+    )
+
+
+# Where to begin the search for an entry state.
+
+
+# Slower, the direction of travel is noise.
+LEAST_SPEED = 1.0  # m/s
+# So many of the last fixes tell the velocity to begin with.
+_LAST = 5
+# Changes of velocity of which the direction means something, m/s.
+_LEAST_CHANGE = 0.5
+# Guesses nearer than this lead to the same end, deg.
+_SAME = 30.0
+
+
+def first_guesses(
+    turned: NavigationRun, fixes: Fixes, priors: EntryPriors
+) -> tuple[list[NavState], list[Finding]]:
+    """Guess place and velocity from the last fixes, and one heading or two.
+
+    Parameters
+    ----------
+    turned : NavigationRun
+        From a stand, level and north, up to the anchor.
+    fixes : Fixes
+        Those that are believed.
+    priors : EntryPriors
+
+    Returns
+    -------
+    guesses : list of NavState
+        Heading as the priors have it; or the direction of travel; and that for which the
+        changes of velocity by the sensors agree best with those of the fixes, where it is another.
+    findings : list of Finding
+    """
+    velocity = _velocities(fixes)
+    late = np.median(velocity[-_LAST:], axis=0)
+    end = float(turned.time[-1])
+    ahead = late * (end - fixes.instants[-1])
+    place = geodetic_from_ned(ahead, fixes.place[-1])
+    speed = math.hypot(late[0], late[1])
+    findings = []
+    headings: list[float] = []
+    if priors.heading_deg is not None:
+        headings = [priors.heading_deg]
+    else:
+        if speed >= LEAST_SPEED:
+            headings.append(math.degrees(math.atan2(late[1], late[0])))
+        by_change = _heading_by_changes(turned, fixes.instants, velocity)
+        if by_change is not None and not any(_near(by_change, h) for h in headings):
+            headings.append(by_change)
+        if speed < LEAST_SPEED:
+            findings.append(
+                Finding("crash.fixes-before-anchor-say-too", quantity="heading", speed=speed)
+            )
+    guesses = [
+        NavState.from_degrees(
+            *place.tolist(),
+            v_n=late,
+            roll_deg=priors.roll_deg,
+            pitch_deg=priors.pitch_deg,
+            heading_deg=h % 360.0,
+            time=end,
+        )
+        for h in (headings or [0.0])
+    ]
+    return guesses, findings
+
+
+def _velocities(fixes: Fixes) -> Array:
+    """Of each fix; from its neighbours' places where it was not measured."""
+    told = np.isfinite(fixes.sd[:, 3:])
+    if told.all():
+        return fixes.velocity
+    moved = place_difference(fixes.place, fixes.place[0], ellipsoid=WGS84)
+    return np.where(told, fixes.velocity, np.gradient(moved, fixes.instants, axis=0))
+
+
+def _heading_by_changes(turned: NavigationRun, instants: Array, velocity: Array) -> float | None:
+    """Heading at the end, deg, from changes of the level velocity; None where there are none."""
+    felt = between(turned.time, turned.history[:, 3:5], instants)
+    felt = felt - felt.mean(axis=0)
+    seen = velocity[:, :2] - velocity[:, :2].mean(axis=0)
+    if min(float(np.sqrt((x * x).sum(axis=1).mean())) for x in (felt, seen)) < _LEAST_CHANGE:
+        return None
+    begun, _ = rigid_fit(felt, seen)
+    return math.degrees(begun) + float(rotation.euler_from_quaternion(turned.history[-1, 6:10])[2])
+
+
+def _near(a: float, b: float) -> bool:
+    return bool(np.abs(rotation.within_half_turn(np.array(a - b))) < _SAME)
+
+
+# What an entry state cannot be made of.
+
+
+# Least of what an entry state can be made of.
+LEAST_FIXES = 3
+LEAST_SPAN = 1.0  # s
+LONGEST_WINDOW = 60.0  # s
+
+
+def check_arguments(
+    imu: pd.DataFrame,
+    gnss: pd.DataFrame,
+    impact: float,
+    window: float,
+    anchor: float,
+    antenna: Sequence[float],
+) -> None:
+    """Refuse tables and arguments that no entry state can be made of."""
+    check_imu(imu)
+    check_gnss(gnss)
+    if ACCEL[0] not in imu.columns:
+        raise DataError(
+            "crash.no-accelerometer-nothing-carries-velocity",
+            file=imu.attrs.get("source"),
+            quantity="accel",
+        )
+    if not (math.isfinite(impact) and math.isfinite(anchor) and anchor <= impact):
+        raise ConfigError("crash.anchor-impact", quantity="anchor", anchor=anchor, impact=impact)
+    if not 1.0 <= window <= LONGEST_WINDOW:
+        raise ConfigError(
+            "crash.gnss-window-out-of-range",
+            quantity="window",
+            window=window,
+            longest_window=LONGEST_WINDOW,
+        )
+    if len(antenna) != 3 or not all(math.isfinite(x) for x in antenna):
+        raise ConfigError("crash.antenna-not-three-numbers", quantity="antenna", antenna=antenna)
+    sensed = index_of(imu)
+    step = float(np.median(np.diff(sensed)))
+    if not sensed[0] < anchor <= sensed[-1] + step:
+        raise DataError(
+            "crash.goes-anchor",
+            file=imu.attrs.get("source"),
+            quantity="time",
+            sensed=sensed[0],
+            sensed_2=sensed[-1],
+            anchor=anchor,
+        )
+    sd = values_of(gnss, [*POSITION_SD, *VELOCITY_SD])
+    if (sd == 0.0).any():
+        row, column = (int(i) for i in np.argwhere(sd == 0.0)[0])
+        raise DataError(
+            "crash.standard-deviation-zero-nothing-measured",
+            file=gnss.attrs.get("source"),
+            row=row + 1,
+            quantity=[*POSITION_SD, *VELOCITY_SD][column],
+        )
+
+
+def check_enough(fixes: Fixes, why: list[tuple[Finding, ...]], source: str | None) -> None:
+    """Refuse to make one of too few fixes, and say where the others went."""
+    span = float(np.ptp(fixes.instants)) if len(fixes.instants) else 0.0
+    placed = int(np.isfinite(fixes.sd[:, :3]).all(axis=1).sum())
+    if min(len(fixes.instants), placed) >= LEAST_FIXES and span >= LEAST_SPAN:
+        return
+    # Of each kind of reason its first stands for all.
+    counts = Counter(f.code for found in why for f in found)
+    first = {f.code: f for found in reversed(why) for f in found}
+    refused = [
+        Finding("crash.fixes-refused", severity="note", count=count, reason=first[code])
+        for code, count in counts.items()
+    ]
+    raise DataError(
+        "crash.too-few-fixes" if refused else "crash.too-few-fixes-given",
+        file=source,
+        quantity="fixes",
+        count=len(fixes.instants),
+        span=span,
+        placed=placed,
+        refused=refused,
+        least_fixes=LEAST_FIXES,
+        least_span=LEAST_SPAN,
+    )
+
+
+# What a person should know of an entry state.
+
+
+# A heading that is known less well is told.
+WIDE_HEADING = 5.0  # deg
+# Misfits of all fixes that chance makes more seldom are told.
+UNLIKELY = 1e-4
+#: Reasons that need no word: such fixes are not of the drive before the impact.
+LATE = frozenset(
+    ("crash.fix-after-impact", "crash.fix-perhaps-after-impact", "crash.fix-after-anchor")
+)
+
+
+def say_outliers(record: pd.DataFrame) -> None:
+    """Say of each fix that lost weight how far it is off."""
+    why: list[tuple[Finding, ...]] = record["why"].tolist()
+    for name in ("position", "velocity"):
+        lower = record["used"] & (record[f"{name}_weight"] < 1.0)
+        misfits = record.loc[lower, f"{name}_misfit"].to_numpy(dtype=np.float64)
+        for row, misfit in zip(np.flatnonzero(lower), misfits.tolist(), strict=True):
+            reason = Finding(f"crash.fix-{name}-misfit", severity="note", misfit=misfit)
+            why[row] = (*why[row], reason)
+    record["why"] = pd.Series(why, index=record.index, dtype=object)
+
+
+def findings(
+    best: Estimate, record: pd.DataFrame, source: str | None, priors: EntryPriors, impact: float
+) -> list[Finding]:
+    """What a person should know of an estimate."""
+    found = []
+    late = record["why"].map(lambda why: any(f.code in LATE for f in why))
+    refused = record[~record["used"] & ~late]
+    if len(refused):
+        found.append(
+            Finding(
+                "crash.fixes-before-impact-not-believed",
+                file=source,
+                quantity="fixes",
+                count=len(refused),
+                time=refused.index[0],
+                reasons=refused["why"].iloc[0],
+            )
+        )
+    lower = record[record["used"] & (record["why"].map(len) > 0)]
+    if len(lower):
+        found.append(
+            Finding(
+                "crash.fixes-less-weight-or-none",
+                file=source,
+                quantity="fixes",
+                count=len(lower),
+                time=lower.index[0],
+                reasons=lower["why"].iloc[0],
+            )
+        )
+    used = record.index[record["used"]]
+    if impact - used[-1] > 2.0:
+        found.append(
+            Finding(
+                "crash.last-fix-used-before-anchor",
+                severity="note",
+                file=source,
+                quantity="fixes",
+                impact=impact - used[-1],
+            )
+        )
+    if priors.side_slip_sd_deg is not None and not best.slip_fixes:
+        found.append(Finding("crash.side-slip-not-used-no", file=source, quantity="heading"))
+    heading_sd = math.degrees(math.sqrt(best.covariance[8, 8]))
+    if heading_sd > WIDE_HEADING:
+        found.append(
+            Finding(
+                "crash.heading-known-only-drive-vehicle",
+                file=source,
+                quantity="heading",
+                heading_sd=min(heading_sd, 180.0),
+            )
+        )
+    if unlikely(best.chi_square, best.degrees_of_freedom):
+        found.append(
+            Finding(
+                "crash.fixes-fit-worse-than-their",
+                file=source,
+                quantity="fixes",
+                chi_square=best.chi_square,
+                degrees_of_freedom=best.degrees_of_freedom,
+                variance_factor=best.chi_square / best.degrees_of_freedom,
+                sd_factor=math.sqrt(best.chi_square / best.degrees_of_freedom),
+            )
+        )
+    return found
+
+
+def unlikely(chi_square: float, degrees_of_freedom: int) -> bool:
+    """Whether chance hardly makes a misfit as large as this."""
+    from scipy.stats import chi2
+
+    return bool(chi2.sf(chi_square, degrees_of_freedom) < UNLIKELY)

@@ -12,7 +12,7 @@ from strapdown import rotation
 from strapdown._kernels.earth import RATE
 from strapdown._kernels.error_growth import grow_errors, grow_noise
 from strapdown._kernels.ned import ROW, Q, V, reverse_increments
-from strapdown.crash.sample_effects import SampleEffects
+from strapdown.crash.unit_effects import SampleEffects
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import DivergenceError
 from strapdown.increments import motion_increments

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -12,22 +13,21 @@ from numpy.typing import NDArray
 
 from strapdown import frames, rotation
 from strapdown._kernels.ned import ALT, LAT, LON, Q, V
-from strapdown.crash.angle_rates import angles_sd
-from strapdown.crash.between_stamps import ToStamp, to_stamp
-from strapdown.crash.by_contributor import NOISE, by_contributor
-from strapdown.crash.entry import Entry
+from strapdown.constants import STANDARD_GRAVITY as GRAVITY
+from strapdown.crash.entry import Entry, angles_sd
 from strapdown.crash.leg import ATTITUDE, PLACE, VELOCITY, Leg, make_leg
-from strapdown.crash.path_window import path_rows
 from strapdown.crash.reconstruction_summary import path_line
-from strapdown.crash.sample_effects import SampleEffects
+from strapdown.crash.unit_effects import SampleEffects
+from strapdown.crash.window_weights import NOISE, by_contributor, window_weights
 from strapdown.earth import earth_rate
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import ConfigError, DataError
 from strapdown.mechanization import NorthEastDown
 from strapdown.nav_state import NavState
-from strapdown.sensors.prepared_unit import Levelling
+from strapdown.rotation import cross_matrix
+from strapdown.sensors.pre_crash import Levelling
 from strapdown.sensors.triad_errors import triad_of
-from strapdown.tables import EULER, GYRO, NED
+from strapdown.tables import ACCEL, EULER, GYRO, NED
 from strapdown.tables import VELOCITY as VELOCITIES
 
 Array = NDArray[np.float64]
@@ -386,3 +386,172 @@ def _states(leg: Leg) -> Array:
     if leg.backward:
         states[:, V : V + 3] *= -1.0
     return states
+
+
+# The samples of a record that a path is given at.
+
+
+#: Where a path is wanted if nothing is said, s from the trigger: Tadic and Vukajlovic (2016).
+WINDOW = (-0.1, 0.75)
+
+
+def path_rows(imu: pd.DataFrame, at: float, window: Sequence[float] | None) -> tuple[int, int, int]:
+    """Find the first, the entry's and the last sample of a path.
+
+    Parameters
+    ----------
+    imu : DataFrame
+    at : float, s
+        Instant of the entry.
+    window : (float, float), s, optional
+        `WINDOW`, as far as there is a record, if not given.
+
+    Returns
+    -------
+    first, anchor, last : int
+        The entry's is the sample nearest to it, and within the path in any case.
+
+    Raises
+    ------
+    DataError
+        The record does not hold the entry or the window.
+    """
+    time = imu.index.to_numpy(dtype=np.float64)
+    slack = 1e-9 + 0.5 * float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    if not time[0] - slack <= at <= time[-1] + slack:
+        raise DataError(
+            "crash.entry-not-within-record",
+            file=imu.attrs.get("source"),
+            quantity="entry",
+            at=at,
+            time=time[0],
+            time_2=time[-1],
+        )
+    begin, end = (float(x) for x in (_usual(time, at) if window is None else window))
+    if not begin < end or begin < time[0] - slack or end > time[-1] + slack:
+        # What both have, in whole ms.
+        low = max(begin, math.ceil(1e3 * float(time[0])) / 1e3)
+        high = min(end, math.floor(1e3 * float(time[-1])) / 1e3)
+        raise DataError(
+            "crash.window-partly-in-record" if low < high else "crash.window-not-in-record",
+            file=imu.attrs.get("source"),
+            quantity="window",
+            begin=begin,
+            end=end,
+            first=time[0],
+            last=time[-1],
+            low=low,
+            high=high,
+        )
+    anchor = int(np.argmin(np.abs(time - at)))
+    first = min(int(np.searchsorted(time, begin - 1e-9)), anchor)
+    last = max(int(np.searchsorted(time, end + 1e-9, side="right")) - 1, anchor)
+    return first, anchor, last
+
+
+def _usual(time: Array, at: float) -> tuple[float, float]:
+    """The usual window, as far as there is a record; the entry is within in any case."""
+    return (
+        min(max(WINDOW[0], float(time[0])), at),
+        max(min(WINDOW[1], float(time[-1])), at + 1e-6),
+    )
+
+
+# From the instant of an entry to the sample nearest to it: at most half a step.
+
+
+@dataclass(frozen=True, eq=False)
+class ToStamp:
+    """What happens from the instant of an entry to a sample.
+
+    Attributes
+    ----------
+    length : float, s
+        Negative where the sample is the earlier one.
+    turn : ndarray, (3,), rad
+        Rotation vector of the body, body axes.
+    push : ndarray, (3,), m/s
+        Integral of the specific force, in the body axes in the middle.
+    turn_errors, push_errors : ndarray, (p, 3)
+        What one standard deviation of each unknown adds to them.
+    """
+
+    length: float
+    turn: Array
+    push: Array
+    turn_errors: Array
+    push_errors: Array
+
+    def attitude_before(self, q_nb: Array) -> Array:
+        """Attitude at the entry from that at the sample, (4,)."""
+        return rotation.compose(q_nb, rotation.quaternion_from_rotation_vector(-self.turn))
+
+    def attitude_after(self, q_nb: Array) -> Array:
+        """Attitude at the sample from that at the entry, (4,)."""
+        return rotation.compose(q_nb, rotation.quaternion_from_rotation_vector(self.turn))
+
+    def felt(self, q_nb: Array) -> Array:
+        """Integral of the specific force in local level, (3,), m/s; `q_nb` at the sample."""
+        half = rotation.quaternion_from_rotation_vector(-0.5 * self.turn)
+        return rotation.rotate(rotation.compose(q_nb, half), self.push)
+
+    def gained(self, q_nb: Array) -> Array:
+        """Change of the velocity in local level, (3,), m/s; `q_nb` at the sample."""
+        return np.asarray(self.felt(q_nb) + np.array([0.0, 0.0, GRAVITY * self.length]))
+
+    def carried(self, errors: Array, q_nb: Array, *, turned: bool) -> Array:
+        """Errors at the sample from those at the entry.
+
+        Parameters
+        ----------
+        errors : ndarray, (p, 9)
+            Rotation vector in local level, velocity, place; the unknowns of the samples first.
+        q_nb : ndarray, (4,)
+            At the sample.
+        turned : bool
+            The attitude is that of the entry too; otherwise it is the sample's already.
+
+        Returns
+        -------
+        ndarray, (p, 9)
+            To first order. Of the place, what grows in half a step is left out.
+        """
+        out, own = errors.copy(), slice(0, len(self.turn_errors))
+        C = rotation.dcm_from_quaternion(q_nb)
+        # phi x f, of every row.
+        out[:, 3:6] += errors[:, :3] @ cross_matrix(self.felt(q_nb))
+        out[own, 3:6] += self.push_errors @ C.T
+        if turned:
+            out[own, :3] += self.turn_errors @ C.T
+        return out
+
+
+def to_stamp(imu: pd.DataFrame, effects: SampleEffects, instant: float, row: int) -> ToStamp:
+    """Integrate from an instant between two samples to one of them.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        Imu table; between its samples as `window_weights` says.
+    effects : SampleEffects
+        On the same samples.
+    instant : float, s
+        Before the first or after the last sample, these hold on.
+    row : int
+        Of the sample.
+    """
+    time = imu.index.to_numpy(dtype=np.float64)
+    length = float(time[row] - instant)
+    inside = min(max(instant, float(time[0])), float(time[-1]))
+    sampling = str(imu.attrs.get("sampling", "instantaneous"))
+    weights = window_weights(time, inside, float(time[row]), sampling)
+    weights[row] += inside - instant
+    near = np.flatnonzero(weights)
+    few = weights[near]
+    return ToStamp(
+        length,
+        few @ imu[GYRO].to_numpy(dtype=np.float64)[near],
+        few @ imu[ACCEL].to_numpy(dtype=np.float64)[near],
+        np.einsum("n,pni->pi", few, effects.rate[:, near]),
+        np.einsum("n,pni->pi", few, effects.force[:, near]),
+    )

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.alignment.levelling import level
+from strapdown.crash.acceleration import force_at_rest
+from strapdown.crash.at_point import AtPoint, at_point
+from strapdown.crash.entry import Entry
+from strapdown.crash.path import reconstruct_path
 from strapdown.crash.prepare_findings import (
     bias_findings,
     length_findings,
@@ -16,37 +22,40 @@ from strapdown.crash.prepare_findings import (
     saturation_findings,
     step_findings,
 )
-from strapdown.crash.prepare_options import check_options
-from strapdown.crash.rest_attitude import (
-    from_stated_attitude,
-    gravity_correction,
-    level_at_rest,
-    with_gravity,
-)
-from strapdown.errors import Finding
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.results.rests import RestStretch
-from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
-from strapdown.sensors.high_g_bias import bias_from_lower_range
+from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad, UnitArrays, check_unit
 from strapdown.sensors.pre_crash import (
+    FROM_GRAVITY,
     BiasEstimate,
+    Levelling,
+    PreparedUnit,
     find_pre_crash_rest,
     gyro_bias_from,
     in_axes,
 )
-from strapdown.sensors.prepared_unit import FROM_GRAVITY, PreparedUnit
-from strapdown.sensors.range_agreement import agreement_findings
-from strapdown.sensors.range_merge import merge_ranges
+from strapdown.sensors.range_merge import agreement_findings, bias_from_lower_range, merge_ranges
 from strapdown.sensors.rest import rest_between
 from strapdown.sensors.saturation import RangeLimits, find_limits
-from strapdown.sensors.triad_errors import ZERO, Triad, triad_of
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
-from strapdown.sensors.unit_checks import UnitArrays, check_unit
+from strapdown.sensors.synchronise import SynchronisedUnit, SynchronisedUnits
+from strapdown.sensors.triad_errors import ZERO, Triad, check_sd, finite, triad_of, triple
+from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.sensors.unmeasured import assumed_findings, with_filled_axes, with_gyro
-from strapdown.tables import imu_table
+from strapdown.tables import ACCEL, imu_table
+
+__all__ = [
+    "OPTIONS",
+    "check_options",
+    "checked_options",
+    "from_stated_attitude",
+    "gravity_correction",
+    "level_at_rest",
+    "prepare_unit",
+    "with_gravity",
+]
+
 
 Array = NDArray[np.float64]
-
-__all__ = ["prepare_unit"]
 
 
 def prepare_unit(
@@ -295,3 +304,358 @@ def _where_there(found: BiasEstimate, absent: tuple[int, ...]) -> BiasEstimate:
 def _stated_sd(uncertainty: TriadUncertainty, C: Array) -> Array:
     """Of the bias of the lowest range, in vehicle axes."""
     return np.asarray(np.sqrt(C**2 @ np.asarray(uncertainty.axis("bias")) ** 2))
+
+
+# What may be asked of `prepare_unit`.
+
+
+OPTIONS = (
+    "gravity",
+    "rest",
+    "levelling",
+    "impact",
+    "moving_at_impact",
+    "steady_acceleration",
+    "steady_rate",
+    "match_gravity",
+    "margin",
+    "hysteresis",
+    "fade",
+)
+
+
+def checked_options(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the options, all of them known.
+
+    Raises
+    ------
+    ConfigError
+        One is not.
+    """
+    for name in options:
+        if name not in OPTIONS:
+            raise ConfigError(
+                "crash.preparation-option-unknown",
+                quantity="preparation",
+                name=name,
+                word=str(name),
+                known=OPTIONS,
+            )
+    return dict(options)
+
+
+def check_options(unit: str, **given: Any) -> None:
+    """Check the options of a unit's preparation.
+
+    Raises
+    ------
+    ConfigError
+        One is out of range, or of another kind.
+    """
+    gravity, rest, levelling = given["gravity"], given["rest"], given["levelling"]
+    if not (finite(gravity) and 9.7 < gravity < 9.9):
+        raise ConfigError(
+            "crash.gravity-nowhere-ground", file=unit, quantity="gravity", gravity=gravity
+        )
+    if not (isinstance(rest, str) and rest == "auto") and not _is_stretch(rest):
+        raise ConfigError("crash.no-stretch", file=unit, quantity="rest", rest=rest)
+    if levelling is not None:
+        code = "crash.levelling-not-three-numbers"
+        _, pitch, sd = triple(levelling, "levelling", code, unit)
+        if abs(pitch) > 90.0 or sd < 0.0:
+            raise ConfigError(
+                "crash.levelling-out-of-range",
+                file=unit,
+                quantity="levelling",
+                levelling=repr(levelling),
+            )
+    for name in ("impact", "margin", "hysteresis", "fade"):
+        if not finite(given[name]):
+            raise ConfigError(
+                "crash.preparation-not-a-number", file=unit, quantity=name, given=given[name]
+            )
+    check_sd(given["steady_acceleration"], "steady_acceleration", "m/s²", unit)
+    check_sd(given["steady_rate"], "steady_rate", "rad/s", unit)
+
+
+def _is_stretch(given: Any) -> bool:
+    try:
+        start, end = given
+    except (TypeError, ValueError):
+        return False
+    return finite(start) and finite(end) and start < end
+
+
+# Units of one vehicle prepared together: who has no rest is levelled by who has.
+
+
+# Over which the attitude that is lent is read, in samples.
+READ = 2
+
+
+def prepare_together(
+    together: SynchronisedUnits,
+    point: Sequence[float],
+    gravity: float,
+    options: Mapping[str, Any],
+) -> list[AtPoint]:
+    """Prepare units and move them to a point.
+
+    Parameters
+    ----------
+    together : SynchronisedUnits
+        Each over what it covers itself.
+    point : sequence of float, (3,), m
+        Vehicle axes, from the vehicle's origin.
+    gravity : float, m/s²
+    options : mapping
+        Of `prepare_unit`, for all; under the name of a unit, a mapping of its own ones.
+
+    Returns
+    -------
+    list of AtPoint
+        In the order of the units. A unit that borrows its gyro and is not levelled by an option,
+        and whose record begins after the lender's rest, is levelled by the lender: its roll and
+        pitch carried on by the gyro to where the borrower's record begins, with their standard
+        deviation.
+
+    Raises
+    ------
+    DataError, ConfigError
+        As `prepare_unit`.
+    """
+    names = {u.unit.name for u in together.units}
+    common = {k: v for k, v in options.items() if k not in names}
+    turning = [u.unit.name for u in together.units if u.lender is None and _turns(u)]
+    done: dict[str, AtPoint] = {}
+    for unit in sorted(together.units, key=lambda u: u.lender is not None):
+        own = {"gravity": gravity, **common, **options.get(unit.unit.name, {})}
+        if unit.lender is not None and own.get("levelling") is None:
+            lent = _attitude_at_start(unit, done[unit.lender])
+            if lent is not None:
+                own["levelling"] = lent
+        hint = _gyro_to_borrow(unit, turning)
+        try:
+            prepared = prepare_unit(unit.unit, **checked_options(own))
+        except DataError as error:
+            if hint is None or error.finding.quantity != "gyro":
+                raise
+            raise DataError(
+                "crash.no-gyro-for-path",
+                file=error.finding.file,
+                row=error.finding.row,
+                quantity="gyro",
+                reason=error.finding,
+                hint=hint,
+            ) from None
+        if hint is not None:
+            prepared = replace(prepared, findings=(*prepared.findings, hint))
+        done[unit.unit.name] = at_point(prepared, point, time_sd=unit.time_sd)
+    return [done[u.unit.name] for u in together.units]
+
+
+def _turns(unit: SynchronisedUnit) -> bool:
+    """Whether it has a gyro that measures something, and is no stand-in for an assumption."""
+    gyro = unit.unit.gyro
+    return gyro is not None and len(gyro.absent) < 3
+
+
+def _gyro_to_borrow(unit: SynchronisedUnit, turning: Sequence[str]) -> Finding | None:
+    """For a unit without gyro that takes none from another, of which there are some."""
+    if unit.lender is not None or _turns(unit) or not turning:
+        return None
+    return Finding(
+        "crash.gyro-not-borrowed" if len(turning) == 1 else "crash.gyros-not-borrowed",
+        file=unit.unit.name,
+        quantity="gyro",
+        turning=turning,
+        lender=turning[0],
+    )
+
+
+def _attitude_at_start(
+    unit: SynchronisedUnit, lender: AtPoint
+) -> tuple[float, float, float] | None:
+    """Roll, pitch and their sd in deg where a record begins, or None where it has its own rest."""
+    begin = float(unit.accelerometers[0].triad.table.index[0])
+    rest = lender.rest
+    if rest is None or rest.grade == "steady" or begin <= rest.end:
+        return None
+    step = float(lender.imu.index[1] - lender.imu.index[0])
+    still = Entry(time=begin, velocity=(0.0, 0.0, 0.0), heading_deg=0.0)
+    path = reconstruct_path(
+        lender.imu,
+        lender.effects,
+        lender.levelling,
+        rest.end,
+        still,
+        window=(begin, begin + READ * step),
+        zeroed_at_rest=True,
+    )
+    attitude, sd = path.table.iloc[path.anchor], path.sd.iloc[path.anchor]
+    return (
+        float(attitude["roll"]),
+        float(attitude["pitch"]),
+        math.hypot(float(sd["roll"]), float(sd["pitch"])) / math.sqrt(2.0),
+    )
+
+
+# Attitude and the lowest range's bias from the specific force before a crash.
+
+
+def level_at_rest(rest: RestStretch, unknown: float, gravity: float, source: str) -> Levelling:
+    """Roll and pitch from the mean specific force, with the sd that its noise leaves.
+
+    Parameters
+    ----------
+    rest : RestStretch
+        In vehicle axes.
+    unknown : float, m/s²
+        Standard deviation of the vehicle's own acceleration over it, each axis.
+    gravity : float, m/s²
+    source : str
+        For messages.
+
+    Returns
+    -------
+    Levelling
+        Its sd is that of the worse of the two angles: an acceleration error e across the
+        specific force turns it by ``e / g`` (roll: over ``cos(pitch)``).
+
+    Raises
+    ------
+    DataError
+        The length is not within 20 % of gravity.
+    """
+    assert rest.accel_mean is not None and rest.accel_mean_sd is not None
+    try:
+        roll, pitch = level(rest.accel_mean)
+    except DataError as error:
+        raise DataError(
+            "crash.rest-not-level",
+            file=source,
+            quantity="levelling",
+            reason=error.finding,
+            start=rest.start,
+            end=rest.end,
+        ) from None
+    across = math.hypot(max(rest.accel_mean_sd), unknown) / gravity
+    sd = math.degrees(across / max(math.cos(math.radians(pitch)), 1e-3))
+    return Levelling(roll, pitch, sd, from_rest=True)
+
+
+def from_stated_attitude(
+    stated: tuple[float, float, float],
+    rest: RestStretch | None,
+    bias_sd: Array,
+    unknown: float,
+    gravity: float,
+) -> tuple[Levelling, Array | None]:
+    """Bias of the lowest range from gravity in a stated attitude.
+
+    Parameters
+    ----------
+    stated : (roll, pitch, sd), deg
+    rest : RestStretch, optional
+        In vehicle axes.
+    bias_sd : ndarray, (3,), m/s²
+        Stated sd of the lowest range's bias, vehicle axes.
+    unknown : float, m/s²
+        As `level_at_rest`.
+    gravity : float, m/s²
+
+    Returns
+    -------
+    levelling : Levelling
+    shift : ndarray, (3,), m/s², or None
+        What the lowest range reads at rest less what gravity gives in that attitude; None where
+        there is no rest, or where the stated bias is known better than ``g`` times the sd of
+        the attitude.
+    """
+    roll, pitch, sd = stated
+    levelling = Levelling(float(roll), float(pitch), float(sd), from_rest=False)
+    if rest is None or rest.accel_mean is None or rest.accel_mean_sd is None:
+        return levelling, None
+    known = math.hypot(gravity * math.radians(sd), unknown, max(rest.accel_mean_sd))
+    if known >= float(bias_sd.max()):
+        return levelling, None
+    return levelling, np.asarray(rest.accel_mean) - force_at_rest(roll, pitch, gravity)
+
+
+def with_gravity(
+    unit: CrashUnit,
+    data: UnitArrays,
+    levelling: tuple[float, float, float] | None,
+    gravity: float,
+) -> UnitArrays:
+    """Put gravity's part on the axes that are assumed.
+
+    Parameters
+    ----------
+    unit : CrashUnit
+        Whose triads say which axes those are.
+    data : UnitArrays
+        Its numbers, sensor axes.
+    levelling : (roll, pitch, sd), deg, optional
+        Of the vehicle at rest.
+    gravity : float, m/s²
+
+    Raises
+    ------
+    DataError
+        There is such an axis, and no levelling is stated: accelerometers along two axes do not
+        tell how a vehicle stands.
+    """
+    absent = list(unit.accelerometers[0].absent)
+    if not absent:
+        return data
+    if levelling is None:
+        missing = " and no ".join(ACCEL[k] for k in absent)
+        raise DataError(
+            "crash.no-without-three-axes-attitude",
+            file=unit.name,
+            quantity="levelling",
+            missing=missing,
+        )
+    at_rest = force_at_rest(levelling[0], levelling[1], gravity) @ unit.mounting.C_vs
+    filled = tuple(y.copy() for y in data.accelerometers)
+    for y in filled:
+        y[:, absent] = at_rest[absent]
+    return replace(data, accelerometers=filled)
+
+
+def gravity_correction(
+    rest: RestStretch, uncertainty: TriadUncertainty, unknown: float, gravity: float
+) -> tuple[float, Array] | None:
+    """What makes the specific force at rest as long as gravity.
+
+    Parameters
+    ----------
+    rest : RestStretch
+        In vehicle axes.
+    uncertainty : TriadUncertainty
+        Of the lowest range.
+    unknown : float, m/s²
+        As `level_at_rest`.
+    gravity : float, m/s²
+
+    Returns
+    -------
+    correction : float, m/s²
+        To be added along the direction.
+    direction : ndarray, (3,)
+        Of the mean specific force, vehicle axes.
+
+    Notes
+    -----
+    It takes off the bias along the vertical, and what the scale factor makes of gravity, while
+    the body does not turn. None over a steady stretch whose own acceleration is less known than
+    that bias and scale.
+    """
+    assert rest.accel_mean is not None
+    mean = np.asarray(rest.accel_mean)
+    length = float(np.linalg.norm(mean))
+    own = math.hypot(max(uncertainty.axis("bias")), gravity * max(uncertainty.axis("scale")))
+    if unknown > 0.0 and unknown >= own:
+        return None
+    return gravity - length, mean / length

@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
 from strapdown.results.rests import RestStretch
-from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
+from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad, UnitArrays
 from strapdown.sensors.range_merge import MergedRanges
 from strapdown.sensors.saturation import RangeLimits
-from strapdown.sensors.unit_checks import UnitArrays
 
 Array = NDArray[np.float64]
 

@@ -13,9 +13,9 @@ from strapdown.crash.pdof import NedPdof
 from strapdown.tables import NED
 
 if TYPE_CHECKING:
+    from strapdown.crash.delta_v_bound import VelocityChange
     from strapdown.crash.path import CrashPath
     from strapdown.crash.unit_reconstruction import UnitReconstruction
-    from strapdown.crash.velocity_change import VelocityChange
 
 __all__ = ["change_line", "path_line", "summary_table", "unit_line"]
 

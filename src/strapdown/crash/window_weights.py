@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
+import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
@@ -11,9 +14,10 @@ from strapdown.errors import ConfigError, DataError
 from strapdown.tables.checks import as_array, check_time
 from strapdown.tables.imu import SAMPLINGS
 
-Array = NDArray[np.float64]
-
 __all__ = ["resolved_weights", "window_weights"]
+
+
+Array = NDArray[np.float64]
 
 
 def window_weights(
@@ -129,3 +133,39 @@ def resolved_weights(weights: ArrayLike, q_nb: ArrayLike, sampling: str) -> Arra
     q = attitude_of_samples(q_nb, sampling, len(w))
     turned: Array = w[:, None, None] * rotation.dcm_from_quaternion(q)
     return turned
+
+
+# Sums over the unknowns of each line of an error budget.
+
+
+#: The line of what is independent from sample to sample.
+NOISE = "sensor noise"
+
+
+def by_contributor(
+    values: Array, columns: Sequence[str], contributors: Sequence[str], more: Mapping[str, Array]
+) -> pd.DataFrame:
+    """Add up what belongs to one line.
+
+    Parameters
+    ----------
+    values : ndarray, (p, k)
+        Of each unknown: variances, or products.
+    columns : sequence of str, (k,)
+    contributors : sequence of str, (p,)
+        The line that each unknown belongs to.
+    more : dict of ndarray, (k,)
+        What no unknown stands for, by line.
+
+    Returns
+    -------
+    DataFrame
+        Indexed by contributor, in the order in which they first occur.
+    """
+    lines = pd.DataFrame(values, columns=list(columns))
+    table = lines.groupby(list(contributors), sort=False).sum()
+    for name, values_of_line in more.items():
+        already = table.loc[name].to_numpy() if name in table.index else np.zeros(len(columns))
+        table.loc[name] = already + values_of_line
+    table.index.name = "contributor"
+    return table

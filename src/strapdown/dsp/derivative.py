@@ -3,19 +3,37 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.polynomial import legendre
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.dsp.fitted_weights import bandwidth, fitted_weights, slope_response
-from strapdown.dsp.local_weights import LocalWeights
 from strapdown.dsp.samples import as_channels, positive_step
 from strapdown.errors import ConfigError, DataError
 
-Array = NDArray[np.float64]
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
-__all__ = ["Derivative", "SlidingFit", "derivative", "widest_fit"]
+__all__ = [
+    "Derivative",
+    "LocalSlope",
+    "LocalWeights",
+    "SlidingFit",
+    "bandwidth",
+    "derivative",
+    "fitted_weights",
+    "local_slope",
+    "mirrored",
+    "slope_response",
+    "widest_fit",
+]
+
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,3 +211,301 @@ def derivative(values: ArrayLike, fit: SlidingFit, *, causal: bool = False) -> D
     table = np.array([fit.weights(k) for k in range(-fit.half, fit.half + 1)])
     local = LocalWeights(first, table[at - first])
     return Derivative(local.apply(channels), local.noise_factor, 0.0, np.ones(n, dtype=bool))
+
+
+# Value and slope of a polynomial fitted to a few samples, as weights of the samples.
+
+
+def fitted_weights(time: Array, at: Array, degree: int) -> tuple[Array, Array]:
+    """Weights of the value and the slope of a polynomial of least squares.
+
+    Parameters
+    ----------
+    time : ndarray, (m, w), s
+        Stamps of the samples of m windows, increasing, any spacing.
+    at : ndarray, (m,), s
+        Where each is told.
+    degree : int
+        1 to w - 1.
+
+    Returns
+    -------
+    value : ndarray, (m, w)
+    slope : ndarray, (m, w), 1/s
+
+    Notes
+    -----
+    With equal steps the filters of Savitzky and Golay (1964, doi:10.1021/ac60214a047). The basis
+    is Legendre's over the window, for which the normal equations are well conditioned.
+    """
+    middle, half = 0.5 * (time[:, -1] + time[:, 0]), 0.5 * (time[:, -1] - time[:, 0])
+    basis = legendre.legvander((time - middle[:, None]) / half[:, None], degree)
+    turned = basis.transpose(0, 2, 1)
+    coefficients = np.linalg.solve(turned @ basis, turned)
+    u = (at - middle) / half
+    value = legendre.legvander(u, degree)
+    slope = legendre.legvander(u, degree - 1) @ legendre.legder(np.eye(degree + 1))
+    return (
+        np.einsum("mk,mkw->mw", value, coefficients),
+        np.einsum("mk,mkw->mw", slope, coefficients) / half[:, None],
+    )
+
+
+def slope_response(weights: Array, offset: Array, frequency: Array) -> NDArray[np.complex128]:
+    """Output of weights of a slope per true derivative of a sine.
+
+    Parameters
+    ----------
+    weights : ndarray, (w,), 1/s
+    offset : ndarray, (w,), s
+        Of each sample from where the slope is told.
+    frequency : ndarray, (k,), Hz
+        Above zero.
+
+    Returns
+    -------
+    ndarray of complex, (k,)
+    """
+    omega = 2.0 * np.pi * frequency
+    return np.asarray(np.exp(1j * np.outer(omega, offset)) @ weights / (1j * omega))
+
+
+def bandwidth(
+    response: Callable[[Array], NDArray[np.complex128]], highest: float, parts: int, loss: float
+) -> float:
+    """Frequency below which the size of a response is off one by no more than a loss.
+
+    Parameters
+    ----------
+    response : callable
+        Of frequencies, (k,), Hz.
+    highest : float, Hz
+        Half the rate of the samples.
+    parts : int
+        Of the grid on which the first frequency beyond is looked for.
+    loss : float
+
+    Returns
+    -------
+    float, Hz
+    """
+    grid = np.linspace(0.0, highest, parts)[1:]
+    over = np.abs(1.0 - np.abs(response(grid))) > loss
+    k = int(np.argmax(over)) if over.any() else len(grid) - 1
+    low, high = (grid[k - 1] if k else 0.0), grid[k]
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        if abs(1.0 - abs(response(np.array([middle]))[0])) > loss:
+            high = middle
+        else:
+            low = middle
+    return float(low)
+
+
+# Slope of a sampled signal from a polynomial of a few neighbours, with its exact noise.
+
+
+# So many rows are solved at once: a few megabytes.
+CHUNK = 20_000
+LEAST_SAMPLES = 3
+# Enough for a polynomial of degree four; fewer have one of degree two.
+USUAL_SAMPLES = 7
+
+
+@dataclass(frozen=True, eq=False)
+class LocalSlope:
+    """Weights that make values and slopes of a signal from its samples.
+
+    Attributes
+    ----------
+    first : ndarray of int, (n,)
+        First sample of each row's window.
+    slope, value : ndarray, (n, w)
+        Weights of the samples of the window: of the slope, in 1/s, and of the value.
+    bandwidth : float, Hz
+        Frequency at which the slope in the middle of a record has fallen to 1/√2 of the true
+        one (where the signal is late: is off by as much). Its delay is zero there: the window is
+        symmetric.
+    window : float, s
+        From the first to the last sample of a window.
+    """
+
+    first: NDArray[np.int64]
+    slope: Array
+    value: Array
+    bandwidth: float
+    window: float
+
+    def slope_of(self, y: Array) -> Array:
+        """Slope of samples (n, k) at each stamp, in their unit per s."""
+        return LocalWeights(self.first, self.slope).apply(y)
+
+    def value_of(self, y: Array) -> Array:
+        """Value of the signal (n, k) where the slopes are taken."""
+        return LocalWeights(self.first, self.value).apply(y)
+
+    def weighted(self, rows: Array) -> tuple[Array, Array]:
+        """Weights of the samples in sums of slopes and of values.
+
+        Parameters
+        ----------
+        rows : ndarray, (m, n)
+            Weights of the slopes (and values) in each of m sums.
+
+        Returns
+        -------
+        slope, value : ndarray, (m, n)
+            Weights of the samples of the signal.
+        """
+        by_slope, by_value = self._matrices
+        return np.asarray(rows @ by_slope), np.asarray(rows @ by_value)
+
+    @cached_property
+    def _matrices(self) -> tuple[csr_array, csr_array]:
+        """The weights as matrices (n, n), nearly empty."""
+        from scipy.sparse import csr_array
+
+        n, width = self.slope.shape
+        columns = (self.first[:, None] + np.arange(width)).ravel()
+        starts = np.arange(0, n * width + 1, width)
+        slope = csr_array((self.slope.ravel(), columns, starts), shape=(n, n))
+        return slope, csr_array((self.value.ravel(), columns, starts), shape=(n, n))
+
+
+def local_slope(time: Array, *, window: float | None = None, delay: float = 0.0) -> LocalSlope:
+    """Weights of a polynomial fitted by least squares to each sample and its neighbours.
+
+    Parameters
+    ----------
+    time : ndarray, (n,), s
+        Increasing stamps, any spacing.
+    window : float, s, optional
+        Length of a window; seven samples if not given, and never fewer than three. The polynomial
+        is of degree four where there are seven samples or more, and of degree two otherwise.
+    delay : float, s
+        By how much the signal is late: value and slope are taken this much after each stamp.
+
+    Returns
+    -------
+    LocalSlope
+        With equal steps the filter of Savitzky and Golay. White noise s becomes
+        ``s sqrt(sum(slope²))``. Without delay the values are the samples themselves.
+
+    Notes
+    -----
+    By how much slopes are off, for steps h: those of a parabola through five samples by
+    ``17/30 h²`` times the third derivative, those of degree four through seven by ``-131/630 h⁴``
+    times the fifth. Of a pulse of 60 ms at 200 Hz that is 15 % and 1.6 %. White noise s leaves
+    0.32 and 0.51 s/h in a slope, and 0.48 and 0.59 s at each end of an integral of slopes: what a
+    change of velocity has of it.
+
+    Raises
+    ------
+    DataError
+        There are fewer than three samples.
+    ConfigError
+        The window is not positive or the delay is longer than half of it.
+    """
+    n = time.size
+    if n < LEAST_SAMPLES:
+        raise DataError(
+            "dsp.samples-too-few-derivative", quantity="time", n=n, least_samples=LEAST_SAMPLES
+        )
+    step = float(np.median(np.diff(time)))
+    if window is not None and not window > 0.0:
+        raise ConfigError("dsp.no-window", quantity="window", window=window)
+    width = USUAL_SAMPLES if window is None else 2 * max(1, round(0.5 * window / step)) + 1
+    width = min(width, n)
+    if abs(delay) > 0.5 * width * step:
+        raise ConfigError(
+            "dsp.delay-longer-than-half-window", quantity="delay", delay=delay, width=width * step
+        )
+    degree = 4 if width >= USUAL_SAMPLES else min(2, width - 1)
+    first = np.clip(np.arange(n) - width // 2, 0, n - width)
+    slope, value = np.empty((n, width)), np.empty((n, width))
+    for a in range(0, n, CHUNK):
+        rows = slice(a, min(a + CHUNK, n))
+        near = time[first[rows][:, None] + np.arange(width)]
+        value[rows], slope[rows] = fitted_weights(near, time[rows] + delay, degree)
+    if delay == 0.0:
+        value = (first[:, None] + np.arange(width) == np.arange(n)[:, None]).astype(np.float64)
+    middle = n // 2
+    at = time[first[middle] + np.arange(width)] - time[middle] - delay
+    span = float(time[min(n - 1, int(first[middle]) + width - 1)] - time[first[middle]])
+
+    def response(frequency: Array) -> NDArray[np.complex128]:
+        return slope_response(slope[middle], at, frequency)
+
+    band = bandwidth(response, 0.5 / step, 64 * width, 1.0 - math.sqrt(0.5))
+    return LocalSlope(first, slope, value, band, span)
+
+
+# Outputs that are each a weighted sum of near samples: applied, and the noise they pass.
+
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class LocalWeights:
+    """Output j is ``sum_i weights[j, i] x[first[j] + i]``.
+
+    Attributes
+    ----------
+    first : ndarray of int64, (m,)
+    weights : ndarray, (m, w)
+    """
+
+    first: Indices
+    weights: Array
+
+    @property
+    def noise_factor(self) -> Array:
+        """Standard deviation of each output per that of independent samples, (m,)."""
+        return np.asarray(np.linalg.norm(self.weights, axis=1))
+
+    def apply(self, values: Array) -> Array:
+        """Outputs of samples of shape (n, k), as (m, k)."""
+        near = values[self.first[:, None] + np.arange(self.weights.shape[1])]
+        return np.asarray(np.einsum("ji,jik->jk", self.weights, near))
+
+    def any_of(self, marked: NDArray[np.bool_], least: float = 0.01) -> NDArray[np.bool_]:
+        """Whether a marked sample counts in each output, (m, k).
+
+        Parameters
+        ----------
+        marked : ndarray of bool, (n, k)
+        least : float
+            A sample counts whose weight is more than this part of the output's largest.
+        """
+        size = np.abs(self.weights)
+        counts = size > least * size.max(axis=1, keepdims=True)
+        near = marked[self.first[:, None] + np.arange(self.weights.shape[1])]
+        return np.asarray((counts[:, :, None] & near).any(axis=1))
+
+
+def mirrored(first: Indices, weights: Array, n: int) -> LocalWeights:
+    """Weights that reach beyond a record, laid back onto its samples.
+
+    The record is continued by its point mirror about the end samples, ``x[-i] = 2 x[0] - x[i]``.
+
+    Parameters
+    ----------
+    first : ndarray of int64, (m,)
+        May be negative.
+    weights : ndarray, (m, w)
+    n : int
+        Samples of the record; `weights` reach beyond it by fewer.
+    """
+    width = weights.shape[1]
+    if first.min() >= 0 and first.max() + width <= n:
+        return LocalWeights(first, weights)
+    start = np.clip(first, 0, max(n - width, 0))
+    out = np.zeros((len(first), min(width, n)))
+    at = first[:, None] + np.arange(width)
+    rows = np.broadcast_to(np.arange(len(first))[:, None], at.shape)
+    for beyond, end in ((at < 0, 0), (at > n - 1, n - 1)):
+        np.add.at(out, (rows[beyond], 2 * end - at[beyond] - start[rows[beyond]]), -weights[beyond])
+        np.add.at(out, (rows[beyond], end - start[rows[beyond]]), 2.0 * weights[beyond])
+    inside = (at >= 0) & (at <= n - 1)
+    np.add.at(out, (rows[inside], (at - start[:, None])[inside]), weights[inside])
+    return LocalWeights(start, out)

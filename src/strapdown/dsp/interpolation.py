@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.dsp.decimation import SLACK, Flags, Resampled, in_blocks
-from strapdown.dsp.local_weights import LocalWeights
+from strapdown.dsp.derivative import LocalWeights
 from strapdown.dsp.samples import as_channels
 from strapdown.errors import DataError
 

@@ -7,19 +7,16 @@ from typing import TYPE_CHECKING
 from strapdown.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
-    from strapdown.estimation.covariances import COVARIANCES
-    from strapdown.estimation.error_filter import ErrorFilter
-    from strapdown.estimation.error_model import PHYSICAL, ErrorModel
-    from strapdown.estimation.filter_state import FilterState
-    from strapdown.estimation.influence_huber import Huber
-    from strapdown.estimation.influence_tukey import Tukey
-    from strapdown.estimation.paper_update import PaperUpdate
-    from strapdown.estimation.quaternion_model import QuaternionModel
-    from strapdown.estimation.robust_update import RobustUpdate
-    from strapdown.estimation.rotation_vector_model import RotationVectorModel
+    from strapdown.estimation.covariance import COVARIANCES, Chernodarov, UpdateRule
+    from strapdown.estimation.error_filter import ErrorFilter, FilterState
+    from strapdown.estimation.error_model import (
+        PHYSICAL,
+        ErrorModel,
+        QuaternionModel,
+        RotationVectorModel,
+    )
+    from strapdown.estimation.robust import Huber, PaperUpdate, RobustUpdate, Tukey
     from strapdown.estimation.sensor_blocks import gyro_misalignment, gyro_scale
-    from strapdown.estimation.update_rule import UpdateRule
-    from strapdown.estimation.wd import Chernodarov
 
 __all__ = [
     "COVARIANCES",
@@ -42,18 +39,10 @@ __all__ = [
 load_on_first_use(
     __name__,
     {
-        "covariances": "COVARIANCES",
-        "error_filter": "ErrorFilter",
-        "error_model": "ErrorModel PHYSICAL",
-        "filter_state": "FilterState",
-        "influence_huber": "Huber",
-        "influence_tukey": "Tukey",
-        "paper_update": "PaperUpdate",
-        "quaternion_model": "QuaternionModel",
-        "robust_update": "RobustUpdate",
-        "rotation_vector_model": "RotationVectorModel",
+        "covariance": "COVARIANCES Chernodarov UpdateRule",
+        "error_filter": "ErrorFilter FilterState",
+        "error_model": "PHYSICAL ErrorModel QuaternionModel RotationVectorModel",
+        "robust": "Huber PaperUpdate RobustUpdate Tukey",
         "sensor_blocks": "gyro_misalignment gyro_scale",
-        "update_rule": "UpdateRule",
-        "wd": "Chernodarov",
     },
 )

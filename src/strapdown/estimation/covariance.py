@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from functools import cache
+from types import ModuleType
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.estimation.update_rule import UpdateRule
+from strapdown.errors import ConfigError, DataError
 
 Array = NDArray[np.float64]
 
@@ -147,3 +150,531 @@ class CovarianceForm(ABC):
     def sd(self, state: Array) -> Array:
         """Return the standard deviation of each state, (n,)."""
         return np.sqrt(np.diagonal(self.matrix(state)))
+
+
+# How an observation changes an estimate: how far, and how much of its variance it takes off.
+
+
+class Step(NamedTuple):
+    """One scalar update: ``K = P h' / (slope s + r)``, ``x + K moved``.
+
+    The covariance becomes ``(1 - slope K h) P (1 - slope K h)' + slope r K K'``. A plain update has
+    ``moved = nu``, ``slope = 1`` and ``r = R``; one that is believed less has a larger r.
+
+    Attributes
+    ----------
+    moved : float
+        In the unit of the observation.
+    slope : float
+    r : float
+        In the unit of the observation, squared.
+    weight : float
+        For the record: 1 where the observation is believed, 0 where it is not used. With a weight
+        of 0 nothing is changed.
+    """
+
+    moved: float
+    slope: float
+    r: float
+    weight: float
+
+
+class UpdateRule(Protocol):
+    """Says what one observation does."""
+
+    def step(self, nu: float, s: float, r: float) -> Step:
+        """Return the step of one observation.
+
+        Parameters
+        ----------
+        nu : float
+            Observation less its prediction.
+        s : float
+            ``h P h'``, the variance of the prediction.
+        r : float
+            Variance of the observation.
+        """
+        ...
+
+
+class FullUpdate:
+    """Every observation is believed by its stated variance: Kalman's update."""
+
+    def step(self, nu: float, s: float, r: float) -> Step:
+        """Return the whole step, as `UpdateRule.step`."""
+        return Step(nu, 1.0, r, 1.0)
+
+
+# What a filter is told, beside what it computed.
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """Computed less observed, and how it depends on the physical errors.
+
+    Attributes
+    ----------
+    name : str
+        Of whatever observes; two receivers have two names.
+    z : ndarray, (l,)
+        Computed less observed.
+    H : ndarray, (l, p)
+        ``z = H physical + noise``: columns as `ErrorModel` has the physical errors, nine and those
+        of the sensors, in level axes.
+    R : ndarray, (l,)
+        Variances of the noise; its components are independent.
+    labels : tuple of str
+        One a component, with its unit.
+    """
+
+    name: str
+    z: Array
+    H: Array
+    R: Array
+    labels: tuple[str, ...]
+
+
+# What is asked of the matrices that a covariance form is given.
+
+
+#: How far correlations may be from symmetric, and below zero as eigenvalues, in n roundings.
+ROUNDINGS = 1e3
+
+
+def checked_covariance(P: Array) -> Array:
+    """Return a covariance as an array of its own, exactly symmetric.
+
+    Parameters
+    ----------
+    P : array_like, (n, n)
+
+    Returns
+    -------
+    ndarray, (n, n)
+
+    Raises
+    ------
+    DataError
+        P is not square, not finite, not symmetric, or not positive semidefinite.
+    """
+    P = np.array(P, dtype=np.float64, order="C")
+    if P.ndim != 2 or P.shape[0] != P.shape[1] or not P.size:
+        raise _bad("estimation.covariance-not-square", shape=str(P.shape))
+    if not np.isfinite(P).all():
+        i, j = np.argwhere(~np.isfinite(P))[0]
+        raise _bad("estimation.covariance-not-finite", value=P[i, j], i=i + 1, j=j + 1)
+    variances = np.diagonal(P)
+    if (variances < 0.0).any():
+        i = int(np.argmin(variances))
+        raise _bad("estimation.variance-negative", value=P[i, i], i=i + 1)
+    sd = np.sqrt(variances)
+    known = sd == 0.0
+    if (P[known] != 0.0).any():
+        i = int(np.flatnonzero(known & (P != 0.0).any(axis=1))[0])
+        raise _bad("estimation.covariance-without-variance", i=i + 1)
+    unit = np.where(known, 1.0, sd)
+    correlation = P / unit[:, None] / unit
+    tolerance = ROUNDINGS * len(P) * np.finfo(np.float64).eps
+    if np.abs(correlation - correlation.T).max() > tolerance:
+        i, j = np.unravel_index(np.argmax(np.abs(correlation - correlation.T)), P.shape)
+        raise _bad(
+            "estimation.covariance-not-symmetric",
+            i=i + 1,
+            j=j + 1,
+            value=P[i, j],
+            mirrored=P[j, i],
+        )
+    P = 0.5 * (P + P.T)
+    lowest = float(np.linalg.eigvalsh(0.5 * (correlation + correlation.T))[0])
+    if lowest < -tolerance:
+        raise _bad("estimation.covariance-indefinite", eigenvalue=lowest)
+    return P
+
+
+def indefinite(row: int) -> DataError:
+    """Return what to raise where a factorisation finds a covariance indefinite."""
+    return _bad("estimation.covariance-indefinite-in-row", i=row + 1)
+
+
+def _bad(code: str, **data: Any) -> DataError:
+    return DataError(code, quantity="P", **data)
+
+
+def check_prediction(state: Array, Phi: Array, Q: Array) -> None:
+    """Raise `DataError` where the shapes of a prediction do not fit."""
+    for name, given in (("Phi", Phi), ("Q", Q)):
+        if given.shape != state.shape:
+            raise DataError(
+                "estimation.shape-covariance",
+                quantity=name,
+                name=name,
+                shape=given.shape,
+                shape_2=state.shape,
+            )
+
+
+def bad_prediction(row: int, Phi: Array, Q: Array) -> DataError:
+    """Return what to raise where a predicted variance is no variance."""
+    for name, given in (("Phi", Phi), ("Q", Q)):
+        if not np.isfinite(given).all():
+            i, j = np.argwhere(~np.isfinite(given))[0]
+            return DataError(
+                "estimation.row-column",
+                quantity=name,
+                name=name,
+                given=given[i, j],
+                i=i + 1,
+                j=j + 1,
+            )
+    return DataError(
+        "estimation.predicted-variance-state-no-variance", quantity="Q", at_row=row + 1
+    )
+
+
+def check_observations(x: Array, z: Array, H: Array, R: Array) -> None:
+    """Raise `DataError` where the shapes of an epoch's observations do not fit."""
+    if H.ndim != 2 or H.shape[1] != len(x) or not H.shape[0] == len(z) == len(R):
+        raise DataError(
+            "estimation.z-shape-h-r-states",
+            quantity="H",
+            shape=z.shape,
+            shape_2=H.shape,
+            shape_3=R.shape,
+            count=len(x),
+        )
+
+
+def bad_observation(j: int, nu: float, s: float, R: Array) -> DataError:
+    """Return what to raise where observation j cannot be used."""
+    if not R[j] >= 0.0 or not np.isfinite(R[j]):
+        return DataError("estimation.variance-observation", quantity="R", j=j + 1, r=R[j])
+    which, number = (
+        ("difference from its prediction", nu) if not np.isfinite(nu) else ("expected variance", s)
+    )
+    return DataError("estimation.observation", quantity="z", which=which, number=number, j=j + 1)
+
+
+# The observations of an epoch, one after the other, under a rule that is asked at each.
+
+
+def take_by_rule(
+    expect: Callable[..., tuple[float, float]],
+    take: Callable[..., None],
+    parts: tuple[Array, Array],
+    x: Array,
+    observations: tuple[Array, Array, Array],
+    rule: UpdateRule | Sequence[UpdateRule],
+    work: Array,
+) -> Innovations:
+    """Change the parts of a covariance and x, in place, by every observation.
+
+    Parameters
+    ----------
+    expect, take : kernels
+        The two halves of a scalar step; between them the rule is asked.
+    parts : (ndarray, ndarray)
+        What the kernels keep a covariance in.
+    x : ndarray, (n,)
+    observations : (z, H, R)
+    rule : UpdateRule, or a sequence of them
+    work : ndarray
+        What `expect` leaves to `take`.
+    """
+    z, H, R = observations
+    matrix, diagonal = parts
+    told = np.empty((3, len(z)))
+    steps = [one.step for one in rule] if isinstance(rule, Sequence) else [rule.step] * len(z)
+    if len(steps) != len(z):
+        raise ConfigError(
+            "estimation.rules-observations", quantity="rule", count=len(steps), count_2=len(z)
+        )
+    for j, (r, step) in enumerate(zip(R.tolist(), steps, strict=True)):
+        nu, s = expect(matrix, diagonal, x, z, H, j, work)
+        if not (0.0 <= r < math.inf and math.isfinite(nu) and math.isfinite(s)):
+            raise bad_observation(j, nu, s, R)
+        moved, slope, used, weight = step(nu, s, r)
+        if weight != 0.0:
+            take(matrix, diagonal, x, H, j, work, s, moved, slope, used)
+        told[0, j], told[1, j], told[2, j] = nu, s + r, weight
+    return Innovations(told[0], told[1], told[2])
+
+
+def contiguous(*arrays: Array) -> list[Array]:
+    """Return arrays as the kernels want them."""
+    return [np.ascontiguousarray(a, dtype=np.float64) for a in arrays]
+
+
+def own(array: Array) -> Array:
+    """Return a copy that the kernels may change."""
+    return np.array(array, dtype=np.float64, order="C")
+
+
+# The covariance as a matrix: Joseph's update, and the plain one to compare with.
+
+
+@cache
+def _kernels() -> ModuleType:
+    from strapdown._kernels import covariance
+
+    return covariance
+
+
+@dataclass(frozen=True)
+class Plain(CovarianceForm):
+    """``P <- (1 - K h) P``, kept to show where it fails.
+
+    A difference of two matrices that may be equal to rounding: with observations much better
+    than what is known before, variances become negative.
+    """
+
+    name: ClassVar[str] = "plain"
+    summary: ClassVar[str] = "P - K h P: fast, and without defence against rounding"
+    source: ClassVar[str] = "Kalman 1960"
+    _joseph: ClassVar[bool] = False
+
+    def begin(self, P: Array) -> Array:
+        """Return the state of a covariance: itself."""
+        return checked_covariance(P)
+
+    def predict(self, state: Array, Phi: Array, Q: Array) -> Array:
+        """Return ``Phi P Phi' + Q``, exactly symmetric."""
+        state, Phi, Q = contiguous(state, Phi, Q)
+        check_prediction(state, Phi, Q)
+        out = np.empty_like(state)
+        row = _kernels().dense_predict(state, Phi, Q, out)
+        if row >= 0 and (self._joseph or not np.isfinite(out).all()):
+            raise bad_prediction(row, Phi, Q)
+        return out
+
+    def update(
+        self,
+        state: Array,
+        x: Array,
+        z: Array,
+        H: Array,
+        R: Array,
+        rule: UpdateRule | Sequence[UpdateRule] | None = None,
+    ) -> tuple[Array, Array, Innovations]:
+        """Take the observations of an epoch, one after the other; see `CovarianceForm.update`.
+
+        Raises
+        ------
+        DataError
+            Shapes that do not fit, or an observation that is not finite.
+        """
+        kernels = _kernels()
+        z, H, R = contiguous(z, H, R)
+        P, x = own(state), own(x)
+        check_observations(x, z, H, R)
+        if rule is not None:
+            take = kernels.joseph_take if self._joseph else kernels.plain_take
+            work = np.empty((3, len(x)))
+            return (
+                P,
+                x,
+                take_by_rule(kernels.dense_expect, take, (P, P[0]), x, (z, H, R), rule, work),
+            )
+        told = np.ones((3, len(z)))
+        bad = kernels.dense_update(P, x, z, H, R, self._joseph, told)
+        if bad >= 0:
+            raise bad_observation(bad, told[0, bad], told[1, bad], R)
+        return P, x, Innovations(told[0], told[1], told[2])
+
+    def matrix(self, state: Array) -> Array:
+        """Return P: the state."""
+        return state.copy()
+
+
+@dataclass(frozen=True)
+class Joseph(Plain):
+    """``P <- (1 - K h) P (1 - K h)' + r K K'``.
+
+    A sum of two matrices neither of which is negative, whatever the gain is: rounding of the gain
+    counts in second order only. It holds P itself, which costs half of the digits that U-D has.
+    """
+
+    name: ClassVar[str] = "joseph"
+    summary: ClassVar[str] = "P itself; (1 - K h) P (1 - K h)' + r K K'"
+    source: ClassVar[str] = "Bucy and Joseph 1968; as rank-one changes, Bierman 1977, Section V.4"
+    _joseph: ClassVar[bool] = True
+
+
+# The covariance as ``U D U'``: Bierman's update and Thornton's prediction.
+
+
+@cache
+def _kernels_ud() -> tuple[ModuleType, ModuleType]:
+    from strapdown._kernels import factored_update, factors
+
+    return factors, factored_update
+
+
+@dataclass(frozen=True)
+class BiermanThornton(CovarianceForm):
+    """Unit upper triangular U and diagonal D; a state holds U above its diagonal and D on it.
+
+    No variance is ever computed as a difference: D stays >= 0, and digits are kept as if by
+    square roots, without taking any.
+    """
+
+    name: ClassVar[str] = "ud"
+    summary: ClassVar[str] = "U D U', an orthogonalisation a prediction"
+    source: ClassVar[str] = "Bierman 1977, Sections V.3 (update) and VI.4 (Thornton's prediction)"
+
+    def begin(self, P: Array) -> Array:
+        """Return the factors of a covariance; see `CovarianceForm.begin`."""
+        factors, _ = _kernels_ud()
+        P = checked_covariance(P)
+        out = np.empty_like(P)
+        if (row := factors.udu_factor(P, out)) >= 0:
+            raise indefinite(row)
+        return out
+
+    def predict(self, state: Array, Phi: Array, Q: Array) -> Array:
+        """Return the factors of ``Phi P Phi' + Q``, by one weighted Gram-Schmidt.
+
+        Raises
+        ------
+        DataError
+            Shapes that do not fit; Phi or Q that is not finite; Q with a negative eigenvalue.
+        """
+        state, Phi, Q = contiguous(state, Phi, Q)
+        check_prediction(state, Phi, Q)
+        out = np.empty_like(state)
+        row = _kernels_ud()[0].udu_predict(state, Phi, Q, out)
+        if row >= 0:
+            raise bad_prediction(row, Phi, Q)
+        return out
+
+    def update(
+        self,
+        state: Array,
+        x: Array,
+        z: Array,
+        H: Array,
+        R: Array,
+        rule: UpdateRule | Sequence[UpdateRule] | None = None,
+    ) -> tuple[Array, Array, Innovations]:
+        """Take the observations of an epoch, one after the other; see `CovarianceForm.update`.
+
+        Raises
+        ------
+        DataError
+            Shapes that do not fit, or an observation that is not finite.
+        """
+        _, kernels = _kernels_ud()
+        z, H, R = contiguous(z, H, R)
+        ud, x = own(state), own(x)
+        check_observations(x, z, H, R)
+        if rule is not None:
+            expect, take = kernels.ud_expect, kernels.ud_take
+            work = np.empty((4, len(x)))
+            return ud, x, take_by_rule(expect, take, (ud, ud[0]), x, (z, H, R), rule, work)
+        told = np.ones((3, len(z)))
+        bad = kernels.ud_update(ud, x, z, H, R, told)
+        if bad >= 0:
+            raise bad_observation(bad, told[0, bad], told[1, bad], R)
+        return ud, x, Innovations(told[0], told[1], told[2])
+
+    def matrix(self, state: Array) -> Array:
+        """Return ``U D U'``."""
+        out = np.empty_like(state)
+        _kernels_ud()[0].udu_matrix(np.ascontiguousarray(state), out)
+        return out
+
+
+# The W-D form: columns are appended over an epoch, and orthogonalised once at its end.
+
+
+@cache
+def _kernels_wd() -> ModuleType:
+    from strapdown._kernels import factored_update
+
+    return factored_update
+
+
+@dataclass(frozen=True)
+class Chernodarov(BiermanThornton):
+    """``P = W D W'`` within an epoch, ``U D U'`` between epochs.
+
+    W begins as ``[Phi U, G]``; an observation deflates it and appends its gain as a column, so
+    that Joseph's form is met factor by factor. `epoch` orthogonalises once for prediction
+    and observations together, as the source does; `predict` and `update` alone do so once each.
+    """
+
+    name: ClassVar[str] = "wd"
+    summary: ClassVar[str] = "W D W', one orthogonalisation an epoch"
+    source: ClassVar[str] = "Chernodarov 2009, Eqs. (5)-(15), (14) with W deflated"
+
+    def update(
+        self,
+        state: Array,
+        x: Array,
+        z: Array,
+        H: Array,
+        R: Array,
+        rule: UpdateRule | Sequence[UpdateRule] | None = None,
+    ) -> tuple[Array, Array, Innovations]:
+        """Take the observations of an epoch, one after the other; see `CovarianceForm.update`."""
+        (state,) = contiguous(state)
+        return self._observed(state, state, state, False, x, (z, H, R), rule)
+
+    def epoch(
+        self,
+        state: Array,
+        Phi: Array,
+        Q: Array,
+        x: Array,
+        z: Array,
+        H: Array,
+        R: Array,
+        rule: UpdateRule | Sequence[UpdateRule] | None = None,
+    ) -> tuple[Array, Array, Innovations]:
+        """Predict and take the observations, with one orthogonalisation (Eqs. 6-15)."""
+        state, Phi, Q = contiguous(state, Phi, Q)
+        check_prediction(state, Phi, Q)
+        return self._observed(state, Phi, Q, True, x, (z, H, R), rule)
+
+    def _observed(
+        self,
+        state: Array,
+        Phi: Array,
+        Q: Array,
+        predicted: bool,
+        x: Array,
+        observations: tuple[Array, Array, Array],
+        rule: UpdateRule | Sequence[UpdateRule] | None,
+    ) -> tuple[Array, Array, Innovations]:
+        kernels = _kernels_wd()
+        z, H, R = contiguous(*observations)
+        x, out = own(x), np.empty_like(state)
+        check_observations(x, z, H, R)
+        if rule is None:
+            told = np.ones((3, len(z)))
+            bad = kernels.wd_epoch(state, Phi, Q, predicted, x, z, H, R, told, out)
+            if bad >= 0:
+                raise bad_observation(bad, told[0, bad], told[1, bad], R)
+            if bad < -1:
+                raise bad_prediction(-2 - bad, Phi, Q)
+            return out, x, Innovations(told[0], told[1], told[2])
+        W, d, row = kernels.wd_begin(state, Phi, Q, predicted, len(z))
+        if row >= 0:
+            raise bad_prediction(row, Phi, Q)
+        work = np.empty((3, W.shape[1]))
+        expect, take = kernels.wd_expect, kernels.wd_take
+        innovations = take_by_rule(expect, take, (W, d), x, (z, H, R), rule, work)
+        row = kernels.wd_finish(W, d, out)
+        if row >= 0:
+            raise bad_prediction(row, Phi, Q)
+        return out, x, innovations
+
+
+# The one table of covariance forms.
+
+
+COVARIANCES: dict[str, type[CovarianceForm]] = {
+    "joseph": Joseph,
+    "ud": BiermanThornton,
+    "wd": Chernodarov,
+    "plain": Plain,
+}

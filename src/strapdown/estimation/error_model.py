@@ -10,10 +10,16 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown._kernels import psi_model as kernel
+from strapdown._kernels import wander_error_states as states
+from strapdown._kernels import wander_errors as wander_errors
+from strapdown._kernels.growth import growth_arrays, growth_room, padded_width
+from strapdown._kernels.level import LEVEL
+from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import ConfigError
-from strapdown.estimation.sensor_states import SensorStates, Stacked, stack
-from strapdown.estimation.states import StateBlock, StateLayout
+from strapdown.estimation.sensor_states import SensorStates, Stacked, StateBlock, StateLayout, stack
 from strapdown.mechanization.mechanization import Mechanization
+from strapdown.mechanization.wander_azimuth import WanderAzimuth
 from strapdown.sensors.triad_errors import Triad
 
 Array = NDArray[np.float64]
@@ -141,3 +147,283 @@ def refuse_damped_height(mechanization: Mechanization) -> None:
     """
     if mechanization.height == "damped":
         raise ConfigError("estimation.error-model-no-states-loop", quantity="height")
+
+
+# Fifteen states: displacement, velocity, rotation vector, and the biases of the sensors.
+
+
+AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class RotationVectorModel(ErrorModel):
+    """Errors as vectors relative to the Earth: the psi-angle model, in level axes.
+
+    Its nine core states are the physical errors themselves, whatever mechanization they are of:
+    those of `mechanization.state_error.state_error`. With gyro and accelerometer biases it has 15
+    states. Regular everywhere, the poles included, where the mechanization is.
+
+    To first order in the errors; over a step of attitude and force by their means.
+
+    Attributes
+    ----------
+    gyro_noise, accel_noise, sensors
+        As `ErrorModel`.
+    """
+
+    name: ClassVar[str] = "rotation_vector"
+    summary: ClassVar[str] = "15 states: displacement, velocity, rotation vector, biases"
+    source: ClassVar[str] = "Benson (1975), psi-angle"
+    states_are_physical: ClassVar[bool] = True
+    core: ClassVar[tuple[StateBlock, ...]] = (
+        StateBlock("displacement", AXES, "m"),
+        StateBlock("velocity", AXES, "m/s"),
+        StateBlock("rotation", AXES, "rad"),
+    )
+
+    def transition(self, segment: Segment, step: float) -> tuple[Array, Array]:
+        """Return how errors go over a segment, as `ErrorModel.transition`.
+
+        Raises
+        ------
+        ConfigError
+            The height of the mechanization is damped: its loop has states of its own.
+        """
+        used = segment.mechanization
+        refuse_damped_height(used)
+        n = self.layout.size
+        phi, q = np.empty((n, n)), np.empty((n, n))
+        sensors = self.stacked
+        kernel.psi_transitions(
+            used.levels(segment.history),
+            segment.increments,
+            used.level_up,
+            step,
+            sensors.gyro_terms,
+            sensors.accel_terms,
+            sensors.decay,
+            sensors.drive,
+            np.array(self.gyro_noise),
+            np.array(self.accel_noise),
+            used.height == "held",
+            find_ellipsoid(used.ellipsoid).parameters(),
+            phi,
+            q,
+            np.empty((PHYSICAL, padded_width(n))),
+            np.empty((n, n)),
+            np.empty((n, n)),
+            growth_arrays(n),
+            growth_room(n),
+            np.empty((n, n)),
+            np.empty((6, 3)),
+        )
+        return phi, q
+
+    def to_physical(self, mechanization: Mechanization, time: float, row: Array) -> Array:
+        """Return the identity: the states are the physical errors."""
+        return np.eye(self.layout.size)
+
+    def from_physical(self, mechanization: Mechanization, time: float, row: Array) -> Array:
+        """Return the identity."""
+        return np.eye(self.layout.size)
+
+
+# Seventeen states: velocity in a wander azimuth, two quaternions, biases of the sensors.
+
+
+COMPONENTS = ("w", "x", "y", "z")
+#: Number of states before those of the sensors.
+STATES = states.STATES
+
+
+@dataclass(frozen=True)
+class QuaternionModel(ErrorModel):
+    """Errors of what a wander-azimuth mechanization reckons, component by component.
+
+    The states of Chernodarov (2009), (3): the errors of the three components of velocity in the
+    axes xi, eta, zeta, of the four of the quaternion body to inertial, and of the four of the
+    quaternion level to Earth; with gyro and accelerometer biases 17. ``A = dF/dY`` of (1), (2),
+    (4), with the standard skew-symmetric matrix in (1), whose print is not. There is no state of
+    the height: with a height that is held the vertical velocity has no error; with a free one it
+    has, and what gravity gives away with height is left out.
+
+    Three directions are nothing physical: the norms of the two quaternions, and a turn of the level
+    axes about zeta together with the velocity's components. `from_physical` gives them zero, and
+    they stay zero: norms are kept by the equations, and at the end of every segment the level axes
+    of the truth are taken to be those without a turn about zeta.
+
+    Inertial axes are those of the Earth at time zero. To first order in the errors; over a step of
+    attitude and force by their means. Regular at the poles.
+
+    Attributes
+    ----------
+    gyro_noise, accel_noise, sensors
+        As `ErrorModel`.
+    """
+
+    name: ClassVar[str] = "quaternions"
+    summary: ClassVar[str] = (
+        "17 states: velocity and two quaternions by components, biases; none of the height, which "
+        "no aid corrects"
+    )
+    source: ClassVar[str] = "Chernodarov (2009) (3)"
+    has_height: ClassVar[bool] = False
+    core: ClassVar[tuple[StateBlock, ...]] = (
+        StateBlock("velocity", ("xi", "eta", "zeta"), "m/s"),
+        StateBlock("q_ib", COMPONENTS, "1"),
+        StateBlock("q_ew", COMPONENTS, "1"),
+    )
+
+    def transition(self, segment: Segment, step: float) -> tuple[Array, Array]:
+        """Return how errors go over a segment, as `ErrorModel.transition`.
+
+        Parameters
+        ----------
+        segment : Segment
+            Of a `WanderAzimuth`; its times are those of one clock throughout a run.
+        step : float, s
+
+        Raises
+        ------
+        ConfigError
+            The mechanization has no wander azimuth, or damps its height by a loop that has states
+            of its own.
+        """
+        used = _checked(segment.mechanization)
+        k = self.layout.size - STATES
+        n = PHYSICAL + k
+        levels = used.levels(segment.history)
+        phi, q = np.empty((n, n)), np.empty((n, n))
+        sensors = self.stacked
+        earth = find_ellipsoid(used.ellipsoid).parameters()
+        wander_errors.wander_transitions(
+            levels,
+            segment.increments,
+            step,
+            sensors.gyro_terms,
+            sensors.accel_terms,
+            sensors.decay,
+            sensors.drive,
+            np.array(self.gyro_noise),
+            np.array(self.accel_noise),
+            used.height == "held",
+            earth,
+            phi,
+            q,
+            np.empty((PHYSICAL, padded_width(n))),
+            np.empty((n, n)),
+            np.empty((n, n)),
+            growth_arrays(n),
+            growth_room(n),
+            np.empty((n, n)),
+            np.empty((15, 3)),
+            np.empty(LEVEL),
+        )
+        end = levels[-1]
+        states.fix_gauge(end, phi)
+        states.fix_gauge(end, q)
+        states.fix_gauge(end, q.T)
+        _, back = _columns(used, segment.time[0], segment.history[0])
+        forth, _ = _columns(used, segment.time[-1], segment.history[-1])
+        core = forth[:, :PHYSICAL]
+        Phi, Q = np.zeros((2, n + 2, n + 2))
+        Phi[:STATES, :STATES] = (
+            core @ phi[:PHYSICAL, :PHYSICAL] @ back[:PHYSICAL]
+            + forth[:, PHYSICAL:] @ back[PHYSICAL:]
+        )
+        Phi[:STATES, STATES:] = core @ phi[:PHYSICAL, PHYSICAL:]
+        Phi[STATES:, STATES:] = phi[PHYSICAL:, PHYSICAL:]
+        of_core = core @ q[:PHYSICAL, :PHYSICAL] @ core.T
+        Q[:STATES, :STATES] = 0.5 * (of_core + of_core.T)
+        Q[:STATES, STATES:] = core @ q[:PHYSICAL, PHYSICAL:]
+        Q[STATES:, :STATES] = Q[:STATES, STATES:].T
+        Q[STATES:, STATES:] = q[PHYSICAL:, PHYSICAL:]
+        return Phi, Q
+
+    def to_physical(self, mechanization: Mechanization, time: float, row: Array) -> Array:
+        """Return T, as `ErrorModel.to_physical`: its row of the vertical displacement is zero."""
+        used = _checked(mechanization)
+        core = np.empty((PHYSICAL, PHYSICAL))
+        earth = find_ellipsoid(used.ellipsoid).parameters()
+        states.physical_of_variables(used.levels(row[None])[0], earth, core)
+        _, back = _columns(used, time, row)
+        k = self.layout.size - STATES
+        out = np.zeros((PHYSICAL + k, STATES + k))
+        out[:PHYSICAL, :STATES] = core @ back[:PHYSICAL]
+        out[PHYSICAL:, STATES:] = np.eye(k)
+        return out
+
+    def from_physical(self, mechanization: Mechanization, time: float, row: Array) -> Array:
+        """Return E, as `ErrorModel.from_physical`: a vertical displacement is lost.
+
+        With a height that is held a vertical velocity is lost, too.
+        """
+        used = _checked(mechanization)
+        core = np.empty((PHYSICAL, PHYSICAL))
+        earth = find_ellipsoid(used.ellipsoid).parameters()
+        held = used.height == "held"
+        states.variables_of_physical(used.levels(row[None])[0], earth, held, core)
+        forth, _ = _columns(used, time, row)
+        k = self.layout.size - STATES
+        out = np.zeros((STATES + k, PHYSICAL + k))
+        out[:STATES, :PHYSICAL] = forth[:, :PHYSICAL] @ core
+        out[STATES:, PHYSICAL:] = np.eye(k)
+        return out
+
+    def null_directions(self, mechanization: Mechanization, time: float, row: Array) -> Array:
+        """Return what is nothing physical.
+
+        Parameters
+        ----------
+        mechanization : Mechanization
+        time : float, s
+        row : ndarray, (12,)
+
+        Returns
+        -------
+        ndarray, (3, n)
+            Twice the norm of ``q_ib`` and of ``q_ew`` by 1, and a turn of the level axes about
+            zeta by 1 rad.
+        """
+        used = _checked(mechanization)
+        forth, _ = _columns(used, time, row)
+        turn = np.zeros(PHYSICAL)
+        turn[wander_errors.THETA + 2] = 1.0
+        states.turn_gauge(
+            used.levels(row[None])[0], 1.0, turn[wander_errors.DV : wander_errors.DV + 3]
+        )
+        out = np.zeros((3, self.layout.size))
+        out[:2, :STATES] = forth[:, PHYSICAL:].T
+        out[2, :STATES] = forth[:, :PHYSICAL] @ turn
+        return out
+
+
+def _columns(used: Mechanization, time: float, row: Array) -> tuple[Array, Array]:
+    """States of the variables of the kernel and of the two norms, and the inverse."""
+    forth, back = np.empty((2, STATES, STATES))
+    turn = find_ellipsoid(used.ellipsoid).rotation_rate * time
+    states.component_columns(row, turn, forth)
+    states.invert_columns(forth, back)
+    return forth, back
+
+
+def _checked(mechanization: Mechanization) -> Mechanization:
+    if not isinstance(mechanization, WanderAzimuth):
+        raise ConfigError(
+            "estimation.error-model-wander-azimuth-none",
+            quantity="mechanization",
+            name=QuaternionModel.name,
+            name_2=mechanization.name,
+            name_3=WanderAzimuth.name,
+        )
+    refuse_damped_height(mechanization)
+    return mechanization
+
+
+# The one table of error models.
+
+
+ERROR_MODELS: dict[str, type[ErrorModel]] = {
+    "rotation_vector": RotationVectorModel,
+    "quaternions": QuaternionModel,
+}

@@ -9,21 +9,23 @@ that they multiply are the measured ones. What only measurements see (`lever_arm
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from strapdown.errors import ConfigError
-from strapdown.estimation.sensor_states import COUPLING, SensorStates
-from strapdown.estimation.states import StateBlock
-from strapdown.sensors.triad_errors import TriadLike
+from strapdown.estimation.sensor_states import COUPLING, SensorStates, StateBlock
+from strapdown.sensors.triad_errors import Triad, TriadLike, triad_of
+from strapdown.sensors.uncertainty import BiasDrift, ImuUncertainty, TriadUncertainty
 from strapdown.tables.checks import is_number
 
 __all__ = [
     "ERRORS_OF_SENSORS",
+    "STATED_STATES",
+    "StateProcess",
     "accel_bias",
     "accel_drift",
     "accel_misalignment",
@@ -37,9 +39,16 @@ __all__ = [
     "lever_arm",
     "mounting",
     "random_walk",
+    "resting_sd",
+    "resting_states",
+    "standard_states",
+    "stated_states",
+    "states_that_are_stated",
     "time_offset",
     "unseen",
+    "with_processes",
 ]
+
 
 Array = NDArray[np.float64]
 
@@ -324,3 +333,357 @@ def _as_many(given: Any, k: int, name: str) -> Array:
     ):
         raise ConfigError("estimation.sd-out-of-range", quantity=name, sd=str(given), count=k)
     return np.array([float(x) for x in numbers])
+
+
+# What the sensors of a body at rest may be off by, as states of a filter.
+
+
+def resting_sd(sensors: ImuUncertainty, rate: ArrayLike, force: ArrayLike) -> tuple[Array, Array]:
+    """Return what gyros and accelerometers may read too much while rate and force stay the same.
+
+    Scale factors, misalignments and g-sensitivities are then a part of the bias: no rest can tell
+    them from it.
+
+    Parameters
+    ----------
+    sensors : ImuUncertainty
+    rate : array_like, (3,), rad/s
+        Mean rate in body axes.
+    force : array_like, (3,), m/s²
+        Mean specific force in body axes.
+
+    Returns
+    -------
+    gyro, accel : ndarray, (3,), rad/s and m/s²
+        Standard deviations.
+    """
+    w, f = np.asarray(rate, dtype=np.float64), np.asarray(force, dtype=np.float64)
+    sensitivity = np.asarray(sensors.gyro.axis("g_sensitivity")) * math.sqrt(float(f @ f))
+    gyro = _resting(sensors.gyro, sensors.gyro_drift, w)
+    accel = _resting(sensors.accel, sensors.accel_drift, f)
+    return np.sqrt(gyro + sensitivity**2), np.sqrt(accel)
+
+
+def resting_states(
+    sensors: ImuUncertainty, rate: ArrayLike, force: ArrayLike
+) -> tuple[SensorStates, SensorStates]:
+    """Return the biases of a body that stays as it stands, as states.
+
+    Parameters
+    ----------
+    sensors, rate, force
+        As `resting_sd`.
+
+    Returns
+    -------
+    gyro_bias, accel_bias : SensorStates
+        Random walks: over a time that is short beside its correlation time a Gauss-Markov process
+        of deviation s is one, with the drive ``s sqrt(2 / correlation time)``.
+    """
+    gyro, accel = resting_sd(sensors, rate, force)
+    return (
+        random_walk(gyro_bias(tuple(gyro)), _walk(sensors.gyro_drift)),
+        random_walk(accel_bias(tuple(accel)), _walk(sensors.accel_drift)),
+    )
+
+
+def _resting(triad: TriadUncertainty, drift: BiasDrift, value: Array) -> Array:
+    """Variance of each axis."""
+    constant = np.square(triad.axis("bias")) + np.square(drift.triad)
+    return np.asarray(constant + triad.variance_by_input(value))
+
+
+def _walk(drift: BiasDrift) -> tuple[float, float, float]:
+    part = 0.0 if math.isinf(drift.correlation_time) else math.sqrt(2.0 / drift.correlation_time)
+    x, y, z = drift.triad
+    return (part * x, part * y, part * z)
+
+
+# Errors of sensors as states by their names, with the sizes that a data sheet states.
+
+
+#: By name of the block: triad, attribute of its uncertainty, what makes the block of it, and the
+#: key of [sensors.gyro] or [sensors.accel] that states it.
+STATED_STATES: dict[str, tuple[str, str, Callable[..., SensorStates], str]] = {
+    "gyro_bias": ("gyro", "bias", gyro_bias, "bias_sd_deg_per_h"),
+    "accel_bias": ("accel", "bias", accel_bias, "bias_sd_ug"),
+    "gyro_drift": ("gyro", "drift", gyro_drift, "bias_instability_deg_per_h, correlation_time_s"),
+    "accel_drift": ("accel", "drift", accel_drift, "bias_instability_ug, correlation_time_s"),
+    "gyro_scale": ("gyro", "scale", gyro_scale, "scale_sd_ppm"),
+    "accel_scale": ("accel", "scale", accel_scale, "scale_sd_ppm"),
+    "gyro_misalignment": ("gyro", "misalignment", gyro_misalignment, "misalignment_sd_mrad"),
+    "accel_misalignment": ("accel", "misalignment", accel_misalignment, "misalignment_sd_mrad"),
+    "g_sensitivity": ("gyro", "g_sensitivity", g_sensitivity, "g_sensitivity_sd_deg_per_h_per_g"),
+}
+
+
+#: Errors that go with rate and force: nothing at rest, and most of all on the move.
+MOVING = ("gyro_scale", "accel_scale", "gyro_misalignment", "accel_misalignment")
+
+
+def stated_states(
+    sensors: ImuUncertainty, names: Sequence[str] | None = None
+) -> tuple[SensorStates, ...]:
+    """Return errors of sensors as states.
+
+    Parameters
+    ----------
+    sensors : ImuUncertainty
+        How large each may be.
+    names : sequence of str, optional
+        Of `STATED_STATES`; if not given, biases and drifts as `standard_states`, and of scale
+        factors and misalignments those whose size is stated: without them the bounds of a body that
+        turns and accelerates are too narrow. A bias that is named without its drift is a random
+        walk that bounds both.
+
+    Returns
+    -------
+    tuple of SensorStates
+
+    Raises
+    ------
+    ConfigError
+        There is no such block, one is named twice, or nothing states its size.
+    """
+    if names is None:
+        known = [n for n in MOVING if any(_size(n, sensors))]
+        return (*standard_states(sensors), *(_block(n, sensors, {}, known) for n in known))
+    bounds = {one.block.name: one for one in standard_states(sensors, separate=False)}
+    out = []
+    for name in names:
+        if name not in STATED_STATES:
+            raise ConfigError(
+                "estimation.no-error-sensor-filter-can",
+                quantity="states",
+                name=name,
+                word=name,
+                known=STATED_STATES,
+            )
+        if list(names).count(name) > 1:
+            raise ConfigError("estimation.stands-twice", quantity="states", name=name)
+        out.append(_block(name, sensors, bounds, names))
+    return tuple(out)
+
+
+def states_that_are_stated(sensors: ImuUncertainty) -> tuple[str, ...]:
+    """Return those of `STATED_STATES` whose size is stated: all that can be estimated.
+
+    Parameters
+    ----------
+    sensors : ImuUncertainty
+
+    Returns
+    -------
+    tuple of str
+    """
+    return tuple(
+        name
+        for name, (triad, attribute, _, _) in STATED_STATES.items()
+        if any(_size(name, sensors))
+        and (
+            attribute != "drift"
+            or math.isfinite(getattr(sensors, f"{triad}_drift").correlation_time)
+        )
+    )
+
+
+def _block(
+    name: str, sensors: ImuUncertainty, bounds: dict[str, SensorStates], names: Sequence[str]
+) -> SensorStates:
+    triad, attribute, make, keys = STATED_STATES[name]
+    if attribute == "bias" and f"{triad}_drift" not in names:
+        return bounds[name]
+    drift, sd = getattr(sensors, f"{triad}_drift"), _size(name, sensors)
+    if not any(sd):
+        raise ConfigError(
+            "estimation.nothing-states-how-large-may-2",
+            quantity="states",
+            name=name,
+            keys=keys,
+            triad=triad,
+        )
+    if attribute != "drift":
+        return make(sd)
+    if math.isinf(drift.correlation_time):
+        raise ConfigError(
+            "estimation.nothing-states-over-time-changes-2",
+            quantity="states",
+            name=name,
+            triad=triad,
+        )
+    return make(sd, drift.correlation_time)
+
+
+def _size(name: str, sensors: ImuUncertainty) -> Triad:
+    """Standard deviation of a block, axis by axis."""
+    triad, attribute, _, _ = STATED_STATES[name]
+    if attribute == "drift":
+        drift: BiasDrift = getattr(sensors, f"{triad}_drift")
+        return drift.triad
+    stated: TriadUncertainty = getattr(sensors, triad)
+    return stated.axis(attribute)
+
+
+# The biases of a sensor as states, of what its data sheet leaves unknown.
+
+
+def standard_states(sensors: ImuUncertainty, *, separate: bool = True) -> tuple[SensorStates, ...]:
+    """Return the biases of gyros and accelerometers as states.
+
+    A bias is a constant of the record and a Gauss-Markov process within it, which is more than
+    three states can hold: their sum is not Markov.
+
+    Parameters
+    ----------
+    sensors : ImuUncertainty
+    separate : bool
+        True: the two as they are, ``gyro_bias gyro_drift accel_bias accel_drift``, twelve states
+        where both triads drift (a triad that does not has no drift block). False: their sum as a
+        random walk, ``gyro_bias accel_bias``, six states as in the papers' models; with
+        ``sd² = bias² + 2 drift²`` and ``drive² = 2 drift² / correlation_time`` its covariance
+        over any instants exceeds the true one by a positive semidefinite matrix, and with less
+        of either it does not, so that a filter's P is a bound for what its estimates do.
+
+    Returns
+    -------
+    tuple of SensorStates
+
+    Notes
+    -----
+    Of the bound: for unit correlation time and variance, functions on [0, T] have in the space of
+    the process the norm ``(f(0)² + f(T)² + int f'² + f² dt) / 2`` and in that of the walk
+    ``f(0)²/k + int f'² dt / drive²``; a kernel exceeds another if its norm is never larger
+    (Aronszajn 1950, sec. 7), which for all f and T asks for ``k >= 2`` and ``drive² >= 2``.
+    """
+    return (
+        *_of_triad(sensors.gyro, sensors.gyro_drift, gyro_bias, gyro_drift, separate),
+        *_of_triad(sensors.accel, sensors.accel_drift, accel_bias, accel_drift, separate),
+    )
+
+
+def _of_triad(
+    constant: TriadUncertainty,
+    drift: BiasDrift,
+    bias_block: Callable[[Triad], SensorStates],
+    drift_block: Callable[[Triad, float], SensorStates],
+    separate: bool,
+) -> list[SensorStates]:
+    sd, time = constant.axis("bias"), drift.correlation_time
+    if math.isinf(time) or not any(drift.triad):
+        # A drift without end is a constant, too.
+        return [bias_block(_both(sd, drift.triad))]
+    if separate:
+        return [bias_block(sd), drift_block(drift.triad, time)]
+    root = math.sqrt(2.0)
+    twice = triad_of(root * x for x in drift.triad)
+    bound = random_walk(bias_block(_both(sd, twice)), triad_of(x / math.sqrt(time) for x in twice))
+    return [bound]
+
+
+def _both(a: Triad, b: Triad) -> Triad:
+    return triad_of(math.hypot(x, y) for x, y in zip(a, b, strict=True))
+
+
+# How an error of a sensor changes in time, as a person states it: constant, fading or walking.
+
+
+@dataclass(frozen=True)
+class StateProcess:
+    """What is stated of a block of states; what is not stays as it was.
+
+    Attributes
+    ----------
+    sd : float or triad, optional
+        At the start; of a Gauss-Markov process at every instant. SI.
+    correlation_time : float, s, optional
+        Of a stationary Gauss-Markov process.
+    walk : float or triad, unit/√s, optional
+        Of a random walk.
+
+    Raises
+    ------
+    ConfigError
+        Both a correlation time and a walk are stated.
+    """
+
+    sd: TriadLike | None = None
+    correlation_time: float | None = None
+    walk: TriadLike | None = None
+
+    def __post_init__(self) -> None:
+        if self.correlation_time is not None and self.walk is not None:
+            raise ConfigError(
+                "estimation.cannot-both-walk-come-back", quantity="states, correlation_time"
+            )
+
+    def of(self, name: str, block: SensorStates | None) -> SensorStates:
+        """Return a block with what is stated.
+
+        Parameters
+        ----------
+        name : str
+            Of `ERRORS_OF_SENSORS`.
+        block : SensorStates, optional
+            As it was; None where only this states it.
+
+        Returns
+        -------
+        SensorStates
+
+        Raises
+        ------
+        ConfigError
+            Nothing states how large it is.
+        """
+        if self.sd is not None:
+            drifts = name.endswith("_drift")
+            time = self.correlation_time
+            if (
+                drifts
+                and time is None
+                and block is not None
+                and math.isfinite(block.correlation_time)
+            ):
+                time = block.correlation_time
+            if drifts and time is None:
+                raise ConfigError(
+                    "estimation.nothing-states-over-time-changes",
+                    quantity=f"states.{name}",
+                    name=name,
+                )
+            made = ERRORS_OF_SENSORS[name]
+            new = made(self.sd, time) if drifts else made(self.sd)
+            if block is not None and not drifts:
+                new = replace(new, drive=block.drive, correlation_time=block.correlation_time)
+            block = new
+        if block is None:
+            raise ConfigError(
+                "estimation.nothing-states-how-large-may", quantity=f"states.{name}", name=name
+            )
+        if self.correlation_time is not None:
+            return gauss_markov(block, self.correlation_time)
+        return block if self.walk is None else random_walk(block, self.walk)
+
+
+def with_processes(
+    states: tuple[SensorStates, ...], processes: Mapping[str, StateProcess]
+) -> tuple[SensorStates, ...]:
+    """Return states with what is stated of some of them; those that are not there come last.
+
+    Parameters
+    ----------
+    states : tuple of SensorStates
+    processes : mapping of str to StateProcess
+        By name of a block.
+
+    Returns
+    -------
+    tuple of SensorStates
+    """
+    there = {one.block.name for one in states}
+    changed = [
+        processes[one.block.name].of(one.block.name, one) if one.block.name in processes else one
+        for one in states
+    ]
+    more = [process.of(name, None) for name, process in processes.items() if name not in there]
+    return (*changed, *more)

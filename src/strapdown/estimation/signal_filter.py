@@ -9,10 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError
-from strapdown.estimation.covariance import CovarianceForm
-from strapdown.estimation.robust_update import RobustUpdate
-from strapdown.estimation.update_rule import UpdateRule
-from strapdown.estimation.wd import Chernodarov
+from strapdown.estimation.covariance import Chernodarov, CovarianceForm, UpdateRule
+from strapdown.estimation.robust import RobustUpdate
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from strapdown.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
-    from strapdown.evaluation.dead_reckoning import dead_reckon
+    from strapdown.evaluation.position_references import dead_reckon
     from strapdown.evaluation.trajectory_differences import ROTATION_ERROR, trajectory_differences
 
 __all__ = [
@@ -19,7 +19,7 @@ __all__ = [
 load_on_first_use(
     __name__,
     {
-        "dead_reckoning": "dead_reckon",
+        "position_references": "dead_reckon",
         "trajectory_differences": "ROTATION_ERROR trajectory_differences",
     },
 )

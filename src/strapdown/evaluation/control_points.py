@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import DataError
-from strapdown.evaluation.trajectory_at import trajectory_at
+from strapdown.evaluation.trajectory_differences import trajectory_at
 from strapdown.frames import ned_from_geodetic
 from strapdown.tables import places_of
 from strapdown.tables.checks import index_of, source_of, values_of

@@ -2,32 +2,45 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from html import escape
+
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import DataError, Finding
-from strapdown.evaluation.trajectory_at import (
-    SAME_BEAT,
-    interpolation_cost,
-    same_stamps,
-    trajectory_at,
-)
-from strapdown.frames import ecef_from_geodetic, place_difference
+from strapdown.frames import ecef_from_geodetic, geodetic_from_ecef, place_difference, q_ne
 from strapdown.tables import (
     EULER,
+    GEODETIC,
+    NED,
     VELOCITY,
     check_trajectory,
+    check_trajectory_error,
     find_gaps,
     places_of,
     trajectory_error_table,
+    trajectory_table,
 )
 
-Array = NDArray[np.float64]
+__all__ = [
+    "ROTATION_ERROR",
+    "SAME_BEAT",
+    "DifferenceSummary",
+    "InterpolationCost",
+    "QuantityError",
+    "interpolation_cost",
+    "same_stamps",
+    "summarise_differences",
+    "trajectory_at",
+    "trajectory_differences",
+]
 
-__all__ = ["ROTATION_ERROR", "trajectory_differences"]
+
+Array = NDArray[np.float64]
 
 ROTATION_ERROR = ["phi_N", "phi_E", "phi_D"]
 # Trajectories that begin farther apart than this are asked whether they are of one vehicle.
@@ -212,3 +225,387 @@ def _interpolated(time: Array, reference: pd.DataFrame, ellipsoid: Ellipsoid) ->
             **costs,
         ),
     ]
+
+
+# A trajectory at instants between its rows, and what interpolation costs.
+#
+# Everything is interpolated along the axes of the Earth, so that neither the date line nor a pole
+# is a special place.
+
+
+# Stamps of one beat that were summed up and not multiplied differ by this share of a step at most;
+# interpolating so near to a row costs nothing.
+SAME_BEAT = 1e-6
+
+
+@dataclass(frozen=True)
+class InterpolationCost:
+    """What interpolating between the rows of a trajectory may cost at most.
+
+    Attributes
+    ----------
+    position_m : float, m
+    velocity_m_s : float, m/s
+    rotation_deg : float, deg
+    """
+
+    position_m: float
+    velocity_m_s: float
+    rotation_deg: float
+
+
+@dataclass(frozen=True)
+class _Nodes:
+    """Rows of a trajectory along the axes of the Earth: position, velocity, attitude."""
+
+    time: Array
+    r: Array
+    v: Array
+    q_eb: Array
+
+
+def _nodes(trajectory: pd.DataFrame, ellipsoid: Ellipsoid) -> _Nodes:
+    place = places_of(trajectory)
+    to_earth = rotation.conjugate(q_ne(place[:, 0], place[:, 1]))
+    q_nb = rotation.quaternion_from_euler(trajectory[EULER].to_numpy(dtype=np.float64))
+    return _Nodes(
+        trajectory.index.to_numpy(dtype=np.float64),
+        ecef_from_geodetic(place, ellipsoid=ellipsoid),
+        rotation.rotate(to_earth, trajectory[VELOCITY].to_numpy(dtype=np.float64)),
+        rotation.compose(to_earth, q_nb),
+    )
+
+
+def _between(
+    nodes: _Nodes, before: NDArray[np.intp], after: NDArray[np.intp], time: Array
+) -> tuple[Array, Array, Array]:
+    """Position, velocity and attitude between two rows each."""
+    h = (nodes.time[after] - nodes.time[before])[:, None]
+    s = (time[:, None] - nodes.time[before][:, None]) / h
+    r_0, r_1, v_0, v_1 = nodes.r[before], nodes.r[after], nodes.v[before], nodes.v[after]
+    r = (
+        r_0
+        + (r_1 - r_0) * (s * s * (3.0 - 2.0 * s))
+        + h * (v_0 * (s * (1.0 - s) ** 2) - v_1 * (s * s * (1.0 - s)))
+    )
+    v = v_0 + s * (v_1 - v_0)
+    q_0 = nodes.q_eb[before]
+    turn = rotation.rotation_vector_from_quaternion(
+        rotation.compose(rotation.conjugate(q_0), nodes.q_eb[after])
+    )
+    return r, v, rotation.compose(q_0, rotation.quaternion_from_rotation_vector(s * turn))
+
+
+def same_stamps(
+    stamps: Array, time: Array, share: float = 0.0
+) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Find the nearest stamp of each instant, and whether it is the same but for rounding.
+
+    Parameters
+    ----------
+    stamps : ndarray, (m,), s
+        Increasing.
+    time : ndarray, (n,), s
+    share : float
+        Share of the step around the instant that still counts as rounding.
+
+    Returns
+    -------
+    nearest : ndarray of int, (n,)
+    same : ndarray of bool, (n,)
+        Within `share`, or eight units in the last place.
+    """
+    last = len(stamps) - 1
+    right = np.clip(np.searchsorted(stamps, time), min(1, last), last)
+    left = np.maximum(right - 1, 0)
+    nearest = np.where(time - stamps[left] < stamps[right] - time, left, right)
+    slack = np.maximum(
+        8.0 * np.spacing(np.maximum(np.abs(time), np.abs(stamps[nearest]))),
+        share * (stamps[right] - stamps[left]),
+    )
+    return nearest, np.abs(time - stamps[nearest]) <= slack
+
+
+def trajectory_at(
+    trajectory: pd.DataFrame, time: ArrayLike, ellipsoid: Ellipsoid = WGS84
+) -> pd.DataFrame:
+    """Trajectory at any instants within its span.
+
+    Parameters
+    ----------
+    trajectory : DataFrame
+        A Trajectory table.
+    time : array_like, (n,), s
+        Increasing, and within the span of the table, but for a millionth of a step.
+    ellipsoid : Ellipsoid
+        To which its places refer.
+
+    Returns
+    -------
+    DataFrame
+        A Trajectory table: the rows themselves where the stamps are the same. Between two rows
+        a step of `h` apart, position is the cubic of Hermite through both positions and
+        velocities, right to ``h⁴/384`` times the largest fourth derivative; velocity changes in
+        proportion to time, right to ``h²/8`` times the largest jerk; attitude turns at a
+        constant rate relative to the Earth, right to ``h²/8`` times the largest angular
+        acceleration.
+
+    Raises
+    ------
+    DataError
+        The table is not valid, an instant lies outside of its span, or the instants do not
+        increase.
+    """
+    check_trajectory(trajectory)
+    t = np.asarray(time, dtype=np.float64)
+    stamps = trajectory.index.to_numpy(dtype=np.float64)
+    nearest, same = same_stamps(stamps, t)
+    _, beat = same_stamps(stamps, t, SAME_BEAT)
+    outside = np.flatnonzero(~beat & ~((t > stamps[0]) & (t < stamps[-1])))
+    if outside.size:
+        raise DataError(
+            "evaluation.outside-span",
+            file=trajectory.attrs.get("source"),
+            row=int(outside[0]) + 1,
+            quantity="time",
+            t=t[outside[0]],
+            stamps=stamps[0],
+            stamps_2=stamps[-1],
+        )
+    out = trajectory[[*GEODETIC, *VELOCITY, *EULER]].to_numpy(dtype=np.float64)[nearest]
+    if not same.all():
+        apart = t[~same]
+        after = np.clip(np.searchsorted(stamps, apart), 1, len(stamps) - 1)
+        used = slice(int(after.min()) - 1, int(after.max()) + 1)
+        nodes = _nodes(trajectory.iloc[used], ellipsoid)
+        after = after - used.start
+        r, v, q_eb = _between(nodes, after - 1, after, apart)
+        place = geodetic_from_ecef(r, ellipsoid=ellipsoid)
+        to_level = q_ne(place[:, 0], place[:, 1])
+        out[~same] = np.hstack(
+            [
+                place,
+                rotation.rotate(to_level, v),
+                rotation.euler_from_quaternion(rotation.compose(to_level, q_eb)),
+            ]
+        )
+    return trajectory_table(
+        t, out[:, :3], out[:, 3:6], out[:, 6:], source=trajectory.attrs.get("source")
+    )
+
+
+def interpolation_cost(
+    trajectory: pd.DataFrame, ellipsoid: Ellipsoid = WGS84
+) -> InterpolationCost | None:
+    """Judge what interpolation costs, by interpolating each row from its two neighbours.
+
+    Parameters
+    ----------
+    trajectory : DataFrame
+        A Trajectory table.
+    ellipsoid : Ellipsoid
+
+    Returns
+    -------
+    InterpolationCost or None
+        None for fewer than three rows. The misfit at a row that lies at the share `s` of the
+        double step `H` goes with ``s² (1-s)² H⁴`` for position, and with ``s (1-s) H²`` for
+        velocity and attitude; from it follows what the longer of the two steps costs in its
+        middle. The largest of all rows is given. Noise of the rows is no cost of interpolation
+        and enters undiminished, so that for a noisy trajectory this is too much.
+    """
+    if len(trajectory) < 3:
+        return None
+    nodes = _nodes(trajectory, ellipsoid)
+    middle = np.arange(1, len(nodes.time) - 1)
+    r, v, q_eb = _between(nodes, middle - 1, middle + 1, nodes.time[middle])
+    steps = np.diff(nodes.time)
+    longer = np.maximum(steps[:-1], steps[1:])
+    # s (1-s) H² is the product of the two steps.
+    share = longer**2 / (4.0 * steps[:-1] * steps[1:])
+
+    def largest(misfit: Array) -> float:
+        return float(misfit.max())
+
+    return InterpolationCost(
+        largest(np.linalg.norm(r - nodes.r[middle], axis=1) * share**2),
+        largest(np.linalg.norm(v - nodes.v[middle], axis=1) * share),
+        largest(rotation.rotation_angle(q_eb, nodes.q_eb[middle]) * share),
+    )
+
+
+# The differences of two trajectories in a few numbers.
+
+
+@dataclass(frozen=True)
+class QuantityError:
+    """Error of one quantity over time.
+
+    Attributes
+    ----------
+    quantity : str
+        A column, or what is made of several: ``horizontal`` and ``position`` (the lengths in two
+        and three dimensions), ``horizontal velocity``, ``velocity``, ``rotation`` (the angle
+        between the attitudes).
+    unit : str
+    rms : float
+        Over the instants, each with the same weight.
+    largest : float
+        Of the magnitude.
+    largest_at : float, s
+        When that is.
+    final : float
+        With its sign.
+    """
+
+    quantity: str
+    unit: str
+    rms: float
+    largest: float
+    largest_at: float
+    final: float
+
+
+@dataclass(frozen=True)
+class DifferenceSummary:
+    """Errors of a trajectory: root mean square, largest, final.
+
+    Attributes
+    ----------
+    source, reference : str or None
+        What was compared with what.
+    samples : int
+    start, end : float, s
+    errors : tuple of QuantityError
+    findings : tuple of Finding
+        What a person should know about the comparison.
+    """
+
+    source: str | None
+    reference: str | None
+    samples: int
+    start: float
+    end: float
+    errors: tuple[QuantityError, ...]
+    findings: tuple[Finding, ...]
+
+    def __getitem__(self, quantity: str) -> QuantityError:
+        """Error of one quantity.
+
+        Raises
+        ------
+        DataError
+            There is none of that name.
+        """
+        for error in self.errors:
+            if error.quantity == quantity:
+                return error
+        raise DataError(
+            "evaluation.no-error",
+            of_what=quantity,
+            word=quantity,
+            known=[e.quantity for e in self.errors],
+        )
+
+    def to_pandas(self) -> pd.DataFrame:
+        """One row a quantity: ``unit rms largest largest_at final``."""
+        return pd.DataFrame([vars(e) for e in self.errors]).set_index("quantity")
+
+    @property
+    def title(self) -> str:
+        """What was compared, over what."""
+        named = f"{self.source or 'estimate'} minus {self.reference or 'reference'}"
+        span = f"{self.start:.9g} to {self.end:.9g} s, {self.samples} instants"
+        return f"{named}, {span}"
+
+    def __str__(self) -> str:
+        lines = [self.title, f"{'':24}{'rms':>11}{'largest':>11}{'at s':>11}{'final':>11}"]
+        lines += [
+            f"{e.quantity + ' ' + e.unit:24}{e.rms:11.4g}{e.largest:11.4g}{e.largest_at:11.6g}"
+            f"{e.final:11.4g}"
+            for e in self.errors
+        ]
+        return "\n".join([*lines, *(f"note: {f}" for f in self.findings)])
+
+    def _repr_html_(self) -> str:
+        """The table for a notebook."""
+        head = "".join(f"<th>{h}</th>" for h in ("", "rms", "largest", "at s", "final"))
+        rows = "".join(
+            f"<tr><th>{escape(e.quantity)} {escape(e.unit)}</th>"
+            + "".join(
+                f"<td>{v}</td>"
+                for v in (
+                    f"{e.rms:.4g}",
+                    f"{e.largest:.4g}",
+                    f"{e.largest_at:.6g}",
+                    f"{e.final:.4g}",
+                )
+            )
+            + "</tr>"
+            for e in self.errors
+        )
+        notes = "".join(f"<div><small>{escape(str(f))}</small></div>" for f in self.findings)
+        return (
+            f"<div><div><b>{escape(self.title)}</b></div><table><thead><tr>{head}</tr></thead>"
+            f"<tbody>{rows}</tbody></table>{notes}</div>"
+        )
+
+
+def summarise_differences(differences: pd.DataFrame) -> DifferenceSummary:
+    """Root mean square, largest and final error of each component and of their lengths.
+
+    Parameters
+    ----------
+    differences : DataFrame
+        As `trajectory_differences` returns it, or any TrajectoryError table; without
+        ``phi_N phi_E phi_D`` there is no ``rotation``.
+
+    Returns
+    -------
+    DifferenceSummary
+
+    Raises
+    ------
+    DataError
+        The table is not valid, or has no rows.
+    """
+    check_trajectory_error(differences)
+    if differences.empty:
+        raise DataError("evaluation.table-no-rows", file=differences.attrs.get("source"))
+    time = differences.index.to_numpy(dtype=np.float64)
+    groups = [
+        (NED, "m", {"horizontal": NED[:2], "position": NED}),
+        (VELOCITY, "m/s", {"horizontal velocity": VELOCITY[:2], "velocity": VELOCITY}),
+        (EULER, "deg", {}),
+    ]
+    if set(ROTATION_ERROR) <= set(differences.columns):
+        groups.append((ROTATION_ERROR, "deg", {"rotation": ROTATION_ERROR}))
+    errors = []
+    for columns, unit, lengths in groups:
+        series = {c: differences[c].to_numpy(dtype=np.float64) for c in columns}
+        series |= {
+            name: np.sqrt(np.square([series[c] for c in parts]).sum(axis=0))
+            for name, parts in lengths.items()
+        }
+        errors += [_error(name, unit, values, time) for name, values in series.items()]
+    return DifferenceSummary(
+        differences.attrs.get("source"),
+        differences.attrs.get("reference"),
+        len(time),
+        float(time[0]),
+        float(time[-1]),
+        tuple(errors),
+        tuple(differences.attrs.get("findings", ())),
+    )
+
+
+def _error(name: str, unit: str, values: Array, time: Array) -> QuantityError:
+    worst = int(np.argmax(np.abs(values)))
+    return QuantityError(
+        name,
+        unit,
+        float(np.sqrt(np.mean(np.square(values)))),
+        float(abs(values[worst])),
+        float(time[worst]),
+        float(values[-1]),
+    )

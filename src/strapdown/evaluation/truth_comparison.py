@@ -11,13 +11,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
 from strapdown._kernels import geodetic as kernel
-from strapdown.dsp.chi_square import normal_quantile
+from strapdown.dsp.chi_square import chi_square_exceeded, chi_square_quantile, normal_quantile
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import DataError, Finding
-from strapdown.evaluation.nees import SHARE, bounds, normalised_squares
-from strapdown.evaluation.trajectory_at import SAME_BEAT, same_stamps, trajectory_at
-from strapdown.evaluation.trajectory_differences import trajectory_differences
+from strapdown.evaluation.trajectory_differences import (
+    SAME_BEAT,
+    same_stamps,
+    trajectory_at,
+    trajectory_differences,
+)
 from strapdown.frames import q_ne
+from strapdown.navigation.record import NavigationRecord
 from strapdown.rotation.euler_angles import euler_sd
 from strapdown.simulation.earth_motion import EarthMotion
 from strapdown.tables import (
@@ -33,11 +37,18 @@ from strapdown.tables import (
 __all__ = [
     "COMPONENTS",
     "PARTS",
+    "SHARE",
+    "SmootherConsistency",
     "TruthComparison",
+    "band_of_mean",
+    "bounds",
     "compare_with_places",
     "compare_with_truth",
+    "normalised_squares",
+    "smoother_consistency",
     "state_errors",
 ]
+
 
 Array = NDArray[np.float64]
 
@@ -351,3 +362,137 @@ def _nothing_in_common(trajectory: pd.DataFrame, span: tuple[float, float]) -> D
         span=span[0],
         span_2=span[1],
     )
+
+
+# Errors against what was claimed of them: normalised squares and their bounds.
+
+
+#: Of the bounds, where nothing else is said.
+SHARE = 0.95
+
+
+def normalised_squares(errors: Array, covariance: Array) -> Array:
+    """Return ``e' P^-1 e`` of each epoch (NEES), chi-square if P is what is claimed of e.
+
+    Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001,
+    Eq. (5.4.2-1). Each component counts in units of its own standard deviation, so that metres
+    beside radians cost no digits.
+
+    Parameters
+    ----------
+    errors : ndarray, (..., n)
+    covariance : ndarray, (..., n, n)
+
+    Returns
+    -------
+    ndarray, (...)
+
+    Raises
+    ------
+    DataError
+        A covariance is not positive definite; its first epoch is named.
+    """
+    sd = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
+    if not np.all(sd > 0.0):
+        raise _not_positive(np.argwhere(~(sd > 0.0))[0])
+    e = errors / sd
+    P = covariance / (sd[..., :, None] * sd[..., None, :])
+    try:
+        factor = np.linalg.cholesky(P)
+    except np.linalg.LinAlgError:
+        bad = np.linalg.eigvalsh(P)[..., 0] <= 0.0
+        raise _not_positive(np.argwhere(bad)[0] if bad.any() else np.zeros(1, int)) from None
+    y = np.linalg.solve(factor, e[..., None])[..., 0]
+    return np.asarray(np.sum(y * y, axis=-1))
+
+
+def bounds(freedom: int, share: float = SHARE) -> tuple[float, float]:
+    """Return the two-sided bounds within which a share of chi-square numbers is."""
+    outside = 0.5 - 0.5 * share
+    return chi_square_quantile(outside, freedom), chi_square_exceeded(outside, freedom)
+
+
+def band_of_mean(freedom: int, runs: int, share: float = SHARE) -> tuple[float, float]:
+    """Return the bounds of the mean over independent runs of a chi-square number each.
+
+    Bar-Shalom et al. (2001), Eq. (5.4.2-9): ``chi2(runs * freedom) / runs``.
+    """
+    low, high = bounds(freedom * runs, share)
+    return low / runs, high / runs
+
+
+def _not_positive(at: NDArray[np.int_]) -> DataError:
+    return DataError(
+        "evaluation.covariance-not-positive-definite", row=int(at[0]) + 1, quantity="covariance"
+    )
+
+
+# Whether a filter and its smoother can both be right.
+
+
+#: Of a difference, in the standard deviations that are expected of it.
+WITHIN = 3.0
+#: A smoother that takes less than this share off a variance has told nothing, and the difference
+#: of the variances is rounding.
+TOLD = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class SmootherConsistency:
+    """Differences of what a filter said and what its smoother says.
+
+    Attributes
+    ----------
+    columns : tuple of str
+        Components: those of a TrajectoryError table.
+    instants : ndarray of int, (9,)
+        At which the smoother told more than the filter.
+    share : ndarray, (9,)
+        Of these, where the difference is within three of its standard deviations; NaN where there
+        are none.
+    rms : ndarray, (9,)
+        Root mean square of the difference in them: about 1 where the model is right.
+    """
+
+    columns: tuple[str, ...]
+    instants: NDArray[np.int_]
+    share: Array
+    rms: Array
+
+
+def smoother_consistency(
+    forward: NavigationRecord, smoothed: NavigationRecord, ellipsoid: Ellipsoid = WGS84
+) -> SmootherConsistency:
+    """Hold the difference of two estimates against what their covariances say of it.
+
+    Where the model is right, ``x_filter - x_smoother`` has the covariance ``P_filter -
+    P_smoother`` (McReynolds, JOTA 1 (1967); Bryson and Ho, Applied Optimal Control, 1975, sec.
+    13.2), of each component a normal number, correlated over time: three standard deviations hold
+    99.7 % of them. A filter that believes a wrong model is told so by its own later observations.
+
+    Parameters
+    ----------
+    forward, smoothed : NavigationRecord
+        Of one run.
+    ellipsoid : Ellipsoid
+
+    Returns
+    -------
+    SmootherConsistency
+    """
+    columns = list(TRAJECTORY_ERROR)
+    apart = trajectory_differences(forward.trajectory, smoothed.trajectory, ellipsoid)
+    rows, marks = apart.index.to_numpy(), forward.sd.index.to_numpy()
+    # A mark is of the first row after it; one that a later mark precedes that row is not.
+    row = np.searchsorted(rows, marks - 1e-7)
+    kept = np.append(row[1:] > row[:-1], True) & (row < len(rows))
+    values = apart[columns].to_numpy()[row[kept]]
+    less = np.square(forward.sd[columns].to_numpy()[kept])
+    more = less - np.square(smoothed.sd[columns].to_numpy()[kept])
+    told = more > TOLD * less
+    z = np.where(told, values / np.sqrt(np.where(told, more, 1.0)), np.nan)
+    count = told.sum(axis=0)
+    inside = (np.abs(z) <= WITHIN).sum(axis=0)
+    squares = np.where(told, np.square(z), 0.0).sum(axis=0)
+    of = np.where(count > 0, count, np.nan)
+    return SmootherConsistency(tuple(columns), count, inside / of, np.sqrt(squares / of))

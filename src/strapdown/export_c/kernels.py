@@ -3,21 +3,13 @@
 from __future__ import annotations
 
 import ast
+import copy
 import importlib
 import inspect
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
 from strapdown._kernels.arithmetic import PACKAGE, SOURCES
-from strapdown.export_c.ranges import Env, Number, Span
-from strapdown.export_c.specialise import Specialiser
-from strapdown.export_c.syntax import (
-    Keep,
-    attach_comments,
-    loaded,
-    walk,
-    without_docstring,
-    without_unused,
-)
 
 
 @dataclass
@@ -154,3 +146,407 @@ class Kernels:
                     return other.results if other else 1
                 return 1 if value is not None else 0
         return 0
+
+
+# The kernels that one algorithm needs, with its options put in as constants.
+#
+# The kernels take their options as numbers. Here a kernel is read as a syntax tree and followed
+# from its first function: conditions that the options decide are decided, what they exclude is
+# dropped, and so are parameters and variables that are then of no use. What remains are the same
+# formulas in the same order. Nothing here knows C.
+
+
+class Specialiser:
+    """One function, with what is known of its names."""
+
+    def __init__(self, kernels: Kernels, env: Env) -> None:
+        self.kernels, self.env = kernels, env
+
+    # --- statements -----------------------------------------------------------------------
+
+    def block(self, body: list[ast.stmt]) -> list[ast.stmt]:
+        """Specialise statements, up to the first that returns."""
+        done: list[ast.stmt] = []
+        for node in body:
+            done += self.statement(node)
+            if done and isinstance(done[-1], ast.Return):
+                break
+        return done
+
+    def statement(self, node: ast.stmt) -> list[ast.stmt]:
+        """Specialise one statement: into none, one or several."""
+        if isinstance(node, ast.If):
+            return self.branch(node)
+        new: ast.stmt
+        if isinstance(node, ast.Assign) and len(node.targets) == 1:
+            new = ast.Assign([self.target(node.targets[0])], self.expression(node.value))
+            self.remember(node.targets[0])
+        elif isinstance(node, ast.AugAssign):
+            target = self.target(node.target)
+            if not isinstance(target, ast.Name | ast.Subscript):
+                raise UntranslatableError("statement outside the subset", node)
+            new = ast.AugAssign(target, node.op, self.expression(node.value))
+        elif isinstance(node, ast.Return) and node.value is not None:
+            new = ast.Return(self.expression(node.value))
+        elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
+            new = ast.Expr(self.expression(node.value))
+        elif isinstance(node, ast.For) and isinstance(node.iter, ast.Tuple):
+            return self.each(node, node.iter)
+        elif isinstance(node, ast.For):
+            new = ast.For(node.target, self.expression(node.iter), self.block(node.body), [])
+        elif isinstance(node, ast.While):
+            new = ast.While(self.expression(node.test), self.block(node.body), [])
+        else:
+            raise UntranslatableError("statement outside the subset", node)
+        return [like(new, node)]
+
+    def target(self, node: ast.expr) -> ast.expr:
+        """Specialise what a value is given to."""
+        for part in ast.walk(node):
+            if (
+                isinstance(part, ast.Name)
+                and isinstance(part.ctx, ast.Store)
+                and part.id in self.env
+            ):
+                raise UntranslatableError("an option is given another value", node)
+        return self.expression(node)
+
+    def remember(self, target: ast.expr) -> None:
+        """Note the range of a name that has one."""
+        if isinstance(target, ast.Name) and target.id in self.kernels.ranges:
+            self.env[target.id] = self.kernels.ranges[target.id]
+
+    def each(self, node: ast.For, values: ast.Tuple) -> list[ast.stmt]:
+        """Write a loop over a tuple out."""
+        if not isinstance(node.target, ast.Name):
+            raise UntranslatableError("loop over more than one name", node)
+        out: list[ast.stmt] = []
+        for value in values.elts:
+            out += self.block(
+                [Put(node.target.id, value).visit(copy.deepcopy(s)) for s in node.body]
+            )
+        return out
+
+    def branch(self, node: ast.If) -> list[ast.stmt]:
+        """Decide a condition, or follow both ways with what each of them knows."""
+        truth = self.truth(node.test)
+        if truth is not None:
+            return self.block(node.body if truth else node.orelse)
+        before = dict(self.env)
+        test = self.expression(node.test)
+        name, value = equality(node.test, self.env)
+        if name:
+            self.env[name] = (value, value)
+        body = self.block(node.body)
+        self.env = otherwise = dict(before)
+        if name:
+            otherwise[name] = without(before[name], value)
+        orelse = self.block(node.orelse)
+        # What follows is reached only by the other way.
+        self.env = otherwise if body and isinstance(body[-1], ast.Return) else before
+        return [like(ast.If(test, body, orelse), node)]
+
+    # --- expressions ----------------------------------------------------------------------
+
+    def expression(self, node: ast.expr) -> ast.expr:
+        """Put in what is known."""
+        if self.depends(node):
+            span = self.span(node)
+            if span and span[0] == span[1]:
+                return ast.copy_location(ast.Constant(span[0]), node)
+        if isinstance(node, ast.Call):
+            return self.call(node)
+        if isinstance(node, ast.IfExp):
+            truth = self.truth(node.test)
+            if truth is not None:
+                return self.expression(node.body if truth else node.orelse)
+        if isinstance(node, ast.BoolOp):
+            return self.boolean(node)
+        new = copy.copy(node)
+        for name, value in ast.iter_fields(node):
+            if isinstance(value, ast.expr):
+                setattr(new, name, self.expression(value))
+            elif isinstance(value, list):
+                setattr(
+                    new, name, [self.expression(v) if isinstance(v, ast.expr) else v for v in value]
+                )
+        return new
+
+    def boolean(self, node: ast.BoolOp) -> ast.expr:
+        """Leave out the terms that are known and do not matter."""
+        rest = [self.expression(v) for v in node.values if self.truth(v) is None]
+        return rest[0] if len(rest) == 1 else ast.copy_location(ast.BoolOp(node.op, rest), node)
+
+    def call(self, node: ast.Call) -> ast.expr:
+        """Call the function that is specialised for what is known of the arguments."""
+        if not isinstance(node.func, ast.Name) or not self.kernels.is_kernel(node.func.id):
+            return ast.copy_location(
+                ast.Call(node.func, [self.expression(a) for a in node.args], []), node
+            )
+        names = self.kernels.parameters(node.func.id)
+        arguments = dict(zip(names, node.args, strict=True))
+        known = {n: s for n, a in arguments.items() if self.depends(a) and (s := self.span(a))}
+        function = self.kernels.require(node.func.id, known)
+        values = [self.expression(arguments[n]) for n in function.parameters]
+        return ast.copy_location(ast.Call(ast.Name(function.name, ast.Load()), values, []), node)
+
+    # --- what is known --------------------------------------------------------------------
+
+    def depends(self, node: ast.expr) -> bool:
+        """Whether an option has a part in it; formulas of constants alone stay as written."""
+        return any(isinstance(p, ast.Name) and p.id in self.env for p in ast.walk(node))
+
+    def span(self, node: ast.expr) -> Span | None:
+        """Value or range of an expression, where the options or the constants tell."""
+        if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
+            return node.value, node.value
+        if isinstance(node, ast.Name):
+            return self.env.get(node.id) or self.kernels.span(node.id)
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and len(node.args) == 1:
+            kind = {"int": int, "float": float}.get(node.func.id)
+            inside = self.span(node.args[0])
+            return (kind(inside[0]), kind(inside[1])) if kind and inside else None
+        if isinstance(node, ast.BinOp):
+            a, b = self.span(node.left), self.span(node.right)
+            operation = ARITHMETIC.get(type(node.op))
+            if a and b and operation:
+                corners = [operation(p, q) for p in a for q in b]
+                return min(corners), max(corners)
+        return None
+
+    def truth(self, node: ast.expr) -> bool | None:
+        """Whether a condition holds, where the options tell."""
+        if isinstance(node, ast.BoolOp):
+            known = [self.truth(v) for v in node.values]
+            decides = isinstance(node.op, ast.Or)
+            if decides in known:
+                return decides
+            return None if None in known else not decides
+        if isinstance(node, ast.Compare) and len(node.ops) == 1 and self.depends(node):
+            a, b = self.span(node.left), self.span(node.comparators[0])
+            if a and b:
+                return COMPARISONS[type(node.ops[0])](a, b)
+        span = self.env.get(node.id) if isinstance(node, ast.Name) else None
+        return bool(span[0]) if span and span[0] == span[1] else None
+
+
+# What is known of a number before the program runs: its value, or its range.
+
+
+Number = float | int
+# A scalar is (v, v); a whole number of which only the range is known is (low, high).
+Span = tuple[Number, Number]
+Env = dict[str, Span]
+
+
+ARITHMETIC: dict[type[ast.operator], Callable[[Number, Number], Number]] = {
+    ast.Add: lambda a, b: a + b,
+    ast.Sub: lambda a, b: a - b,
+    ast.Mult: lambda a, b: a * b,
+}
+
+
+def _less(a: Span, b: Span) -> bool | None:
+    return True if a[1] < b[0] else False if a[0] >= b[1] else None
+
+
+def _equal(a: Span, b: Span) -> bool | None:
+    if a[0] == a[1] == b[0] == b[1]:
+        return True
+    return False if a[1] < b[0] or b[1] < a[0] else None
+
+
+def _not(known: bool | None) -> bool | None:
+    return None if known is None else not known
+
+
+COMPARISONS: dict[type[ast.cmpop], Callable[[Span, Span], bool | None]] = {
+    ast.Lt: _less,
+    ast.Gt: lambda a, b: _less(b, a),
+    ast.GtE: lambda a, b: _not(_less(a, b)),
+    ast.LtE: lambda a, b: _not(_less(b, a)),
+    ast.Eq: _equal,
+    ast.NotEq: lambda a, b: _not(_equal(a, b)),
+}
+
+
+def equality(test: ast.expr, env: Env) -> tuple[str, Number]:
+    """Return name and value of a condition ``name == value`` on a name of known range."""
+    if (
+        isinstance(test, ast.Compare)
+        and isinstance(test.left, ast.Name)
+        and test.left.id in env
+        and isinstance(test.ops[0], ast.Eq)
+        and isinstance(test.comparators[0], ast.Constant)
+    ):
+        value = test.comparators[0].value
+        if isinstance(value, int):
+            return test.left.id, value
+    return "", 0
+
+
+def without(span: Span, value: Number) -> Span:
+    """Leave a value at either end of a range out."""
+    low, high = span
+    return (low + (low == value), high - (high == value))
+
+
+# What is read from, and changed in, the syntax trees of kernels.
+
+
+class UntranslatableError(Exception):
+    """A kernel has left the subset of Python that can be translated."""
+
+    def __init__(self, what: str, node: ast.AST) -> None:
+        super().__init__(f"line {getattr(node, 'lineno', '?')}: {what}: {ast.unparse(node)}")
+
+
+class Put(ast.NodeTransformer):
+    """Put an expression in the place of a name."""
+
+    def __init__(self, name: str, value: ast.expr) -> None:
+        self.name, self.value = name, value
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        """Replace the name."""
+        return self.value if node.id == self.name else node
+
+
+class Keep(ast.NodeTransformer):
+    """Return some of the results alone."""
+
+    def __init__(self, keep: tuple[int, ...]) -> None:
+        self.keep = keep
+
+    def visit_Return(self, node: ast.Return) -> ast.Return:
+        """Choose from a tuple."""
+        if not isinstance(node.value, ast.Tuple):
+            raise UntranslatableError("results that cannot be chosen from", node)
+        values = [node.value.elts[i] for i in self.keep]
+        node.value = values[0] if len(values) == 1 else ast.Tuple(values, ast.Load())
+        return node
+
+
+def like(new: ast.stmt, old: ast.stmt) -> ast.stmt:
+    """Give a new statement the place and the comment of the old one."""
+    ast.copy_location(new, old)
+    new.comment = getattr(old, "comment", "")  # type: ignore[attr-defined]
+    return new
+
+
+def walk(body: Iterable[ast.AST]) -> Iterator[ast.AST]:
+    """Every node of some statements."""
+    for node in body:
+        yield from ast.walk(node)
+
+
+def loaded(body: Iterable[ast.AST]) -> set[str]:
+    """Return the names that are read; what an augmented assignment changes is read, too."""
+    names = set()
+    for node in walk(body):
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
+            names.add(node.id)
+        elif isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Name):
+            names.add(node.target.id)
+    return names
+
+
+def without_docstring(body: list[ast.stmt]) -> list[ast.stmt]:
+    """The statements of a function after its docstring."""
+    first = body[0]
+    is_doc = isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant)
+    return body[1:] if is_doc else body
+
+
+def without_unused(body: list[ast.stmt]) -> list[ast.stmt]:
+    """Drop assignments to names that nobody reads, until there are none."""
+    while True:
+        used = loaded(body)
+        shorter = _assignments_to(body, used)
+        if loaded(shorter) == used:
+            return shorter
+        body = shorter
+
+
+def _assignments_to(body: list[ast.stmt], used: set[str]) -> list[ast.stmt]:
+    out: list[ast.stmt] = []
+    for node in body:
+        if isinstance(node, ast.If | ast.For | ast.While):
+            node.body = _assignments_to(node.body, used)
+            node.orelse = _assignments_to(node.orelse, used)
+        elif isinstance(node, ast.Assign):
+            target, value = node.targets[0], node.value
+            if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
+                pairs = [
+                    (t, v)
+                    for t, v in zip(target.elts, value.elts, strict=True)
+                    if not (isinstance(t, ast.Name) and t.id not in used)
+                ]
+                if not pairs:
+                    continue
+                target.elts, value.elts = [t for t, _ in pairs], [v for _, v in pairs]
+            elif isinstance(target, ast.Name) and target.id not in used:
+                continue
+        out.append(node)
+    return out
+
+
+def attach_comments(tree: ast.Module, lines: list[str]) -> None:
+    """Note with each statement the comment lines right above it."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.stmt) and not isinstance(node, ast.FunctionDef):
+            at = node.lineno - 2
+            found: list[str] = []
+            while at >= 0 and lines[at].lstrip().startswith("# ") and "# ---" not in lines[at]:
+                found.insert(0, lines[at].strip()[2:])
+                at -= 1
+            node.comment = " ".join(found)  # type: ignore[attr-defined]
+
+
+# --- where a variable is declared ---------------------------------------------------------
+
+
+def first_uses(body: list[ast.stmt], names: set[str]) -> dict[int, set[str]]:
+    """Find for each name the innermost block that holds it all, and its first statement there."""
+    places: dict[int, set[str]] = {}
+    for name in names:
+        block = body
+        while True:
+            holding = [node for node in block if name in _names([node])]
+            first = holding[0]
+            inner = [b for b in _blocks(first) if name in _names(b)]
+            outside = isinstance(first, ast.If | ast.While) and name in _names([first.test])
+            if len(holding) > 1 or len(inner) != 1 or outside:
+                break
+            block = inner[0]
+        places.setdefault(id(first), set()).add(name)
+    return places
+
+
+def _blocks(node: ast.stmt) -> list[list[ast.stmt]]:
+    if isinstance(node, ast.If):
+        return [node.body, node.orelse]
+    return [node.body] if isinstance(node, ast.For | ast.While) else []
+
+
+def _names(body: Iterable[ast.AST]) -> set[str]:
+    return {n.id for n in walk(body) if isinstance(n, ast.Name)}
+
+
+def stored(body: Iterable[ast.AST]) -> Iterator[str]:
+    """The names that are given a value."""
+    for node in walk(body):
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            yield node.id
+
+
+def plain_name(node: ast.expr) -> str:
+    """The name that an expression is, or nothing."""
+    return node.id if isinstance(node, ast.Name) else ""
+
+
+def name_of(node: ast.expr) -> str:
+    """The name that an expression must be."""
+    if not isinstance(node, ast.Name):
+        raise UntranslatableError("a plain name is expected", node)
+    return node.id

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterable
+import textwrap
+from collections.abc import Iterable, Iterator
 
-from strapdown.export_c.expressions import BINARY, Expressions
-from strapdown.export_c.kernels import Function
-from strapdown.export_c.kinds import POINTERS, Kinds
-from strapdown.export_c.layout import TIE, comment, wrapped
-from strapdown.export_c.syntax import (
+from strapdown.export_c.kernels import (
+    Function,
+    Kernels,
     UntranslatableError,
     first_uses,
     loaded,
@@ -18,6 +17,237 @@ from strapdown.export_c.syntax import (
     stored,
     walk,
 )
+
+# From an expression of a kernel to one of C, with parentheses where C needs them.
+
+
+FUNCTIONS = {
+    **{name: name for name in ("sqrt", "sin", "cos", "atan2", "hypot", "fmod", "copysign")},
+    "abs": "fabs",
+    "max": "fmax",
+}
+BINARY: dict[type[ast.operator], tuple[str, int]] = {
+    ast.Add: ("+", 12),
+    ast.Sub: ("-", 12),
+    ast.Mult: ("*", 13),
+    ast.Div: ("/", 13),
+    ast.Mod: ("%", 13),
+}
+_COMPARE: dict[type[ast.cmpop], str] = {
+    ast.Lt: "<",
+    ast.LtE: "<=",
+    ast.Gt: ">",
+    ast.GtE: ">=",
+    ast.Eq: "==",
+    ast.NotEq: "!=",
+}
+_UNARY, _ATOM = 14, 20
+
+
+class Expressions:
+    """The expressions of one function."""
+
+    def __init__(self, kinds: Kinds, function: Function) -> None:
+        self.all, self.function = kinds, function
+        self.types = kinds.types(function)
+
+    def text(self, node: ast.expr, places: list[str] | None = None, over: int = 0) -> str:
+        """Write an expression, in parentheses where it binds more weakly than `over`."""
+        text, strength = self._text(node, places or [])
+        return f"({text})" if strength < over else text
+
+    def _text(self, node: ast.expr, places: list[str]) -> tuple[str, int]:
+        if isinstance(node, ast.Name):
+            return node.id, _ATOM
+        if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
+            return number(node.value), _ATOM
+        if isinstance(node, ast.Attribute) and node.attr == "pi":
+            return "PI", _ATOM
+        if isinstance(node, ast.Subscript):
+            self._note_size(node)
+            return f"{self.text(node.value)}[{self.text(node.slice)}]", _ATOM
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+            return f"-{self.text(node.operand, over=_UNARY)}", _UNARY
+        if isinstance(node, ast.BinOp):
+            sign, strength = BINARY[type(node.op)]
+            left = self.text(node.left, over=strength)
+            # Not regrouped: floating point is not associative.
+            return f"{left} {sign}{TIE}{self.text(node.right, over=strength + 1)}", strength
+        if isinstance(node, ast.Compare) and len(node.ops) == 1:
+            sides = [self.text(n, over=12) for n in (node.left, node.comparators[0])]
+            return f" {_COMPARE[type(node.ops[0])]}{TIE}".join(sides), 9
+        if isinstance(node, ast.BoolOp):
+            sign = f" &&{TIE}" if isinstance(node.op, ast.And) else f" ||{TIE}"
+            return sign.join(self.text(v, over=9) for v in node.values), 5
+        if isinstance(node, ast.IfExp):
+            parts = [self.text(n, over=9) for n in (node.test, node.body, node.orelse)]
+            return f"{parts[0]} ?{TIE}{parts[1]} :{TIE}{parts[2]}", 3
+        if isinstance(node, ast.Call):
+            return self.call(node, places), _ATOM
+        raise UntranslatableError("expression outside the subset", node)
+
+    def call(self, node: ast.Call, places: list[str]) -> str:
+        """Write a call of a kernel, a conversion, or a function of the math library."""
+        name = node.func.attr if isinstance(node.func, ast.Attribute) else name_of(node.func)
+        if self.all.callee(node):
+            return f"{name}({', '.join([*(self.text(a) for a in node.args), *places])})"
+        arguments = [self.text(a) for a in node.args]
+        if name in ("int", "float"):
+            inside = self.text(node.args[0], over=_UNARY)
+            return f"({'int' if name == 'int' else 'real_t'}){inside}"
+        if name not in FUNCTIONS:
+            raise UntranslatableError("function outside the subset", node)
+        macro = FUNCTIONS[name].upper()
+        if name == "max":
+            text = arguments[0]
+            for other in arguments[1:]:
+                text = f"{macro}({text}, {other})"
+            return text
+        return f"{macro}({', '.join(arguments)})"
+
+    def _note_size(self, node: ast.Subscript) -> None:
+        if name_of(node.value) == "state":
+            self.all.state_size = max(self.all.state_size, 1 + self.highest(node.slice))
+
+    def highest(self, node: ast.expr) -> int:
+        """Return the highest value that an index can have."""
+        if isinstance(node, ast.Constant) and isinstance(node.value, int):
+            return node.value
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add | ast.Mult):
+            a, b = self.highest(node.left), self.highest(node.right)
+            return a + b if isinstance(node.op, ast.Add) else a * b
+        if isinstance(node, ast.Name):
+            span = self.all.kernels.span(node.id) or self.all.kernels.ranges.get(node.id)
+            if span:
+                return int(span[1])
+            for other in walk(self.function.body):
+                if isinstance(other, ast.For) and name_of(other.target) == node.id:
+                    return self._last(other)
+                if isinstance(other, ast.Assign) and plain_name(other.targets[0]) == node.id:
+                    return self.highest(other.value)
+        raise UntranslatableError("index whose range is not known", node)
+
+    def _last(self, loop: ast.For) -> int:
+        bounds = [ast.unparse(a) for a in loop.iter.args] if isinstance(loop.iter, ast.Call) else []
+        if not all(b.isdigit() for b in bounds):
+            return 0  # up to a count, which is bound by what was written before
+        return range(*(int(b) for b in bounds))[-1]
+
+
+# What each name of the specialised kernels is in C, and the heads of the functions.
+
+
+# Results up to this number go where pointers say; more of them into one array.
+POINTERS = 4
+
+
+class Kinds:
+    """The kinds of all names in the functions that were asked of the kernels.
+
+    Attributes
+    ----------
+    state_size : int
+        Numbers of the state that the functions written so far touch.
+    """
+
+    def __init__(self, kernels: Kernels) -> None:
+        self.kernels = kernels
+        self.state_size = 0
+        self._types: dict[str, dict[str, str]] = {}
+        self._returns: dict[str, str] = {}
+        self._changed: dict[str, set[str]] = {}
+        for function in kernels.functions:  # callees stand before their callers
+            self._changed[function.name] = set(self._written(function))
+            self._type_arrays(function)
+        for function in reversed(kernels.functions):
+            self._type_arguments(function)
+
+    def types(self, function: Function) -> dict[str, str]:
+        """Return the kind of each name: 'real_t', 'int', or 'array'."""
+        return self._types.setdefault(function.name, {})
+
+    def changes(self, name: str, parameter: str) -> bool:
+        """Whether a function writes into an array that it is given."""
+        return parameter in self._changed[name]
+
+    def _written(self, function: Function) -> Iterator[str]:
+        for node in walk(function.body):
+            if isinstance(node, ast.Subscript) and isinstance(node.ctx, ast.Store):
+                yield name_of(node.value)
+            elif isinstance(node, ast.Call) and (other := self.callee(node)):
+                for parameter, argument in zip(other.parameters, node.args, strict=True):
+                    if parameter in self._changed[other.name]:
+                        yield name_of(argument)
+
+    def callee(self, node: ast.expr) -> Function | None:
+        """Return the kernel that an expression calls."""
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            return self.kernels.named(node.func.id)
+        return None
+
+    def _type_arrays(self, function: Function) -> None:
+        """Find what is an array: it has an index here, or where it is handed on to."""
+        types = self.types(function)
+        for node in walk(function.body):
+            if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name):
+                types[node.value.id] = "array"
+            elif isinstance(node, ast.Call) and (other := self.callee(node)):
+                for parameter, argument in zip(other.parameters, node.args, strict=True):
+                    if self.types(other).get(parameter) == "array":
+                        types[name_of(argument)] = "array"
+
+    def _type_arguments(self, function: Function) -> None:
+        """Find the kinds of the locals, then of the parameters of what is called."""
+        types = self.types(function)
+        for node in walk(function.body):
+            if isinstance(node, ast.For):
+                types[name_of(node.target)] = "int"
+        for node in walk(function.body):
+            if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
+                types.setdefault(node.targets[0].id, self.kind(node.value, types))
+        for node in walk(function.body):
+            other = self.callee(node) if isinstance(node, ast.expr) else None
+            if other and isinstance(node, ast.Call):
+                for parameter, argument in zip(other.parameters, node.args, strict=True):
+                    self.types(other).setdefault(parameter, self.kind(argument, types))
+            if isinstance(node, ast.Return) and node.value is not None:
+                self._returns[function.name] = self.kind(node.value, types)
+
+    def kind(self, node: ast.expr, types: dict[str, str]) -> str:
+        """Return the kind of an expression."""
+        if isinstance(node, ast.Name):
+            span = self.kernels.span(node.id)
+            return "int" if span and isinstance(span[0], int) else types.get(node.id, "real_t")
+        if isinstance(node, ast.Constant):
+            return "int" if isinstance(node.value, int) else "real_t"
+        if isinstance(node, ast.Compare | ast.BoolOp):
+            return "int"
+        if isinstance(node, ast.BinOp):
+            both = {self.kind(node.left, types), self.kind(node.right, types)}
+            return "int" if both == {"int"} and not isinstance(node.op, ast.Div) else "real_t"
+        if isinstance(node, ast.Call):
+            name = plain_name(node.func)
+            return "int" if name == "int" else self._returns.get(name, "real_t")
+        return "real_t"
+
+    def returns(self, function: Function) -> str:
+        """Return what a C function returns: one number, or nothing."""
+        return self._returns.get(function.name, "real_t") if function.results == 1 else "void"
+
+    def prototype(self, function: Function) -> str:
+        """Return the head of a function, on one line."""
+        types, arguments = self.types(function), []
+        for p in function.parameters:
+            if types.get(p) == "array":
+                const = "" if self.changes(function.name, p) else "const "
+                arguments.append(f"{const}real_t *{p}".replace(" ", TIE))
+            else:
+                arguments.append(f"{types.get(p, 'real_t')}{TIE}{p}")
+        if function.results > POINTERS:
+            arguments.append(f"real_t{TIE}out[{function.results}]")
+        elif function.results > 1:
+            arguments += [f"real_t{TIE}*out{i + 1}" for i in range(function.results)]
+        return f"static {self.returns(function)} {function.name}({', '.join(arguments)})"
 
 
 class Translator(Kinds):
@@ -167,3 +397,49 @@ class _Body(Expressions):
             names = ["out"] if many else [f"out{i + 1}" for i in range(results)]
             out = wrapped(f"{self.text(value, names)};", indent)
         return out if last else [*out, f"{indent}return;"]
+
+
+# How a comment, a statement and a number stand in the C file.
+
+
+WIDTH = 100
+
+
+def comment(text: str, indent: str = "") -> list[str]:
+    """Lines of a C comment."""
+    paragraphs = [" ".join(p.split()) for p in text.strip().split("\n\n")]
+    room = WIDTH - len(indent) - 3
+    if len(paragraphs) == 1 and len(paragraphs[0]) <= room - 3:
+        return [f"{indent}/* {paragraphs[0]} */"]
+    lines: list[str] = []
+    for paragraph in paragraphs:
+        lines += [*([""] if lines else []), *textwrap.wrap(paragraph, room)]
+    return [
+        f"{indent}/* {lines[0]}",
+        *(f"{indent} * {line}".rstrip() for line in lines[1:]),
+        f"{indent} */",
+    ]
+
+
+# A blank at which no line is broken.
+TIE = "\0"
+
+
+def wrapped(text: str, indent: str) -> list[str]:
+    """One statement, broken at blanks where it is too long."""
+    lines = textwrap.wrap(
+        text,
+        WIDTH,
+        initial_indent=indent,
+        subsequent_indent=indent + "    ",
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return [line.replace(TIE, " ") for line in lines]
+
+
+def number(value: float) -> str:
+    """A literal: whole numbers as such, others as R(...), which is of the precision chosen."""
+    if isinstance(value, int):
+        return str(int(value))
+    return f"R({value!r})"

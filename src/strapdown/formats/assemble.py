@@ -2,29 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError
+from strapdown.constants import TIME_UNITS
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.assemble_truth import truth_of_log
 from strapdown.formats.body_axes import Axes, body_axes
-from strapdown.formats.clocks import with_clock
+from strapdown.formats.clocks import RELATIVE, Clock, clock_of_name, with_clock
 from strapdown.formats.find_columns import AXES, Column, find_columns, require_gyro
+from strapdown.formats.inference import Inference
 from strapdown.formats.judge import UNITS
-from strapdown.formats.log_stamps import clock_of_log, stamps_of_log, time_reading
 from strapdown.formats.numbers import ticks_of
-from strapdown.formats.plausibility import report_absurd, report_gaps
-from strapdown.formats.recording import RawLog, ReadOptions, Recording
-from strapdown.formats.sampling import sampling_of_rates
+from strapdown.formats.recording import Origin, RawLog, ReadOptions, Recording
+from strapdown.formats.stamps import Stamps, read_stamps
 from strapdown.formats.summed import SUMS, intervals, sampling_of_sums
-from strapdown.formats.triad_units import told_by_numbers, units_of_triads
-from strapdown.formats.triad_values import values_of_triads
-from strapdown.formats.unit_words import factor_of
-from strapdown.formats.usable_rows import finite_rows
+from strapdown.formats.triad_units import told_by_numbers, units_of_triads, values_of_triads
+from strapdown.formats.unit_words import factor_of, parse_unit
 from strapdown.results.inputs import Reading
-from strapdown.tables import imu_table
+from strapdown.tables import SAMPLINGS, find_gaps, imu_table
 
-__all__ = ["assemble"]
+__all__ = [
+    "assemble",
+    "clock_of_log",
+    "finite_rows",
+    "sampling_of_rates",
+    "stamps_of_log",
+    "time_reading",
+]
+
 
 Array = NDArray[np.float64]
 
@@ -141,3 +150,327 @@ def _readings_of_triad(
             )
         )
     return readings
+
+
+# Time of a log: its unit, its stamps, and the clock that they belong to.
+
+
+def stamps_of_log(
+    raw: RawLog,
+    found: dict[str, Column],
+    ticks: NDArray[Any] | None,
+    dated: bool,
+    options: ReadOptions,
+    finite: NDArray[np.bool_],
+    said: dict[str, Inference],
+    findings: list[Finding],
+) -> Stamps:
+    """Stamps of the finite rows.
+
+    Parameters
+    ----------
+    raw : RawLog
+    found : dict of str to Column
+    ticks : ndarray or None, (n,)
+        Stamps as they stand in the file.
+    dated : bool
+        They were dates, and are ns now.
+    options : ReadOptions
+    finite : ndarray of bool, (n,)
+        From `finite_rows`.
+    said : dict of str to Inference
+        What the numbers say.
+    findings : list of Finding
+        What was concluded or repaired is added.
+
+    Raises
+    ------
+    DataError
+        There is no time, or it cannot be used.
+    ConfigError
+        The rate that was stated is none.
+    """
+    rows = np.flatnonzero(finite)
+    rate = options.rate or raw.rate
+    if options.rate is not None and not (np.isfinite(options.rate) and options.rate > 0):
+        raise ConfigError("io.rate-not-positive", quantity="--rate", rate=options.rate)
+    if ticks is None:
+        if rate is None:
+            raise DataError("io.time-column-missing", file=raw.name, quantity="time")
+        everything = np.ones(rows.size, dtype=bool)
+        why = f"no time column: {rate:g} Hz as stated"
+        return Stamps(rows / rate, "s", why, everything, Origin(0, "s"), [])
+    column = found["time"]
+    if options.rate is not None:
+        findings.append(
+            Finding(
+                "io.rate-not-used",
+                file=raw.name,
+                quantity="time",
+                severity="note",
+                rate=options.rate,
+                source=column.source,
+            )
+        )
+    unit, why = column.unit, "in its name"
+    if dated:
+        unit, why = "ns", "dates and times of ISO 8601"
+    elif options.time_unit:
+        unit, why = parse_unit(options.time_unit, "time"), "stated by --time-unit"
+    elif column.why == "stated by the file":
+        why = "stated by the file"
+    elif unit is None and "time_unit" in said and said["time_unit"].settled:
+        unit, why = str(said["time_unit"].value), str(said["time_unit"])
+        if unit != "s":
+            findings.append(
+                said["time_unit"].finding("io.time-unit-inferred", file=raw.name, quantity="time")
+            )
+    stamps = read_stamps(
+        ticks[rows],
+        unit,
+        why,
+        file=raw.name,
+        row=lambda k: raw.row(int(rows[k])),
+        repair=options.repair,
+    )
+    findings += stamps.findings
+    return stamps
+
+
+def time_reading(raw: RawLog, found: dict[str, Column], stamps: Stamps, sample: int) -> Reading:
+    """What the column of time was taken for, with its value at the first sample used."""
+    if "time" not in found:
+        return Reading("(none)", "time", "s", stamps.why, 0.0)
+    source = found["time"].source
+    value = raw.columns[source][sample]
+    first = float(value) if raw.columns[source].dtype.kind in "iufb" else str(value)
+    return Reading(source, "time", stamps.unit, f"{found['time'].why}; unit {stamps.why}", first)
+
+
+def clock_of_log(raw: RawLog, found: dict[str, Column], stamps: Stamps, dated: bool) -> Clock:
+    """What the stamps of a log count, and from when."""
+    if "time" not in found:
+        return Clock(RELATIVE)
+    origin = float(stamps.origin.stamp) * TIME_UNITS[stamps.origin.unit]
+    first = origin + float(stamps.seconds[0])
+    name = raw.clock or clock_of_name(found["time"].source, first, dated=dated)
+    return Clock(name, origin)
+
+
+# How a row of rates was sampled.
+
+
+def sampling_of_rates(raw: RawLog, options: ReadOptions, findings: list[Finding]) -> str:
+    """As stated by the user, else by the file, else at the stamps.
+
+    Parameters
+    ----------
+    raw : RawLog
+    options : ReadOptions
+    findings : list of Finding
+        What was assumed is added.
+
+    Returns
+    -------
+    {'instantaneous', 'mean'}
+
+    Raises
+    ------
+    ConfigError
+        There is no such kind.
+    """
+    asked = (options.sampling or raw.sampling or "").lower()
+    if not asked:
+        findings.append(
+            Finding(
+                "io.sampling-taken-as-instantaneous",
+                severity="note",
+                file=raw.name,
+                quantity="sampling",
+            )
+        )
+        return "instantaneous"
+    if asked not in SAMPLINGS:
+        raise ConfigError(
+            "io.sampling-unknown", quantity="--sampling", asked=asked, word=asked, known=SAMPLINGS
+        )
+    return asked
+
+
+# What in a log's numbers can hardly be, or should be known.
+
+PLAUSIBILITY_AXES = "xyz"
+
+# Beyond this no rate is one, and squares of it leave the range of doubles soon.
+IMPOSSIBLE_RATE = 1e6  # rad/s
+# Nothing that is carried, driven or flown turns like this for a twentieth of a log.
+LASTING_RATE = 20.0  # rad/s, 3 turns a second
+# No gyro in a phone, a toy, a car or an aircraft reads this; a unit that is wrong does.
+ABSURD_RATE = 100.0  # rad/s, 16 turns a second
+# Full scales that gyros are made with, deg/s. A run of equal readings at one of them was cut off.
+FULL_SCALES = (125.0, 250.0, 400.0, 450.0, 500.0, 1000.0, 2000.0, 4000.0)
+CUT_OFF_RUN = 3  # samples
+
+# A gap this long holds a motion that nothing tells of.
+LONG_GAP = 1.0  # s
+
+
+def report_gaps(name: str, time: Array, gyro: Array, findings: list[Finding]) -> None:
+    """Say where time has holes, and how much may have been turned in the longest."""
+    gaps = find_gaps(time)
+    if not gaps:
+        return
+    worst = max(gaps, key=lambda g: g.length)
+    speed = np.sqrt((gyro[worst.sample - 1 : worst.sample + 1] ** 2).sum(axis=1)).max()
+    missed = float(np.degrees(speed * worst.length))
+    findings.append(
+        Finding(
+            "io.long-gap" if worst.length >= LONG_GAP else "io.gaps",
+            file=name,
+            quantity="time",
+            severity="warning" if worst.length >= LONG_GAP else "note",
+            count=len(gaps),
+            length=worst.length,
+            start=worst.start,
+            end=worst.end,
+            usual=worst.usual,
+            missed_deg=missed,
+        )
+    )
+
+
+def report_absurd(
+    name: str, gyro: Array, row: Callable[[int], int], findings: list[Finding]
+) -> None:
+    """Say where a rate is more than can be, or is cut off at the sensor's full scale.
+
+    Raises
+    ------
+    DataError
+        A rate is beyond anything that turns.
+    """
+    largest = np.abs(gyro).max(axis=0)
+    k = int(largest.argmax())
+    if largest[k] > IMPOSSIBLE_RATE:
+        at = int(np.abs(gyro[:, k]).argmax())
+        raise DataError(
+            "io.rate-impossible",
+            file=name,
+            row=row(at),
+            quantity=f"gyro_{PLAUSIBILITY_AXES[k]}",
+            gyro=gyro[at, k],
+        )
+    lasting = float(np.quantile(np.sqrt((gyro * gyro).sum(axis=1)), 0.95))
+    if LASTING_RATE < lasting <= largest[k] <= ABSURD_RATE:
+        findings.append(
+            Finding(
+                "io.rate-absurd-for-long",
+                file=name,
+                quantity="gyro",
+                lasting=lasting,
+                lasting_2=lasting / (2 * np.pi),
+            )
+        )
+    if largest[k] > ABSURD_RATE:
+        at = int(np.abs(gyro[:, k]).argmax())
+        findings.append(
+            Finding(
+                "io.rate-absurd",
+                file=name,
+                row=row(at),
+                quantity=f"gyro_{PLAUSIBILITY_AXES[k]}",
+                gyro=gyro[at, k],
+                largest=largest[k] / (2 * np.pi),
+            )
+        )
+    for k in range(3):
+        reading = float(np.degrees(largest[k]))
+        # A 16-bit reading ends one step short of the full scale.
+        scale = next((s for s in FULL_SCALES if s * (1 - 1e-3) <= reading <= s * 1.0001), None)
+        if scale is None:
+            continue
+        full = np.abs(gyro[:, k]) == largest[k]
+        run = np.convolve(full, np.ones(CUT_OFF_RUN), mode="valid") == CUT_OFF_RUN
+        if run.any():
+            findings.append(
+                Finding(
+                    "io.rate-at-full-scale",
+                    file=name,
+                    row=row(int(run.argmax())),
+                    quantity=f"gyro_{PLAUSIBILITY_AXES[k]}",
+                    full=int(full.sum()),
+                    reading=reading,
+                )
+            )
+
+
+# Rows of a log in which every value that is used is a number.
+
+
+def finite_rows(
+    raw: RawLog,
+    found: dict[str, Column],
+    ticks: NDArray[Any] | None,
+    values: dict[str, Array],
+    options: ReadOptions,
+    findings: list[Finding],
+) -> NDArray[np.bool_]:
+    """Rows in which every value that is used is a number.
+
+    Parameters
+    ----------
+    raw : RawLog
+    found : dict of str to Column
+    ticks : ndarray or None, (n,)
+        Stamps as they stand in the file.
+    values : dict of str to ndarray, (n, 3)
+        Of the triads that are used.
+    options : ReadOptions
+        Whether rows may be left out.
+    findings : list of Finding
+        How many are left out is added.
+
+    Returns
+    -------
+    ndarray of bool, (n,)
+
+    Raises
+    ------
+    DataError
+        A row cannot be used and may not be left out, or none is left.
+    """
+    blocks = dict(values)
+    if ticks is not None:
+        blocks = {"time": ticks[:, None].astype(np.float64)} | blocks
+    keep = np.ones(len(values["gyro"]), dtype=bool)
+    for name, block in blocks.items():
+        bad = ~np.isfinite(block)
+        if not bad.any():
+            continue
+        row, column = (int(i) for i in np.argwhere(bad)[0])
+        quantity = name if name == "time" else f"{name}_{AXES[column]}"
+        count = int(bad.any(axis=1).sum())
+        if not options.repair:
+            raise DataError(
+                "io.not-finite-in-rows",
+                file=raw.name,
+                row=raw.row(row),
+                quantity=quantity,
+                block=block[row, column],
+                source=found[quantity].source,
+                count=count,
+            )
+        findings.append(
+            Finding(
+                "io.rows-without-number-left-out",
+                file=raw.name,
+                row=raw.row(row),
+                quantity=quantity,
+                severity="note",
+                count=count,
+            )
+        )
+        keep &= ~bad.any(axis=1)
+    if not keep.any():
+        raise DataError("io.no-usable-row", file=raw.name)
+    return keep

@@ -8,9 +8,14 @@ from pathlib import Path
 from strapdown.errors import DataError, Finding
 from strapdown.formats.crash_record import CrashRecord
 from strapdown.formats.crash_text import LONGEST_NAME, clean, unique
-from strapdown.formats.mme_channel import channel_of, is_bad
-from strapdown.formats.mme_file import MmeFile, read_mme_file
-from strapdown.formats.mme_text import MmeHeader, read_header
+from strapdown.formats.mme_file import (
+    MmeFile,
+    MmeHeader,
+    channel_of,
+    is_bad,
+    read_header,
+    read_mme_file,
+)
 
 __all__ = ["detect", "read"]
 

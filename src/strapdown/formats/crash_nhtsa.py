@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.formats.crash_text import LONGEST_NAME, clean
-from strapdown.formats.nhtsa import CrashTest, Vehicle, header_of, read_nhtsa
-from strapdown.formats.nhtsa_channel import UNITS, Channel
+from strapdown.formats.nhtsa import UNITS, Channel, CrashTest, Vehicle, header_of, read_nhtsa
 
 Array = NDArray[np.float64]
 

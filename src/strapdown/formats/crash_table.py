@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import csv as quoting
+import io
+import json
+import re
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -11,21 +15,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
-from strapdown.formats.crash_names import ChannelName, read_channel_name
-from strapdown.formats.crash_preamble import read_text_table
+from strapdown.formats import csv
+from strapdown.formats.columns import INDEXED, TRIADS, read_name
+from strapdown.formats.crash_attributes import attributes_of, check_attributes
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.formats.crash_stamps import Clock, seconds_of
 from strapdown.formats.crash_text import LONGEST_NAME, clean, unique
-from strapdown.formats.crash_units import factor_of
+from strapdown.formats.crash_units import factor_of, unit_of
 from strapdown.formats.crash_velocity import ONE_STEP
+from strapdown.formats.day_time import day_nanoseconds
 from strapdown.formats.find_columns import Column
 from strapdown.formats.numbers import numbers, ticks_of
 from strapdown.formats.recording import RawLog
 
+__all__ = [
+    "NOTE",
+    "ChannelName",
+    "detect",
+    "notes_of",
+    "read",
+    "read_channel_name",
+    "read_text_table",
+    "record_of",
+    "write_crash_csv",
+]
+
+
 Array = NDArray[np.float64]
 T = TypeVar("T")
-
-__all__ = ["detect", "read", "record_of"]
 
 # Of a column of text so many fields must be numbers to be one with a fault in it.
 MOSTLY = 0.5
@@ -320,3 +337,395 @@ def _stamps(raw: RawLog, clock: str, stated: str) -> Callable[[], Array]:
         return seconds_of(Clock(clock, stamps, unit, raw.name, raw.row))[0]
 
     return read
+
+
+# What the name of a column says in a crash record: quantity, axis and unit.
+#
+# Recorders in vehicles name their columns in words (``Longitudinal Delta-V (MPH)``), loggers in
+# letters (``ax [g]``). Longitudinal is positive forward, lateral from left to right, vertical down,
+# as SAE J1698 and SAE J211 have it.
+
+
+_BRACKETS = re.compile(r"[\[(]\s*([^\[\]]+?)\s*[\])]\s*$")
+_AXIS = {
+    "x": "x",
+    "longitudinal": "x",
+    "long": "x",
+    "longi": "x",
+    "forward": "x",
+    "fwd": "x",
+    "y": "y",
+    "lateral": "y",
+    "lat": "y",
+    "right": "y",
+    "transverse": "y",
+    "z": "z",
+    "vertical": "z",
+    "vert": "z",
+    "down": "z",
+    "normal": "z",
+}
+# Axes that point the other way than ours.
+_REVERSED = {"backward": "-x", "rearward": "-x", "left": "-y", "up": "-z"}
+_TURNS = {"roll": "x", "pitch": "y", "yaw": "z"}
+_WORDS = {
+    "acceleration": ("acceleration", "accel", "acc", "accelerations", "accelerometer"),
+    "rate": ("rate", "gyro", "gyr", "gyroscope", "angular"),
+    "velocity": ("velocity", "vel", "deltav", "dv", "deltavelocity"),
+    "displacement": ("displacement", "crush"),
+    "force": ("force", "load"),
+}
+# A gyro to the makers of phones, an acceleration in g to those of crash recorders.
+_EITHER = ("gx", "gy", "gz")
+_CRASH_NAMES_OF_TRIAD = {"accel": "acceleration", "gyro": "rate"}
+_TRIAD_NAMES = {name: triad for triad, names in TRIADS.items() for name in names if len(name) > 1}
+
+
+@dataclass(frozen=True)
+class ChannelName:
+    """What a name says.
+
+    Attributes
+    ----------
+    quantity : str
+        A key of `crash_record.QUANTITIES`.
+    axis : str
+        ``x y z``, with a minus where the name says so, or empty.
+    unit : str
+        In this package's spelling, or as it stands there where it is not known; or empty.
+    change : bool
+        Of a velocity: the name says that it is a change since time zero.
+    contradiction : str
+        What in the name speaks against its unit, or empty.
+    """
+
+    quantity: str
+    axis: str = ""
+    unit: str = ""
+    change: bool = False
+    contradiction: str = ""
+
+
+def read_channel_name(name: str, unit: str = "") -> ChannelName:
+    """Read quantity, axis and unit from a column's name.
+
+    Parameters
+    ----------
+    name : str
+        As ``ax [g]``, ``Gyr_X (deg/s)``, ``Lateral Delta-V (km/h)``, ``Yaw rate``.
+    unit : str
+        What a row of units under the header says of it.
+
+    Returns
+    -------
+    ChannelName
+        The unit decides what the quantity is; the words, where there is no unit.
+    """
+    said = read_name(name)
+    text = name.strip()
+    bracket = _BRACKETS.search(text)
+    if bracket:
+        unit, text = unit or bracket.group(1), text[: bracket.start()]
+    known = unit_of(unit) if unit else None
+    if not unit and said.unit:
+        known = unit_of(said.unit)
+    words = _words(text)
+    change = _says_change(words)
+    spoken = _quantity(words, said.quantity, change)
+    if spoken == "time" and (known is None or known[0] == "time") and (known or not unit):
+        return ChannelName("time", "", known[1] if known else "")
+    written = known[1] if known else unit
+    if "speed" in words or "speeds" in words:
+        return ChannelName("other", "", written)
+    quantity = known[0] if known else spoken if spoken != "time" and not unit else "other"
+    if quantity == "time":
+        stamps = "time" in words and not change
+        return ChannelName("time" if stamps or spoken == "time" else "other", "", written)
+    against = ""
+    if known and spoken not in ("other", quantity):
+        against = f"its name says {spoken}, and its unit is one of {quantity}"
+    axis = _axis(words, quantity, said.quantity)
+    return ChannelName(quantity, axis, written, change and quantity == "velocity", against)
+
+
+def _words(text: str) -> list[str]:
+    text = INDEXED.sub(r"\1", text)
+    # accX, GyroY: a capital after a small letter begins a word.
+    text = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", text)
+    return [w for w in re.split(r"[^a-z0-9]+", text.lower()) if w]
+
+
+def _says_change(words: list[str]) -> bool:
+    joined = " ".join(words)
+    return bool(
+        re.search(
+            r"\b(delta ?v|dv|delta velocity|delta vel|velocity change|geschwindigkeits)", joined
+        )
+    )
+
+
+def _quantity(words: list[str], triad: str | None, change: bool) -> str:
+    if triad == "time":
+        return "time"
+    if change:
+        return "velocity"
+    if "".join(words) in _EITHER:
+        return "other"
+    base = str(triad).partition("_")[0]
+    if base in _CRASH_NAMES_OF_TRIAD:
+        return _CRASH_NAMES_OF_TRIAD[base]
+    for quantity, known in _WORDS.items():
+        if any(w in known for w in words):
+            return quantity
+    return "other"
+
+
+def _axis(words: list[str], quantity: str, triad: str | None) -> str:
+    if quantity == "rate":
+        for word, axis in _TURNS.items():
+            if word in words:
+                return axis
+    if triad and triad[-2:] in ("_x", "_y", "_z"):
+        return triad[-1]
+    if quantity == "other":
+        return next((w for w in words if w in ("x", "y", "z")), "")
+    found = {(_AXIS | _REVERSED)[w] for w in words if w in _AXIS or w in _REVERSED}
+    if not found:
+        # accx, gyroz: a known word with its axis at the end.
+        found = {w[-1] for w in words if w[-1] in "xyz" and w[:-1] in _TRIAD_NAMES}
+    return found.pop() if len(found) == 1 else ""
+
+
+# Text tables as recorders export them: a title above the header, and a row of units under it.
+
+
+# A header stands within so many lines, or there is none.
+HIGHEST_HEADER = 200
+# So many rows under the first look like it.
+ROWS = 3
+# Lines above a table that a person would read.
+MOST_REMARKS = 24
+# Rows of plain numbers of some hundred bytes: more than this is no table of a crash.
+LARGEST = 2_000_000_000
+_TITLE = "# title: "
+_NO_UNIT = ("", "-", "--", "none", "1")
+
+
+def read_text_table(
+    path: Path,
+) -> tuple[RawLog, dict[str, dict[str, Any]], str, tuple[str, ...]]:
+    """Read a text table whose header need not be its first line.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    RawLog
+        Its `units` are those of a row of units, where there is one.
+    dict of str to dict
+        What comments say of columns, as `crash_attributes.attributes_of` gives it.
+    str
+        Title in a comment, or empty.
+    tuple of str
+        The other lines above the table, in which recorders write rate, range and axes.
+
+    Raises
+    ------
+    DataError
+        As `formats.csv.read`.
+    """
+    if path.stat().st_size > LARGEST:
+        raise DataError(
+            "io.bytes-more-than-table-crash", file=path.name, st_size=path.stat().st_size
+        )
+    text, findings = csv.decoded(path.read_bytes(), path.name)
+    if "\0" in text:
+        raise DataError("io.crash-table-with-zero-bytes", file=path.name)
+    lines = text.splitlines()
+    header, units_at, units = _header(lines)
+    remarks = _remarks(lines, header)
+    if header is not None:
+        # Blank lines are skipped, and rows keep their numbers.
+        above = [line if csv.is_comment(line) else "" for line in lines[:header]]
+        lines[:header] = above
+        if units_at is not None:
+            lines[units_at] = ""
+    ended = "\n" if text.endswith(("\n", "\r")) else ""
+    raw = csv.parse(("\n".join(lines) + ended).encode(), path.name, (path,))
+    raw.findings[:0] = findings
+    if units and len(units) == len(raw.columns):
+        raw.units |= {name: u for name, u in zip(raw.columns, units, strict=True) if u}
+    _read_clocks(raw)
+    notes = notes_of(lines, raw)
+    title = next((line[len(_TITLE) :] for line in lines[:1] if line.startswith(_TITLE)), "")
+    # A comment may be the header.
+    return raw, notes, title, tuple(r for r in remarks if not r.startswith(next(iter(raw.columns))))
+
+
+def _remarks(lines: list[str], header: int | None) -> tuple[str, ...]:
+    above = []
+    for at, line in enumerate(lines[:HIGHEST_HEADER]):
+        if at == header or (not csv.is_comment(line) and (header is None or at > header)):
+            break
+        if line.startswith((NOTE, _TITLE)):
+            continue
+        text = clean(line.lstrip("#% "), LONGEST_NAME)
+        if text:
+            above.append(text)
+    return tuple(above[:MOST_REMARKS])
+
+
+def _read_clocks(raw: RawLog) -> None:
+    """Times of day become nanoseconds since midnight."""
+    stated = dict(raw.stated)
+    for name, values in raw.columns.items():
+        if values.dtype.kind != "O":
+            continue
+        ticks = day_nanoseconds(values)
+        if ticks is not None:
+            raw.columns[name] = ticks
+            stated[name] = ("time", "ns")
+    raw.stated = stated
+
+
+def notes_of(lines: list[str], raw: RawLog) -> dict[str, dict[str, Any]]:
+    """What comments say of columns; what is not understood is told in the log's findings."""
+    names = list(raw.columns)
+    notes: dict[str, dict[str, Any]] = {}
+    for row, line in enumerate(lines, start=1):
+        if line.strip() and not csv.is_comment(line):
+            break
+        if not line.startswith(NOTE):
+            continue
+        try:
+            said = json.loads(line[len(NOTE) :])
+            checked = check_attributes(said, raw.name, row)
+            column = int(said["column"])
+            notes[names[column - 1]] = checked
+        except (DataError, ValueError, TypeError, KeyError, IndexError, RecursionError) as error:
+            reason = error.finding if isinstance(error, DataError) else None
+            raw.findings.append(
+                Finding(
+                    "io.comment-of-no-channel" if reason is None else "io.comment-left-out",
+                    file=raw.name,
+                    row=row,
+                    severity="note",
+                    reason=reason,
+                )
+            )
+    return notes
+
+
+def _header(lines: list[str]) -> tuple[int | None, int | None, list[str]]:
+    """Where the header and the units stand, and the units; None where the first line is it."""
+    said = [
+        (at, csv.fields_of(line, csv.separator_of(line)))
+        for at, line in enumerate(lines[:HIGHEST_HEADER])
+        if line.strip() and not csv.is_comment(line)
+    ]
+    # Rows of numbers alone; of a table that has a column of text, rows that are mostly numbers.
+    # "Channels: 3" above a table looks like one: what goes on as it begins goes first.
+    for goes_on in (True, False):
+        for whole in (True, False):
+            for k, (_, fields) in enumerate(said):
+                if not _is_row(fields, whole):
+                    continue
+                below = [f for _, f in said[k + 1 : k + 1 + ROWS]]
+                if goes_on and not (
+                    below and all(len(f) == len(fields) and _is_row(f, whole) for f in below)
+                ):
+                    continue
+                return _above(said[:k], len(fields))
+    return None, None, []
+
+
+def _is_row(fields: list[str], whole: bool) -> bool:
+    there = [f for f in fields if f]
+    numbers = sum(map(csv.is_data, there))
+    return bool(numbers and (numbers == len(there) if whole else 2 * numbers >= len(fields)))
+
+
+def _above(
+    said: list[tuple[int, list[str]]], width: int
+) -> tuple[int | None, int | None, list[str]]:
+    whole = [(at, fields) for at, fields in said if len(fields) == width]
+    if not whole or whole[-1] != said[-1]:
+        return None, None, []
+    at, fields = whole[-1]
+    # A cell may stand above and say only the unit: it is one where every cell does.
+    plain = [f.strip("[](){} ") for f in fields]
+    known = [unit_of(p) is not None for p in plain if p.lower() not in _NO_UNIT]
+    if len(whole) > 1 and whole[-2] == said[-2] and known and all(known):
+        units = ["" if p.lower() in _NO_UNIT else p for p in plain]
+        return whole[-2][0], at, units
+    return at, None, []
+
+
+# Crash records written as text tables: the unit in each heading, and the rest in comments.
+
+
+#: Before what a comment says of a column.
+NOTE = "# channel: "
+
+
+def write_crash_csv(path: str | Path, record: CrashRecord) -> tuple[Path, ...]:
+    """Write a record as text tables.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of the table. Channels with other stamps go into tables of their own, beside it: with
+        ``_2``, ``_3`` after the name.
+    record : CrashRecord
+        Values are written in SI, each number in the fewest digits that give it back exactly.
+
+    Returns
+    -------
+    tuple of Path
+        The tables.
+
+    Raises
+    ------
+    DataError
+        The record has no channel.
+    """
+    groups: dict[bytes, list[tuple[dict[str, Any], Array]]] = {}
+    stamps: dict[bytes, Array] = {}
+    for channel in record.channels:
+        if channel.quantity == "time":
+            continue
+        time, values = channel.load()
+        key = time.tobytes()
+        stamps[key] = time
+        groups.setdefault(key, []).append((attributes_of(channel), values))
+    if not groups:
+        raise DataError("io.record-without-channels", file=record.path.name)
+    first = Path(path)
+    paths = []
+    for k, (key, members) in enumerate(groups.items(), start=1):
+        paths.append(first if k == 1 else first.with_stem(f"{first.stem}_{k}"))
+        _write(paths[-1], record.title, stamps[key], members)
+    return tuple(paths)
+
+
+def _write(
+    path: Path, title: str, time: Array, members: list[tuple[dict[str, Any], Array]]
+) -> None:
+    import pyarrow as pa
+    import pyarrow.csv as pa_csv
+
+    comments = [f"# title: {clean(title)}"]
+    headings = ["time [s]"]
+    columns = {"0": pa.array(time)}
+    for k, (said, values) in enumerate(members, start=1):
+        unit = clean(said["unit"])
+        headings.append(clean(said["name"]) + (f" [{unit}]" if unit else ""))
+        comments.append(NOTE + json.dumps({"column": k + 1, **said}, ensure_ascii=True))
+        columns[str(k)] = pa.array(values)
+    line = io.StringIO()
+    quoting.writer(line, lineterminator="\n").writerow(headings)
+    with path.open("wb") as stream:
+        stream.write(("\n".join(comments) + "\n" + line.getvalue()).encode())
+        pa_csv.write_csv(pa.table(columns), stream, pa_csv.WriteOptions(include_header=False))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -10,17 +11,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.formats.crash_clock import triad_stamps
-from strapdown.formats.crash_record import CrashChannel, CrashRecord
-from strapdown.formats.crash_triad_unit import triad_factor
+from strapdown.formats.crash_record import QUANTITIES, CrashChannel, CrashRecord
+from strapdown.formats.crash_stamps import Clock, last_midnight, seconds_of
+from strapdown.formats.crash_units import FACTORS, factor_of, state_unit
+from strapdown.formats.inference import Signals, infer_signals
+from strapdown.formats.judge import what_numbers_say
+from strapdown.formats.stamps import EPOCH
 from strapdown.tables import ACCEL, GYRO, SAMPLINGS
 
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = NDArray[np.float64]
+__all__ = ["triad_factor", "triad_of_channels", "triad_stamps"]
 
-__all__ = ["triad_of_channels"]
+
+Array = NDArray[np.float64]
 
 _COLUMNS = {"acceleration": ACCEL, "rate": GYRO}
 _AXES = ("x", "y", "z")
@@ -297,3 +302,347 @@ def _table(parts: list[_Axis], factors: dict[str, float], columns: list[str]) ->
         values[np.searchsorted(stamps, part.time)] = part.values
         data[columns[_AXES.index(part.axis)]] = values * (part.sign * factors[part.axis])
     return pd.DataFrame(data, index=pd.Index(stamps, name="time"))
+
+
+# Stamps and values of one channel, from what the record has and what a case states of it.
+
+
+# How far a stated rate may be from that of the stamps.
+RATE_AGREES = 0.01
+
+
+def triad_stamps(
+    record: CrashRecord,
+    channel: CrashChannel,
+    time: str | None,
+    time_unit: str | None,
+    rate_hz: float | None,
+    findings: list[Finding],
+) -> tuple[Array, Array]:
+    """Stamps in s and values of a channel.
+
+    Parameters
+    ----------
+    record : CrashRecord
+    channel : CrashChannel
+    time, time_unit, rate_hz
+        As of `triad_of_channels`.
+    findings : list of Finding
+        What was concluded is added.
+
+    Returns
+    -------
+    time, values : ndarray, (n,)
+
+    Raises
+    ------
+    ConfigError
+        What is stated contradicts the record, or itself.
+    DataError
+        Nothing tells the stamps, or time does not advance.
+    """
+    if rate_hz is not None and not (math.isfinite(rate_hz) and rate_hz > 0.0):
+        raise ConfigError("io.crash-rate-not-positive", quantity="rate_hz", rate_hz=rate_hz)
+    if time is None and time_unit is None and rate_hz is None:
+        stamps, values = channel.load()
+        _check_advances(channel, stamps)
+        # What was concluded on the way is told again.
+        if channel.clock and (own := _clock_of(record, channel.clock, None)).unit == "":
+            findings.extend(seconds_of(own)[1])
+        return stamps, values
+    if time is None and not channel.clock and rate_hz is None:
+        raise ConfigError(
+            "io.time-unit-stated-record-no"
+            if channel.samples is not None
+            else "io.time-unit-stated-record-stamps",
+            file=record.path.name,
+            quantity="time_unit",
+            time_unit=time_unit,
+        )
+    name = time if time is not None else channel.clock
+    values = channel.samples() if channel.samples is not None else channel.load()[1]
+    values = np.asarray(values, dtype=np.float64)
+    if rate_hz is None:
+        return _same_length(channel, *_stated(record, name, time_unit, findings), values)
+    return _even(record, channel, name, time_unit, rate_hz, findings, values), values
+
+
+def _clock_of(record: CrashRecord, name: str, time_unit: str | None) -> Clock:
+    held = record.channel(name)
+    read = held.samples or (lambda: held.load()[1])
+    recorded = held.unit if held.quantity == "time" else ""
+    if held.quantity not in ("time", "other"):
+        raise DataError(
+            "io.holds-stamps-needed",
+            file=held.file or record.path.name,
+            quantity=f"channel {name}",
+            of_what=held.quantity,
+        )
+    stated = state_unit(time_unit, "time", "time_unit") if time_unit else ""
+    if stated and recorded and stated != recorded:
+        raise ConfigError(
+            "io.time-unit-stated-record-says",
+            file=record.path.name,
+            quantity="time_unit",
+            time_unit=time_unit,
+            recorded=recorded,
+        )
+    return Clock(name, read(), recorded or stated, held.file or record.path.name, held.row)
+
+
+def _stated(
+    record: CrashRecord, name: str, time_unit: str | None, findings: list[Finding]
+) -> tuple[Array, str]:
+    seconds, told = seconds_of(_clock_of(record, name, time_unit))
+    findings += told
+    return seconds, name
+
+
+def _same_length(
+    channel: CrashChannel, stamps: Array, name: str, values: Array
+) -> tuple[Array, Array]:
+    if stamps.size != values.size:
+        raise DataError(
+            "io.samples-channel-stamps",
+            file=channel.file or None,
+            quantity=f"channel {channel.name}",
+            size=values.size,
+            name=name,
+            size_2=stamps.size,
+        )
+    return stamps, values
+
+
+def _even(
+    record: CrashRecord,
+    channel: CrashChannel,
+    name: str,
+    time_unit: str | None,
+    rate_hz: float,
+    findings: list[Finding],
+    values: Array,
+) -> Array:
+    """Evenly spaced stamps, from the first recorded one where there is one."""
+    count = np.arange(values.size, dtype=np.float64)
+    start, span = 0.0, 0.0
+    if name:
+        clock = _clock_of(record, name, time_unit)
+        stamps = _same_length(channel, clock.stamps.astype(np.float64), name, values)[0]
+        ends = stamps[[0, -1]]
+        seconds = _ends(clock, ends, rate_hz, values.size)
+        start, span = float(seconds[0]), float(seconds[1] - seconds[0])
+        if abs(start) > EPOCH:
+            start -= last_midnight(start, 1.0)
+    elif channel.samples is None:
+        stamps = channel.load()[0]
+        start, span = float(stamps[0]), float(stamps[-1] - stamps[0])
+    if (name or channel.samples is None) and values.size > 1:
+        recorded = (values.size - 1) / span if span > 0.0 else math.inf
+        if not abs(recorded / rate_hz - 1.0) <= RATE_AGREES:
+            raise ConfigError(
+                "io.rate-hz-stated-stamps-record",
+                file=record.path.name,
+                quantity="rate_hz",
+                rate_hz=rate_hz,
+                recorded=recorded,
+            )
+        findings.append(
+            Finding(
+                "io.stamps-evenly-spaced-hz-first",
+                file=record.path.name,
+                quantity="time",
+                severity="note",
+                rate_hz=rate_hz,
+            )
+        )
+    return start + count / rate_hz
+
+
+def _ends(clock: Clock, ends: Array, rate_hz: float, count: int) -> Array:
+    """First and last stamp in s; of a clock without a unit, in the one that fits the rate."""
+    from strapdown.constants import TIME_UNITS
+
+    if not np.isfinite(ends).all():
+        raise DataError(
+            "io.first-or-last-stamp-missing",
+            file=clock.file,
+            row=clock.row(0 if not np.isfinite(ends[0]) else count - 1),
+            quantity=f"time ({clock.name})",
+        )
+    if clock.unit:
+        return ends * TIME_UNITS[clock.unit]
+    span = float(ends[1] - ends[0])
+    for factor in TIME_UNITS.values():
+        if span > 0.0 and abs((count - 1) / (span * factor) / rate_hz - 1.0) <= RATE_AGREES:
+            return ends * factor
+    return ends
+
+
+def _check_advances(channel: CrashChannel, stamps: Array) -> None:
+    bad = np.flatnonzero(~(np.diff(stamps) > 0.0)) if stamps.size > 1 else np.array([], int)
+    if stamps.size == 0 or bad.size or not np.isfinite(stamps[0]):
+        k = int(bad[0]) + 1 if bad.size else 0
+        raise DataError(
+            "io.time-goes" if bad.size else "io.no-stamps",
+            file=channel.file or None,
+            row=channel.row(k),
+            quantity=f"time of channel {channel.name}",
+            stamps=stamps[k - 1] if bad.size else None,
+            stamps_2=stamps[k] if bad.size else None,
+        )
+
+
+# The unit of a triad: as the record says it, as the case states it, or as its numbers tell it.
+
+
+_TRIAD = {"acceleration": "accel", "rate": "gyro"}
+# What is shown of numbers that tell no unit.
+_CHOICES = {"acceleration": ("g", "m/s2"), "rate": ("deg/s", "rad/s")}
+
+
+def triad_factor(
+    record: CrashRecord,
+    axes: Mapping[str, tuple[CrashChannel, Array]],
+    time: Array,
+    quantity: str,
+    stated: str | None,
+    findings: list[Finding],
+) -> tuple[dict[str, float], str]:
+    """Factors that turn the values of each axis into SI.
+
+    Parameters
+    ----------
+    record : CrashRecord
+    axes : dict of str to (CrashChannel, ndarray)
+        Values are SI where the channel's unit is known, else as recorded.
+    time : ndarray, (n,), s
+    quantity : {'acceleration', 'rate'}
+    stated : str or None
+        By the case.
+    findings : list of Finding
+        What was concluded is added.
+
+    Returns
+    -------
+    factors : dict of str to float
+    unit : str
+        As recorded, or stated.
+
+    Raises
+    ------
+    ConfigError
+        What is stated is no unit of the quantity, or contradicts the record.
+    DataError
+        Nothing tells the unit.
+    """
+    own = {a: c.unit for a, (c, _) in axes.items() if _known(c)}
+    velocity = {c.quantity == "velocity" for c, _ in axes.values()}
+    kind = "velocity" if velocity == {True} else quantity
+    wanted = state_unit(stated, kind) if stated else ""
+    for axis, unit in own.items():
+        if wanted and unit != wanted:
+            channel = axes[axis][0]
+            raise ConfigError(
+                "io.unit-stated-record-says",
+                file=record.path.name,
+                quantity="unit",
+                stated=stated,
+                unit=unit,
+                name=channel.name,
+            )
+    open_axes = [a for a in axes if a not in own]
+    if not open_axes:
+        return dict.fromkeys(axes, 1.0), " ".join(dict.fromkeys(own.values()))
+    if not wanted:
+        if len(set(own.values())) == 1:
+            # One axis says it for the triad: a header is often filled in once.
+            wanted = next(iter(own.values()))
+            without = ", ".join(axes[a][0].name for a in open_axes)
+            other = axes[next(iter(own))][0].name
+            findings.append(
+                Finding(
+                    "io.unit-taken-from-other-axis",
+                    file=record.path.name,
+                    quantity="unit",
+                    without=without,
+                    wanted=wanted,
+                    other=other,
+                )
+            )
+        else:
+            wanted = _evident(record, axes, time, kind, findings)
+    for axis in open_axes:
+        channel = axes[axis][0]
+        if channel.unit:
+            findings.append(
+                Finding(
+                    "io.record-says-not-known-read",
+                    file=channel.file or None,
+                    quantity=f"channel {channel.name}",
+                    severity="note",
+                    unit=channel.unit,
+                    wanted=wanted,
+                )
+            )
+    return {a: 1.0 if a in own else FACTORS[kind][wanted] for a in axes}, wanted
+
+
+def _known(channel: CrashChannel) -> bool:
+    """Whether the values are in SI already."""
+    return factor_of(channel.quantity, channel.unit) is not None
+
+
+def _evident(
+    record: CrashRecord,
+    axes: Mapping[str, tuple[CrashChannel, Array]],
+    time: Array,
+    quantity: str,
+    findings: list[Finding],
+) -> str:
+    block = [v for _, v in axes.values()]
+    names = ", ".join(c.name for c, _ in axes.values())
+    unit = None
+    if quantity in _TRIAD and len(block) == 3 and all(b.shape == time.shape for b in block):
+        values = np.column_stack(block)
+        triad = _TRIAD[quantity]
+        signals = Signals(
+            time,
+            gyro=values if triad == "gyro" else None,
+            accel=values if triad == "accel" else None,
+            time_unit="s",
+        )
+        said = {i.quantity: i for i in infer_signals(signals)}
+        unit, form = said.get(f"{triad}_unit"), said.get(f"{triad}_form")
+        if unit is not None and unit.settled and (form is None or form.value == "rate"):
+            findings.append(
+                unit.finding(
+                    "io.crash-unit-inferred",
+                    file=record.path.name,
+                    quantity=f"unit of {names}",
+                )
+            )
+            return str(unit.value)
+    raise DataError(
+        "io.crash-unit-not-stated" if unit is None else "io.crash-unit-undecided",
+        file=record.path.name,
+        quantity=names,
+        choices=_choices(block, quantity),
+        **what_numbers_say(unit),
+    )
+
+
+def _choices(block: list[Array], quantity: str) -> list[Finding]:
+    """The units that it may have, with the largest value in each."""
+    largest = max(float(np.nanmax(np.abs(b), initial=0.0)) for b in block)
+    units = _CHOICES.get(quantity, tuple(FACTORS[quantity])[:3])
+    return [
+        Finding(
+            "io.crash-choice-of-unit",
+            severity="note",
+            unit=unit,
+            largest=largest,
+            value=largest * FACTORS[quantity][unit],
+            si=QUANTITIES[quantity],
+        )
+        for unit in units
+    ]

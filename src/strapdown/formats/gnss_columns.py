@@ -27,7 +27,7 @@ from strapdown.formats.quantity_columns import (
     find_quantities,
 )
 from strapdown.formats.recording import RawLog
-from strapdown.tables.columns import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
+from strapdown.tables.checks import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
 
 __all__ = ["QUANTITIES", "detect", "read"]
 

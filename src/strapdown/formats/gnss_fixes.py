@@ -13,7 +13,7 @@ from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.clocks import GPS, RELATIVE, Clock, unrolled, with_clock
 from strapdown.formats.table_rows import told_by_file_rows
 from strapdown.tables import gnss_table
-from strapdown.tables.columns import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
+from strapdown.tables.checks import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
 
 __all__ = ["Fixes", "GnssOptions", "table_of_fixes"]
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -11,14 +13,30 @@ from numpy.typing import NDArray
 
 from strapdown.constants import TIME_UNITS
 from strapdown.errors import DataError
+from strapdown.formats import csv
+from strapdown.formats.crash_record import CrashChannel
 from strapdown.formats.crash_text import LONGEST_NAME, clean
-from strapdown.formats.crash_units import unit_of
-from strapdown.formats.mme_codes import MmeCode, decode_mme
-from strapdown.formats.mme_text import MmeHeader, even_stamps, read_header, read_samples
+from strapdown.formats.crash_units import factor_of, unit_of
+from strapdown.formats.mme_codes import DIMENSIONS, NO_CLASS, MmeCode, decode_mme
+from strapdown.tables import SAMPLINGS
+
+__all__ = [
+    "MmeFile",
+    "MmeHeader",
+    "channel_of",
+    "clock_of",
+    "even_stamps",
+    "is_bad",
+    "read_header",
+    "read_mme_file",
+    "read_number",
+    "read_samples",
+    "stamps_of",
+    "text_of",
+]
+
 
 Array = NDArray[np.float64]
-
-__all__ = ["MmeFile", "clock_of", "read_mme_file", "stamps_of"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,3 +172,417 @@ def stamps_of(
         return even_stamps(first, header.text("sampling interval").split()[0], count)
 
     return even
+
+
+# One channel of an ISO MME test: its header in words, and its samples when they are asked.
+
+
+#: What the writer of this package says in comments, and no field of the standard does.
+SAMPLING_NOTE = "sampling "
+AXIS_NOTE = "axis "
+CHANGE_NOTE = "change of velocity since time zero of the recorder"
+BODY_NOTE = "fixed to "
+FILTER_NOTE = "low-pass "
+AXES = ("x", "y", "z", "-x", "-y", "-z")
+_GOOD = ("ok", "o.k.", "good", "valid", "as measured")
+_REMARKS = (
+    "location",
+    "reference system",
+    "transducer type",
+    "transducer id",
+    "pre-filter type",
+    "data source",
+    "laboratory channel code",
+    "customer channel code",
+)
+
+
+def channel_of(file: MmeFile, name: str, others: Mapping[str, tuple[str, MmeFile]]) -> CrashChannel:
+    """Make a channel of a record of it.
+
+    Parameters
+    ----------
+    file : MmeFile
+    name : str
+        Unique in the record.
+    others : dict of str to (str, MmeFile)
+        Channels of the test by their code in capitals, each with its name: a channel may hold the
+        stamps of another.
+
+    Returns
+    -------
+    CrashChannel
+
+    Raises
+    ------
+    DataError
+        A field of the header is no number.
+    """
+    header, known = file.header, file.known
+    text = header.text("unit")
+    quantity, unit, factor, against = _unit(file, text)
+    notes = header.all("comments")
+    change = CHANGE_NOTE in notes
+    clock = clock_of(file, others)
+    read_stamps = stamps_of(file, clock, others)
+
+    def samples() -> Array:
+        values = read_samples(file.path, header, f"channel {name}")
+        if quantity == "velocity" and not change and values.size:
+            values = values - values[0]
+        return values if factor is None else values * factor
+
+    def load() -> tuple[Array, Array]:
+        values = samples()
+        return values if quantity == "time" else read_stamps(values.size), values
+
+    # Stamps that the header does not tell may be stated by a case.
+    open_stamps = (
+        bool(clock) or quantity == "time" or _plain_number(header, "sampling interval") is None
+    )
+    full_scale = _plain_number(header, "channel amplitude class")
+    cut_off = _plain_number(header, "cut off frequency")
+    return CrashChannel(
+        name=name,
+        quantity=quantity,
+        axis=_note(notes, AXIS_NOTE, AXES) or (known.axis if known else ""),
+        unit=unit,
+        load=load,
+        sampling=_note(notes, SAMPLING_NOTE, SAMPLINGS)
+        or ("instantaneous" if quantity in ("acceleration", "rate") else None),
+        place=_place(file),
+        body=_note(notes, BODY_NOTE) or (known.body if known else "not known"),
+        low_pass=_note(notes, FILTER_NOTE) or _low_pass(file, cut_off),
+        remarks=_remarks(file, against, notes),
+        full_scale=None if full_scale is None else full_scale * (factor or 1.0),
+        bandwidth=cut_off if cut_off is not None and cut_off > 0.0 else None,
+        file=file.path.name,
+        row=lambda k: header.end + k + 1,
+        clock=others[clock.upper()][0] if clock else "",
+        samples=samples if open_stamps else None,
+    )
+
+
+def _unit(file: MmeFile, text: str) -> tuple[str, str, float | None, str]:
+    """Quantity, unit, factor, and what of the code speaks against the unit."""
+    said = file.known.quantity if file.known else "other"
+    found = unit_of(text) if text else None
+    if found is None:
+        # Of a quantity whose unit is not stated or not known the values are as recorded.
+        return said, clean(text, LONGEST_NAME), None, ""
+    quantity, unit = found
+    if said in ("other", quantity):
+        # A dimension that is known and none of ours, such as an angle, is not made one.
+        plain = file.known is not None and file.code[12:14].upper() in DIMENSIONS
+        if said == "other" and plain and file.code[12:14] != "00":
+            return "other", unit, None, ""
+        return quantity, unit, factor_of(quantity, unit), ""
+    against = f"its code says {said}, and its unit is one of {quantity}"
+    return quantity, unit, factor_of(quantity, unit), against
+
+
+def _note(notes: list[str], key: str, known: tuple[str, ...] = ()) -> str:
+    said = next((n[len(key) :] for n in notes if n.startswith(key)), "")
+    return said if not known or said in known else ""
+
+
+def _place(file: MmeFile) -> str:
+    given = file.header.text("name of the channel")
+    place = file.known.place if file.known else ""
+    return given or place
+
+
+def _plain_number(header: MmeHeader, key: str) -> float | None:
+    """A number of the header that may also be a word there."""
+    try:
+        return header.number(key)
+    except DataError:
+        return None
+
+
+def _low_pass(file: MmeFile, cut_off: float | None) -> str:
+    parts = []
+    stated = file.header.text("channel frequency class")
+    if file.known and file.known.code[-1] != NO_CLASS:
+        parts.append(file.known.filter)
+    elif stated and file.known is None:
+        parts.append(stated if not stated.isdecimal() else f"CFC {stated}")
+    if cut_off is not None and cut_off > 0.0:
+        parts.append(f"{cut_off:g} Hz before the sampler")
+    return "; ".join(parts)
+
+
+def _remarks(file: MmeFile, against: str, notes: list[str]) -> tuple[str, ...]:
+    header, known = file.header, file.known
+    remarks = [against] if against else []
+    if known is None:
+        remarks.append(
+            f"'{file.code}' is no channel code of sixteen characters"
+            if file.code
+            else "it has no channel code"
+        )
+    else:
+        remarks.append(f"{known.test_object}, {known.dimension}, {known.direction}")
+        if header.text("name of the channel") and known.place:
+            remarks.append(f"place by its code: {known.place}")
+        if known.unknown:
+            remarks.append(f"not in the tables of codes: {', '.join(known.unknown)}")
+        stated = header.text("channel frequency class")
+        figures = "".join(c for c in stated if c.isdigit())
+        if figures and known.filter.startswith("CFC") and figures not in known.filter.split():
+            remarks.append(f"its header says {stated}, and its code {known.filter}")
+    if status := header.text("data status"):
+        remarks.append(f"status {status}")
+    remarks += [f"{key}: {header.text(key)}" for key in _REMARKS if header.text(key)]
+    own = (SAMPLING_NOTE, AXIS_NOTE, BODY_NOTE, FILTER_NOTE)
+    remarks += [n for n in notes if not n.startswith(own)]
+    return tuple(remarks)
+
+
+def is_bad(file: MmeFile) -> bool:
+    """Whether the laboratory gives another status than a good one."""
+    status = file.header.text("data status").lower()
+    return bool(status) and status not in _GOOD
+
+
+# Files of ISO MME as text: lines of ``key :value``, and samples under them.
+
+
+# Headers have some thousand characters; samples some ten each.
+LONGEST_HEADER = 262_144
+LARGEST = 1_000_000_000
+# Powers of ten and whole numbers that doubles hold exactly.
+EXACT_POWER = 22
+EXACT_WHOLE = 2**53
+_KEY = re.compile(r"([^:]*[^:\s])\s*:(.*)")
+_NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eEdD][+-]?\d+)?")
+_UNUSUAL = re.compile(r"[^0-9eE+\-. \t\n]")
+_MISSING = ("novalue", "nan")
+
+
+@dataclass(frozen=True)
+class MmeHeader:
+    """Lines of a header.
+
+    Attributes
+    ----------
+    file : str
+        For messages.
+    values : dict of str to (str, int)
+        Key in small letters, with single blanks, to its value and its line; the first where a key
+        stands more than once.
+    more : dict of str to list of str
+        All values of each key.
+    end : int
+        Number of lines before the samples.
+    """
+
+    file: str
+    values: dict[str, tuple[str, int]]
+    more: dict[str, list[str]]
+    end: int
+
+    def text(self, key: str) -> str:
+        """Value of a key on one line; empty where it is not stated."""
+        value = self.values.get(key, ("", 0))[0]
+        return "" if value.lower() in ("novalue", "none", "-") else clean(value)
+
+    def all(self, key: str) -> list[str]:
+        """Each stated value of a key."""
+        texts = [clean(v) for v in self.more.get(key, [])]
+        return [t for t in texts if t and t.lower() not in ("novalue", "none", "-")]
+
+    def line(self, key: str) -> int | None:
+        """Line of a key."""
+        return self.values[key][1] if key in self.values else None
+
+    def number(self, key: str) -> float | None:
+        """Value of a key as a number, with or without a unit after it.
+
+        Raises
+        ------
+        DataError
+            It is stated, and no number.
+        """
+        text = self.text(key)
+        if not text:
+            return None
+        value = read_number(text.split()[0])
+        if value is None or not np.isfinite(value):
+            raise DataError(
+                "io.no-number", file=self.file, row=self.line(key), quantity=key, text=text[:60]
+            )
+        return value
+
+
+def text_of(path: Path, longest: int = LARGEST) -> str:
+    """Text of a file of the test, in UTF-8 or Windows-1252.
+
+    Raises
+    ------
+    DataError
+        It is no text, or far too large.
+    """
+    if path.stat().st_size > LARGEST:
+        raise DataError("io.bytes-more-than-channel", file=path.name, st_size=path.stat().st_size)
+    with path.open("rb") as stream:
+        data = stream.read(longest)
+    if len(data) == longest:
+        data = data[: data.rfind(b"\n") + 1]
+    text = csv.decoded(data, path.name)[0]
+    if "\0" in text:
+        raise DataError("io.mme-with-zero-bytes", file=path.name)
+    return text
+
+
+def read_header(path: Path) -> MmeHeader:
+    """Read the header of a file of the test.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    MmeHeader
+
+    Raises
+    ------
+    DataError
+        It is empty, no text, or a line is neither ``key :value`` nor the first sample.
+    """
+    values: dict[str, tuple[str, int]] = {}
+    more: dict[str, list[str]] = {}
+    end = 0
+    for row, line in enumerate(_lines(text_of(path, LONGEST_HEADER)), start=1):
+        text = line.strip()
+        if not text:
+            continue
+        if is_sample(text):
+            end = row - 1
+            break
+        end = row
+        match = _KEY.fullmatch(text)
+        if match is None:
+            raise DataError(
+                "io.mme-line-not-understood", file=path.name, row=row, clean=clean(text, 60)
+            )
+        key = " ".join(match[1].lower().split())
+        values.setdefault(key, (match[2].strip(), row))
+        more.setdefault(key, []).append(match[2].strip())
+    if not values:
+        raise DataError(
+            "io.no-header" if end == 0 and path.stat().st_size else "io.file-empty-3",
+            file=path.name,
+            row=1,
+        )
+    return MmeHeader(path.name, values, more, end)
+
+
+def is_sample(text: str) -> bool:
+    """Whether a line is a sample and no `key :value`."""
+    return bool(_NUMBER.fullmatch(text)) or text.lower() in _MISSING
+
+
+def read_number(text: str) -> float | None:
+    """Read a number, with a point or a comma."""
+    if not _NUMBER.fullmatch(text):
+        return None
+    return float(text.replace(",", ".").replace("d", "e").replace("D", "e"))
+
+
+def read_samples(path: Path, header: MmeHeader, quantity: str) -> Array:
+    """Samples of a channel, one a line; NaN for NOVALUE.
+
+    Parameters
+    ----------
+    path : Path
+    header : MmeHeader
+        Of that file.
+    quantity : str
+        For messages.
+
+    Returns
+    -------
+    ndarray, (n,)
+
+    Raises
+    ------
+    DataError
+        A line is no number, or their count is not that of the header.
+    """
+    lines = _lines(text_of(path))[header.end :]
+    while lines and not lines[-1].strip():
+        lines.pop()
+    promised = header.number("number of samples")
+    if promised is not None and promised != len(lines):
+        cut = len(lines) < promised
+        raise DataError(
+            "io.samples-header-says" if cut else "io.samples-header-says-2",
+            file=path.name,
+            row=header.end + (len(lines) if cut else int(promised) + 1),
+            quantity=quantity,
+            count=len(lines),
+            promised=promised,
+        )
+    if not lines:
+        raise DataError(
+            "io.header-no-samples-under", file=path.name, row=header.end, quantity=quantity
+        )
+    if not _UNUSUAL.search("\n".join(lines)):
+        # Most files have points alone and nothing missing.
+        try:
+            return np.array(lines, dtype=np.float64)
+        except ValueError:
+            pass
+    out = np.empty(len(lines))
+    for k, line in enumerate(lines):
+        text = line.strip()
+        value = float("nan") if text.lower() in _MISSING else read_number(text)
+        if value is None:
+            raise DataError(
+                "io.no-number-2",
+                file=path.name,
+                row=header.end + k + 1,
+                quantity=quantity,
+                clean=clean(text, 60),
+            )
+        out[k] = value
+    return out
+
+
+def even_stamps(first: str, interval: str, count: int) -> Array:
+    """Stamps of even sampling, each the double nearest to the decimal number.
+
+    Parameters
+    ----------
+    first, interval : str
+        Decimal numbers, s, as the header has them.
+    count : int
+
+    Returns
+    -------
+    ndarray, (count,), s
+        Where the decimals fit into whole numbers below 2^53 over a power of ten up to 10^22, which
+        doubles hold exactly, the quotient of the two is rounded once, as IEEE 754 has it; a sum of
+        doubles would be off by one in the last place, and a stamp of -0.0499 not be -0.0499.
+    """
+    start, step = _decimal(first), _decimal(interval)
+    k = np.arange(count, dtype=np.int64)
+    places = max(0, *(-int(d.as_tuple().exponent) for d in (start, step)))
+    if places <= EXACT_POWER:
+        scale = 10**places
+        a, b = int(start * scale), int(step * scale)
+        if abs(a) + abs(b) * count < EXACT_WHOLE:
+            whole = (a + b * k).astype(np.float64)
+            return np.asarray(whole / float(scale), dtype=np.float64)
+    return np.asarray(float(start) + float(step) * k, dtype=np.float64)
+
+
+def _decimal(text: str) -> Decimal:
+    return Decimal(text.replace(",", ".").lower().replace("d", "e"))
+
+
+def _lines(text: str) -> list[str]:
+    # Not splitlines: it would end a line at characters that stand in comments.
+    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")

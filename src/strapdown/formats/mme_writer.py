@@ -15,15 +15,15 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError
 from strapdown.formats.crash_record import QUANTITIES, CrashChannel, CrashRecord
 from strapdown.formats.crash_text import clean
-from strapdown.formats.mme_channel import (
+from strapdown.formats.mme_codes import FILTERS, LENGTH, NO_CLASS, decode_mme
+from strapdown.formats.mme_file import (
     AXIS_NOTE,
     BODY_NOTE,
     CHANGE_NOTE,
     FILTER_NOTE,
     SAMPLING_NOTE,
+    even_stamps,
 )
-from strapdown.formats.mme_codes import FILTERS, LENGTH, NO_CLASS, decode_mme
-from strapdown.formats.mme_text import even_stamps
 
 Array = NDArray[np.float64]
 

@@ -9,13 +9,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.constants import ACCEL_UNITS, GYRO_UNITS
 from strapdown.errors import DataError, Finding
-from strapdown.formats.nhtsa_channel import KMH, Channel
-from strapdown.formats.nhtsa_header import only, row_error, sections, to_number, to_whole
 
 __all__ = ["Channel", "CrashTest", "Vehicle", "header_of", "read_nhtsa"]
+
 
 TEST_FIELDS, CHANNEL_FIELDS, VEHICLE_FIELDS = 20, 20, 42
 MM = 1e-3
@@ -319,3 +324,380 @@ def _ranges(numbers: list[int]) -> str:
         else:
             parts.append([n, n])
     return ", ".join(f"{a}" if a == b else f"{a}-{b}" for a, b in parts)
+
+
+# The header of a crash test of the NHTSA database, row by row: sections, fields, numbers.
+
+
+SECTIONS = ("EV5", "TEST", "VEHICLE", "BARRIER", "OCCUPANT", "RESTRAINT", "INSTRUMENTATION", "END")
+# Headers are text of some hundred bytes a channel, of which no test has a hundred thousand.
+LARGEST_HEADER = 50_000_000
+
+
+def sections(file: Path) -> dict[str, list[tuple[list[str], int]]]:
+    """Rows of each section, field by field, with their line numbers.
+
+    Raises
+    ------
+    DataError
+        The file is missing, empty, far too large, cut, or in another form.
+    """
+    if not file.is_file():
+        raise DataError("io.no-such-file", file=str(file))
+    size = file.stat().st_size
+    if size == 0 or size > LARGEST_HEADER:
+        raise DataError(
+            "io.file-empty-5" if not size else "io.bytes-no-ev-header", file=file.name, size=size
+        )
+    rows: dict[str, list[tuple[list[str], int]]] = {name: [] for name in SECTIONS}
+    section = ""
+    seen: set[str] = set()
+    for k, line in enumerate(file.read_bytes().decode("latin-1").splitlines(), start=1):
+        text = line.strip()
+        if not text or text.startswith("#"):
+            continue
+        if text.startswith("-----"):
+            section = text.strip("- ").upper()
+            if section not in rows:
+                raise DataError(
+                    "io.no-section-ev",
+                    file=file.name,
+                    row=k,
+                    quantity="section",
+                    section=section,
+                    word=section,
+                    known=SECTIONS,
+                )
+            seen.add(section)
+        elif section in ("", "EV5", "END"):
+            raise DataError("io.stands-no-section", file=file.name, row=k, text=text[:40])
+        else:
+            rows[section].append(([f.strip() for f in line.split("|")], k))
+    missing = [name for name in ("EV5", "TEST", "INSTRUMENTATION", "END") if name not in seen]
+    if missing:
+        raise DataError("io.no-section", file=file.name, quantity="section", missing=missing)
+    return rows
+
+
+def only(
+    rows: dict[str, list[tuple[list[str], int]]], section: str, file: Path
+) -> tuple[list[str], int]:
+    """Return the row of a section that has one, with its line; refuse another count."""
+    if len(rows[section]) != 1:
+        raise DataError(
+            "io.rows-section-needed",
+            file=file.name,
+            quantity=section,
+            count=len(rows[section]),
+            section=section,
+        )
+    return rows[section][0]
+
+
+def to_number(text: str, file: Path, line: int, what: str) -> float:
+    """Return a field as a number, NaN where it is not stated; refuse what is none."""
+    if text in ("", "NA", "UN"):
+        return math.nan
+    try:
+        value = float(text)
+    except ValueError:
+        raise bad_number(text, file, line, what) from None
+    if not math.isfinite(value):
+        raise bad_number(text, file, line, what)
+    return value
+
+
+def to_whole(text: str, file: Path, line: int, what: str) -> int:
+    """Return a field as a whole number; refuse what is none, or not stated."""
+    value = to_number(text, file, line, what)
+    if not math.isfinite(value) or value != int(value):
+        raise bad_number(text, file, line, what)
+    return int(value)
+
+
+def bad_number(text: str, file: Path, line: int, what: str) -> DataError:
+    """What is said of a field that should be a number."""
+    return DataError("io.no-number-4", file=file.name, row=line, quantity=what, text=text)
+
+
+def row_error(file: Path, line: int, section: str, found: int, needed: int) -> DataError:
+    """What is said of a row with too few or too many fields."""
+    return DataError(
+        "io.fields-between-bars-row",
+        file=file.name,
+        row=line,
+        quantity=section,
+        found=found,
+        section=section,
+        needed=needed,
+    )
+
+
+# One channel of a crash test of the NHTSA database: what its header row says, and its samples.
+
+
+KMH = 1.0 / 3.6
+#: Units as the database writes them: what they are in SI, and the factor. Only units whose
+#: meaning is beyond doubt; another one is refused when its channel is read.
+UNITS: dict[str, tuple[str, float]] = {
+    "G'S": ("m/s2", ACCEL_UNITS["g"]),
+    "G": ("m/s2", ACCEL_UNITS["g"]),
+    "M/S2": ("m/s2", 1.0),
+    "DPS": ("rad/s", GYRO_UNITS["deg/s"]),
+    "DEG/SEC": ("rad/s", GYRO_UNITS["deg/s"]),
+    "RAD/S": ("rad/s", 1.0),
+    "NWT": ("N", 1.0),
+    "N": ("N", 1.0),
+    "NWM": ("N*m", 1.0),
+    "NM": ("N*m", 1.0),
+    "MM": ("m", 1e-3),
+    "KPH": ("m/s", KMH),
+}
+TIMES: dict[str, float] = {"SEC": 1.0, "MSEC": 1e-3}
+# Stamps have six decimals: two steps may so differ by 1 µs.
+STAMP_ROUNDING = 1.1e-6  # s
+# A row of two numbers is shorter; a file that is far larger is not what its header says.
+LONGEST_ROW = 64  # bytes
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A channel as its header row describes it; `table` reads its samples when first asked.
+
+    Attributes
+    ----------
+    vehicle : int
+        Number of the vehicle in the test; 0 for the barrier.
+    number : int
+        Number of the curve, and of its file.
+    kind : str
+        The database's code of the sensor: AC accelerometer, AV angular velocity, LC load cell,
+        DS displacement.
+    occupant : str
+        Code of the seat (01 driver, 02 front passenger), or NA.
+    location : str
+        Code of the place: HDCG head, FLLR floor left rear, ENGN engine.
+    axis : str
+        XL, YL, ZL local to the part; XG, YG, ZG of the vehicle.
+    time_unit, unit : str
+        As recorded.
+    prefilter_hz : float, Hz
+        Of the analogue filter before sampling; NaN where not stated.
+    maker, calibrated : str
+    rating : float
+        Full scale, in the recorded unit; NaN where not stated.
+    used_percent : float, %
+        Of the rating, as the laboratory stated it.
+    initial_velocity : float, m/s
+        Of the part along the axis before the impact, with the sign of the file: positive for
+        a vehicle that drives forward; NaN where not stated.
+    first, last : int
+        Numbers of the first and last sample, counted from the impact.
+    interval : float, s
+    status : str
+        The database's code: AM as measured, CF channel failed, NO no data.
+    primary : bool
+        P, not R for redundant.
+    comment : str
+    path : Path or None
+        File of the samples; None where the folder has none.
+    """
+
+    vehicle: int
+    number: int
+    kind: str
+    occupant: str
+    location: str
+    axis: str
+    time_unit: str
+    unit: str
+    prefilter_hz: float
+    maker: str
+    calibrated: str
+    rating: float
+    used_percent: float
+    initial_velocity: float
+    first: int
+    last: int
+    interval: float
+    status: str
+    primary: bool
+    comment: str
+    path: Path | None
+
+    @property
+    def name(self) -> str:
+        """Number and comment, for messages and tables."""
+        return f"channel {self.number} ({self.comment})"
+
+    @property
+    def present(self) -> bool:
+        """Whether the folder holds its samples."""
+        return self.path is not None
+
+    @property
+    def samples(self) -> int:
+        """Samples that the header promises."""
+        return self.last - self.first + 1
+
+    @property
+    def si_unit(self) -> str:
+        """Unit of `table`.
+
+        Raises
+        ------
+        DataError
+            The recorded unit is not known.
+        """
+        return self._si()[0]
+
+    @property
+    def rating_si(self) -> float:
+        """Full scale in the unit of `table`."""
+        return self.rating * self._si()[1]
+
+    @cached_property
+    def table(self) -> pd.DataFrame:
+        """Samples in SI: index ``time`` in s from the impact, column ``value``.
+
+        Accelerations are as recorded: the channels are zeroed before the impact, so gravity at
+        rest is not in them.
+
+        Raises
+        ------
+        DataError
+            There is no file; it is empty, cut, or not what the header says; a value is no
+            finite number; time does not advance; the unit is not known.
+        """
+        time, values = self.recorded
+        assert self.path is not None
+        unit, factor = self._si()
+        table = pd.DataFrame(
+            {"value": values * factor}, index=pd.Index(time, name="time"), copy=False
+        )
+        table.attrs = {"source": self.path.name, "unit": unit, "sampling": "instantaneous"}
+        return table
+
+    @cached_property
+    def recorded(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Stamps in s from the impact, and samples in the unit as recorded.
+
+        Raises
+        ------
+        DataError
+            As `table`, but of the unit.
+        """
+        if self.path is None:
+            raise DataError(
+                "io.listed-header-file-not-folder",
+                quantity=f"channel {self.number}",
+                name=self.name,
+            )
+        if self.time_unit not in TIMES:
+            raise DataError(
+                "io.time-unit-not-known",
+                file=self.path.name,
+                quantity="time",
+                time_unit=self.time_unit,
+                word=self.time_unit,
+                known=TIMES,
+            )
+        pairs = _read_pairs(self)
+        time = pairs[:, 0] * TIMES[self.time_unit]
+        _check_time(self, time)
+        return time, pairs[:, 1].copy()
+
+    def _si(self) -> tuple[str, float]:
+        if self.unit.upper() not in UNITS:
+            raise DataError(
+                "io.unit-not-known",
+                file=self.path.name if self.path else None,
+                quantity=f"channel {self.number}",
+                unit=self.unit,
+                name=self.name,
+                word=self.unit.upper(),
+                known=UNITS,
+            )
+        return UNITS[self.unit.upper()]
+
+
+def _read_pairs(channel: Channel) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    path = channel.path
+    assert path is not None
+    size = path.stat().st_size
+    if size == 0:
+        raise DataError("io.file-empty-4", file=path.name, quantity=f"channel {channel.number}")
+    if size > LONGEST_ROW * (channel.samples + 1):
+        raise DataError(
+            "io.bytes-too-many-samples-header",
+            file=path.name,
+            quantity=f"channel {channel.number}",
+            size=size,
+            samples=channel.samples,
+        )
+    lines = path.read_bytes().decode("ascii", "replace").splitlines()
+    out = np.empty((len(lines), 2))
+    for k, line in enumerate(lines):
+        fields = line.split()
+        try:
+            time, value = (float(text) for text in fields)
+        except ValueError:
+            raise DataError(
+                "io.not-time-value",
+                file=path.name,
+                row=k + 1,
+                quantity=f"channel {channel.number}",
+                at_line=line[:60],
+            ) from None
+        if not (math.isfinite(time) and math.isfinite(value)):
+            raise DataError(
+                "io.not-finite-number-3",
+                file=path.name,
+                row=k + 1,
+                quantity="time" if not math.isfinite(time) else f"channel {channel.number}",
+                strip=line.strip()[:60],
+            )
+        out[k] = time, value
+    if len(lines) != channel.samples:
+        cut = len(lines) < channel.samples
+        raise DataError(
+            "io.samples-header-row-says" if cut else "io.samples-header-row-says-2",
+            file=path.name,
+            row=len(lines) if cut else channel.samples + 1,
+            quantity=f"channel {channel.number}",
+            count=len(lines),
+            samples=channel.samples,
+            first=channel.first,
+            last=channel.last,
+        )
+    return out
+
+
+def _check_time(channel: Channel, time: np.ndarray[tuple[int], np.dtype[np.float64]]) -> None:
+    assert channel.path is not None
+    steps = np.diff(time)
+    back = np.flatnonzero(steps <= 0.0)
+    if back.size:
+        k = int(back[0]) + 1
+        raise DataError(
+            "io.time-goes-4",
+            file=channel.path.name,
+            row=k + 1,
+            quantity="time",
+            time=time[k - 1],
+            time_2=time[k],
+        )
+    expected = channel.interval * (channel.first + np.arange(time.size))
+    off = np.flatnonzero(np.abs(time - expected) > STAMP_ROUNDING)
+    if off.size:
+        k = int(off[0])
+        raise DataError(
+            "io.stamp-header-sample-every",
+            file=channel.path.name,
+            row=k + 1,
+            quantity="time",
+            time=time[k],
+            first=channel.first + k,
+            interval=channel.interval * 1000000.0,
+            expected=expected[k],
+        )

@@ -7,8 +7,7 @@ import pandas as pd
 
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError
-from strapdown.formats.nhtsa import CrashTest
-from strapdown.formats.nhtsa_channel import Channel
+from strapdown.formats.nhtsa import Channel, CrashTest
 from strapdown.tables import imu_table
 
 __all__ = ["accelerations", "imu_of"]

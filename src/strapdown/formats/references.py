@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown.errors import ConfigError, DataError
-from strapdown.evaluation.place_references import is_place, parse_place
+from strapdown.evaluation.position_references import is_place, parse_place
 from strapdown.evaluation.reference_points import parse_reference
 from strapdown.formats import csv, read_raw
 from strapdown.formats.assemble_truth import truth_of_file

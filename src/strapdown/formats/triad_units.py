@@ -13,12 +13,13 @@ from strapdown.formats.columns import parse_axes, says_increment
 from strapdown.formats.find_columns import AXES, Column
 from strapdown.formats.inference import Inference, Signals, infer_signals
 from strapdown.formats.judge import UNITS, inferred_unit, report_contradictions
+from strapdown.formats.numbers import numbers
 from strapdown.formats.recording import RawLog, ReadOptions
 from strapdown.formats.summed import OPEN, SUMS
-from strapdown.formats.triad_values import left_out
 from strapdown.formats.unit_words import parse_unit
 
-__all__ = ["told_by_numbers", "units_of_triads"]
+__all__ = ["left_out", "told_by_numbers", "units_of_triads", "values_of_triads"]
+
 
 Array = NDArray[np.float64]
 
@@ -156,3 +157,73 @@ def _stated_unit(
         stated = columns[0].why == "stated by the file"
         return unit, "stated by the file" if stated else "in its name"
     return None
+
+
+# Values of gyro, accelerometer and magnetometer as they stand in a file.
+
+# Left out where they cannot be used, for the gyro alone makes an attitude.
+OPTIONAL = ("accel", "mag")
+
+
+def values_of_triads(
+    raw: RawLog, found: dict[str, Column], findings: list[Finding]
+) -> dict[str, Array]:
+    """Values of each triad that can be used, as they stand in the file.
+
+    Parameters
+    ----------
+    raw : RawLog
+    found : dict of str to Column
+    findings : list of Finding
+        What is left out is added.
+
+    Returns
+    -------
+    dict of str to ndarray, (n, 3)
+
+    Raises
+    ------
+    DataError
+        Those of the gyro cannot be used.
+    """
+    values = {"gyro": _triad(raw, found, "gyro")}
+    for triad in OPTIONAL:
+        if not any(f"{triad}_{a}" in found for a in AXES):
+            continue
+        missing = [f"{triad}_{a}" for a in AXES if f"{triad}_{a}" not in found]
+        if missing:
+            findings.append(_not_used(raw, triad, "io.left-out-without-axes", missing=missing))
+            continue
+        try:
+            block = _triad(raw, found, triad)
+        except DataError as error:
+            findings.append(left_out(raw, triad, error))
+            continue
+        empty = int((~np.isfinite(block)).any(axis=1).sum())
+        if not np.isfinite(block).any():
+            findings.append(_not_used(raw, triad, "io.left-out-without-number"))
+        elif triad == "mag" and empty:
+            findings.append(_not_used(raw, triad, "io.left-out-rows-without-number", count=empty))
+        else:
+            values[triad] = block
+    return values
+
+
+def _not_used(raw: RawLog, triad: str, code: str, **data: Any) -> Finding:
+    return Finding(code, file=raw.name, quantity=triad, severity="note", **data)
+
+
+def _triad(raw: RawLog, found: dict[str, Column], triad: str) -> Array:
+    parts = [numbers(raw, found[f"{triad}_{a}"], f"{triad}_{a}") for a in AXES]
+    return np.column_stack(parts).astype(np.float64, copy=False)
+
+
+def left_out(raw: RawLog, triad: str, error: DataError) -> Finding:
+    """Say of a triad that it is not used, and why."""
+    return Finding(
+        "io.left-out-unusable",
+        file=raw.name,
+        row=error.finding.row,
+        quantity=triad,
+        reason=error.finding,
+    )

@@ -1,10 +1,13 @@
 """From samples of rate and specific force to increments of angle, velocity and distance."""
 
-from strapdown.increments.accuracy import MotionAccuracy, motion_accuracy
 from strapdown.increments.angle import increments_from_imu
-from strapdown.increments.motion import motion_increments
+from strapdown.increments.motion import (
+    MotionAccuracy,
+    imu_from_increments,
+    motion_accuracy,
+    motion_increments,
+)
 from strapdown.increments.stream import IncrementStream, IncrementStreamState
-from strapdown.increments.summed import imu_from_increments
 
 __all__ = [
     "IncrementStream",

@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from strapdown._kernels import motion_blocks
 from strapdown._kernels import motion_increments as one_step
 from strapdown.errors import ConfigError, DataError
 from strapdown.increments.angle import INTERPOLATIONS as BETWEEN_STAMPS
-from strapdown.tables import ACCEL, GYRO, MOTION, check_imu, check_motion_increments
+from strapdown.tables import ACCEL, GYRO, MOTION, check_imu, check_motion_increments, imu_table
+from strapdown.tables.checks import as_array, check_same_length, check_time
 
-__all__ = ["INTERPOLATIONS", "ROWS", "motion_increments"]
+__all__ = [
+    "INTERPOLATIONS",
+    "ROWS",
+    "MotionAccuracy",
+    "imu_from_increments",
+    "motion_accuracy",
+    "motion_increments",
+]
+
 
 Array = NDArray[np.float64]
 #: `constant` is for means alone.
@@ -132,3 +142,136 @@ def _check(imu: pd.DataFrame, samples: int, interpolation: str, rows: str) -> bo
             quantity="accel",
         )
     return mean
+
+
+# The orders of accuracy of motion increments, as data; the tests fit each of them.
+
+
+@dataclass(frozen=True)
+class MotionAccuracy:
+    """Powers of the step with which errors fall on smooth motion, at the ends of blocks.
+
+    Attributes
+    ----------
+    attitude, velocity, position : int
+        Where the steps of a block are equal.
+    unequal : int
+        Of all three where they are not: with an even number of steps a term of the error
+        cancels between the halves of a block only where these are alike.
+    """
+
+    attitude: int
+    velocity: int
+    position: int
+    unequal: int
+
+
+def _orders(equal: int, unequal: int) -> MotionAccuracy:
+    return MotionAccuracy(equal, equal, equal, unequal)
+
+
+# By the number of steps and the interpolation. The polynomial is wrong by a multiple of
+# the product of distances to its nodes: those of n steps are n + 1 stamps, for samples and for
+# the running sums of means alike, and the integral of that product over equal steps is zero
+# where n is even.
+_BLOCKS = {2: _orders(4, 3), 3: _orders(4, 4), 4: _orders(6, 5)}
+ORDERS: dict[tuple[str, int, str], MotionAccuracy] = {
+    ("instantaneous", 1, "linear"): _orders(2, 2),
+    ("instantaneous", 1, "cubic"): _orders(4, 4),
+    ("mean", 1, "constant"): _orders(2, 2),
+    ("mean", 1, "linear"): _orders(3, 3),
+    ("mean", 1, "cubic"): _orders(4, 4),
+    **{(s, n, "linear"): o for s in ("instantaneous", "mean") for n, o in _BLOCKS.items()},
+}
+
+
+def motion_accuracy(
+    sampling: str, samples: int = 1, interpolation: str = "linear"
+) -> MotionAccuracy:
+    """Look up the orders of accuracy of `motion_increments`.
+
+    Parameters
+    ----------
+    sampling : {'instantaneous', 'mean'}
+    samples, interpolation
+        As `motion_increments`.
+
+    Returns
+    -------
+    MotionAccuracy
+
+    Raises
+    ------
+    ConfigError
+        There is no such combination.
+    """
+    try:
+        return ORDERS[sampling, samples, interpolation]
+    except KeyError:
+        raise ConfigError(
+            "mechanization.no-motion-increments-made-samples",
+            quantity="accuracy",
+            sampling=sampling,
+            samples=samples,
+            interpolation=interpolation,
+        ) from None
+
+
+# A sensor that sums: increments of angle and velocity as means over their steps.
+
+
+def imu_from_increments(
+    time: ArrayLike,
+    theta: ArrayLike,
+    dv: ArrayLike | None = None,
+    dt: float | None = None,
+    source: str | None = None,
+) -> pd.DataFrame:
+    """Make an Imu table of the increments that a sensor summed since its last sample.
+
+    Parameters
+    ----------
+    time : array_like, (n,), s
+        Stamps: the end of the interval of each sample, which begins at the stamp before it.
+    theta : array_like, (n, 3), rad
+        Integral of the rate over the interval, axis by axis, without coning correction.
+    dv : array_like, (n, 3), m/s, optional
+        Integral of the specific force, axis by axis, without sculling correction.
+    dt : float, s, optional
+        Length of the first interval, which no stamp tells; else the median step.
+    source : str, optional
+        Name for messages.
+
+    Returns
+    -------
+    DataFrame
+        An Imu table of means: each increment divided by its step.
+
+    Raises
+    ------
+    DataError
+        As `tables.imu_table`; `dt` is not positive.
+    """
+    stamps = as_array(time, None, "time", source)
+    angle = as_array(theta, 3, "theta", source)
+    velocity = None if dv is None else as_array(dv, 3, "dv", source)
+    check_same_length(source, time=stamps, theta=angle)
+    if velocity is not None:
+        check_same_length(source, time=stamps, dv=velocity)
+    check_time(stamps, source)
+    if len(stamps) < 2 and dt is None:
+        # The table says what is wrong with a single sample.
+        return imu_table(stamps, angle, velocity, sampling="mean", source=source)
+    first = float(np.median(np.diff(stamps))) if dt is None else float(dt)
+    if not (np.isfinite(first) and first > 0.0):
+        raise DataError(
+            "mechanization.first-step-none", file=source, row=1, quantity="dt", first=first
+        )
+    steps = np.concatenate([[first], np.diff(stamps)])[:, None]
+    return imu_table(
+        stamps,
+        angle / steps,
+        None if velocity is None else velocity / steps,
+        sampling="mean",
+        source=source,
+    )

@@ -12,15 +12,42 @@ Blanks around commas, empty lines and those that begin with ``#`` mean nothing.
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
-from strapdown.errors import Finding
-from strapdown.formats.sensorstream import blocks_of
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
 
-__all__ = ["END", "BadLineError", "Measured", "Sample", "Word", "parse_line"]
+from strapdown.aiding.aid import TableAid
+from strapdown.config.navigation import AidSpec
+from strapdown.errors import ConfigError, Finding
+from strapdown.formats import csv
+from strapdown.formats.sensorstream import blocks_of
+from strapdown.navigation.navigator import Navigator
+from strapdown.navigation.record import Mark
+from strapdown.rotation.euler_angles import euler_sd
+from strapdown.systems.sins.modes import ChainPiece
+from strapdown.systems.sins.source import COLUMN_UNITS
+from strapdown.tables import EULER, GEODETIC, GNSS, TRAJECTORY, VELOCITY
+from strapdown.tables.checks import POSITION_SD, VELOCITY_SD
+
+__all__ = [
+    "END",
+    "LINE_FORMS",
+    "AidRows",
+    "BadLineError",
+    "Measured",
+    "Sample",
+    "StateLines",
+    "Word",
+    "parse_line",
+]
+
 
 #: The word that ends a run.
 END = "end"
@@ -161,3 +188,194 @@ def _number(text: str, kind: str) -> float:
 
 def _shown(text: str) -> str:
     return text if len(text) <= LONGEST else f"{text[:LONGEST]}…"
+
+
+# What an aid measured, a line at a time: as a row of its table, and all rows as a file.
+
+
+Array = NDArray[np.float64]
+_UNITS_OF_FIXES = {
+    **dict(zip(GEODETIC, ("deg", "deg", "m"), strict=True)),
+    **dict.fromkeys(POSITION_SD, "m"),
+    **dict.fromkeys([*VELOCITY, *VELOCITY_SD], "m_s"),
+    "quality": "",
+}
+
+
+class AidRows:
+    """The rows that came of one aid.
+
+    Parameters
+    ----------
+    aid : TableAid
+    given : AidSpec
+        What the configuration says in place of what is sent: standard deviations of fixes.
+    """
+
+    def __init__(self, aid: TableAid, given: AidSpec) -> None:
+        self.aid = aid
+        self.of_fixes = set(aid.columns) == set(GNSS)
+        self._columns = GNSS if self.of_fixes else list(aid.columns)
+        self._position_sd = _three(given.position_sd_m)
+        self._velocity_sd = _three(given.velocity_sd_m_per_s)
+        self._time: list[float] = []
+        self._rows: list[list[float]] = []
+
+    @property
+    def newest(self) -> float:
+        """Stamp of the newest row that was kept, s."""
+        return self._time[-1] if self._time else -math.inf
+
+    @property
+    def count(self) -> int:
+        """Rows that were kept."""
+        return len(self._time)
+
+    def row(self, values: Mapping[str, float]) -> list[float]:
+        """Put what a line says in the order of the table.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            By column; of a fix, velocity, standard deviations and quality may be left out.
+
+        Raises
+        ------
+        BadLineError
+            A column is missing, or is none of the table.
+        """
+        name = self.aid.name
+        for column in values:
+            if column not in self._columns:
+                raise BadLineError(name, "live.unknown-column", word=column, known=self._columns)
+        whole = self._whole_fix(dict(values)) if self.of_fixes else values
+        missing = [column for column in self._columns if column not in whole]
+        if missing:
+            code = "live.fix-incomplete" if self.of_fixes else "live.columns-missing"
+            raise BadLineError(name, code, missing=missing, columns=self._columns)
+        return [float(whole[column]) for column in self._columns]
+
+    def _whole_fix(self, values: dict[str, float]) -> dict[str, float]:
+        """A fix with what the configuration says; what was not measured is not known."""
+        if self._position_sd is not None:
+            values |= dict(zip(POSITION_SD, self._position_sd, strict=True))
+        if not set(values) & {*VELOCITY, *VELOCITY_SD}:
+            values |= dict.fromkeys([*VELOCITY, *VELOCITY_SD], math.nan)
+        elif self._velocity_sd is not None:
+            values |= dict(zip(VELOCITY_SD, self._velocity_sd, strict=True))
+        return {"quality": 1.0, **values}
+
+    def table(self, time: float, row: list[float]) -> pd.DataFrame:
+        """A row as the aid takes it."""
+        values = np.array([row])
+        if self.of_fixes:
+            none = np.isnan(values)
+            sd = np.array([column in VELOCITY_SD for column in self._columns])
+            values[none & sd], values[none & ~sd] = np.inf, 0.0
+        table = pd.DataFrame(
+            values, index=pd.Index([time], name="time"), columns=list(self._columns)
+        )
+        table.attrs["source"] = self.aid.name
+        return table
+
+    def keep(self, time: float, row: list[float]) -> None:
+        """Keep a row that the chain was told."""
+        self._time.append(time)
+        self._rows.append(row)
+
+    def write(self, path: Path) -> None:
+        """Write the rows as a file that is read to the same numbers."""
+        values = np.array(self._rows)
+        units = _UNITS_OF_FIXES
+        if not self.of_fixes:
+            of = {c: COLUMN_UNITS.get(c.removesuffix("_sd"), "") for c in self._columns}
+            of |= dict(getattr(type(self.aid), "units", {}))
+            units = {c: u.replace("/", "_") for c, u in of.items()}
+        columns = {"time_s": np.array(self._time)}
+        for k, name in enumerate(self._columns):
+            if not np.isnan(values[:, k]).all():
+                columns[f"{name}_{units[name]}" if units[name] else name] = values[:, k]
+        csv.write(path, columns, {"aid": self.aid.name})
+
+
+def _three(value: float | tuple[float, float, float] | None) -> list[float] | None:
+    return None if value is None else [float(v) for v in np.broadcast_to(value, 3)]
+
+
+# The newest state as a line: JSON or by commas.
+
+STATE = [*GEODETIC, *VELOCITY, *EULER]
+SD = [*POSITION_SD, *VELOCITY_SD, *(f"{angle}_sd" for angle in EULER)]
+LINE_FORMS = ("json", "csv")
+# Decimals: 0.1 mm of a place, and as much of an angle at 6 km.
+_FINE, _COARSE = 9, 6
+_DECIMALS = {name: _FINE if name in ("lat", "lon") else _COARSE for name in (*STATE, *SD)}
+
+
+class StateLines:
+    """Writes a line for the newest state, at most every so many seconds of the record.
+
+    Parameters
+    ----------
+    navigator : Navigator
+    write : callable
+        Takes a line with its end.
+    form : {'json', 'csv'}
+    every : float, s
+        Of the stamps; zero for each sample.
+
+    Raises
+    ------
+    ConfigError
+        There is no such form.
+    """
+
+    def __init__(
+        self,
+        navigator: Navigator,
+        write: Callable[[str], None],
+        form: str = "json",
+        every: float = 1.0,
+    ) -> None:
+        if form not in LINE_FORMS:
+            raise ConfigError("live.unknown-line-form", quantity="--lines", form=form)
+        if not 0.0 <= every < math.inf:
+            raise ConfigError("live.bad-interval", quantity="--every", every=every)
+        self._used, self._write, self._form, self._every = navigator, write, form, every
+        self._next = -math.inf
+        self._mark: Mark | None = None
+        self._begun = False
+
+    def take(self, piece: ChainPiece) -> None:
+        """Take what came of a sample."""
+        for navigation in piece.navigation:
+            if navigation.marks:
+                self._mark = navigation.marks[-1]
+        # A stamp is a decimal fraction that was rounded.
+        if not math.isfinite(piece.time) or piece.time < self._next - 1e-9:
+            return
+        self._next = piece.time + self._every
+        told = {"time": round(piece.time, _FINE), "mode": piece.mode, **self._state(piece)}
+        if self._form == "json":
+            self._write(json.dumps(told) + "\n")
+            return
+        if not self._begun:
+            self._write(",".join(told) + "\n")
+            self._begun = True
+        self._write(",".join("" if v is None else str(v) for v in told.values()) + "\n")
+
+    def _state(self, piece: ChainPiece) -> dict[str, float | None]:
+        rows = [one.history[-1:] for one in piece.navigation if len(one.history)]
+        if not rows:
+            return dict.fromkeys([*STATE, *SD])
+        out = np.empty((1, len(TRAJECTORY)))
+        self._used.filter.mechanization.fill_trajectory(rows[-1], out)
+        state = dict(zip(TRAJECTORY, out[0].tolist(), strict=True))
+        told: dict[str, float | None] = {n: round(state[n], _DECIMALS[n]) for n in STATE}
+        if self._mark is None:
+            return {**told, **dict.fromkeys(SD)}
+        covariance = self._mark.covariance
+        euler = np.array([state[angle] for angle in EULER])
+        sd = np.sqrt(np.diagonal(covariance)[:6]).tolist()
+        sd += euler_sd(euler, covariance[6:, 6:]).tolist()
+        return {**told, **{n: round(v, _COARSE) for n, v in zip(SD, sd, strict=True)}}

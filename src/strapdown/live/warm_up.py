@@ -14,9 +14,8 @@ from strapdown.errors import StrapdownError
 from strapdown.nav_state import NavState
 from strapdown.systems.sins.chain import Chain
 from strapdown.systems.sins.drive import run_by_sample
-from strapdown.systems.sins.gaps import GapPolicy
-from strapdown.systems.sins.known_start import KnownStart
-from strapdown.systems.sins.modes import Navigation
+from strapdown.systems.sins.intake import GapPolicy
+from strapdown.systems.sins.modes import KnownStart, Navigation
 from strapdown.tables import gnss_table, imu_table
 
 __all__ = ["warm_up"]

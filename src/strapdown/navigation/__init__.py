@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 from strapdown.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
-    from strapdown.navigation.damping import Damping, Feedback, Feedforward
-    from strapdown.navigation.lost_covariance import LostCovarianceError
+    from strapdown.navigation.engine import LostCovarianceError
+    from strapdown.navigation.filter_options import Damping, Feedback, Feedforward
     from strapdown.navigation.navigator import Navigator
-    from strapdown.navigation.piece import NavigationPiece
+    from strapdown.navigation.record import NavigationPiece
 
 __all__ = [
     "Damping",
@@ -24,9 +24,9 @@ __all__ = [
 load_on_first_use(
     __name__,
     {
-        "damping": "Damping Feedback Feedforward",
-        "lost_covariance": "LostCovarianceError",
+        "engine": "LostCovarianceError",
+        "filter_options": "Damping Feedback Feedforward",
         "navigator": "Navigator",
-        "piece": "NavigationPiece",
+        "record": "NavigationPiece",
     },
 )

@@ -16,21 +16,22 @@ from strapdown._kernels.level_place import NED, WANDER
 from strapdown.aiding.aid import Epochs
 from strapdown.aiding.gnss import POSITION_CODE
 from strapdown.errors import DivergenceError
-from strapdown.estimation.covariance import CovarianceForm, Innovations
-from strapdown.estimation.covariance_input import bad_observation
-from strapdown.estimation.error_filter import ErrorFilter, diverged
-from strapdown.estimation.error_model import PHYSICAL, refuse_damped_height
-from strapdown.estimation.joseph import Joseph, Plain
-from strapdown.estimation.observation import Observation
-from strapdown.estimation.observed_together import Rules
-from strapdown.estimation.rotation_vector_model import RotationVectorModel
-from strapdown.estimation.ud import BiermanThornton
-from strapdown.estimation.wd import Chernodarov
+from strapdown.estimation.covariance import (
+    BiermanThornton,
+    Chernodarov,
+    CovarianceForm,
+    Innovations,
+    Joseph,
+    Observation,
+    Plain,
+    bad_observation,
+)
+from strapdown.estimation.error_filter import ErrorFilter, Rules, diverged
+from strapdown.estimation.error_model import PHYSICAL, RotationVectorModel, refuse_damped_height
 from strapdown.mechanization.mechanization import Mechanization
 from strapdown.mechanization.ned import NorthEastDown
 from strapdown.mechanization.wander_azimuth import WanderAzimuth
-from strapdown.navigation.engine import LARGEST_GROUP, SAME_INSTANT, Engine, EngineState
-from strapdown.navigation.node_rows import NodeRows
+from strapdown.navigation.engine import LARGEST_GROUP, SAME_INSTANT, Engine, EngineState, NodeRows
 
 __all__ = ["CompiledEngine", "compiled"]
 

@@ -2,32 +2,48 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import TYPE_CHECKING
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.aiding.aid import Aid, Epochs, TableAid, WatchingAid
-from strapdown.aiding.gnss import Gnss
+from strapdown._kernels.split_increment import split_increment
+from strapdown._kernels.steady_motion import STEADY, steady_motion
+from strapdown.aiding.aid import Aid, Epochs, TableAid, View, WatchingAid
+from strapdown.aiding.gnss import HORIZONTAL_CODE, Gnss
 from strapdown.errors import ConfigError
-from strapdown.estimation.error_filter import ErrorFilter
-from strapdown.estimation.filter_state import FilterState
-from strapdown.estimation.large_tilt import is_large
+from strapdown.estimation.covariance import Innovations, Observation, UpdateRule
+from strapdown.estimation.error_filter import (
+    ErrorFilter,
+    FilterState,
+    Rules,
+    is_large,
+    unlearnt_force,
+)
+from strapdown.estimation.robust import AdaptiveRule, Scales
 from strapdown.nav_state import NavState
-from strapdown.navigation.compiled_engine import CompiledEngine, compiled
-from strapdown.navigation.damping import Damping, Feedback
-from strapdown.navigation.engine import SAME_INSTANT, Engine, EngineState, GeneralEngine, begun
-from strapdown.navigation.going import Going
-from strapdown.navigation.navigator_state import NavigatorState
-from strapdown.navigation.piece import NavigationPiece
+from strapdown.navigation.compiled_engine import CompiledEngine, Fixed, compiled
+from strapdown.navigation.engine import (
+    SAME_INSTANT,
+    Engine,
+    EngineState,
+    GeneralEngine,
+    LostCovarianceError,
+    NodeRows,
+    begun,
+)
+from strapdown.navigation.filter_options import Damping, Feedback
+from strapdown.navigation.record import Mark, NavigationPiece, Seen
 
 if TYPE_CHECKING:
     from strapdown.navigation.smoother import Smoother
 
-__all__ = ["Navigator", "NavigatorState", "with_states"]
+__all__ = ["Going", "Navigator", "NavigatorState", "with_states"]
+
 
 Array = NDArray[np.float64]
 
@@ -218,3 +234,358 @@ def with_states(filter_: ErrorFilter, aids: tuple[Aid, ...]) -> ErrorFilter:
     more = tuple(state for aid in aids for state in aid.states())
     model = replace(filter_.model, sensors=(*filter_.model.sensors, *more))
     return replace(filter_, model=model)
+
+
+# What a navigator remembers.
+
+
+@dataclass(frozen=True, eq=False)
+class NavigatorState:
+    """Everything that a navigator remembers: from here it goes on.
+
+    Attributes
+    ----------
+    engine : EngineState
+        Of mechanization, estimates and covariance.
+    queues : mapping of str to Epochs
+        Of each aid, the epochs that are still to come.
+    memories : mapping of str to object
+        Of each aid that watches the sensors.
+    marked : float, s
+        Time of the last mark.
+    observed : float, s
+        When something was observed last; the start, before that.
+    scales : mapping of str to tuple of ScaleState
+        By name of an observation whose rule learns: what it has learnt of each component.
+    steady : ndarray, (7,)
+        Fading means of rate and force (`_kernels.steady_motion`), where an aid wants them.
+    tilted : bool
+        Whether the tilt is, since the start, known so badly that its second order counts.
+    """
+
+    engine: EngineState
+    queues: Mapping[str, Epochs]
+    memories: Mapping[str, Any]
+    marked: float
+    observed: float
+    scales: Mapping[str, Scales] = field(default_factory=dict)
+    steady: Array = field(default_factory=lambda: np.zeros(STEADY))
+    tilted: bool = False
+
+    @property
+    def time(self) -> float:
+        """Time of the newest sample, s."""
+        return self.engine.time
+
+
+# A navigator on its way over a piece of a log.
+
+
+#: Over which shaking is taken out of rates and forces, s: beyond a tenth of a second it is not seen
+#: by receivers, and a vehicle does not change its acceleration by much in it.
+STEADY_TIME = 0.2
+#: Where nothing was observed for so many intervals of marks, there is a mark before the next
+#: observation, too; its stamp is so much earlier, s.
+ALONE = 1.5
+JUST_BEFORE = 1e-6
+#: A variance is negative by rounding alone within this part of those of its kind.
+ROUNDING = 1e-12
+PHYSICAL_LABELS = ("place", "velocity", "attitude")
+
+
+class Going:
+    """A navigator on its way over one piece."""
+
+    def __init__(self, navigator: Navigator, state: NavigatorState) -> None:
+        self.navigator = navigator
+        self.engine = navigator.engine(state.engine)
+        self.queues = dict(state.queues)
+        self.memories = dict(state.memories)
+        self.marked = state.marked
+        self.observed = state.observed
+        self.scales = dict(state.scales)
+        self.tilted = state.tilted
+        self.steady = state.steady.copy()
+        self.begun_steady = state.steady
+        self.steadies: Array | None = None
+        self.seen: list[Seen] = []
+        self.marks: list[Mark] = []
+        self.late: list[tuple[str, float]] = []
+        self.engine.nodes = NodeRows(navigator.filter, navigator.smoother is not None)
+        if state.marked == -np.inf:
+            self.engine.nodes.began(self.engine.filter)
+        self.time: Array = np.empty(0)
+        self.history: Array = np.empty((0, navigator.filter.mechanization.row))
+
+    def over(self, time: Array, rows: Array) -> None:
+        """Go over steps."""
+        for aid in self.navigator.aids:
+            if isinstance(aid, WatchingAid):
+                self.memories[aid.name], self.queues[aid.name] = aid.watch(
+                    self.memories[aid.name], time, rows
+                )
+        self._drop_late()
+        if len(time) and self._cuts(time):
+            rows = rows.copy()
+        if any(aid.wants_steady for aid in self.navigator.aids):
+            self.steadies = np.empty((len(rows), 6))
+            steady_motion(rows, STEADY_TIME, self.steady, self.steadies)
+        self.time, self.history = time, np.empty((len(time), self.history.shape[1]))
+        at = self._fixes(0, time, rows)
+        while True:
+            epoch = self._next_epoch()
+            if epoch <= self.engine.time + SAME_INSTANT:
+                self._observe(self.engine.time)
+                if at and self.engine.time <= time[at - 1] + SAME_INSTANT:
+                    self.history[at - 1] = self.engine.shown()
+                at = self._fixes(at, time, rows)
+                continue
+            if at == len(time):
+                break
+            # The step at whose end, or within which, something is observed next.
+            told = int(time.searchsorted(epoch - SAME_INSTANT))
+            if told < len(time) and time[told] > epoch + SAME_INSTANT:
+                at = self._steps(at, told, time, rows)
+                first, second = np.empty(10), np.empty(10)
+                split_increment(rows[told], epoch - self.engine.time, first, second)
+                room = np.empty((1, self.history.shape[1]))
+                self._run(np.array([epoch]), first[None, :], room)
+                rows[told] = second
+            else:
+                at = self._steps(at, min(told + 1, len(time)), time, rows)
+
+    def _cuts(self, time: Array) -> bool:
+        """Whether an epoch is within a step, which is then cut there."""
+        for queue in self.queues.values():
+            # Mostly nothing is due: a sample alone must not pay for what it does not meet.
+            if not queue.time.size or queue.time[0] >= time[-1] - SAME_INSTANT:
+                continue
+            due = queue.time[: queue.time.searchsorted(time[-1] - SAME_INSTANT)]
+            if (time[time.searchsorted(due - SAME_INSTANT)] > due + SAME_INSTANT).any():
+                return True
+        return False
+
+    def end(self) -> None:
+        """Mark the newest sample."""
+        self.engine.close()
+        self._mark()
+
+    def _fixes(self, made: int, time: Array, rows: Array) -> int:
+        """Go as far as the fixes of a lone receiver reach without an outage; return the steps."""
+        aid, engine = self.navigator.lone_receiver, self.engine
+        if aid is None or not isinstance(engine, CompiledEngine) or self.tilted:
+            return made
+        arm = np.asarray(aid.lever_arm, dtype=np.float64)
+        interval = self.navigator.mark_interval * (1.0 - 1e-9)
+        queue = self.queues[aid.name]
+        while made < len(time):
+            due = int(queue.time.searchsorted(time[-1] + SAME_INSTANT, side="right"))
+            usual = self._until_outage(Epochs(queue.time[:due], queue.values[:due]))
+            if not usual.time.size:
+                break
+            made, fixed, stopped = engine.over_fixes(
+                time,
+                rows,
+                self.history,
+                made,
+                self.marked + interval,
+                interval,
+                arm,
+                usual,
+            )
+            done = len(fixed.told)
+            self._fixed(aid, queue, fixed)
+            queue = Epochs(queue.time[done:], queue.values[done:])
+            if stopped:
+                self._mark()
+        self.queues[aid.name] = queue
+        return made
+
+    def _until_outage(self, queue: Epochs) -> Epochs:
+        """Whole epochs that follow each other, and the last observation, without an outage."""
+        if not queue.time.size:
+            return queue
+        longest = ALONE * self.navigator.mark_interval
+        apart = np.diff(queue.time, prepend=self.observed) > longest
+        ends = apart | (queue.values[:, 0] == HORIZONTAL_CODE)
+        count = int(np.argmax(ends)) if ends.any() else len(ends)
+        return Epochs(queue.time[:count], queue.values[:count])
+
+    def _fixed(self, aid: Gnss, fixes: Epochs, fixed: Fixed) -> None:
+        """Note what came of fixes."""
+        count = len(fixed.told)
+        codes, times = fixes.values[:count, 0].tolist(), fixed.time.tolist()
+        names = {code: aid.names(code) for code in set(codes)}
+        told = map(Innovations, fixed.told[:, 0], fixed.told[:, 1], fixed.told[:, 2])
+        self.seen += [
+            Seen(at, *names[code], nu) for at, code, nu in zip(times, codes, told, strict=True)
+        ]
+        for mark in map(Mark, times, fixed.covariance, fixed.sensors, fixed.sensors_sd):
+            self._add_mark(mark)
+        if count:
+            self.observed = times[-1]
+
+    def state(self) -> NavigatorState:
+        """Where it is now."""
+        return NavigatorState(
+            self.engine.state(),
+            self.queues,
+            self.memories,
+            self.marked,
+            self.observed,
+            self.scales,
+            self.steady,
+            self.tilted,
+        )
+
+    def piece(self) -> NavigationPiece:
+        """What came of it."""
+        return NavigationPiece(
+            self.time,
+            self.history,
+            tuple(self.seen),
+            tuple(self.marks),
+            tuple(self.late),
+            self.engine.nodes.blocks(),
+        )
+
+    def _steady(self, at: float) -> Array | None:
+        """Rate and force without the shaking, at the last sample before an instant."""
+        if self.steadies is None:
+            return None
+        k = int(self.time.searchsorted(at + SAME_INSTANT, side="right"))
+        if k:
+            return np.asarray(self.steadies[k - 1])
+        return self.begun_steady[:6] if self.begun_steady[6] else None
+
+    def _next_epoch(self) -> float:
+        return min((q.time[0] for q in self.queues.values() if q.time.size), default=np.inf)
+
+    def _drop_late(self) -> None:
+        for name, queue in self.queues.items():
+            if queue.time.size and queue.time[0] < self.engine.time - SAME_INSTANT:
+                count = int(queue.time.searchsorted(self.engine.time - SAME_INSTANT))
+                self.late += [(name, float(t)) for t in queue.time[:count]]
+                self.queues[name] = Epochs(queue.time[count:], queue.values[count:])
+
+    def _steps(self, begin: int, end: int, time: Array, rows: Array) -> int:
+        """Steps from `begin` to before `end`."""
+        self._run(time[begin:end], rows[begin:end], self.history[begin:end])
+        return end
+
+    def _run(self, time: Array, rows: Array, history: Array) -> None:
+        made = 0
+        while made < len(time):
+            # The interval is one of a decimal clock.
+            note_at = self.marked + self.navigator.mark_interval * (1.0 - 1e-9)
+            made += self.engine.over(time[made:], rows[made:], history[made:], note_at)
+            if made < len(time):
+                self._mark()
+
+    def _observe(self, at: float) -> None:
+        """Take everything that is observed at an instant."""
+        engine, filter_ = self.engine, self.navigator.filter
+        last = engine.last
+        engine.close()
+        view = View(
+            mechanization=filter_.mechanization,
+            model=filter_.model,
+            time=at,
+            state=engine.mechanization,
+            row=engine.row,
+            sensors=engine.filter.sensors,
+            rate=last[1:4] / last[0],
+            force=last[4:7] / last[0],
+            covariance_of=partial(filter_.physical_covariance, engine.filter),
+            steady=self._steady(at),
+            unobserved=at - self.observed,
+        )
+        told: list[tuple[Aid, Observation]] = []
+        for aid in self.navigator.aids:
+            queue = self.queues[aid.name]
+            count = int(queue.time.searchsorted(at + SAME_INSTANT, side="right"))
+            for values in queue.values[:count]:
+                told += [(aid, one) for one in aid.observe(view, values)]
+            self.queues[aid.name] = Epochs(queue.time[count:], queue.values[count:])
+        if told:
+            if at > self.observed + ALONE * self.navigator.mark_interval:
+                self._mark(JUST_BEFORE)
+            self.observed = at
+            observations = [one for _, one in told]
+            known = [self.engine.known(one) for one in observations]
+            innovations = self._told([aid.rule or filter_.rule for aid, _ in told], observations)
+            self.seen += [
+                Seen(at, one.name, one.labels, nu, one)
+                for one, nu in zip(known, innovations, strict=True)
+            ]
+        self._mark()
+
+    def _told(
+        self, rules: list[UpdateRule | None], observations: list[Observation]
+    ) -> list[Innovations]:
+        """Take observations; what their rules learn of them is kept."""
+        asked: list[Rules] = []
+        for rule, one in zip(rules, observations, strict=True):
+            if isinstance(rule, AdaptiveRule):
+                asked.append(rule.rules(self.scales.get(one.name) or rule.begin(one.z.size)))
+            else:
+                asked.append(rule)
+        met = self.engine.filter
+        innovations = self.engine.observe(observations, asked)
+        self._unlearn(met)
+        for rule, one, nu in zip(rules, observations, innovations, strict=True):
+            if isinstance(rule, AdaptiveRule):
+                before = self.scales.get(one.name) or rule.begin(one.z.size)
+                self.scales[one.name] = rule.after(before, nu, one.R)
+        return innovations
+
+    def _unlearn(self, met: FilterState) -> None:
+        """Know less of what was learnt about a large tilt, where it was corrected."""
+        if not self.tilted or not self.navigator.damping.feeds_back:
+            return
+        filter_, engine = self.navigator.filter, self.engine
+        before = filter_.physical_covariance(met)
+        after = filter_.physical_covariance(engine.filter)
+        Q = unlearnt_force(filter_, met, before, after)
+        if Q is not None:
+            engine.widen(Q)
+        self.tilted = is_large(after)
+
+    def _mark(self, before: float = 0.0) -> None:
+        """Note covariance and estimates, with a stamp that is so much earlier."""
+        filter_, state = self.navigator.filter, self.engine.filter
+        P = filter_.physical_covariance(state)
+        turn = np.kron(np.eye(3), filter_.mechanization.level_from_ned(state.row))
+        mark = Mark(
+            state.time - before,
+            turn.T @ P[:9, :9] @ turn,
+            self.engine.estimates(filter_),
+            self._sd(state.time, P),
+        )
+        self._add_mark(mark)
+
+    def _sd(self, time: float, P: Array) -> Array:
+        """Standard deviations of the sensors' errors; refuses what is no covariance."""
+        variances, model = np.diagonal(P), self.navigator.filter.model
+        kinds = np.concatenate(
+            [np.repeat(variances[:9].reshape(3, 3).max(axis=1), 3), np.square(model.stacked.sd)]
+        )
+        good = variances >= -ROUNDING * kinds
+        if not good.all():
+            k = int(np.argmin(good))
+            label = PHYSICAL_LABELS[k // 3] if k < 9 else list(model.layout.labels())[k - len(P)]
+            raise LostCovarianceError(
+                "navigation.variance-lost",
+                place=np.asarray(variances[:3]),
+                quantity="covariance",
+                state=label,
+                variance=variances[k],
+                time=time,
+            )
+        return np.sqrt(np.maximum(variances[9:], 0.0))
+
+    def _add_mark(self, mark: Mark) -> None:
+        if self.marks and self.marks[-1].time >= mark.time - SAME_INSTANT:
+            self.marks.pop()
+        self.marks.append(mark)
+        self.marked = mark.time

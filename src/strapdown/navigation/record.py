@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-__all__ = ["Event", "NavigationRecord", "Span"]
+from strapdown.estimation.covariance import Innovations, Observation
+
+__all__ = ["Event", "GrowingRows", "Mark", "NavigationPiece", "NavigationRecord", "Seen", "Span"]
+
 
 Array = NDArray[np.float64]
 
@@ -86,3 +90,135 @@ class NavigationRecord:
     events: tuple[Event, ...] = ()
     modes: tuple[Span, ...] = ()
     outages: Mapping[str, tuple[Span, ...]] = field(default_factory=dict)
+
+
+# What a navigator gives for a piece of a log.
+
+
+class Seen(NamedTuple):
+    """One observation at an epoch.
+
+    Attributes
+    ----------
+    time : float, s
+    name : str
+        Of the observation: ``rtk.position``.
+    labels : tuple of str
+        Of its components, with units.
+    innovations : Innovations
+        Computed less observed less what was expected of it; variance that was expected; weight.
+    observation : Observation, optional
+        Of the state before anything of this epoch was taken, estimates that are kept beside taken
+        off; none of a lone receiver in a compiled loop.
+    """
+
+    time: float
+    name: str
+    labels: tuple[str, ...]
+    innovations: Innovations
+    observation: Observation | None = None
+
+
+class Mark(NamedTuple):
+    """Covariance and estimates at an instant, after what was observed then.
+
+    Where nothing was observed for a while there is one before the observation, too, with a stamp
+    that is a microsecond earlier: there an outage ends, and what is known is least.
+
+    Attributes
+    ----------
+    time : float, s
+    covariance : ndarray, (9, 9)
+        Of the errors of the state in north-east-down: displacement m, velocity m/s, rotation rad
+        (`mechanization.state_error.state_error`).
+    sensors : ndarray, (k,)
+        Estimates of the errors of the sensors and of the aids.
+    sensors_sd : ndarray, (k,)
+    """
+
+    time: float
+    covariance: Array
+    sensors: Array
+    sensors_sd: Array
+
+
+@dataclass(frozen=True, eq=False)
+class NavigationPiece:
+    """What came of a piece of a log.
+
+    Attributes
+    ----------
+    time : ndarray, (n,), s
+        Ends of the steps.
+    history : ndarray, (n, row)
+        Rows of the mechanization then, what was estimated taken off.
+    seen : tuple of Seen
+        In the order in which they were taken.
+    marks : tuple of Mark
+        At every epoch, and at least as often as the navigator's `mark_interval`; where an outage
+        ends, before it, too. The newest sample has one by `Navigator.finish`.
+    late : tuple of (str, float)
+        Epochs of aids that came when the navigator was beyond their time, and were not used.
+    nodes : tuple of ndarray, (k, width)
+        For a smoother, where the navigator is to be smoothed: rows of `NodeRows`.
+    """
+
+    time: Array
+    history: Array
+    seen: tuple[Seen, ...]
+    marks: tuple[Mark, ...]
+    late: tuple[tuple[str, float], ...] = ()
+    nodes: tuple[Array, ...] = ()
+
+
+# Rows that are added to, without a copy of those that are there.
+
+
+FIRST_ROOM = 64
+
+
+@dataclass
+class _Room:
+    buffer: Array
+    used: int
+
+
+@dataclass(frozen=True, eq=False)
+class GrowingRows:
+    """Rows of numbers: a value that never changes, whose further growth shares its memory.
+
+    Adding to the newest value costs as much as what is added; adding to an older one copies it.
+
+    Attributes
+    ----------
+    count : int
+    """
+
+    room: _Room
+    count: int = 0
+
+    @classmethod
+    def of(cls, columns: int) -> GrowingRows:
+        """Return no rows of so many columns."""
+        return cls(_Room(np.empty((0, columns)), 0))
+
+    @property
+    def rows(self) -> Array:
+        """All of them, (`count`, columns); not to be written to."""
+        return self.room.buffer[: self.count]
+
+    def and_then(self, rows: Array) -> GrowingRows:
+        """Return these rows and further ones, (k, columns)."""
+        room, count = self.room, self.count + len(rows)
+        if room.used != self.count or count > len(room.buffer):
+            size = max(FIRST_ROOM, count + count // 2)
+            room = _Room(np.empty((size, room.buffer.shape[1])), self.count)
+            room.buffer[: self.count] = self.rows
+        room.buffer[self.count : count] = rows
+        room.used = count
+        return GrowingRows(room, count)
+
+    def without_first(self, number: int) -> GrowingRows:
+        """Return them without the first ones; the memory of these is given back."""
+        left = self.rows[number:].copy()
+        return GrowingRows(_Room(left, len(left)), len(left))

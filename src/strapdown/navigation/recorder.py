@@ -13,10 +13,16 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError
-from strapdown.navigation.growing_rows import GrowingRows
 from strapdown.navigation.navigator import Navigator
-from strapdown.navigation.piece import Mark, NavigationPiece, Seen
-from strapdown.navigation.record import Event, NavigationRecord, Span
+from strapdown.navigation.record import (
+    Event,
+    GrowingRows,
+    Mark,
+    NavigationPiece,
+    NavigationRecord,
+    Seen,
+    Span,
+)
 from strapdown.navigation.smoother import Smoothing
 from strapdown.rotation.euler_angles import euler_sd
 from strapdown.tables import EULER, trajectory_error_table

@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
+import tempfile
+import weakref
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import IO, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from strapdown._kernels.smoothing import padded, smooth_back
-from strapdown._kernels.smoothing_rows import COVARIANCE, TURN
+from strapdown._kernels.smoothing_rows import COVARIANCE, TIME, TURN, row_width
 from strapdown.errors import ConfigError
-from strapdown.estimation.observation import Observation
+from strapdown.estimation.covariance import Observation
+from strapdown.mechanization.mechanization import Mechanization
+from strapdown.navigation.engine import SAME_INSTANT
 from strapdown.navigation.navigator import Navigator
-from strapdown.navigation.piece import NavigationPiece
-from strapdown.navigation.smoothed import Smoothed
-from strapdown.navigation.smoothing_tape import SmoothingTape
+from strapdown.navigation.record import NavigationPiece
 from strapdown.tables.checks import is_number
 
-__all__ = ["SMOOTHERS", "RauchTungStriebel", "Smoother", "Smoothing"]
+__all__ = ["SMOOTHERS", "RauchTungStriebel", "Smoothed", "Smoother", "Smoothing", "SmoothingTape"]
+
 
 Array = NDArray[np.float64]
 
@@ -210,3 +214,172 @@ class Smoothing:
             smooth_back(rows, n, told, less, wanted, errors[begin:end], P)
             yield met, P, rows[there, TURN:COVARIANCE].reshape(-1, 3, 3)
             end = begin
+
+
+# What a smoother found of a run.
+
+
+@dataclass(frozen=True, eq=False)
+class Smoothed:
+    """Errors that a filter's states have, by all observations, and what is left unknown.
+
+    Attributes
+    ----------
+    mechanization : Mechanization
+    time : ndarray, (k,), s
+        Of the nodes.
+    errors : ndarray, (k, 9)
+        Of the state at each, level axes of the mechanization.
+    mark_errors : ndarray, (m, 9)
+        Of the state at each mark, north-east-down.
+    covariance : ndarray, (m, 9, 9)
+        At the marks, north-east-down.
+    sensors : ndarray, (m, s)
+        What the estimates of the sensors then still lack.
+    sensors_sd : ndarray, (m, s)
+    """
+
+    mechanization: Mechanization
+    time: Array
+    errors: Array
+    mark_errors: Array
+    covariance: Array
+    sensors: Array
+    sensors_sd: Array
+
+    def corrected(self, time: Array, history: Array) -> Array:
+        """Return rows of a history without the errors that were found.
+
+        Between two nodes an error goes along a line: a tenth of a second apart, what is left is
+        less than a thousandth of what is smoothed.
+
+        Parameters
+        ----------
+        time : ndarray, (n,), s
+        history : ndarray, (n, row)
+
+        Returns
+        -------
+        ndarray, (n, row)
+        """
+        # At an instant with several nodes the last one is of the state that is shown.
+        right = np.searchsorted(self.time, time + SAME_INSTANT, side="right")
+        before = np.clip(right - 1, 0, len(self.time) - 1)
+        after = np.clip(right, 0, len(self.time) - 1)
+        length = self.time[after] - self.time[before]
+        part = np.clip(time - self.time[before], 0.0, None)
+        share = np.divide(part, length, out=np.zeros_like(part), where=length > 0.0)
+        # Beyond the last node of a filter nothing grows that was noted.
+        share = np.minimum(share, 1.0)[:, None]
+        errors = (1.0 - share) * self.errors[before] + share * self.errors[after]
+        return self.mechanization.corrected_history(history, errors)
+
+
+# Nodes of a filter, kept in memory or, where they are many, on disk.
+
+
+#: Nodes of a chunk: some megabytes.
+CHUNK = 1024
+
+
+class SmoothingTape:
+    """Takes nodes, and gives them back from the last to the first.
+
+    A node takes ``8 (11 + p (p + 1) + p)`` bytes or a little more: 2 kB with 15 errors, 5 kB with
+    24. Beyond the memory that is given, they go to a file without a name, which is gone with the
+    tape or with the process, whichever ends first; their times alone stay.
+
+    Parameters
+    ----------
+    size : int
+        Number of physical errors, p.
+    memory : int, bytes
+
+    Raises
+    ------
+    ConfigError
+        From `take`: the folder for temporary files has no room.
+    """
+
+    def __init__(self, size: int, memory: int) -> None:
+        self.size = size
+        self._width = row_width(size)
+        self._memory = memory
+        self._chunks: list[Array] = []
+        self._used = CHUNK
+        self._times: list[Array] = []
+        self._file: IO[bytes] | None = None
+        self._written = 0
+
+    def take(self, rows: Array) -> None:
+        """Take further nodes.
+
+        Parameters
+        ----------
+        rows : ndarray, (k, width)
+            Of `NodeRows`.
+        """
+        self._times.append(rows[:, TIME].copy())
+        at = 0
+        while at < len(rows):
+            if self._used == CHUNK:
+                self._new_chunk()
+            some = rows[at : at + CHUNK - self._used]
+            self._chunks[-1][self._used : self._used + len(some)] = some
+            self._used += len(some)
+            at += len(some)
+
+    def times(self) -> Array:
+        """Return the time of each node, (count,), s."""
+        self._times = [np.concatenate([np.empty(0), *self._times])]
+        return self._times[0]
+
+    def backward(self) -> Iterator[Array]:
+        """Give chunks of rows, the last one first; within each they are in order of time."""
+        for k in range(len(self._chunks) - 1, -1, -1):
+            last = k + 1 == len(self._chunks)
+            yield self._chunks[k][: self._used if last else CHUNK]
+        for k in range(self._written - 1, -1, -1):
+            yield self._read(k)
+
+    def _new_chunk(self) -> None:
+        most = max(self._memory // (8 * CHUNK * self._width), 1)
+        if len(self._chunks) < most:
+            self._chunks.append(np.empty((CHUNK, self._width)))
+        else:
+            self._write(self._chunks[0])
+            self._chunks.append(self._chunks.pop(0))
+        self._used = 0
+
+    def _write(self, rows: Array) -> None:
+        try:
+            if self._file is None:
+                self._file = tempfile.TemporaryFile()  # noqa: SIM115
+                weakref.finalize(self, _close, self._file)
+            self._file.seek(0, 2)
+            self._file.write(rows.data)
+            self._file.flush()
+        except OSError as error:
+            folder = tempfile.gettempdir()
+            took = 8e-6 * CHUNK * self._width * self._written
+            raise ConfigError(
+                "navigation.smoother-keeps-mb-memory-took",
+                quantity="smoother, memory_mb",
+                memory=1e-06 * self._memory,
+                folder=folder,
+                took=took,
+                strerror=error.strerror or error,
+            ) from None
+        self._written += 1
+
+    def _read(self, number: int) -> Array:
+        assert self._file is not None
+        size = 8 * CHUNK * self._width
+        self._file.seek(number * size)
+        return np.frombuffer(self._file.read(size)).reshape(CHUNK, self._width)
+
+
+def _close(file: IO[bytes]) -> None:
+    """Close a file; where what it holds finds no room any more, it is not missed."""
+    with suppress(OSError):
+        file.close()

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
-from strapdown.prefilter.none import NoPrefilter
-from strapdown.prefilter.prefilter import CHANNELS, Grid, Portion, Prefilter, Prefiltered
-from strapdown.prefilter.report import PrefilterReport
+from strapdown.prefilter.prefilter import (
+    CHANNELS,
+    Grid,
+    NoPrefilter,
+    Portion,
+    Prefilter,
+    Prefiltered,
+    PrefilterReport,
+)
 from strapdown.prefilter.robust_fir import RobustFir
 from strapdown.prefilter.summed import Summed
 from strapdown.prefilter.w_d import RobustWd

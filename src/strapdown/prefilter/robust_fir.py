@@ -8,11 +8,10 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.dsp.fir_decimation import FirDecimation, FirState, fir_decimation
+from strapdown.dsp.decimation import FirDecimation, FirState, fir_decimation
 from strapdown.dsp.outliers import OutlierDesign, OutlierState
 from strapdown.errors import ConfigError
-from strapdown.prefilter.prefilter import Grid, Portion, Prefilter, whole_factor
-from strapdown.prefilter.report import Changed
+from strapdown.prefilter.prefilter import Changed, Grid, Portion, Prefilter, whole_factor
 
 Array = NDArray[np.float64]
 

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.dsp.outliers import OutlierDesign, OutlierState
-from strapdown.prefilter.prefilter import Grid, Portion, Prefilter, whole_factor
-from strapdown.prefilter.report import Changed
+from strapdown.prefilter.prefilter import Changed, Grid, Portion, Prefilter, whole_factor
 
 Array = NDArray[np.float64]
 

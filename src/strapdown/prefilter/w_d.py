@@ -13,13 +13,10 @@ from strapdown.constants import MAD_TO_SD
 from strapdown.dsp.outliers import REPLACED
 from strapdown.dsp.samples import check_segment
 from strapdown.errors import DataError
-from strapdown.estimation.covariance import CovarianceForm
-from strapdown.estimation.robust_update import RobustUpdate
+from strapdown.estimation.covariance import Chernodarov, CovarianceForm, UpdateRule
+from strapdown.estimation.robust import RobustUpdate
 from strapdown.estimation.signal_filter import SignalFilter, SignalState
-from strapdown.estimation.update_rule import UpdateRule
-from strapdown.estimation.wd import Chernodarov
-from strapdown.prefilter.prefilter import Grid, Portion, Prefilter, whole_factor
-from strapdown.prefilter.report import Changed
+from strapdown.prefilter.prefilter import Changed, Grid, Portion, Prefilter, whole_factor
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,6 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.constants import DEG_PER_HOUR, MICRO_G, TWO_SIDED_95
-from strapdown.report.alignment_values import NOT_KNOWN, angle_bound, instant
 from strapdown.report.chart import (
     AXIS_COLOURS,
     BLACK,
@@ -23,6 +22,8 @@ from strapdown.report.chart import (
     Panel,
     curve,
 )
+from strapdown.report.values import NOT_KNOWN, angle_bound
+from strapdown.report.values import alignment_values_instant as instant
 from strapdown.systems.alignment_run import AlignmentResult
 from strapdown.tables import ACCEL, EULER, GYRO
 from strapdown.tables.checks import values_of

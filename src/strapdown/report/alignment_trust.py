@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.alignment.fine_findings import ROCKS
+from strapdown.alignment.fine import ROCKS
 from strapdown.constants import TWO_SIDED_95
 from strapdown.errors import Finding
 from strapdown.rotation import within_half_turn
-from strapdown.systems.alignment_readiness import reference_offset
-from strapdown.systems.alignment_run import AlignmentResult
+from strapdown.systems.alignment_run import AlignmentResult, reference_offset
 from strapdown.tables import EULER
 from strapdown.tables.checks import values_of
 

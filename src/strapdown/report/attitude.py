@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.bundle.json_text import to_json
-from strapdown.bundle.seal import Seal
+from strapdown.attitude import make_algorithm
+from strapdown.bundle.seal import Seal, to_json
 from strapdown.bundle.writing import write_bundle
+from strapdown.errors import ConfigError
+from strapdown.export_c import export_c
 from strapdown.formats import csv
 from strapdown.report import attitude_words as words
-from strapdown.report.attitude_answer_charts import share_basis
-from strapdown.report.attitude_charts import charts
-from strapdown.report.attitude_json import attitude_json
+from strapdown.report.attitude_charts import charts, share_basis
 from strapdown.report.attitude_page import attitude_page
+from strapdown.report.attitude_tables import places_json, source_of
 from strapdown.report.svg_chart import draw
-from strapdown.results.attitude_bench import AttitudeBench
-from strapdown.tables import EULER, QUATERNION
+from strapdown.results.attitude_bench import AttitudeBench, Cost, Score, Share
+from strapdown.tables import EULER, GYRO, QUATERNION
 
 __all__ = ["attitude_json", "attitude_page", "write_attitude"]
 
@@ -119,3 +121,245 @@ def _write_sweep(bench: AttitudeBench, path: Path) -> None:
         }
         | {key.lower().replace(" ", "_"): text for key, text in words.CONVENTIONS},
     )
+
+
+# The attitude bench as plain data.
+
+
+def attitude_json(bench: AttitudeBench) -> dict[str, Any]:
+    """Return a bench as plain data; every key carries its unit.
+
+    Parameters
+    ----------
+    bench : AttitudeBench
+
+    Returns
+    -------
+    dict
+    """
+    costs = {cost.algorithm: _cost(cost) for cost in bench.costs}
+    shares = {share.algorithm: _share(share) for share in bench.shares}
+    return {
+        "schema": "strapdown attitude 1",
+        "source": bench.source,
+        "description": bench.description,
+        "conventions": dict(words.CONVENTIONS),
+        "initial": bench.initial,
+        "gyro_bias": bench.gyro_bias,
+        "headline": words.headline(bench),
+        "answer": _answer(bench),
+        "algorithms": [
+            {
+                "algorithm": run.algorithm,
+                "title": run.title,
+                "equations": source_of(run),
+                "final": _final(run.attitude.iloc[-1], float(run.attitude.index[-1])),
+                "diagnostics": run.diagnostics,
+                "scores": [_score(s) for s in bench.scores if s.algorithm == run.algorithm],
+                "cost": costs.get(run.algorithm),
+                "share": shares.get(run.algorithm),
+            }
+            for run in bench.runs
+        ],
+        "share_basis": share_basis(bench),
+        "sweep": [_plain(row) for row in bench.sweep.to_dict("records")],
+        "trials": _trials(bench),
+        "peers": [
+            {
+                "peer": peer.peer,
+                "aiding": peer.aiding,
+                "final": _final(peer.attitude.iloc[-1], float(peer.attitude.index[-1])),
+                "scores": [_score(s) for s in peer.scores],
+            }
+            for peer in bench.peers
+        ],
+        **places_json(bench),
+        "sampling_error_deg": _sampling_error(bench),
+        "largest_difference_deg": {
+            name: {other: float(v) for other, v in row.items()}
+            for name, row in bench.differences_deg.iterrows()
+        },
+        "rests": [
+            {
+                "start_s": r.start,
+                "end_s": r.end,
+                "gyro_mean_rad_per_s": r.gyro_mean,
+                "gyro_sd_rad_per_s": r.gyro_sd,
+                "accel_mean_m_per_s2": r.accel_mean,
+            }
+            for r in bench.rests
+        ],
+        "readings": [vars(r) for r in bench.readings],
+        "findings": [vars(f) for f in bench.findings],
+    }
+
+
+def _sampling_error(bench: AttitudeBench) -> dict[str, float] | None:
+    if bench.sampling_error_deg is None:
+        return None
+    return dict(zip(("final", "max"), bench.sampling_error_deg, strict=True))
+
+
+def _final(row: Any, time: float) -> dict[str, float]:
+    return (
+        {"time_s": time}
+        | {q: float(row[q]) for q in QUATERNION}
+        | {f"{e}_deg": float(row[e]) for e in EULER}
+    )
+
+
+def _answer(bench: AttitudeBench) -> dict[str, Any]:
+    answer = bench.answer
+    return {
+        "verdict": answer.verdict,
+        "sentence": answer.sentence,
+        "tolerance_deg": answer.tolerance_deg,
+        "algorithm": answer.algorithm,
+        "meaning": answer.meaning,
+        "rate_hz": answer.rate_hz,
+        "why": list(answer.why),
+        "helps": list(answer.helps),
+    }
+
+
+def _score(score: Score) -> dict[str, Any]:
+    return {
+        "against": score.against,
+        "time_s": score.time,
+        "error_deg": score.error_deg,
+        "rms_deg": score.rms_deg,
+        "max_deg": score.max_deg,
+        "turned_deg": score.turned_deg,
+        "expected_deg": score.expected_deg,
+        "sd_deg": score.sd_deg,
+    }
+
+
+def _cost(cost: Cost) -> dict[str, float]:
+    """Operations and cycles are a sample's; memory is in numbers."""
+    return {
+        "add_per_sample": cost.add,
+        "multiply_per_sample": cost.multiply,
+        "divide_per_sample": cost.divide,
+        "sqrt_per_sample": cost.sqrt,
+        "trig_per_sample": cost.trig,
+        "cortex_m4f_cycles_per_sample": cost.cycles,
+        "memory_numbers": cost.memory,
+    }
+
+
+def _share(share: Share) -> dict[str, Any]:
+    def named(three: tuple[float, float, float]) -> dict[str, Any]:
+        return _plain(dict(zip(("final", "rms", "max"), three, strict=True)))
+
+    return {
+        "own_deg": named(share.own_deg),
+        "sensor_deg": None if share.sensor_deg is None else named(share.sensor_deg),
+        "single_deg": named(share.single_deg),
+    }
+
+
+def _trials(bench: AttitudeBench) -> dict[str, Any] | None:
+    if bench.trials is None:
+        return None
+    return {
+        "names": list(bench.trials.names),
+        "errors": [_plain(row) for row in bench.trials.errors.to_dict("records")],
+        "ranking": [_plain(row) for row in bench.trials.ranking.to_dict("records")],
+    }
+
+
+def _plain(row: dict[Any, Any]) -> dict[str, Any]:
+    """Without NaN, which JSON has not: what does not apply is null."""
+    plain: dict[str, Any] = {}
+    for key, value in row.items():
+        item = value.item() if hasattr(value, "item") else value
+        plain[str(key)] = None if isinstance(item, float) and not math.isfinite(item) else item
+    return plain
+
+
+# The algorithm that a bench chose, as a C file.
+
+
+# What an embedded test needs: a second or so of motion, in a file that can still be read.
+VECTOR = 64
+
+
+def check_c(path: Path | None, force: bool) -> None:
+    """Refuse a path that cannot be written, before anything is run.
+
+    Raises
+    ------
+    ConfigError
+        It is no name of a C file, it exists and may not be replaced, or its folder does not.
+    """
+    if path is None:
+        return
+    if path.suffix.lower() not in (".c", ".h"):
+        # What --force replaces might else be the log itself.
+        raise ConfigError("report.no-name-c-file", file=str(path), quantity="--export-c")
+    if path.is_dir() or (path.exists() and not force):
+        raise ConfigError("report.already", file=str(path), quantity="--export-c")
+    if not path.parent.is_dir():
+        raise ConfigError("report.no-such-folder", file=str(path.parent), quantity="--export-c")
+
+
+def chosen_for_c(bench: AttitudeBench) -> str:
+    """Return the algorithm to export: the one that the answer names, or else the only one.
+
+    Raises
+    ------
+    ConfigError
+        The answer names none and there are several.
+    """
+    labels = [run.algorithm for run in bench.runs]
+    chosen = labels[0] if len(labels) == 1 else bench.answer.algorithm
+    if chosen is None:
+        raise ConfigError("report.no-algorithm-accurate-enough-chosen", quantity="--export-c")
+    return chosen
+
+
+def write_c(bench: AttitudeBench, path: Path, *, force: bool = False) -> str:
+    """Write one algorithm of a bench as C99, with a test vector of its log.
+
+    Parameters
+    ----------
+    bench : AttitudeBench
+    path : Path
+        File to write.
+    force : bool
+        Replace a file that is there.
+
+    Returns
+    -------
+    str
+        The algorithm: the one that the answer names, or else the only one.
+
+    Raises
+    ------
+    ConfigError
+        The answer names none and there are several, or the file may not be written.
+    """
+    check_c(path, force)
+    chosen = chosen_for_c(bench)
+    first = bench.runs[0].attitude[QUATERNION].to_numpy()
+    start = _liveliest(bench)
+    text = export_c(
+        make_algorithm(chosen),
+        interpolation=str(bench.specification["interpolation"]),
+        q_nb=first[start],
+        imu=bench.imu.iloc[start : start + VECTOR],
+    )
+    partial = path.with_name(path.name + ".partial")
+    partial.write_text(text, encoding="utf-8", newline="\n")
+    partial.replace(path)
+    return chosen
+
+
+def _liveliest(bench: AttitudeBench) -> int:
+    """Where the stretch of the test vector turns most: one at rest would test nothing."""
+    rate = bench.imu[GYRO].to_numpy()
+    energy = (rate * rate).sum(axis=1).cumsum()
+    if len(energy) <= VECTOR:
+        return 0
+    return int((energy[VECTOR:] - energy[:-VECTOR]).argmax())

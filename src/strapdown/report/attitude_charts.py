@@ -5,18 +5,24 @@ from __future__ import annotations
 import numpy as np
 
 from strapdown.evaluation.differences import error_angles
-from strapdown.report.attitude_answer_charts import (
-    LEAST_ERROR,
-    LEAST_WORDS,
-    answer_charts,
-    judgement_charts,
+from strapdown.report.attitude_numbers import (
+    MEANINGS,
+    full_rate_errors,
+    largest_known,
+    like_with_like,
 )
 from strapdown.report.chart import (
     AXIS_COLOURS,
     BLACK,
+    BLUE,
     BUCKETS,
+    GREEN,
+    GREY,
+    VERMILLION,
+    Array,
     Band,
     Chart,
+    Level,
     Line,
     Mark,
     Panel,
@@ -24,7 +30,8 @@ from strapdown.report.chart import (
     curve,
     look,
 )
-from strapdown.results.attitude_bench import AttitudeBench
+from strapdown.report.path_marks import place_labels
+from strapdown.results.attitude_bench import AttitudeBench, PeerRun
 from strapdown.tables import EULER, GYRO
 
 _TIME = "time, s"
@@ -223,3 +230,346 @@ def _difference(bench: AttitudeBench) -> Chart:
         _TIME,
         (Panel("difference, deg", tuple(lines), log=True),),
     )
+
+
+# The charts that the answer rests on: cost, rate, whose error it is, luck, other libraries.
+
+
+# A logarithmic axis has no zero; what is less is drawn here.
+LEAST_ERROR, LEAST_WORDS = 1e-6, "10⁻⁶°"
+_FAINT = "#c3c9d0"
+
+
+def answer_charts(bench: AttitudeBench) -> list[Chart]:
+    """Return the charts for the top of the page: cost against error, and the rates.
+
+    Parameters
+    ----------
+    bench : AttitudeBench
+
+    Returns
+    -------
+    list of Chart
+    """
+    found = [_cost(bench)] if bench.costs else []
+    return [*found, _sweep(bench)] if len(bench.sweep) else found
+
+
+def judgement_charts(bench: AttitudeBench) -> list[Chart]:
+    """Return the charts for the end of the page: shares, trials and peers.
+
+    Parameters
+    ----------
+    bench : AttitudeBench
+
+    Returns
+    -------
+    list of Chart
+    """
+    found = [_share(bench)] if bench.shares else []
+    if bench.trials is not None:
+        found.append(_trials(bench))
+    if any(peer.scores for peer in bench.peers):
+        found.append(_peers(bench))
+    return found
+
+
+def _shown(values: object) -> Array:
+    """Numbers for a logarithmic axis; NaN stays NaN."""
+    array = np.atleast_1d(np.asarray(values, dtype=np.float64))
+    return np.where(np.isnan(array), np.nan, np.maximum(array, LEAST_ERROR))
+
+
+def _tolerance(bench: AttitudeBench) -> str:
+    return f"tolerance {bench.answer.tolerance_deg:g}°"
+
+
+def _cost(bench: AttitudeBench) -> Chart:
+    cycles = np.array([max(cost.cycles, 1.0) for cost in bench.costs])
+    errors = full_rate_errors(bench)
+    names = [cost.algorithm for cost in bench.costs]
+    total = _shown([errors.get(name, np.nan) for name in names])
+    shares = {share.algorithm: share.own_deg[2] for share in bench.shares}
+    own = _shown([shares.get(name, np.nan) for name in names])
+    tolerance = max(bench.answer.tolerance_deg, LEAST_ERROR)
+    lines = []
+    front = _pareto(cycles, total)
+    if len(front) > 1:
+        steps_x = np.repeat(cycles[front], 2)[1:]
+        steps_y = np.repeat(total[front], 2)[:-1]
+        lines.append(Line("nothing is cheaper and better", steps_x, steps_y, GREY, "dot", 1.4))
+    judged = any(share.sensor_deg is not None for share in bench.shares) or bool(bench.scores)
+    if judged:
+        stems = np.column_stack([own, total, np.full(len(own), np.nan)]).ravel()
+        lines.append(Line("", np.repeat(cycles, 3), stems, _FAINT, width=1.0, legend=False))
+    known = ~np.isnan(total)
+    obstacles = np.column_stack([cycles, own])[~np.isnan(own)] if judged else np.empty((0, 2))
+    level = np.array([[float(np.median(cycles)), tolerance]])
+    places = place_labels(
+        np.log10(cycles[known]),
+        np.log10(total[known]),
+        [name for name, is_known in zip(names, known, strict=True) if is_known],
+        np.log10(np.vstack([obstacles, level])),
+    )
+    for k, place in zip(np.flatnonzero(known), places, strict=True):
+        style, at, name = look(int(k)), cycles[k : k + 1], names[k]
+        lines.append(
+            Line(
+                name,
+                at,
+                total[k : k + 1],
+                style["colour"],
+                points=True,
+                symbol=style["symbol"],
+                size=12,
+                labels=(name,),
+                places=(place,),
+                legend=False,
+            )
+        )
+        if judged:
+            lines.append(
+                Line(
+                    f"{name}, its own error",
+                    at,
+                    own[k : k + 1],
+                    style["colour"],
+                    points=True,
+                    symbol=style["symbol"],
+                    size=10,
+                    hollow=True,
+                    legend=False,
+                )
+            )
+    return Chart(
+        "cost",
+        "Cost against error",
+        (
+            "Filled: the whole error, by which the answer judges. Hollow: the algorithm's own part "
+            "of it. "
+            if judged
+            else "The algorithm's own error: nothing is known of the attitude. "
+        )
+        + "Largest rotation angle at the log's own rate. Cost: counted operations of a sample, "
+        f"weighed as a Cortex-M4F takes them. Drawn at {LEAST_WORDS} where it is less.",
+        "cost, Cortex-M4F cycles per sample",
+        (
+            Panel(
+                "error, deg", tuple(lines), log=True, levels=(Level(tolerance, _tolerance(bench)),)
+            ),
+        ),
+        log_x=True,
+    )
+
+
+def _pareto(cost: Array, error: Array) -> list[int]:
+    """Which points nothing beats in both, from the cheapest on."""
+    front: list[int] = []
+    for k in sorted(np.flatnonzero(~np.isnan(error)).tolist(), key=lambda j: (cost[j], error[j])):
+        if not front or error[k] < error[front[-1]]:
+            front.append(k)
+    return front
+
+
+def _sweep(bench: AttitudeBench) -> Chart:
+    answer = bench.answer
+    meanings = [m for m in MEANINGS if (bench.sweep["meaning"] == m).any()]
+    judged = bool(bench.scores)
+    panels = []
+    for meaning in meanings:
+        part = bench.sweep[bench.sweep["meaning"] == meaning]
+        lines = []
+        for k, run in enumerate(bench.runs):
+            rows = part[part["algorithm"] == run.algorithm].sort_values("rate_hz")
+            if rows.empty:
+                continue
+            rate = rows["rate_hz"].to_numpy(dtype=np.float64)
+            style = look(k)
+            if judged:
+                lines.append(
+                    Line(
+                        f"{run.algorithm}, its own error",
+                        rate,
+                        _shown(rows["own_deg"]),
+                        style["colour"],
+                        style["dash"],
+                        width=0.7,
+                        legend=False,
+                    )
+                )
+            lines.append(
+                Line(
+                    run.algorithm,
+                    rate,
+                    _shown(rows["error_deg"]),
+                    style["colour"],
+                    style["dash"],
+                    # Curves that coincide lie within each other, and all are seen.
+                    width=max(1.4, 4.4 - 0.4 * k),
+                    symbol=style["symbol"],
+                    dots=True,
+                    size=7,
+                )
+            )
+        chosen = part[
+            (part["algorithm"] == answer.algorithm)
+            & np.isclose(part["rate_hz"], np.nan if answer.rate_hz is None else answer.rate_hz)
+        ]
+        if answer.meaning in (None, meaning) and len(chosen):
+            lines.append(
+                Line(
+                    "the answer",
+                    chosen["rate_hz"].to_numpy(dtype=np.float64),
+                    _shown(chosen["error_deg"]),
+                    BLACK,
+                    points=True,
+                    symbol="circle",
+                    size=19,
+                    hollow=True,
+                )
+            )
+        level = Level(max(answer.tolerance_deg, LEAST_ERROR), _tolerance(bench))
+        label = "error, deg"
+        title = MEANINGS[meaning].capitalize()
+        panels.append(Panel(label, tuple(lines), log=True, title=title, levels=(level,)))
+    return Chart(
+        "sweep",
+        "Error against rate",
+        (
+            "Thick: the whole error; thin: the algorithm's own, with that of the rate. "
+            if judged
+            else "The algorithm's own error, with that of the rate. "
+        )
+        + "Left out: as if the sensor were read less often. Summed: as if it integrated in "
+        f"between. Drawn at {LEAST_WORDS} where it is less.",
+        "rate, Hz",
+        tuple(panels),
+        log_x=True,
+        beside=True,
+    )
+
+
+def _share(bench: AttitudeBench) -> Chart:
+    names = tuple(share.algorithm for share in bench.shares)
+    rows = np.arange(len(names), dtype=np.float64)
+    parts = [
+        ("its own, with the rate's", [s.own_deg[2] for s in bench.shares], BLUE, "circle"),
+        ("of single precision", [s.single_deg[2] for s in bench.shares], GREEN, "diamond"),
+    ]
+    sensor = [np.nan if s.sensor_deg is None else s.sensor_deg[2] for s in bench.shares]
+    if not np.isnan(sensor).all():
+        parts.insert(0, ("of the sensor", sensor, VERMILLION, "square"))
+    lines = tuple(
+        Line(name, _shown(values), rows, colour, points=True, symbol=symbol, size=11)
+        for name, values, colour, symbol in parts
+    )
+    return Chart(
+        "share",
+        "Whose error it is",
+        "The largest rotation angle that each part makes. "
+        + share_basis(bench)
+        + f" Drawn at {LEAST_WORDS} where it is less.",
+        "error, deg",
+        (Panel("", lines, categories=names),),
+        log_x=True,
+    )
+
+
+def share_basis(bench: AttitudeBench) -> str:
+    """Say whether the shares are exact or estimates."""
+    if bench.specification["source"]["kind"] == "scenario":
+        return (
+            "Exact: simulated, so that each algorithm also ran on samples without the sensor's "
+            "errors."
+        )
+    own = (
+        "Estimate: the algorithm's own part is its difference from the most accurate algorithm "
+        "on the same samples"
+    )
+    if any(share.sensor_deg is not None for share in bench.shares):
+        return own + ", and the sensor's is what that one differs from the truth."
+    return own + "; the sensor's is not known without a truth."
+
+
+def _trials(bench: AttitudeBench) -> Chart:
+    trials = bench.trials
+    assert trials is not None
+    names = tuple(str(name) for name in trials.ranking["algorithm"])
+    row_of = {name: k for k, name in enumerate(names)}
+    errors = trials.errors[trials.errors["algorithm"].isin(names)]
+    at = np.array([row_of[name] for name in errors["algorithm"]], dtype=np.float64)
+    mean, low, high = (
+        _shown(trials.ranking[c].to_numpy()) for c in ("mean_deg", "low_deg", "high_deg")
+    )
+    lines = (
+        Line(
+            "one trial",
+            _shown(errors["error_deg"].to_numpy()),
+            at,
+            GREY,
+            points=True,
+            symbol="circle",
+            size=7,
+            hollow=True,
+        ),
+        Line(
+            "mean, with its 95 % interval",
+            mean,
+            np.arange(len(names), dtype=np.float64),
+            BLUE,
+            points=True,
+            symbol="diamond",
+            size=11,
+            low=np.where(np.isnan(low), mean, low),
+            high=np.where(np.isnan(high), mean, high),
+        ),
+    )
+    return Chart(
+        "trials",
+        f"Over {len(trials.names)} trials",
+        "The error by which the answer judges, best on top.",
+        "error, deg",
+        (Panel("", lines, categories=names),),
+        (Mark(max(bench.answer.tolerance_deg, LEAST_ERROR), _tolerance(bench)),),
+        log_x=True,
+    )
+
+
+def _peers(bench: AttitudeBench) -> Chart:
+    alone, aided = like_with_like(bench)
+    errors = full_rate_errors(bench)
+    own = [(name, error, BLUE, "circle") for name, error in errors.items()]
+    panels = [_peer_panel("Gyro alone", own + _rows(alone))]
+    if aided:
+        panels.append(_peer_panel("Aided: another task", _rows(aided, named=True)))
+    return Chart(
+        "peers",
+        "Other libraries on the same log",
+        "The largest error against what is known. Blue: strapdown's algorithms. What an "
+        "accelerometer or a magnetometer corrects is another task and stands apart.",
+        "error, deg",
+        tuple(panels),
+        (Mark(max(bench.answer.tolerance_deg, LEAST_ERROR), _tolerance(bench)),),
+        log_x=True,
+        beside=True,
+    )
+
+
+def _rows(peers: list[PeerRun], named: bool = False) -> list[tuple[str, float, str, str]]:
+    rows = []
+    for peer in peers:
+        error = largest_known(peer.scores)
+        name = f"{peer.peer} ({peer.aiding})" if named else peer.peer
+        rows.append((name, np.nan if error is None else error, VERMILLION, "square"))
+    return rows
+
+
+def _peer_panel(title: str, rows: list[tuple[str, float, str, str]]) -> Panel:
+    lines = []
+    for colour, symbol, who in ((BLUE, "circle", "strapdown"), (VERMILLION, "square", "others")):
+        ours = [k for k, row in enumerate(rows) if row[2] == colour]
+        if ours:
+            values = _shown([rows[k][1] for k in ours])
+            at = np.array(ours, dtype=np.float64)
+            lines.append(Line(who, values, at, colour, points=True, symbol=symbol, size=11))
+    return Panel("", tuple(lines), title=title, categories=tuple(row[0] for row in rows))

@@ -7,9 +7,7 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from strapdown.results.attitude_bench import AttitudeBench
-from strapdown.results.runs import AttitudeRun, PeerRun
-from strapdown.results.scores import Score
+from strapdown.results.attitude_bench import AttitudeBench, AttitudeRun, PeerRun, Score
 
 __all__ = [
     "MEANINGS",

@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from strapdown.evaluation.reference_points import in_words
-from strapdown.results.attitude_bench import AttitudeBench
+from strapdown.results.attitude_bench import AttitudeBench, Score, SecondLog
 from strapdown.results.inputs import Reading
-from strapdown.results.scores import Score
-from strapdown.results.second_log import SecondLog
-from strapdown.systems.attitude_judgement import passed_pole
+from strapdown.systems.attitude_known import passed_pole
 
 CONVENTIONS = (
     ("Body axes", "x forward, y right, z down"),

@@ -7,12 +7,14 @@ import math
 import numpy as np
 
 from strapdown.constants import DEG_PER_HOUR, MICRO_G
-from strapdown.report.crash_values import GAP, KMH, plain
 from strapdown.report.document import KeyFigure
-from strapdown.report.navigation_values import (
+from strapdown.report.values import (
+    GAP,
+    KMH,
     duration_words,
     half,
     length_words,
+    plain,
     share_words,
     shown_unit,
 )

@@ -4,27 +4,33 @@ from __future__ import annotations
 
 import html
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from strapdown.crash.crash_event import CrashEvent
+from strapdown import rotation
+from strapdown.crash.events import CrashEvent
 from strapdown.crash.path import CrashPath
 from strapdown.report.chart import BLACK, BLUE, GREY, VERMILLION
-from strapdown.report.crash_body import VehicleBody, vehicle_body
+from strapdown.report.crash_moments import path_moments
 from strapdown.report.crash_outline import Outline
-from strapdown.report.crash_stills import crash_stills
-from strapdown.report.document import Animation
+from strapdown.report.document import Animation, Picture
+from strapdown.report.error_envelope import hull
 from strapdown.report.plan_view import nice_step, tick_words
 from strapdown.report.plotly_chart import FONT
+from strapdown.report.svg_drawing import INK, SMALL, Drawing
+from strapdown.report.values import plain
 from strapdown.tables import NED
 
-Array = NDArray[np.float64]
+__all__ = ["MOST_FRAMES", "VehicleBody", "crash_stills", "path_animation", "vehicle_body"]
 
-__all__ = ["MOST_FRAMES", "path_animation"]
+
+Array = NDArray[np.float64]
 
 #: More than these a slider of a page cannot tell apart.
 MOST_FRAMES = 120
@@ -296,3 +302,305 @@ def _layout(
             }
         ],
     }
+
+
+# Instants of the motion in space, in parallel projection from right, ahead and above.
+
+
+_WIDTH, _GAP, _HEAD = 640.0, 10.0, 20.0
+_MOST = 6
+# Where the eye is: so far ahead of the right side, and so high, deg.
+_AHEAD, _ABOVE = 28.0, 30.0
+_GRID = "#dfe4ea"
+# Wider than so many times its height, and two views stand in a row instead of three.
+_WIDE = 2.0
+
+
+def crash_stills(
+    path: CrashPath,
+    body: VehicleBody,
+    *,
+    events: Sequence[CrashEvent] = (),
+    point: Sequence[float] = (0.0, 0.0, 0.0),
+    ground: float = 0.5,
+) -> Picture:
+    """Draw the vehicle at up to six instants of its path.
+
+    Parameters
+    ----------
+    path : CrashPath
+    body : VehicleBody
+    events : sequence of CrashEvent
+    point : sequence of float, (3,), m
+        The reference point in vehicle axes.
+    ground : float, m
+        How far down the ground is drawn, in the axes of the path.
+
+    Returns
+    -------
+    Picture
+        One scale for all.
+    """
+    places = path.table[NED].to_numpy(dtype=np.float64)
+    instants = _instants(path, events)
+    rows = [int(np.abs(path.time - at).argmin()) for _, at in instants]
+    flat = _Projection(path.entry.heading_deg)
+    corners = [body.placed(places[k], path.q_nb[k], point) for k in rows]
+    shown = flat.page(np.vstack([*corners, places]))
+    low, high = shown.min(axis=0), shown.max(axis=0)
+    size = np.maximum(high - low, 0.5)
+    columns = 2 if size[0] > _WIDE * size[1] else 3
+    width = (_WIDTH - _GAP * (columns - 1)) / columns
+    scale = min((width - 16.0) / size[0], 240.0 / size[1])
+    height = scale * float(size[1]) + 16.0
+    lines = -(-len(rows) // columns)
+    words = ", ".join(f"{name} {plain(1e3 * at, 0)} ms" for name, at in instants)
+    out = Drawing(_WIDTH, lines * (height + _HEAD + _GAP), f"The vehicle in space at {words}")
+    for k, (row, (name, at)) in enumerate(zip(rows, instants, strict=True)):
+        left = (k % columns) * (width + _GAP)
+        top = (k // columns) * (height + _HEAD + _GAP)
+        centre = np.array([left + 0.5 * width, top + _HEAD + 0.5 * height])
+
+        def pixels(points: Array, centre: Array = centre) -> Array:
+            page = flat.page(points) - 0.5 * (low + high)
+            return np.asarray(centre + scale * page * [1.0, -1.0])
+
+        _cell(out, (left, top, width, height), f"{plain(1e3 * at, 0)} ms", name)
+        shadow = places.copy()
+        shadow[:, 2] = ground
+        with out.within((left, top + _HEAD, left + width, top + _HEAD + height)):
+            _ground_crash_stills(out, pixels, (places, corners), ground)
+            out.shape(pixels(shadow), "#8a939e", 1.0, "dash", closed=False)
+            out.shape(pixels(shadow[: row + 1]), BLUE, 2.2, closed=False)
+            _body(out, body, corners[k], flat, pixels)
+    return Picture(
+        "motion",
+        out.svg(),
+        "The motion in space",
+        "The vehicle at instants of its path, in parallel projection from the right, ahead and "
+        "above of how it stood at the entry; one scale for all. Orange: the front. Blue: the path "
+        "of the reference point up to then, put down on the ground; dashed: the whole of it. "
+        f"Lines on the ground are {_step(places, corners):g} m apart. The height of the vehicle is "
+        "for the eye alone.",
+        out.alt,
+    )
+
+
+class _Projection:
+    """Parallel projection onto a page: right, and up; depth grows away from the eye."""
+
+    def __init__(self, heading_deg: float) -> None:
+        heading, around = math.radians(heading_deg), -math.radians(_AHEAD)
+        above = math.radians(_ABOVE)
+        ahead = np.array([math.cos(heading), math.sin(heading), 0.0])
+        right = np.array([-math.sin(heading), math.cos(heading), 0.0])
+        up = np.array([0.0, 0.0, -1.0])
+        away = math.sin(around) * ahead - math.cos(around) * right
+        across = math.cos(around) * ahead + math.sin(around) * right
+        self._page = np.column_stack([across, math.cos(above) * up + math.sin(above) * away])
+        self.away = math.cos(above) * away - math.sin(above) * up
+
+    def page(self, points: Array) -> Array:
+        return np.asarray(points @ self._page)
+
+
+def _instants(path: CrashPath, events: Sequence[CrashEvent]) -> list[tuple[str, float]]:
+    """The instants that matter, and others where there is most time between."""
+    found = path_moments(path, events)
+    if len(found) > _MOST:
+        found = [one for one in found if one[0] != "begin"]
+    while len(found) > _MOST:
+        gaps = [found[k + 1][1] - found[k - 1][1] for k in range(1, len(found) - 1)]
+        found.pop(1 + int(np.argmin(gaps)))
+    step = float(np.median(np.diff(path.time))) if len(path.time) > 1 else 0.0
+    while 2 <= len(found) < _MOST:
+        gaps = [b[1] - a[1] for a, b in pairwise(found)]
+        k = int(np.argmax(gaps))
+        if gaps[k] < 4.0 * step:
+            break
+        found.insert(k + 1, ("", 0.5 * (found[k][1] + found[k + 1][1])))
+    return found
+
+
+def _cell(out: Drawing, box: tuple[float, float, float, float], when: str, name: str) -> None:
+    left, top, width, height = box
+    low, high = top + _HEAD, top + _HEAD + height
+    rim = [(left, low), (left + width, low), (left + width, high), (left, high)]
+    out.shape(rim, "#c3cad2", 0.8, fill="#fbfcfd")
+    after = out.text((left + 2.0, top + 10.0), when, 11.5, INK, bold=True)[2]
+    out.text((after + 6.0, top + 10.0), name, SMALL, "#4a525c")
+
+
+def _step(places: Array, corners: list[Array]) -> float:
+    """Between lines on the ground, m."""
+    every = np.vstack([places, *corners])[:, :2]
+    return nice_step(float(np.ptp(every, axis=0).max()) / 12.0)
+
+
+def _ground_crash_stills(
+    out: Drawing, pixels: Callable[[Array], Array], shown: tuple[Array, list[Array]], ground: float
+) -> None:
+    places, corners = shown
+    every = np.vstack([places, *corners])
+    low, high = every[:, :2].min(axis=0), every[:, :2].max(axis=0)
+    step = _step(places, corners)
+    low, high = np.floor(low / step) * step, np.ceil(high / step) * step
+    for axis in (0, 1):
+        other = 1 - axis
+        for k in range(round((high[axis] - low[axis]) / step) + 1):
+            ends = np.full((2, 3), ground)
+            ends[:, axis] = low[axis] + k * step
+            ends[:, other] = low[other], high[other]
+            out.shape(pixels(ends), _GRID, 0.7, closed=False)
+
+
+def _body(
+    out: Drawing,
+    body: VehicleBody,
+    corners: Array,
+    flat: _Projection,
+    pixels: Callable[[Array], Array],
+) -> None:
+    """Faces that the eye sees."""
+    for f in body.seen(corners, flat.away):
+        points = pixels(corners[list(body.faces[f])])
+        out.shape(points, "#3d5166", 0.6, fill=body.colours[f])
+
+
+# The vehicle as a body in space: its outline given a height, its front marked.
+
+
+# Heights of no vehicle in particular, m, down from the vehicle's origin: the origin of a car is
+# taken half a metre above the ground.
+_SILL, _BELT, _ROOF = 0.50, -0.30, -0.95
+_RING = 16  # corners of the outline that are kept
+# Of length and width: the cabin at the belt and at the roof.
+_CABIN = ((0.09, 0.735, 0.90), (0.19, 0.565, 0.72))
+_CABIN_FACES = 5
+_SIDE, _TOP, _GLASS, _FRONT = "#9fb3c8", "#cdd8e2", "#3d5166", "#D55E00"
+
+
+@dataclass(frozen=True, eq=False)
+class VehicleBody:
+    """Corners and faces of a body.
+
+    Attributes
+    ----------
+    corners : ndarray, (n, 3), m
+        Vehicle axes forward, right, down, from the vehicle's origin.
+    faces : tuple of tuple of int
+        Corners of each face.
+    colours : tuple of str
+        Of each face.
+    cabin : int
+        How many of the last faces are those of a cabin on top of the rest.
+    """
+
+    corners: Array = field(repr=False)
+    faces: tuple[tuple[int, ...], ...] = field(repr=False)
+    colours: tuple[str, ...] = field(repr=False)
+    cabin: int = 0
+
+    @property
+    def bottom(self) -> float:
+        """How far down it reaches from the origin, m."""
+        return float(self.corners[:, 2].max())
+
+    @property
+    def triangles(self) -> tuple[Array, tuple[str, ...]]:
+        """Corners of triangles that make up the faces, (k, 3), and the colour of each."""
+        rows, colours = [], []
+        for face, colour in zip(self.faces, self.colours, strict=True):
+            for j in range(1, len(face) - 1):
+                rows.append([face[0], face[j], face[j + 1]])
+                colours.append(colour)
+        return np.array(rows, dtype=np.float64), tuple(colours)
+
+    @property
+    def edges(self) -> tuple[tuple[int, int], ...]:
+        """Pairs of corners, each once."""
+        found: dict[tuple[int, int], None] = {}
+        for face in self.faces:
+            for a, b in zip(face, (*face[1:], face[0]), strict=True):
+                found[(min(a, b), max(a, b))] = None
+        return tuple(found)
+
+    def seen(self, corners: Array, away: Array) -> list[int]:
+        """Faces that are seen, the farthest first, however the body is turned.
+
+        Parameters
+        ----------
+        corners : ndarray, (n, 3), m
+            As `placed`.
+        away : ndarray, (3,)
+            Direction of sight, in the same axes.
+        """
+        lower = range(len(self.faces) - self.cabin)
+        upper = range(len(self.faces) - self.cabin, len(self.faces))
+        order: list[list[int]] = [[], []]
+        for part, faces in enumerate((lower, upper)):
+            used = sorted({c for f in faces for c in self.faces[f]})
+            middle = corners[used].mean(axis=0) if used else np.zeros(3)
+            for f in faces:
+                a, b, c = corners[list(self.faces[f][:3])]
+                normal = np.cross(b - a, c - a)
+                outward = normal if normal @ (a - middle) > 0.0 else -normal
+                if outward @ away < 0.0:
+                    order[part].append(f)
+        # Both parts are convex, and the top of the lower one lies between them.
+        cap = lower[-1]
+        above = cap in order[0]
+        return [*order[0], *order[1]] if above else [*order[1], *order[0]]
+
+    def placed(self, at: ArrayLike, q_nb: ArrayLike, point: ArrayLike) -> Array:
+        """Corners in the axes of the path, (n, 3), m.
+
+        Parameters
+        ----------
+        at : array_like, (3,), m
+            Where `point` is.
+        q_nb : array_like, (4,)
+        point : array_like, (3,), m
+            Of the vehicle, vehicle axes.
+        """
+        arms = self.corners - np.asarray(point, dtype=np.float64)
+        return np.asarray(rotation.rotate(q_nb, arms) + np.asarray(at, dtype=np.float64))
+
+
+def vehicle_body(outline: Outline) -> VehicleBody:
+    """Make a body of an outline: a car with a cabin, or a plain one of a stated outline.
+
+    Parameters
+    ----------
+    outline : Outline
+        In vehicle axes.
+    """
+    ring = hull(outline.body)
+    if len(ring) > _RING:
+        ring = ring[np.unique(np.linspace(0, len(ring), _RING, endpoint=False).astype(int))]
+    low, high = outline.low, outline.high
+    n, top = len(ring), _ROOF if outline.stated else _BELT
+    levels = [np.column_stack([ring, np.full(n, z)]) for z in (_SILL, top)]
+    faces: list[tuple[int, ...]] = []
+    colours: list[str] = []
+    front = float(high[0] - 0.06 * (high[0] - low[0]))
+    for k in range(n):
+        j = (k + 1) % n
+        faces.append((k, j, n + j, n + k))
+        ahead = min(ring[k, 0], ring[j, 0]) > front
+        colours.append(_FRONT if ahead else _SIDE)
+    faces.append(tuple(range(n, 2 * n)))
+    colours.append(_TOP)
+    if not outline.stated:
+        length, width = (high - low).tolist()
+        middle = 0.5 * float(low[1] + high[1])
+        for (rear, fore, wide), z in zip(_CABIN, (_BELT, _ROOF), strict=True):
+            x = low[0] + length * np.array([rear, fore, fore, rear])
+            y = middle + 0.5 * width * wide * np.array([-1.0, -1.0, 1.0, 1.0])
+            levels.append(np.column_stack([x, y, np.full(4, z)]))
+        a, b = 2 * n, 2 * n + 4
+        faces += [(a + k, a + (k + 1) % 4, b + (k + 1) % 4, b + k) for k in range(4)]
+        faces.append((b, b + 1, b + 2, b + 3))
+        colours += [_GLASS] * 4 + [_TOP]
+    cabin = 0 if outline.stated else _CABIN_FACES
+    return VehicleBody(np.vstack(levels), tuple(faces), tuple(colours), cabin)

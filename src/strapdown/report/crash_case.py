@@ -5,16 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from strapdown.bundle.json_text import to_json
-from strapdown.bundle.seal import Seal
+from strapdown.bundle.seal import Seal, to_json
 from strapdown.config.crash_case import CaseSpec
 from strapdown.formats.mme_writer import write_mme
-from strapdown.report.crash_assumptions import CONVENTIONS
-from strapdown.report.crash_csv import signals_table, trajectory_table, write_table
 from strapdown.report.crash_document import crash_document
 from strapdown.report.crash_figures import crash_figures
-from strapdown.report.crash_json import crash_json
-from strapdown.report.crash_signal_record import signal_record
+from strapdown.report.crash_json import (
+    crash_json,
+    signal_record,
+    signals_table,
+    trajectory_table,
+    write_table,
+)
+from strapdown.report.crash_limits import CONVENTIONS
 from strapdown.report.document_data import draw_stills
 from strapdown.report.document_files import write_drawings, write_text
 from strapdown.report.document_html import document_page

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from strapdown.crash.pdof_interval import AngleInterval
+from strapdown.crash.pdof import AngleInterval
 from strapdown.report.chart import BLUE, GREY, ORANGE, VERMILLION
 from strapdown.report.crash_moments import interval_words
 from strapdown.report.crash_outline import Outline, draw_outline
-from strapdown.report.crash_values import plain
 from strapdown.report.document import Picture
 from strapdown.report.svg_drawing import INK, SMALL, Drawing, shortened
+from strapdown.report.values import plain
 
 __all__ = ["Direction", "pdof_dial"]
 

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from strapdown import __version__
-from strapdown.report import crash_check_tables as checks
-from strapdown.report import crash_source_tables as sources
+from strapdown.report import crash_tables as checks
+from strapdown.report import crash_tables as sources
 from strapdown.report import crash_tables as tables
 from strapdown.report.chart import Chart
-from strapdown.report.crash_assumptions import CONVENTIONS, assumptions, how_to_verify, method
 from strapdown.report.crash_figures import CrashFigures
-from strapdown.report.crash_limits import grave_limitations, limitations
-from strapdown.report.crash_notes import notes, record_facts
-from strapdown.report.crash_values import GAP, plain
-from strapdown.report.crash_words import headline, key_figures, lead
+from strapdown.report.crash_limits import (
+    CONVENTIONS,
+    assumptions,
+    grave_limitations,
+    how_to_verify,
+    limitations,
+    method,
+)
+from strapdown.report.crash_words import headline, key_figures, lead, notes, record_facts
 from strapdown.report.document import (
     Block,
     ChartBlock,
@@ -24,6 +28,7 @@ from strapdown.report.document import (
     Section,
     TableBlock,
 )
+from strapdown.report.values import GAP, plain
 from strapdown.systems.crash_case import CaseResult
 
 __all__ = ["crash_document"]

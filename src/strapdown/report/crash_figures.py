@@ -13,11 +13,19 @@ from strapdown.crash.path import CrashPath
 from strapdown.crash.unit_reconstruction import UnitReconstruction
 from strapdown.report.chart import Chart
 from strapdown.report.crash_animation import path_animation
-from strapdown.report.crash_budget import delta_v_budget_chart, place_budget_chart
+from strapdown.report.crash_charts import (
+    StatedDeltaV,
+    accelerations_chart,
+    delta_v_budget_chart,
+    delta_v_chart,
+    differences_chart,
+    pdof_by_shift_chart,
+    pdof_by_window_chart,
+    place_budget_chart,
+    risk_chart,
+)
 from strapdown.report.crash_conventions import MountingPoint, conventions_picture
-from strapdown.report.crash_delta_v import StatedDeltaV, delta_v_chart
 from strapdown.report.crash_dial import Direction, pdof_dial
-from strapdown.report.crash_direction import pdof_by_shift_chart, pdof_by_window_chart
 from strapdown.report.crash_motion import (
     attitude_chart,
     place_chart,
@@ -26,14 +34,10 @@ from strapdown.report.crash_motion import (
 )
 from strapdown.report.crash_outline import vehicle_outline
 from strapdown.report.crash_plan import path_plan
-from strapdown.report.crash_risk import risk_chart
 from strapdown.report.crash_signals import UnitSignals, unit_signals
-from strapdown.report.crash_units import accelerations_chart, differences_chart
-from strapdown.report.crash_values import axis_names
 from strapdown.report.document import Animation, Picture
-from strapdown.systems.case_references import ReferenceAnswer
-from strapdown.systems.case_severity import main_event
-from strapdown.systems.crash_case import CaseResult
+from strapdown.report.values import axis_names
+from strapdown.systems.crash_case import CaseResult, ReferenceAnswer, main_event
 from strapdown.tables import NED
 
 __all__ = ["CrashFigures", "crash_figures", "reference_in_path_axes"]

@@ -3,26 +3,35 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
 
 from strapdown import __version__
 from strapdown.bundle.configuration_paths import names_file
 from strapdown.constants import TWO_SIDED_95
-from strapdown.crash.crash_event import CrashEvent
+from strapdown.crash.compare_units import UnitComparison
 from strapdown.crash.crash_type import CrashType
+from strapdown.crash.delta_v_bound import EventChanges, VelocityChange
+from strapdown.crash.events import CrashEvent
+from strapdown.crash.path import CrashPath
 from strapdown.crash.pdof import NedPdof
-from strapdown.crash.unit_comparison import UnitComparison
 from strapdown.crash.unit_reconstruction import UnitReconstruction
-from strapdown.crash.velocity_change import EventChanges, VelocityChange
 from strapdown.errors import Finding
-from strapdown.report import crash_assumptions, crash_limits, crash_words
-from strapdown.report.crash_values import spaced
-from strapdown.systems.case_references import ReferenceAnswer
-from strapdown.systems.case_severity import SeverityAnswer, main_event
-from strapdown.systems.crash_case import CaseResult
-from strapdown.tables import EULER, NED, VELOCITY
+from strapdown.formats import csv
+from strapdown.formats.crash_record import CrashChannel, CrashRecord
+from strapdown.report import crash_limits, crash_words
+from strapdown.report import crash_limits as crash_assumptions
+from strapdown.report.values import spaced
+from strapdown.systems.crash_case import CaseResult, ReferenceAnswer, SeverityAnswer, main_event
+from strapdown.tables import ACCEL, EULER, GYRO, NED, VELOCITY
 
-__all__ = ["crash_json"]
+__all__ = ["crash_json", "signal_record", "signals_table", "trajectory_table", "write_table"]
+
 
 AXES = ("forward", "right", "down")
 
@@ -231,3 +240,123 @@ def _reference(answer: ReferenceAnswer) -> dict[str, Any]:
         "largest_m": None if found is None else list(found.largest),
         "consistent": answer.consistent,
     }
+
+
+# What came of a crash case, as tables in CSV: the path, and the signals at the reference point.
+
+
+UNITS = dict.fromkeys(NED, "m") | dict.fromkeys(VELOCITY, "m_per_s") | dict.fromkeys(EULER, "deg")
+
+
+def trajectory_table(path: CrashPath) -> pd.DataFrame:
+    """Return the path with its standard deviations, each column with its unit.
+
+    Parameters
+    ----------
+    path : CrashPath
+
+    Returns
+    -------
+    DataFrame
+        ``time_s``, place, velocity, attitude, then the standard deviations of each.
+    """
+    values = path.table.rename(columns={c: f"{c}_{u}" for c, u in UNITS.items()})
+    sd = path.sd.rename(columns={c: f"{c}_sd_{u}" for c, u in UNITS.items()})
+    table = pd.concat([values, sd], axis=1)
+    table.insert(0, "time_s", path.time)
+    return table.reset_index(drop=True)
+
+
+def signals_table(unit: UnitReconstruction) -> pd.DataFrame:
+    """Return what one recorder says at the reference point, gravity in it.
+
+    Parameters
+    ----------
+    unit : UnitReconstruction
+
+    Returns
+    -------
+    DataFrame
+        Specific force forward, right, down in m/s² and rates in deg/s at the common stamps, and
+        for a recorder of several ranges which of them spoke (0 the lowest) and where it was at
+        its end, by sensor axis.
+    """
+    imu = unit.at_point.imu
+    table = pd.DataFrame({"time_s": imu.index.to_numpy()})
+    for axis, column in zip(("forward", "right", "down"), ACCEL, strict=True):
+        table[f"force_{axis}_m_per_s2"] = imu[column].to_numpy()
+    for axis, column in zip(("roll", "pitch", "yaw"), GYRO, strict=True):
+        table[f"rate_{axis}_deg_per_s"] = np.degrees(imu[column].to_numpy())
+    prepared = unit.at_point.prepared
+    if prepared is not None:
+        for k, axis in enumerate("xyz"):
+            table[f"range_{axis}"] = prepared.range_spoken[:, k].astype(np.int64)
+            table[f"at_end_{axis}"] = prepared.clipped[:, k].astype(np.int64)
+    return table
+
+
+def write_table(table: pd.DataFrame, path: Path, comments: dict[str, str]) -> None:
+    """Write a table as CSV with shortest round-trip numbers.
+
+    Parameters
+    ----------
+    table : DataFrame
+    path : Path
+    comments : dict of str to str
+        At the top.
+    """
+    csv.write(path, {str(c): table[c].to_numpy() for c in table.columns}, comments)
+
+
+# What the recorders say at the reference point, as one crash record: for ISO MME.
+
+
+Array = NDArray[np.float64]
+
+
+def signal_record(
+    title: str, point: str, answers: Sequence[UnitReconstruction], rate_hz: float
+) -> CrashRecord:
+    """Return the signals of all answers at the reference point.
+
+    Parameters
+    ----------
+    title : str
+        Of the case.
+    point : str
+        Name of the reference point.
+    answers : sequence of UnitReconstruction
+    rate_hz : float, Hz
+        Of the common stamps.
+
+    Returns
+    -------
+    CrashRecord
+        Of each recorder, and of their mean, specific force (gravity in it) and rates along the
+        vehicle's axes.
+    """
+    channels = []
+    for unit in answers:
+        imu = unit.at_point.imu
+        time = imu.index.to_numpy(dtype=np.float64)
+        for columns, quantity, symbol in ((ACCEL, "acceleration", "m/s2"), (GYRO, "rate", "rad/s")):
+            for column, axis in zip(columns, "xyz", strict=True):
+                channels.append(
+                    CrashChannel(
+                        f"{unit.name} {column}",
+                        quantity,
+                        axis,
+                        symbol,
+                        _load(time, imu[column].to_numpy(dtype=np.float64)),
+                        sampling=str(imu.attrs["sampling"]),
+                        place=f"{point}, by {unit.name}",
+                        low_pass=f"brought to {rate_hz:g} Hz",
+                    )
+                )
+    return CrashRecord(
+        Path("signals"), "mme", title, {"reference point": point}, tuple(channels), ()
+    )
+
+
+def _load(time: Array, values: Array) -> Callable[[], tuple[Array, Array]]:
+    return lambda: (time, values)

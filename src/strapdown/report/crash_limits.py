@@ -6,12 +6,26 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from strapdown.report.crash_sensor_limits import assumed, borrowed, clipping, rest, ringing
-from strapdown.report.crash_values import instant, plain
-from strapdown.systems.case_severity import main_event
-from strapdown.systems.crash_case import CaseResult
+from strapdown.constants import TWO_SIDED_95
+from strapdown.crash.unit_reconstruction import UnitReconstruction
+from strapdown.report.values import about, instant, plain, speed
+from strapdown.sensors.pre_crash import PreparedUnit
+from strapdown.systems.crash_case import CaseResult, main_event
 
-__all__ = ["grave_limitations", "limitations"]
+__all__ = [
+    "CONVENTIONS",
+    "assumed",
+    "assumptions",
+    "borrowed",
+    "clipping",
+    "grave_limitations",
+    "how_to_verify",
+    "limitations",
+    "method",
+    "rest",
+    "ringing",
+]
+
 
 #: What makes an answer wrong, and not only less precise.
 GRAVE = frozenset(
@@ -191,3 +205,329 @@ def _no_reference(result: CaseResult) -> Iterator[tuple[str, str, str]]:
             "Nothing to compare with",
             "No film, no survey and no other measurement of the crash was given.",
         )
+
+
+# What the sensors of a case limit: ranges, what is missing, rest, rate.
+
+
+# A rest that is shorter leaves biases that a longer one would have told.
+SHORT_REST = 2.0  # s
+# Below this rate a structure that rings is not integrated: a quarter of the rate is the fastest.
+RINGS = 1000.0  # Hz
+AXES = ("forward", "right", "down")
+
+
+def _prepared(result: CaseResult) -> Iterator[tuple[UnitReconstruction, PreparedUnit]]:
+    for unit in result.reconstruction.units:
+        if unit.at_point.prepared is not None:
+            yield unit, unit.at_point.prepared
+
+
+def clipping(result: CaseResult) -> Iterator[tuple[str, str, str]]:
+    """Return which sensors were at the end of their range."""
+    cut: dict[str, list[tuple[str, str]]] = {"accelerometer": [], "gyro": []}
+    for unit, prepared in _prepared(result):
+        time = unit.at_point.time
+        for what, clipped in (
+            ("accelerometer", prepared.clipped),
+            ("gyro", prepared.gyro_clipped),
+        ):
+            axes = [k for k in range(3) if clipped[:, k].any()]
+            if axes:
+                rows = np.flatnonzero(clipped.any(axis=1))
+                names = ", ".join("xyz"[k] for k in axes)
+                said = (
+                    f"{unit.name}: its axis {names}, {len(rows)} samples between "
+                    f"{instant(time[rows[0]])} and {instant(time[rows[-1]])}"
+                )
+                cut[what].append((unit.name, said))
+    for what, found in cut.items():
+        if not found:
+            continue
+        follows, then = (
+            ("the true delta-V is larger", "every place after it is off by what is missing")
+            if what == "accelerometer"
+            else ("the vehicle turned more", "what is resolved with its attitude is off")
+        )
+        yield (
+            "clipped",
+            f"{', '.join(name for name, _ in found)}: the {what} was at the end of its range, and "
+            f"{follows}",
+            f"{'; '.join(said for _, said in found)}; no wider range stands behind it. What was "
+            f"cut off is missing, and no bound here knows how much: along that axis {follows} than "
+            f"what is told here, and {then}.",
+        )
+
+
+def assumed(result: CaseResult) -> Iterator[tuple[str, str, str]]:
+    """Return what was not measured, once for all recorders of which the same is true."""
+    told: dict[str, list[str]] = {}
+    for spec in result.spec.units:
+        given, parts = spec.assumed, []
+        if given is None:
+            continue
+        span = f"between {instant(given.over_s[0])} and {instant(given.over_s[1])}"
+        if given.turn_sd_deg is not None:
+            parts.append(
+                "There is no gyro: the vehicle is taken not to have turned, with a standard "
+                f"deviation of {_each(given.turn_sd_deg, '°', 'roll, pitch and heading')} {span}."
+            )
+        if given.delta_v_sd_m_per_s is not None:
+            missing = [
+                name
+                for name, column in zip(AXES, ("x", "y", "z"), strict=True)
+                if all(column not in t.channels for t in spec.accelerometers)
+            ]
+            parts.append(
+                f"There is no accelerometer along {' and '.join(missing) or 'an axis'}: nothing is "
+                "taken to have changed there, with a standard deviation of "
+                f"{_each(given.delta_v_sd_m_per_s, ' m/s', 'x, y and z')} {span}."
+            )
+        parts.append("The bounds have it; they are wrong where the assumption is.")
+        if given.because:
+            parts.append(f"Reason stated: {given.because.rstrip('.')}.")
+        told.setdefault(" ".join(parts), []).append(spec.name)
+    for text, names in told.items():
+        yield "assumed", f"{', '.join(names)}: not everything was measured", text
+
+
+def _each(sd: float | tuple[float, float, float], unit: str, names: str) -> str:
+    """One standard deviation for all axes, or one for each."""
+    if isinstance(sd, float):
+        return f"{sd:g}{unit}"
+    return f"{sd[0]:g}, {sd[1]:g} and {sd[2]:g}{unit} ({names})"
+
+
+def rest(result: CaseResult) -> Iterator[tuple[str, str, str]]:
+    """Return what the stretch before the crash does not tell."""
+    told: dict[tuple[str, str], list[str]] = {}
+    for unit, prepared in _prepared(result):
+        still, level = prepared.rest, prepared.levelling
+        if still is None:
+            half = TWO_SIDED_95 * level.sd_deg
+            said = (
+                "no stationary stretch before the crash",
+                f"Roll and pitch are stated, {about(level.roll_deg, half, '°')} and "
+                f"{about(level.pitch_deg, half, '°')}, or carried over from another recorder; "
+                "biases are as stated of the sensors.",
+            )
+        elif still.grade == "steady":
+            said = (
+                "quiet before the crash, but perhaps at speed",
+                f"The stretch from {instant(still.start)} to {instant(still.end)} may have been "
+                "driven; acceleration and turning over it are taken as zero with a bound.",
+            )
+        elif still.end - still.start < SHORT_REST:
+            said = (
+                "a short stationary stretch",
+                f"{instant(still.end - still.start)} before the crash, from "
+                f"{instant(still.start)}: biases and levelling are known the less the "
+                "shorter it is, and the bounds are so much wider.",
+            )
+        else:
+            continue
+        told.setdefault(said, []).append(unit.name)
+    for (head, text), names in told.items():
+        yield "rest", f"{', '.join(names)}: {head}", text
+
+
+def borrowed(result: CaseResult) -> Iterator[tuple[str, str, str]]:
+    """Return who has no gyro, and whose turning it takes."""
+    told: dict[str, list[str]] = {}
+    for unit in result.units:
+        if unit.gyro is None and unit.gyro_from is not None:
+            told.setdefault(unit.gyro_from, []).append(unit.name)
+    for lender, names in told.items():
+        yield (
+            "borrowed-gyro",
+            f"{', '.join(names)}: no gyro",
+            f"The turning is that of {lender}: a rigid vehicle turns everywhere alike. An error of "
+            "that gyro is in all of them, and the comparison of recorders does not show it.",
+        )
+
+
+def ringing(result: CaseResult) -> Iterator[tuple[str, str, str]]:
+    """Return whose samples are too few for a structure that rings."""
+    slow = []
+    for unit in result.units:
+        stamps = unit.accelerometers[-1].table.index.to_numpy()
+        rate = 1.0 / float(np.median(np.diff(stamps)))
+        means = unit.accelerometers[-1].table.attrs.get("sampling") == "mean"
+        if rate < RINGS and not means:
+            slow.append((unit.name, rate))
+    if slow:
+        which = ", ".join(f"{name} ({rate:.4g} Hz)" for name, rate in slow)
+        yield (
+            "ringing",
+            "Ringing of the structure is not seen at this rate",
+            f"{which}: what swings faster than a quarter of the rate cannot be integrated from "
+            "samples. Ringing of 10 g at 195 Hz that decays in 30 ms moves the path by 1 m within "
+            "750 ms at 200 Hz, and is not in the bounds. Another recorder at 1 kHz or more that "
+            "agrees excludes it.",
+        )
+
+
+# What a crash report takes for given, and its conventions.
+
+
+CONVENTIONS = (
+    ("Vehicle axes", "forward, right, down, turning with the vehicle"),
+    ("Time", "s from the trigger; a recorder's own clock may show anything"),
+    (
+        "Path",
+        "north, east, down from the place of the reference point at the entry; where no heading "
+        "is stated, forward and right of the vehicle at the entry take the place of north and east",
+    ),
+    ("Attitude", "roll, pitch, heading (3-2-1): right side down, nose up, clockwise are positive"),
+    (
+        "Delta-V",
+        "the change of velocity, so that a frontal crash has a negative forward part; along the "
+        "turning axes of the vehicle, as recorders integrate it, where nothing else is said",
+    ),
+    (
+        "Direction of force (PDOF)",
+        "where the force came from: atan2(−ΔV right, −ΔV forward); 0° the front, positive "
+        "clockwise seen from above, 90° the right side; on the clock 12 is the front",
+    ),
+    (
+        "Event, time zero, end",
+        "49 CFR 563.5(b): 8 km/h within 150 ms make an event; it begins with 0.8 km/h within 20 ms "
+        "and ends when the resultant change within 20 ms becomes that or less",
+    ),
+    (
+        "Bounds",
+        "hold the truth in 95 of 100 cases (1.96 standard deviations) where everything that is "
+        "stated and assumed here is right; of a direction, Fieller's interval",
+    ),
+    ("Units", "SI, with km/h for changes of velocity and g = 9.80665 m/s² for accelerations"),
+)
+
+
+def assumptions(result: CaseResult) -> tuple[tuple[str, str], ...]:
+    """Return what is taken for given in this case.
+
+    Returns
+    -------
+    tuple of (head, text)
+    """
+    spec = result.spec
+    options, entry = spec.options, spec.entry
+    found = [
+        (
+            "Rigid vehicle",
+            "Between each recorder and the reference point the vehicle keeps its shape.",
+        ),
+        (
+            "Errors of the sensors",
+            "are normal, of mean zero, and independent from recorder to recorder, with the "
+            "standard deviations of the table under Sensors; within the record they do not drift.",
+        ),
+        (
+            "Gravity",
+            f"is {options.gravity_m_per_s2:g} m/s² and vertical throughout; the turning of the "
+            "Earth over the record is computed and not assumed away.",
+        ),
+        (
+            "Samples",
+            f"The records are brought to {options.rate_hz:g} Hz as "
+            + (
+                "true means over each step."
+                if options.sampling == "mean"
+                else "values of a band-limited signal; each low-pass is taken to be late by its "
+                "time constant."
+            ),
+        ),
+        (
+            "Clocks",
+            "are tied by each recorder's trigger, as well as it is stated."
+            if options.clock == "trigger"
+            else "are tied by what the recorders felt, laid over each other.",
+        ),
+    ]
+    if entry.kind == "speed":
+        assert entry.speed_m_per_s is not None and entry.speed_sd_m_per_s is not None
+        half = TWO_SIDED_95 * entry.speed_sd_m_per_s
+        direction = TWO_SIDED_95 * entry.slip_sd_deg
+        found.append(
+            (
+                "Entry",
+                f"At {instant(entry.time_s)} the vehicle moved at "
+                f"{speed(entry.speed_m_per_s, half)}, {entry.slip_deg:g} ± {direction:.2g}° "
+                f"clockwise of where it pointed, and horizontally within "
+                f"{TWO_SIDED_95 * entry.climb_sd_m_per_s:.2g} m/s. Source: "
+                f"{entry.source or 'not stated'}.",
+            )
+        )
+    elif entry.kind == "standstill":
+        found.append(("Entry", "The vehicle stood still when the record began."))
+    else:
+        found.append(
+            (
+                "Entry",
+                "The fixes are believed as far as they say, never beyond 50 m/s² or 20 m/s³, nor "
+                "from the impact on.",
+            )
+        )
+    reasons: dict[str, list[str]] = {}
+    for unit in spec.units:
+        if unit.assumed is not None and unit.assumed.because:
+            reasons.setdefault(unit.assumed.because, []).append(unit.name)
+    for because, names in reasons.items():
+        found.append((", ".join(names), f"What was not measured is assumed because: {because}"))
+    return tuple(found)
+
+
+def method(result: CaseResult) -> tuple[str, ...]:
+    """Return the steps from the records to the answers, in order."""
+    steps = [
+        "The clocks of the recorders are tied to the trigger, and all channels are brought to "
+        "common stamps without aliasing; the delay of each low-pass is taken off.",
+        "The stationary stretch before the crash tells the bias of the gyro, that of a high "
+        "range against a low one, and roll and pitch; where there is none, what is stated is used.",
+        "Ranges are merged: the low one while it is clear of its end, the high one beyond.",
+        "Each recorder is turned into vehicle axes and moved to the reference point.",
+        "Events are found, and their changes of velocity integrated along the turning axes and, "
+        "with gravity taken off, over ground.",
+        "The path runs from the entry, forward and backward, by strapdown navigation.",
+        "Every unknown of the sensors, mounting, clocks and entry is carried through all of this, "
+        "linearly"
+        + (
+            "."
+            if result.samples is None
+            else f", and by {len(result.samples.errors)} complete runs with drawn errors."
+        ),
+    ]
+    if len(result.units) > 1:
+        steps.append(
+            "The recorders are compared at the reference point"
+            + (
+                ", and their weighted mean is reconstructed as well."
+                if result.reconstruction.combined is not None
+                else "."
+            )
+        )
+    return tuple(steps)
+
+
+def how_to_verify() -> tuple[tuple[str, str], ...]:
+    """Return how anybody checks the report, beside the command."""
+    return (
+        (
+            "Run it again",
+            "Install strapdown in the version named on page one (pip install strapdown) and give "
+            "the command below. It checks every file against the seal, runs the whole case again "
+            "from the records, and compares each byte; it names every file and every option that "
+            "was changed.",
+        ),
+        (
+            "The seal",
+            "is the SHA-256 of manifest.json, which holds that of every file of the folder. It was "
+            "printed when the report was made: write it into the file of the case, apart from the "
+            "folder, since who changes a file and the manifest too would not be found otherwise.",
+        ),
+        (
+            "By other means",
+            "The records stand under inputs/, the path in trajectory.csv and all numbers in "
+            "crash.json, with their units in the names.",
+        ),
+    )

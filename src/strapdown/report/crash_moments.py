@@ -8,12 +8,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.crash.crash_event import CrashEvent
+from strapdown.crash.events import CrashEvent
 from strapdown.crash.path import CrashPath
-from strapdown.crash.pdof_interval import AngleInterval
+from strapdown.crash.pdof import AngleInterval
 from strapdown.crash.unit_reconstruction import UnitReconstruction
 from strapdown.report.chart import BLACK, Mark, look
-from strapdown.report.crash_values import plain
+from strapdown.report.values import plain
 
 Array = NDArray[np.float64]
 

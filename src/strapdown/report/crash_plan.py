@@ -10,17 +10,17 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.crash.crash_event import CrashEvent
+from strapdown.crash.events import CrashEvent
 from strapdown.crash.leg import PLACE
 from strapdown.crash.path import CrashPath
 from strapdown.report.chart import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
 from strapdown.report.crash_moments import path_moments
 from strapdown.report.crash_outline import Outline, draw_outline
-from strapdown.report.crash_values import plain
 from strapdown.report.document import Picture
 from strapdown.report.error_envelope import envelope
 from strapdown.report.plan_view import PlanView
 from strapdown.report.svg_drawing import INK, SMALL, Box, Drawing, text_width
+from strapdown.report.values import plain
 from strapdown.tables import NED
 
 Array = NDArray[np.float64]

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from strapdown.bundle.destination import check_destination
-from strapdown.bundle.json_text import to_json
-from strapdown.bundle.seal import Seal
+from strapdown import earth
+from strapdown.bundle.seal import Seal, check_destination, to_json
 from strapdown.bundle.writing import write_bundle
 from strapdown.config import CrashSimulationSpec
 from strapdown.crash.pdof import pdof
@@ -25,20 +26,30 @@ from strapdown.formats.recorder_csv import (
     write_path_csv,
     write_recorder_csv,
 )
-from strapdown.report.simulated_case_file import PartPlace, case_text, part_file, part_name
-from strapdown.report.stated_errors import stated_errors
+from strapdown.sensors.catalogue import KEYS, load_sensor
 from strapdown.sensors.crash_unit import Mounting, RecordedTriad
-from strapdown.simulation.case_recording import (
+from strapdown.sensors.uncertainty import TriadUncertainty, uncertainty_of
+from strapdown.simulation import TriadErrors
+from strapdown.simulation.crash_cases import (
     AFTER,
     RecordedCase,
     RecordedUnit,
+    find_case,
     record_case,
 )
-from strapdown.simulation.crash_cases import find_case
 from strapdown.simulation.exact_answers import ExactAnswers
+from strapdown.simulation.recorder_design import TriadDesign
 from strapdown.tables import ACCEL, GYRO
 
-__all__ = ["write_crash_simulation"]
+__all__ = [
+    "PartPlace",
+    "case_text",
+    "part_file",
+    "part_name",
+    "stated_errors",
+    "write_crash_simulation",
+]
+
 
 # Over which 49 CFR 563 looks for the change of an event; the pulses of all crashes here are over.
 SPAN = 0.15  # s
@@ -283,3 +294,342 @@ def _unit(of: RecordedUnit) -> dict[str, Any]:
 
 def _mounting(mounting: Mounting) -> dict[str, list[float]]:
     return {"position_m": list(mounting.position), "angles_deg": list(mounting.angles_deg)}
+
+
+# The case file of a simulated crash: what an investigator would fill in, filled in.
+
+
+# Attributes of a triad's uncertainty, and the keys of the catalogue in which a case states them.
+_STATED: dict[str, dict[str, str]] = {
+    "accel": {
+        "noise_density": "noise_density_ug_per_sqrt_hz",
+        "bias": "bias_sd_mg",
+        "scale": "scale_sd_percent",
+        "misalignment": "misalignment_sd_percent",
+        "nonlinearity_2": "nonlinearity_bound_percent",
+        "full_scale": "full_scale_g",
+        "quantization": "quantization_mg",
+        "bandwidth": "bandwidth_hz",
+    },
+    "gyro": {
+        "noise_density": "noise_density_deg_per_s_per_sqrt_hz",
+        "bias": "bias_sd_deg_per_s",
+        "scale": "scale_sd_percent",
+        "misalignment": "misalignment_sd_percent",
+        "nonlinearity_2": "nonlinearity_bound_percent",
+        "g_sensitivity": "g_sensitivity_sd_deg_per_s_per_g",
+        "full_scale": "full_scale_deg_per_s",
+        "quantization": "quantization_deg_per_s",
+        "bandwidth": "bandwidth_hz",
+    },
+}
+# A catalogue states an uncertainty to fewer digits than this.
+_DIGITS = 7
+_COMMON_RATE = 200.0  # Hz
+# Where comments begin.
+_COLUMN = 34
+_HEAD = """\
+# {summary}.
+# Simulated: recorders that wrote records, and here what an investigator would state of them.
+# What no record tells, and only you can know of a real crash, is marked "yours".
+# scenario.json and truth.csv hold what really happened.
+#{remark}
+# Run: strapdown crash case.toml
+#
+# Axes of the vehicle: forward, right, down. Lengths in m from one origin, here the centre of mass.
+# Each key ends in its unit. Every ..._sd is a standard deviation: two of three cases lie within it.
+
+title = {title}
+number = {number}
+author = ""  # yours
+description = {description}
+
+[vehicle]  # yours: for drawings, and for models of severity
+name = "simulated car"
+mass_kg = 1300.0  # nothing here depends on it
+length_m = 4.2
+width_m = 1.7
+front_m = 2.0  # from the origin forward to the bumper
+
+[point]  # the point whose motion is told
+name = "centre of mass"
+position_m = [0.0, 0.0, 0.0]
+"""
+_SPEED = """
+[entry]  # yours: how the vehicle came to the crash
+kind = "speed"  # speed, standstill or gnss
+source = "simulated light gate"
+speed_m_per_s = {speed}  # {kmh} km/h
+speed_sd_m_per_s = {speed_sd}
+time_s = 0.0  # when it was measured, from the trigger
+heading_deg = {heading}  # of the vehicle then; with 0, "north" is forward and "east" right
+slip_deg = {slip}  # direction of travel less heading
+slip_sd_deg = 0.5
+"""
+_STANDSTILL = """
+[entry]  # yours: how the vehicle came to what happened
+kind = "standstill"  # speed, standstill or gnss
+source = "simulated: it was parked"
+"""
+_UNIT = """
+[[units]]
+name = "{name}"
+position_m = {position}  # yours: forward, right, down, with a tape measure
+position_sd_m = {position_sd}
+angles_deg = {angles}  # yours: roll, pitch, heading of the recorder against the vehicle
+angles_sd_deg = {angles_sd}
+trigger_s = {trigger}  # yours: the common trigger on this recorder's clock
+trigger_sd_s = {trigger_sd}
+"""
+_ASSUMED = """
+[units.assumed]  # yours: there is no gyro
+turn_sd_deg = {turn}  # by how much the vehicle may have turned, each axis
+over_s = [0.0, 0.15]
+because = {because}
+"""
+_REFERENCES = """
+[[references]]  # what the path is held beside; leave it out where there is none
+kind = "path"
+name = "cameras"
+source = "two simulated cameras, 1000 frames/s, calibrated"
+path = "cameras.csv"
+
+# In a simulation the truth is known, too. Take the # away to see the answers beside it.
+# [[references]]
+# kind = "path"
+# name = "truth"
+# source = "simulation"
+# path = "truth.csv"
+"""
+_OPTIONS = """
+[options]
+rate_hz = {rate}  # of the common stamps
+sampling = "{sampling}"
+gravity_m_per_s2 = {gravity}  # yours: at the place
+clock = "trigger"  # trigger, or correlation of what the recorders felt
+monte_carlo_runs = 2000
+seed = 0
+"""
+
+
+@dataclass(frozen=True)
+class PartPlace:
+    """Where a part of a recorder was written: the file, its three channels, and its stamps."""
+
+    path: str
+    channels: tuple[str, str, str]
+    time: str | None = None
+
+
+def case_text(recorded: RecordedCase, places: Mapping[str, PartPlace], seed: int) -> str:
+    """Write the case file of a simulated crash.
+
+    Parameters
+    ----------
+    recorded : RecordedCase
+    places : mapping of str to PartPlace
+        By `part_file`.
+    seed : int
+        Of the simulation, for the file's number.
+
+    Returns
+    -------
+    str
+        TOML that states what is told of the recorders, and not what they really did.
+    """
+    case, entry = recorded.case, recorded.entry
+    summary = case.summary[0].upper() + case.summary[1:]
+    remark = "".join(f"\n# {line}" for line in _wrapped(case.remark)) + "\n#" if case.remark else ""
+    pieces = [
+        _HEAD.format(
+            summary=summary,
+            remark=remark,
+            title=_text(summary),
+            number=_text(f"simulated {case.name}, seed {seed}"),
+            description=_text(case.remark or "A simulated crash with known truth."),
+        )
+    ]
+    if entry.speed == 0.0:
+        pieces.append(_STANDSTILL)
+    else:
+        pieces.append(
+            _SPEED.format(
+                speed=_number(entry.told_speed),
+                kmh=f"{3.6 * entry.told_speed:.1f}",
+                speed_sd=_number(entry.speed_sd),
+                heading=_number(round(entry.heading_deg, 6)),
+                slip=_number(round(entry.slip_deg, 6)),
+            )
+        )
+    pieces += [_unit_text(unit, places) for unit in recorded.units]
+    pieces.append(_REFERENCES)
+    pieces.append(
+        _OPTIONS.format(
+            sampling=_sampling(recorded),
+            rate=_number(_rate(recorded)),
+            gravity=_number(_gravity(recorded), 5),
+        )
+    )
+    return _aligned("".join(pieces))
+
+
+def part_name(unit: RecordedUnit, which: int | None) -> str:
+    """Name of an accelerometer by its number, or of the gyro (None)."""
+    if which is None:
+        return "gyro"
+    if len(unit.unit.accelerometers) == 1:
+        return "accel"
+    return "low-g" if which == 0 else "high-g"
+
+
+def part_file(unit: RecordedUnit, which: int | None) -> str:
+    """Name of the file of a part, without ending."""
+    return f"{unit.unit.name}_{part_name(unit, which)}".lower().replace("-", "_")
+
+
+def _unit_text(of: RecordedUnit, places: Mapping[str, PartPlace]) -> str:
+    unit, design = of.unit, of.recorder.design
+    assert unit.trigger is not None
+    text = _UNIT.format(
+        name=unit.name,
+        position=_numbers(unit.mounting.position),
+        position_sd=_number(unit.mounting.position_sd),
+        angles=_numbers(unit.mounting.angles_deg),
+        angles_sd=_number(unit.mounting.angles_sd_deg),
+        trigger=_number(round(unit.trigger, 6)),
+        trigger_sd=_number(unit.trigger_sd, 3),
+    )
+    if unit.gyro_from is not None:
+        text += f'gyro_from = "{unit.gyro_from}"  # it has none of its own\n'
+    for k, (triad, built) in enumerate(
+        zip(unit.accelerometers, design.accelerometers, strict=True)
+    ):
+        comment = "  # the lowest range first" if k == 0 else ""
+        text += f"\n[[units.accelerometers]]{comment}\n" + _triad_text(of, triad, built, k, places)
+    if unit.gyro is not None and design.gyro is not None:
+        text += "\n[units.gyro]\n" + _triad_text(of, unit.gyro, design.gyro, None, places)
+    if of.recorder.assumed_turn_sd_deg is not None:
+        text += _ASSUMED.format(
+            turn=_number(of.recorder.assumed_turn_sd_deg), because=_text(of.recorder.because)
+        )
+    return text
+
+
+def _triad_text(
+    of: RecordedUnit,
+    triad: RecordedTriad,
+    built: TriadDesign,
+    which: int | None,
+    places: Mapping[str, PartPlace],
+) -> str:
+    place = places[part_file(of, which)]
+    channels = ", ".join(f'{a} = "{name}"' for a, name in zip("xyz", place.channels, strict=True))
+    lines = [
+        f'name = "{part_name(of, which)}"',
+        f'path = "{place.path}"',
+        f"channels = {{ {channels} }}",
+        *([f'time = "{place.time}"'] if place.time else []),
+        f'sampling = "{triad.table.attrs["sampling"]}"',
+        f'sensor = "{built.part}"',
+    ]
+    kind = "gyro" if which is None else "accel"
+    stated = _differences(kind, built.part, triad.uncertainty)
+    if stated:
+        lines.append("# Instead of the data sheet's:")
+        lines.append(f"uncertainty = {{ {', '.join(stated)} }}")
+    return "\n".join(lines) + "\n"
+
+
+def _differences(kind: str, sensor: str, told: TriadUncertainty) -> list[str]:
+    """What is told of a triad and is not as its data sheet has it."""
+    sheet = uncertainty_of(load_sensor(sensor), kind)
+    found = []
+    for name, key in _STATED[kind].items():
+        ours, theirs = (np.atleast_1d(getattr(u, name)) for u in (told, sheet))
+        if np.array_equal(ours, theirs):
+            continue
+        # A bound of the catalogue is √3 times the standard deviation.
+        factor = KEYS[kind][key].factor * (1.0 if "_bound_" not in key else 1.0 / math.sqrt(3.0))
+        values = [float(v) / factor for v in ours]
+        alike = max(values) - min(values) <= 1e-12 * max(values)
+        value = _number(values[0], _DIGITS) if alike else _numbers(values, _DIGITS)
+        found.append(f"{key} = {value}")
+    return found
+
+
+def _sampling(recorded: RecordedCase) -> str:
+    return str(recorded.units[0].unit.accelerometers[0].table.attrs["sampling"])
+
+
+def _gravity(recorded: RecordedCase) -> float:
+    motion = recorded.case.crash.motion
+    origin, shape = motion.origin, motion.ellipsoid
+    return float(earth.gravity([origin.lat_deg], [origin.alt], ellipsoid=shape)[0, 2])
+
+
+def _rate(recorded: RecordedCase) -> float:
+    """Of the common stamps: 200 Hz, or what the slowest recorder has."""
+    rates = [t.rate for u in recorded.units for t in u.recorder.design.accelerometers]
+    return min(_COMMON_RATE, *rates)
+
+
+def _number(value: float, digits: int = 12) -> str:
+    # Zero is written without a sign.
+    return repr(float(f"{value:.{digits}g}") + 0.0)
+
+
+def _numbers(values: Sequence[float], digits: int = 12) -> str:
+    return f"[{', '.join(_number(v, digits) for v in values)}]"
+
+
+def _text(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)
+
+
+def _aligned(text: str) -> str:
+    """Comments behind values, all in one column where the values leave room."""
+    lines = []
+    for line in text.splitlines():
+        value, mark, comment = line.partition("  # ")
+        lines.append(f"{value:<{_COLUMN}}{mark.lstrip()}{comment}" if mark else line)
+    return "\n".join(lines) + "\n"
+
+
+def _wrapped(text: str) -> list[str]:
+    import textwrap
+
+    return textwrap.wrap(text, 94)
+
+
+# Errors of a sensor in words that carry their units.
+
+
+# What follows the unit of the triad in a key, or stands instead of it.
+_AFTER = {
+    "noise_density": "_per_sqrt_hz",
+    "random_walk": "_per_sqrt_s",
+    "trend": "_per_s",
+    "vibration_rectification": "_per_m2_per_s4",
+}
+_UNITS = {
+    "correlation_time": "s",
+    "jitter": "s",
+    "warm_up_time": "s",
+    "bandwidth": "hz",
+    "misalignment": "rad",
+    "scale": "relative",
+    "nonlinearity_2": "relative",
+    "nonlinearity_3": "relative",
+}
+
+
+def stated_errors(errors: TriadErrors, unit: str) -> dict[str, Any]:
+    """The errors that there are, each key with its unit."""
+    none, stated = TriadErrors(), {}
+    for f in fields(errors):
+        value = getattr(errors, f.name)
+        if value != getattr(none, f.name):
+            of = _UNITS.get(f.name, unit + _AFTER.get(f.name, ""))
+            of += "_per_m_per_s2" if f.name == "g_sensitivity" else ""
+            stated[f"{f.name}_{of}"] = value
+    return stated

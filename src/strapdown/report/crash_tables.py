@@ -6,26 +6,43 @@ import math
 
 import numpy as np
 
-from strapdown.constants import TWO_SIDED_95
-from strapdown.crash.pdof import Pdof
-from strapdown.crash.pdof_interval import AngleInterval
-from strapdown.crash.velocity_change import VelocityChange
-from strapdown.report.crash_values import (
+from strapdown.config.crash_case import TriadSpec
+from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
+from strapdown.crash.delta_v_bound import VelocityChange
+from strapdown.crash.pdof import AngleInterval, Pdof
+from strapdown.report.document import TableBlock
+from strapdown.report.values import (
+    GAP,
     KMH,
+    MEAN,
     about,
     axis_names,
     instant,
     over_ground,
     plain,
     recorder,
+    speed,
 )
-from strapdown.report.document import TableBlock
 from strapdown.rotation import within_half_turn
-from strapdown.systems.case_severity import main_event
-from strapdown.systems.crash_case import CaseResult
+from strapdown.sensors.crash_unit import RecordedTriad
+from strapdown.systems.crash_case import CaseResult, ReferenceAnswer, main_event
 from strapdown.tables import NED
 
-__all__ = ["answers_table", "budget_table", "direction_table", "path_table"]
+__all__ = [
+    "answers_table",
+    "budget_table",
+    "comparison_table",
+    "direction_table",
+    "inputs_table",
+    "path_table",
+    "records_table",
+    "reference_tables",
+    "sensors_table",
+    "severity_table",
+    "units_table",
+]
+
+
 ANGLES = ("roll, deg", "pitch, deg", "heading, deg")
 OVER_GROUND = "Axes: over ground."
 FROM_THE_ENTRY = (
@@ -207,3 +224,272 @@ def budget_table(result: CaseResult) -> TableBlock | None:
 def _sizes(sizes: np.ndarray[tuple[int], np.dtype[np.float64]]) -> tuple[str, ...]:
     scaled = sizes * np.array([KMH, KMH, 1.0, 1.0, 1.0])
     return tuple("–" if s < 5e-4 else plain(float(s), 3) for s in scaled)
+
+
+# Tables of a crash report that hold its answers against recorders, models and references.
+
+
+def comparison_table(result: CaseResult) -> TableBlock | None:
+    """Return how pairs of recorders agree."""
+    comparison = result.reconstruction.comparison
+    if comparison is None:
+        return None
+    rows = []
+    for pair in comparison.pairs:
+        difference, sd = pair.difference[-1], pair.sd[-1]
+        rows.append(
+            (
+                f"{pair.first} less {pair.second}",
+                *(
+                    about(KMH * float(d), KMH * TWO_SIDED_95 * float(s), "")
+                    if math.isfinite(float(d))
+                    else "not measured"
+                    for d, s in zip(difference, sd, strict=True)
+                ),
+                f"{pair.chi_square / max(pair.freedom, 1):.2f}",
+                "below 0.0001" if pair.probability < 1e-4 else f"{pair.probability:.2g}",
+                "yes" if pair.agree else "NO",
+            )
+        )
+    start, end = float(comparison.edges[0]), float(comparison.edges[-1])
+    return TableBlock(
+        (
+            "recorders",
+            "forward, km/h",
+            "right, km/h",
+            "down, km/h",
+            "chi-square per degree of freedom",
+            "probability",
+            "agree",
+        ),
+        tuple(rows),
+        text=(0, 6),
+        caption="Difference of what two recorders say of the velocity at the "
+        f"{result.spec.point.name}, {instant(start)} to {instant(end)}, beside the 95 % bound of "
+        "such a difference. Probability: of differences as large or larger where everything that "
+        "is stated is right.",
+    )
+
+
+def severity_table(result: CaseResult) -> TableBlock | None:
+    """Return what models of injury risk say."""
+    if not result.severity:
+        return None
+    rows = []
+    sources = list(dict.fromkeys(answer.model.source for answer in result.severity))
+    for answer in result.severity:
+        risk = answer.risk
+        rows.append(
+            (
+                answer.model.outcome,
+                "–" if risk is None else f"{100.0 * risk.probability:.2g} %",
+                ("" if answer.because is None else answer.because.sentence("file"))
+                if risk is None
+                else f"{100.0 * risk.low:.2g} to {100.0 * risk.high:.2g} %",
+                *((answer.model.source,) if len(sources) > 1 else ()),
+            )
+        )
+    return TableBlock(
+        (
+            *("outcome", "probability", "by the bound of delta-V"),
+            *(("source",) if len(sources) > 1 else ()),
+        ),
+        tuple(rows),
+        text=(0, 2, 3),
+        caption="Probability that an occupant is hurt at least so, by published models; the bound "
+        "is that of the delta-V alone and not of the model."
+        + (f" Source: {sources[0]}" if len(sources) == 1 else ""),
+    )
+
+
+def reference_tables(result: CaseResult) -> tuple[TableBlock, ...]:
+    """Return the answers beside what else is known: changes of velocity, and paths."""
+    changes: list[tuple[str, ...]] = []
+    paths: list[tuple[str, ...]] = []
+    for answer in result.references:
+        spec, verdict = answer.spec, "yes" if answer.consistent else "NO"
+        who = (spec.name, _name(answer, result))
+        if answer.path is not None:
+            errors = (*answer.path.rms, *answer.path.largest)
+            paths.append((*who, *(plain(float(v), 3) for v in errors), verdict))
+            continue
+        assert spec.delta_v_m_per_s is not None
+        changes.append(
+            (
+                *who,
+                f"{spec.axis}, {instant(answer.span[0])} to {instant(answer.span[1])}",
+                speed(answer.delta_v, TWO_SIDED_95 * answer.sd),
+                speed(spec.delta_v_m_per_s, TWO_SIDED_95 * spec.delta_v_sd_m_per_s),
+                verdict,
+            )
+        )
+    names = axis_names(result)
+    tables = (
+        TableBlock(
+            ("reference", "recorder", "delta-V", "this report", "reference", "within 95 %"),
+            tuple(changes),
+            text=(0, 1, 2, 5),
+            caption="Changes of velocity beside those that are known otherwise; bounds hold 95 %.",
+        ),
+        TableBlock(
+            (
+                *("reference", "recorder"),
+                *(f"{name}, RMS" for name in names),
+                *(f"{name}, largest" for name in names),
+                "within 95 %",
+            ),
+            tuple(paths),
+            text=(0, 1, 8),
+            caption="Errors of the path, m: this report less the reference.",
+        ),
+    )
+    return tuple(table for table in tables if table.rows)
+
+
+def _name(answer: ReferenceAnswer, result: CaseResult) -> str:
+    combined = result.reconstruction.combined
+    return MEAN if combined is not None and answer.unit == combined.name else answer.unit
+
+
+# Tables of what a crash report rests on: records, recorders, sensors, files.
+
+
+DEG = math.degrees(1.0)
+
+
+def records_table(result: CaseResult) -> TableBlock:
+    """Return what was taken from each record, for which recorder."""
+    rows = []
+    for spec, unit in zip(result.spec.units, result.units, strict=True):
+        for triad_spec, triad in zip(spec.accelerometers, unit.accelerometers, strict=True):
+            name = triad.name if "accel" in triad.name else f"{triad.name} accelerometer"
+            rows.append(_taken(result, unit.name, name, triad_spec, triad))
+        if spec.gyro is not None and unit.gyro is not None:
+            rows.append(_taken(result, unit.name, "gyro", spec.gyro, unit.gyro))
+    return TableBlock(
+        ("recorder", "sensors", "record", "format", "channels", "samples", "rate, Hz", "from, to"),
+        tuple(rows),
+        text=(0, 1, 2, 3, 4, 7),
+        caption="What was taken from each record; channels along the axes x, y, z of the recorder. "
+        "Times are those of its own clock.",
+    )
+
+
+def _taken(
+    result: CaseResult, unit: str, name: str, spec: TriadSpec, triad: RecordedTriad
+) -> tuple[str, ...]:
+    record = result.records[spec.path]
+    time = triad.table.index.to_numpy(dtype=np.float64)
+    given = [
+        f"{axis}:{GAP}{spec.channels[axis]}" for axis in ("x", "y", "z") if axis in spec.channels
+    ]
+    return (
+        unit,
+        name,
+        record.path.name,
+        record.format,
+        ", ".join(given) or "by their names",
+        str(len(time)),
+        _rate(triad),
+        f"{instant(float(time[0]))} to {instant(float(time[-1]))}",
+    )
+
+
+def _rate(triad: RecordedTriad) -> str:
+    rate = 1.0 / float(np.median(np.diff(triad.table.index.to_numpy())))
+    return f"{round(rate):d}" if rate >= 1000.0 else f"{rate:.4g}"
+
+
+def units_table(result: CaseResult) -> TableBlock:
+    """Where each recorder sits and how its clock is tied."""
+    rows = []
+    for unit, at in zip(result.units, result.reconstruction.synchronised.units, strict=True):
+        mounting = unit.mounting
+        rows.append(
+            (
+                unit.name,
+                " ".join(plain(v, 3) for v in mounting.position)
+                + f" ± {TWO_SIDED_95 * mounting.position_sd:.2g}",
+                " ".join(plain(v, 1) for v in mounting.angles_deg)
+                + f" ± {TWO_SIDED_95 * mounting.angles_sd_deg:.2g}",
+                "–" if unit.trigger is None else instant(unit.trigger),
+                f"{1e3 * TWO_SIDED_95 * at.time_sd:.2g}",
+                at.how,
+                unit.gyro_from or ("own" if unit.gyro is not None else "none: assumed"),
+            )
+        )
+    return TableBlock(
+        (
+            "recorder",
+            "forward right down, m",
+            "roll pitch heading, deg",
+            "trigger on its clock",
+            "± ms",
+            "clock",
+            "gyro",
+        ),
+        tuple(rows),
+        text=(0, 1, 2, 5, 6),
+        caption="Mounting points from the vehicle's origin; angles turn vehicle axes into the "
+        "recorder's. Bounds hold 95 %.",
+    )
+
+
+def sensors_table(result: CaseResult) -> TableBlock:
+    """What is stated of each triad of sensors."""
+    rows = []
+    for spec, unit in zip(result.spec.units, result.units, strict=True):
+        for triad_spec, triad in zip(spec.accelerometers, unit.accelerometers, strict=True):
+            rows.append(_sensor(unit.name, triad_spec.sensor, triad, STANDARD_GRAVITY, "g"))
+        if spec.gyro is not None and unit.gyro is not None:
+            rows.append(_sensor(unit.name, spec.gyro.sensor, unit.gyro, 1.0 / DEG, "°/s"))
+    return TableBlock(
+        (
+            "recorder",
+            "triad",
+            "sensor",
+            "rate, Hz",
+            "range, ±",
+            "bias",
+            "scale, %",
+            "misalignment, mrad",
+            "noise of a sample",
+        ),
+        tuple(rows),
+        text=(0, 1, 2),
+        caption="Standard deviations as stated in the case or its sensors' data sheets, before a "
+        "rest has told more; the largest of the three axes.",
+    )
+
+
+def _sensor(
+    unit: str, sensor: str | None, triad: RecordedTriad, size: float, symbol: str
+) -> tuple[str, ...]:
+    stated = triad.uncertainty
+    step = float(np.median(np.diff(triad.table.index.to_numpy())))
+    full = max(stated.axis("full_scale"))
+    return (
+        unit,
+        triad.name,
+        "stated in the case" if sensor is None else sensor.replace("\\", "/").rsplit("/", 1)[-1],
+        _rate(triad),
+        "not stated" if math.isinf(full) else f"{full / size:.3g} {symbol}",
+        f"{max(stated.axis('bias')) / size:.2g} {symbol}",
+        f"{100.0 * max(stated.axis('scale')):.2g}",
+        f"{1e3 * max(stated.axis('misalignment')):.2g}",
+        f"{max(stated.axis('noise_density')) / math.sqrt(step) / size:.2g} {symbol}",
+    )
+
+
+def inputs_table(result: CaseResult) -> TableBlock:
+    """Return the files that the report rests on."""
+    rows = []
+    for item in result.inputs:
+        for file, digest in zip(item.files, item.digests, strict=True):
+            rows.append((item.role, file.name, digest))
+    return TableBlock(
+        ("role", "file", "SHA-256"),
+        tuple(rows),
+        text=(0, 1, 2),
+        caption="Copies stand in the folder of the report under inputs/.",
+    )

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.pdof import Pdof
 from strapdown.crash.unit_reconstruction import UnitReconstruction
-from strapdown.report.crash_apart import apart, apart_figures, apart_headline
-from strapdown.report.crash_values import (
+from strapdown.errors import Finding
+from strapdown.formats.crash_record import CrashRecord
+from strapdown.report.document import KeyFigure
+from strapdown.report.values import (
     GAP,
     KMH,
+    MEAN,
     about,
     angle_range,
     axis_names,
@@ -24,20 +29,24 @@ from strapdown.report.crash_values import (
     speed,
     speed_range,
 )
-from strapdown.report.document import KeyFigure
-from strapdown.systems.case_severity import main_event
-from strapdown.systems.crash_case import CaseResult
+from strapdown.systems.crash_case import CaseResult, main_event
 from strapdown.tables import NED
 
 __all__ = [
+    "apart",
+    "apart_figures",
+    "apart_headline",
     "direction",
     "entry_words",
     "headline",
     "key_figures",
     "lead",
+    "notes",
     "path_words",
+    "record_facts",
     "units_words",
 ]
+
 
 TYPES = {
     "front": "an impact from the front",
@@ -232,3 +241,204 @@ def _end(unit: UnitReconstruction) -> tuple[list[float], list[float]]:
     place = unit.path.table[NED].iloc[-1].tolist()
     half = (TWO_SIDED_95 * unit.path.sd[NED].iloc[-1]).tolist()
     return place, half
+
+
+# What is told where recorders do not agree: each by itself, and the span of all.
+
+
+def apart(result: CaseResult) -> bool:
+    """Tell whether there are recorders that do not agree, so that there is no mean of them."""
+    made = result.reconstruction
+    return made.comparison is not None and not made.comparison.agree and made.combined is None
+
+
+def apart_headline(result: CaseResult) -> str:
+    """Return the answers of all recorders in one sentence."""
+    told = "; ".join(f"{unit.name} {_change(unit)}" for unit in result.reconstruction.units)
+    return f"The recorders do not agree, and no mean of them is told. Delta-V: {told}."
+
+
+def apart_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
+    """Return delta-V and direction of force for page one: the span of all bounds.
+
+    Parameters
+    ----------
+    result : CaseResult
+        Of recorders that do not agree.
+    """
+    units = result.reconstruction.units
+    spans = [span for span in map(_span, units) if span is not None]
+    value = "no event"
+    if spans:
+        low, high = min(s[0] for s in spans), max(s[1] for s in spans)
+        value = f"{plain(KMH * low, 1)} to {plain(KMH * high, 1)} km/h"
+    return (
+        KeyFigure(
+            "Delta-V",
+            value,
+            "; ".join(f"{unit.name} {_change(unit)}" for unit in units),
+            "the recorders do not agree: the span of their 95 % bounds, and no mean",
+        ),
+        KeyFigure(
+            "Direction of force",
+            _directions(units),
+            "; ".join(f"{unit.name} {_direction(unit)}" for unit in units),
+            "where the force came from: 0° the front, clockwise seen from above",
+        ),
+    )
+
+
+def _change(unit: UnitReconstruction) -> str:
+    number = main_event(unit)
+    if number is None:
+        return "no event"
+    whole = unit.body[number].event
+    return speed(whole.resultant, whole.resultant_bound)
+
+
+def _span(unit: UnitReconstruction) -> tuple[float, float] | None:
+    number = main_event(unit)
+    if number is None:
+        return None
+    whole = unit.body[number].event
+    return whole.resultant - whole.resultant_bound, whole.resultant + whole.resultant_bound
+
+
+def _angle(unit: UnitReconstruction) -> float | None:
+    number = main_event(unit)
+    if number is None or unit.body[number].event.interval.horizontal.undetermined:
+        return None
+    angle = unit.body[number].event.pdof
+    assert isinstance(angle, Pdof)
+    return angle.horizontal_deg
+
+
+def _direction(unit: UnitReconstruction) -> str:
+    angle, number = _angle(unit), main_event(unit)
+    if angle is None or number is None:
+        return "not determined"
+    across = unit.body[number].event.interval.horizontal
+    return f"{plain(angle, 1)}° ({angle_range(across).removesuffix(' with 95 %')})"
+
+
+def _directions(units: tuple[UnitReconstruction, ...]) -> str:
+    angles = [angle for angle in map(_angle, units) if angle is not None]
+    return " / ".join(f"{plain(angle, 0)}°" for angle in angles) or "not determined"
+
+
+# What was noticed in the records of a case, and what a record says of itself.
+
+
+# A number whose digits beyond the sixth tell nothing, as 15.858333333.
+LONG = re.compile(r"-?\d+\.\d{5,}")
+# Keys of a record that end with their unit.
+UNITS = {"_m_per_s": "m/s", "_kg": "kg", "_m": "m", "_deg": "deg"}
+
+
+def notes(
+    findings: Sequence[Finding], result: CaseResult, *, remedies: bool = True
+) -> tuple[tuple[str, str], ...]:
+    """Return findings as items, one for all files and recorders of which the same is said.
+
+    Parameters
+    ----------
+    findings : sequence of Finding
+    result : CaseResult
+        Whose mean of the recorders is called that.
+    remedies : bool
+        Whether each says what can be done about it.
+
+    Returns
+    -------
+    tuple of (str, str)
+        Where, and what, with what can be done about it.
+    """
+    combined = result.reconstruction.combined
+    told: dict[tuple[str, str], list[str]] = {}
+    alike_by: dict[tuple[str, str], Finding] = {}
+    for finding in findings:
+        file = finding.file or ""
+        if combined is not None:
+            file = file.replace(combined.name, MEAN)
+        rest = [
+            None if finding.row is None else f"row {finding.row}",
+            None if finding.line is None else f"line {finding.line}",
+            finding.quantity,
+        ]
+        remedy = finding.advice("file") or "" if remedies else ""
+        text = _sentence(finding.sentence("file")) + (f" {_sentence(remedy)}" if remedy else "")
+        place = ", ".join(r for r in rest if r)
+        key = place, text
+        alike = [k for k in told if _alike(alike_by[k], finding)]
+        alike_by[key] = finding
+        if file == MEAN and alike:
+            # What differs from the mean's in its numbers alone is said once, with those of it.
+            files = [f for k in alike for f in told.pop(k)]
+            told[key] = [*files, file]
+        else:
+            told.setdefault(key, []).append(file)
+    return tuple(
+        (": ".join(p for p in (_places(files), place) if p), text)
+        for (place, text), files in told.items()
+    )
+
+
+def _alike(first: Finding, second: Finding) -> bool:
+    """Whether two say the same with other numbers."""
+    return (
+        first.code == second.code
+        and first.quantity == second.quantity
+        and _words(first.data) == _words(second.data)
+    )
+
+
+def _words(data: object) -> object:
+    """Return data without their numbers."""
+    if isinstance(data, Mapping):
+        return {key: _words(value) for key, value in data.items()}
+    if isinstance(data, tuple):
+        return tuple(_words(value) for value in data)
+    if isinstance(data, Finding):
+        return data.code, _words(data.data)
+    return None if isinstance(data, int | float) else data
+
+
+def _places(files: Sequence[str]) -> str:
+    named = list(dict.fromkeys(f for f in files if f))
+    if len(named) > 1 and named[-1] == MEAN:
+        return f"{MEAN}, and each by itself"
+    return ", ".join(named)
+
+
+def _sentence(text: str) -> str:
+    found = text.strip()
+    return found[:1].upper() + found[1:] + ("" if found.endswith((".", "!", "?")) else ".")
+
+
+def record_facts(record: CrashRecord) -> tuple[tuple[str, str], ...]:
+    """Return what a record says of the test, once, with units.
+
+    Parameters
+    ----------
+    record : CrashRecord
+
+    Returns
+    -------
+    tuple of (str, str)
+        Empty where it says nothing but the name of its file.
+    """
+    rows = []
+    if record.title and record.title != record.path.stem:
+        rows.append(("title", record.title))
+    for key, value in record.facts.items():
+        name, unit = str(key), ""
+        for ending, symbol in UNITS.items():
+            if name.endswith(ending):
+                name, unit = name.removesuffix(ending), f" {symbol}"
+                break
+        rows.append((name.replace("_", " "), LONG.sub(_short, str(value)) + unit))
+    return tuple(rows)
+
+
+def _short(found: re.Match[str]) -> str:
+    return f"{float(found.group()):.6g}"

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from strapdown.report.crash_values import plain
-from strapdown.report.page import render
+from strapdown.report.document_html import render
+from strapdown.report.values import plain
 
 __all__ = ["Shown", "demo_page", "shown_answer", "shown_truth"]
 

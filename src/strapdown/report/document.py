@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
+import unicodedata
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from typing import Any, TypeVar
 
 from strapdown.report.chart import Chart
 
@@ -21,6 +23,8 @@ __all__ = [
     "Picture",
     "Section",
     "TableBlock",
+    "plain_document",
+    "plain_text",
 ]
 
 
@@ -187,3 +191,151 @@ class Document:
     sections: tuple[Section, ...]
     footer: str = ""
     links: tuple[tuple[str, str], ...] = ()
+
+
+# A document with every text made plain, whoever wrote it.
+
+
+# Characters, by what holds them: there is less room in a heading, a cell or a chart than in a
+# paragraph.
+_TITLE, _LABEL, _CELL, _WORDS = 300, 160, 1000, 4000
+_LIMITS: dict[type, dict[str, int]] = {
+    Chart: {"caption": _WORDS, "title": _TITLE},
+    TableBlock: {"caption": _WORDS, "rows": _CELL},
+    KeyFigure: {"value": 40, "bound": _TITLE, "note": _TITLE},
+    Document: {"facts": _CELL, "subtitle": _TITLE, "title": _TITLE},
+    Section: {"title": _TITLE},
+    Facts: {"rows": _CELL},
+    Items: {"rows": _WORDS},
+    Paragraph: {"text": _WORDS},
+    Picture: {"caption": _WORDS, "alt": _WORDS, "title": _TITLE},
+    Animation: {"caption": _WORDS, "live_caption": _TITLE, "title": _TITLE},
+}
+_MARKED = len("[U+10FFFF]")
+# What plotly may read as markup; it would make links of others.
+_MARKUP = re.compile(r"<(?!/?(?:b|i|br|sub|sup)\s*/?>)", re.IGNORECASE)
+_SLUG = re.compile(r"[^A-Za-z0-9_-]+")
+
+T = TypeVar("T")
+
+
+def plain_document(document: Document) -> Document:
+    """Return a document in which every text is plain and of bounded length.
+
+    Parameters
+    ----------
+    document : Document
+
+    Returns
+    -------
+    Document
+        By `plain_text`: paragraphs, items and captions to 4000 characters, facts and cells to
+        1000, titles and what stands under a key figure to 300, its value to 40, other words to
+        160; slugs to 80 letters, digits, ``_`` and ``-``. The page and the PDF do this themselves;
+        whoever writes charts to files beside them does it first. A second pass does nothing.
+    """
+    return _plain(document, _LABEL)
+
+
+def _plain(value: T, limit: int) -> T:
+    """Copy of a value of any depth with plain texts."""
+    made: Any = value
+    if isinstance(value, str):
+        made = plain_text(value, limit)
+    elif isinstance(value, tuple):
+        made = tuple(_plain(item, limit) for item in value)
+    elif is_dataclass(value) and not isinstance(value, type):
+        made = replace(value, **{f.name: _field(value, f.name) for f in fields(value) if f.init})
+    return made  # type: ignore[no-any-return]
+
+
+def _field(owner: Any, name: str) -> Any:
+    value = getattr(owner, name)
+    limit = _LIMITS.get(type(owner), {}).get(name, _LABEL)
+    if name == "slug":
+        return _SLUG.sub("-", value)[:80].strip("-") or "part"
+    if isinstance(owner, Picture) and name == "svg":
+        return plain_text(value, _MARKED * len(value) + 1, lines=True)
+    if isinstance(owner, Animation) and name == "figure":
+        return _plain_figure(value)
+    if isinstance(owner, Paragraph) and owner.kind == "mono" and name == "text":
+        return plain_text(value, limit, lines=True)
+    return _plain(value, limit)
+
+
+def _plain_figure(value: Any) -> Any:
+    """Copy of plotly's plain data in which texts cannot link to anywhere."""
+    if isinstance(value, str):
+        # Numbers may be packed into long texts: nothing is cut.
+        return _MARKUP.sub("&lt;", plain_text(value, _MARKED * len(value) + 1))
+    if isinstance(value, Mapping):
+        return {str(key): _plain_figure(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain_figure(item) for item in value]
+    return value
+
+
+# Text from outside as text that shows what it is: no character acts, none is invisible.
+
+
+_CUT = "… ({} characters)"
+# More of them on one letter would run over the lines above and below.
+_MOST_COMBINING = 3
+# Control, format (direction, zero width), lone surrogates, private use: none has its own shape.
+_SHAPELESS = frozenset({"Cc", "Cf", "Cs", "Co"})
+_COMBINING = frozenset({"Mn", "Me"})
+
+
+def plain_text(text: str, limit: int = 4000, *, lines: bool = False) -> str:
+    r"""Text in which every character is seen and none commands.
+
+    Parameters
+    ----------
+    text : str
+        From a file, a case or a person.
+    limit : int
+        Longest result; a longer text is cut and says how long it was.
+    lines : bool
+        Whether ends of lines stay; otherwise they are spaces, as are tabs.
+
+    Returns
+    -------
+    str
+        Characters without a shape (``\x00``, the override of direction U+202E, the joiner of zero
+        width U+200D, a lone surrogate) stand as ``[U+202E]``; so does what follows the third
+        combining mark on one letter. Plain text is unchanged, so that a second pass does nothing.
+    """
+    marked = _marked(text[:limit].replace("\r\n", "\n"), "\n" if lines else " ")
+    if len(text) <= limit and len(marked) <= limit:
+        return marked
+    count = _CUT.format(len(text))
+    return marked[: max(0, limit - len(count))] + count
+
+
+def _marked(text: str, end_of_line: str) -> str:
+    # What is printable has a shape; only a heap of combining marks can be wrong with it.
+    if text.isprintable() and (text.isascii() or not _COMBINING & _kinds(text)):
+        return text
+    out: list[str] = []
+    combining = 0
+    for char in text:
+        kind = unicodedata.category(char)
+        combining = combining + 1 if kind in _COMBINING else 0
+        if char in "\n\r\u2028\u2029":
+            out.append(end_of_line)
+        elif char == "\t":
+            out.append(" ")
+        elif kind in _SHAPELESS or _is_no_character(char) or combining > _MOST_COMBINING:
+            out.append(f"[U+{ord(char):04X}]")
+        else:
+            out.append(char)
+    return "".join(out)
+
+
+def _kinds(text: str) -> set[str]:
+    return set(map(unicodedata.category, set(text)))
+
+
+def _is_no_character(char: str) -> bool:
+    code = ord(char)
+    return code & 0xFFFE == 0xFFFE or 0xFDD0 <= code <= 0xFDEF

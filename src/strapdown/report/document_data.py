@@ -20,8 +20,8 @@ from strapdown.report.document import (
     Paragraph,
     Picture,
     TableBlock,
+    plain_document,
 )
-from strapdown.report.document_text import plain_document
 from strapdown.report.still_chart import still
 
 __all__ = ["document_data", "draw_stills", "no_stills"]

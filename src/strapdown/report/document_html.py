@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import base64
 import hashlib
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from typing import Any
 
 from strapdown.report.document import Document
 from strapdown.report.document_data import document_data, draw_stills
-from strapdown.report.page import embedded, render
 
 __all__ = ["document_page"]
+
 
 _HEIGHT = 420  # pixels, of a figure that does not say
 
@@ -72,3 +73,57 @@ def _digest(script: str) -> str:
     """Name of a script in the page's policy; one that is not named does not run."""
     whole = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
     return f"'sha256-{whole}'"
+
+
+# Pages: one offline file, every text from outside escaped.
+
+
+def render(template: str, context: Mapping[str, Any]) -> str:
+    """Render a template into a page that needs nothing else.
+
+    Parameters
+    ----------
+    template : str
+        File in ``templates``.
+    context : mapping
+        Strings are escaped by the template; charts come from `embedded`.
+
+    Returns
+    -------
+    str
+        HTML.
+    """
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+    from markupsafe import Markup
+    from plotly.offline import get_plotlyjs
+
+    environment = Environment(
+        loader=PackageLoader("strapdown.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    # The one text that is code: plotly's own.
+    return environment.get_template(template).render(plotly_js=Markup(get_plotlyjs()), **context)
+
+
+def embedded(figure: Mapping[str, Any]) -> Any:
+    """JSON that may stand inside a script element, whatever text it holds.
+
+    Parameters
+    ----------
+    figure : mapping
+
+    Returns
+    -------
+    markupsafe.Markup
+        With ``<``, ``>`` and ``&`` written as escapes of JSON, so that no ``</script>`` and no
+        ``<!--`` can end or open anything.
+    """
+    from markupsafe import Markup
+
+    text = json.dumps(figure, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+    for char in "<>&":
+        text = text.replace(char, f"\\u{ord(char):04x}")
+    return Markup(text)

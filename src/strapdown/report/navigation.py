@@ -5,24 +5,20 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from strapdown.bundle.json_text import to_json
-from strapdown.bundle.seal import Seal
+from strapdown.bundle.seal import Seal, to_json
 from strapdown.config.navigation_file import navigation_spec
 from strapdown.report.document_data import draw_stills, no_stills
 from strapdown.report.document_files import write_drawings, write_text
 from strapdown.report.document_html import document_page
 from strapdown.report.navigation_document import navigation_document
-from strapdown.report.navigation_files import write_navigation_files
-from strapdown.report.navigation_found import examine
-from strapdown.report.navigation_json import navigation_json
-from strapdown.report.navigation_result import told_of
+from strapdown.report.navigation_found import examine, told_of
+from strapdown.report.navigation_json import navigation_json, write_navigation_files
 from strapdown.report.report_bundle import report_bundle
 from strapdown.report.verdict_document import light_section
 from strapdown.report.verdict_files import write_verdict
 from strapdown.systems.one_thread import one_thread
 from strapdown.systems.progress import Progress, silent
-from strapdown.systems.sins.result import NavigationResult
-from strapdown.systems.sins.run import run_navigation
+from strapdown.systems.sins.run import NavigationResult, run_navigation
 
 __all__ = ["rerun_navigation", "write_navigation"]
 

@@ -7,38 +7,53 @@ from numpy.typing import NDArray
 
 from strapdown.constants import TWO_SIDED_95
 from strapdown.evaluation.plane_bound import plane_bound
-from strapdown.navigation.record import NavigationRecord
+from strapdown.evaluation.truth_comparison import bounds
+from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.report.chart import (
     AXIS_COLOURS,
     BLACK,
     BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILLION,
+    Band,
     Chart,
     Fill,
+    Level,
     Line,
     Panel,
     break_jumps,
     curve,
 )
-from strapdown.report.navigation_strip import outage_bands, strip
-from strapdown.report.navigation_thinning import BUCKETS, thin_fill
-from strapdown.report.navigation_told import NavigationTold
-from strapdown.report.navigation_values import (
-    StateBlock,
-    at_marks,
-    blocks_of,
-    heading_shown,
-    unwrapped,
+from strapdown.report.navigation_found import (
+    Agreement,
+    NavigationErrors,
+    NavigationTold,
+    chi_square_far,
 )
+from strapdown.report.navigation_thinning import BUCKETS, broken, kept_rows, thin_fill
+from strapdown.report.values import StateBlock, at_marks, blocks_of, heading_shown, unwrapped
 from strapdown.tables import EULER, NED, VELOCITY
 
 __all__ = [
     "attitude_chart",
     "bound_chart",
+    "error_charts",
     "height_chart",
+    "innovation_chart",
+    "mode_colour",
+    "nees_chart",
+    "nis_chart",
+    "outage_bands",
     "over_time",
     "state_charts",
+    "strip",
     "velocity_chart",
 ]
+
 
 Array = NDArray[np.float64]
 
@@ -215,3 +230,361 @@ def _block_chart(record: NavigationRecord, block: StateBlock) -> Chart:
         tuple(panels),
         record,
     )
+
+
+# The strip above charts over time: modes, and when each aid was there.
+
+
+_MODES = {"coarse": GREY, "fine": SKY, "navigation": BLUE}
+_MORE = (PURPLE, ORANGE)
+_ROW, _PAD = 0.115, 0.05  # of a panel
+_LETTER = 0.0085  # of the axis
+_MOST_ROWS, _MOST_MARKS = 7, 200
+# Epochs farther apart than so many usual ones are no longer one stretch; of fewer than so many
+# nothing is usual. An epoch alone is as wide as this part of the whole.
+_PAUSE, _FEW, _ALONE = 5.0, 4, 1.0 / 300.0
+
+
+def mode_colour(name: str, names: tuple[str, ...]) -> str:
+    """Colour of a mode among those of a run."""
+    for known, colour in _MODES.items():
+        if name.startswith(known):
+            return colour
+    others = [n for n in names if not n.startswith(tuple(_MODES))]
+    return _MORE[others.index(name) % len(_MORE)]
+
+
+def outage_bands(record: NavigationRecord) -> tuple[Band, ...]:
+    """Shades of the times over which an aid was missing."""
+    spans = {(s.begin, s.end) for spans in record.outages.values() for s in spans}
+    return tuple(Band(begin, end, "outage") for begin, end in sorted(spans))
+
+
+def strip(record: NavigationRecord) -> Panel | None:
+    """Modes and aids in rows; None where there is neither."""
+    time = record.trajectory.index.to_numpy(dtype=np.float64)
+    begins = [float(time[0]), *(m.begin for m in record.modes)]
+    finishes = [float(time[-1]), *(m.end for m in record.modes)]
+    whole = Span("", min(begins), max(finishes))
+    # Before that aids were not used for navigation, but for an alignment.
+    going = Span("", float(time[0]), float(time[-1]))
+    rows: list[str] = []
+    fills: list[Fill] = []
+    # From end to end, whatever stands in the rows.
+    ends = np.array([whole.begin, whole.end])
+    lines = [Line("", ends, np.full(2, np.nan), GREY, points=True, size=0.0, legend=False)]
+    if record.modes:
+        rows.append("mode")
+        fills += _modes(record.modes)
+        lines += _names(record.modes, whole)
+    for aid in _aids(record)[: _MOST_ROWS - len(rows)]:
+        at = float(len(rows))
+        rows.append(aid)
+        out = record.outages.get(aid, ())
+        used = (
+            _between(out, going)
+            if aid in record.outages
+            else _stretches(_epochs(record, aid), going)
+        )
+        fills.append(_bar("used", used, at, 0.3, GREEN))
+        if out:
+            fills.append(_bar("outage", out, at, 0.13, VERMILLION))
+        lost = _rejected(record, aid, whole)
+        if lost.size:
+            y = np.full(lost.size, at)
+            lines.append(Line("rejected", lost, y, VERMILLION, points=True, symbol="x", size=6.0))
+    if not rows:
+        return None
+    return Panel(
+        "",
+        tuple(lines),
+        categories=tuple(rows),
+        height=_PAD + _ROW * len(rows),
+        fills=tuple(fills),
+    )
+
+
+def _aids(record: NavigationRecord) -> list[str]:
+    """Names of the aids: those with outages first."""
+    seen = [name.rpartition(".")[0] or name for name in record.innovations]
+    return list(dict.fromkeys([*record.outages, *seen]))
+
+
+def _of_aid(record: NavigationRecord, aid: str) -> list[str]:
+    return [n for n in record.innovations if (n.rpartition(".")[0] or n) == aid]
+
+
+def _epochs(record: NavigationRecord, aid: str) -> Array:
+    found = [record.innovations[n].index.to_numpy(dtype=np.float64) for n in _of_aid(record, aid)]
+    return np.unique(np.concatenate(found)) if found else np.empty(0)
+
+
+def _rejected(record: NavigationRecord, aid: str, whole: Span) -> Array:
+    """Times of epochs that were not used, as many as can be told apart."""
+    found = []
+    for name in _of_aid(record, aid):
+        table = record.innovations[name]
+        weights = table[[c for c in table.columns if str(c).startswith("weight ")]].to_numpy()
+        found.append(table.index.to_numpy(dtype=np.float64)[(weights <= 0.0).any(axis=1)])
+    times = np.unique(np.concatenate(found)) if found else np.empty(0)
+    cell = (whole.end - whole.begin) / _MOST_MARKS
+    if times.size <= _MOST_MARKS or cell <= 0.0:
+        return times
+    _, first = np.unique(np.floor((times - whole.begin) / cell), return_index=True)
+    return times[first]
+
+
+def _stretches(time: Array, whole: Span) -> tuple[Span, ...]:
+    """Stretches in which epochs follow each other as they usually do, wide enough to be seen."""
+    if not time.size:
+        return ()
+    steps = np.diff(time)
+    usual = float(np.median(steps)) if time.size >= _FEW else 0.0
+    ends = np.flatnonzero(steps > _PAUSE * usual)
+    begins = time[np.concatenate([[0], ends + 1])]
+    lasts = time[np.append(ends, time.size - 1)]
+    least = _ALONE * (whole.end - whole.begin)
+    more = np.maximum(0.5 * (least - (lasts - begins)), 0.0)
+    return tuple(
+        Span("used", float(a), float(b))
+        for a, b in zip(
+            np.maximum(begins - more, whole.begin), np.minimum(lasts + more, whole.end), strict=True
+        )
+    )
+
+
+def _between(out: tuple[Span, ...], whole: Span) -> tuple[Span, ...]:
+    """What is left of the whole without some spans."""
+    found, at = [], whole.begin
+    for span in sorted(out, key=lambda s: s.begin):
+        if span.begin > at:
+            found.append(Span("used", at, span.begin))
+        at = max(at, span.end)
+    if at < whole.end:
+        found.append(Span("used", at, whole.end))
+    return tuple(found)
+
+
+def _bar(
+    name: str, spans: tuple[Span, ...], at: float, thick: float, colour: str, opacity: float = 0.75
+) -> Fill:
+    x = [v for s in spans for v in (s.begin, s.end, np.nan)][:-1]
+    y = [v for _ in spans for v in (at, at, np.nan)][:-1]
+    rows = np.array(y)
+    return Fill(name, np.array(x), rows - thick, rows + thick, colour, opacity)
+
+
+def _modes(modes: tuple[Span, ...]) -> list[Fill]:
+    names = tuple(dict.fromkeys(m.name for m in modes))
+    return [
+        _bar(
+            name,
+            tuple(m for m in modes if m.name == name),
+            0.0,
+            0.45,
+            mode_colour(name, names),
+            0.3,
+        )
+        for name in names
+    ]
+
+
+def _names(modes: tuple[Span, ...], whole: Span) -> list[Line]:
+    """Names of modes in their bars, where there is room."""
+    length = max(whole.end - whole.begin, 1e-9)
+    fit = [m for m in modes if (m.end - m.begin) / length > _LETTER * (len(m.name) + 2)]
+    if not fit:
+        return []
+    x = np.array([0.5 * (m.begin + m.end) for m in fit])
+    labels = tuple(m.name for m in fit)
+    places = ((0, 0),) * len(fit)
+    return [
+        Line(
+            "mode",
+            x,
+            np.zeros(len(fit)),
+            GREY,
+            points=True,
+            size=0.0,
+            labels=labels,
+            places=places,
+            legend=False,
+        )
+    ]
+
+
+# Charts of a run of navigation against its truth.
+
+
+_LEAST = 1e-2
+_NAMES = dict(zip(VELOCITY, NED, strict=True))
+
+
+def error_charts(told: NavigationTold, found: NavigationErrors) -> tuple[Chart, ...]:
+    """Errors of place, velocity and attitude within their bounds."""
+    out = []
+    for slug, title, columns, unit in (
+        ("errors-place", "Errors of place", NED, "m"),
+        ("errors-velocity", "Errors of velocity", VELOCITY, "m/s"),
+        ("errors-attitude", "Errors of attitude", EULER, "deg"),
+    ):
+        panels = []
+        for k, column in enumerate(columns):
+            half, error = found.bound(column), found.error(column)
+            panels.append(
+                Panel(
+                    f"{_NAMES.get(column, column)}, {unit}",
+                    (curve("error", found.time, error, AXIS_COLOURS[k], buckets=BUCKETS),),
+                    fills=(thin_fill(BOUND, found.time, -half, half, AXIS_COLOURS[k]),),
+                    height=0.8,
+                )
+            )
+        caption = f"Navigated less {told.truth_name}, within what the run itself claims."
+        out.append(over_time(slug, title, caption, tuple(panels), told.record))
+    return tuple(out)
+
+
+def nees_chart(told: NavigationTold, found: NavigationErrors) -> Chart | None:
+    """Normalised errors squared of place, velocity and attitude; None where no bound is told."""
+    if not found.freedom:
+        return None
+    low, high = bounds(found.freedom)
+    nees = np.maximum(found.nees, _LEAST)
+    panel = Panel(
+        "error squared",
+        (curve("place, velocity and attitude", found.time, nees, BLUE, buckets=BUCKETS),),
+        log=True,
+        levels=(Level(low, "2.5 %"), Level(high, "97.5 %")),
+    )
+    return over_time(
+        "nees",
+        "Normalised errors squared",
+        f"By the covariance of these errors; {found.freedom} is expected, and 95 of 100 runs "
+        "belong between the levels at an instant. The errors of one run are alike from instant to "
+        "instant: one that stays outside for a while says less than many runs would.",
+        (panel,),
+        told.record,
+    )
+
+
+# Charts of what was observed beside what was expected.
+
+
+# What lies beyond so many times the usual bound is drawn at the edge.
+_REACH, _USUAL = 2.5, 0.97
+# Epochs of a mean, and the least that is drawn of a sum of squares.
+_WINDOW, _NAVIGATION_INNOVATION_CHARTS_LEAST = 20, 1e-2
+# Points of a panel; of those within so many standard deviations no more are drawn.
+_POINTS, _FAR = 500, 3.0
+
+
+def innovation_chart(record: NavigationRecord, agreement: Agreement) -> Chart:
+    """Innovations of one observation with the bounds that were expected."""
+    panels = []
+    beyond = 0
+    step = max(1, agreement.epochs // _POINTS)
+    for k, label in enumerate(agreement.labels):
+        nu, bound = agreement.nu[:, k], TWO_SIDED_95 * agreement.sd[:, k]
+        edge = _REACH * float(np.quantile(bound, _USUAL))
+        low, high = np.clip(-bound, -edge, edge), np.clip(bound, -edge, edge)
+        time, low, high = broken(agreement.time, low, high)
+        fill = thin_fill("95 % expected", time, low, high, GREY, opacity=0.22)
+        lost = agreement.weight[:, k] <= 0.0
+        out = np.abs(nu) > edge
+        beyond += int(out.sum())
+        colour = AXIS_COLOURS[k % 3]
+        lines = [
+            *_points(
+                "used", agreement.time, nu, _some(agreement, k, ~lost & ~out), colour, "circle", 3.4
+            ),
+            *_points("rejected", agreement.time, nu, lost & ~out, VERMILLION, "x", 6.0),
+        ]
+        for up, symbol in ((True, "triangle-up"), (False, "triangle-down")):
+            some = out & ((nu > 0.0) == up)
+            at = np.full(nu.size, edge if up else -edge)
+            lines += _points("beyond the picture", agreement.time, at, some, BLACK, symbol, 6.0)
+        panels.append(Panel(label, tuple(lines), fills=(fill,), height=0.7))
+    more = f" {beyond} lie beyond the edge, and are drawn at it." if beyond else ""
+    if step > 1:
+        more += (
+            f" Of those within {_FAR:g} standard deviations one in {step} is drawn, of the others "
+            "each that can be told apart."
+        )
+    return over_time(
+        f"innovations-{agreement.name.replace('.', '-').replace('_', '-')}",
+        f"Innovations of {agreement.name}",
+        f"Observed less expected; 95 of 100 belong in the band.{more}",
+        tuple(panels),
+        record,
+    )
+
+
+def _some(one: Agreement, k: int, which: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """All that are far off, and of the others even in time as many as can be seen."""
+    step = max(1, one.epochs // _POINTS)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        far = np.abs(one.nu[:, k]) > _FAR * one.sd[:, k]
+    even = np.arange(one.epochs) % step == 0
+    return np.asarray(which & (far | even))
+
+
+def _points(
+    name: str,
+    time: Array,
+    value: Array,
+    some: NDArray[np.bool_],
+    colour: str,
+    symbol: str,
+    size: float,
+) -> list[Line]:
+    if not some.any():
+        return []
+    time, value = time[some], value[some]
+    rows = kept_rows((value,), BUCKETS)
+    return [Line(name, time[rows], value[rows], colour, points=True, symbol=symbol, size=size)]
+
+
+def nis_chart(record: NavigationRecord, found: tuple[Agreement, ...]) -> Chart | None:
+    """Normalised innovations squared of every observation, with what is expected of them."""
+    panels = []
+    thin = any(one.epochs >= 2 * _POINTS for one in found)
+    for k, one in enumerate(found):
+        if not one.used.any():
+            continue
+        low, high = bounds(one.freedom)
+        nis = np.maximum(one.nis, _NAVIGATION_INNOVATION_CHARTS_LEAST)
+        colour = AXIS_COLOURS[(2 + k) % 3]
+        step = max(1, one.epochs // _POINTS)
+        drawn = (np.arange(one.epochs) % step == 0) | (one.nis > chi_square_far(one.freedom))
+        lines = _points("an epoch", one.time, nis, one.used & drawn, colour, "circle", 3.2)
+        lines += _points("rejected", one.time, nis, ~one.used, VERMILLION, "x", 6.0)
+        lines += _mean(one)
+        levels = (Level(low, "2.5 %"), Level(high, "97.5 %"))
+        panels.append(Panel(f"{one.name}", tuple(lines), log=True, levels=levels, height=0.8))
+    if not panels:
+        return None
+    return over_time(
+        "nis",
+        "Normalised innovations squared",
+        "By their expected variance; 95 of 100 belong between the levels. The line is the mean "
+        f"of {_WINDOW} epochs that were used."
+        + (
+            " Where there are many, the points are a part of them, and all of the largest."
+            if thin
+            else ""
+        ),
+        tuple(panels),
+        record,
+    )
+
+
+def _mean(one: Agreement) -> list[Line]:
+    nis, time = one.nis[one.used], one.time[one.used]
+    if nis.size < 2 * _WINDOW:
+        return []
+    total = np.cumsum(np.concatenate([[0.0], nis]))
+    mean = (total[_WINDOW:] - total[:-_WINDOW]) / _WINDOW
+    middle = time[_WINDOW // 2 : _WINDOW // 2 + mean.size]
+    middle, mean = broken(middle, mean)
+    rows = kept_rows((mean,), BUCKETS // 2)
+    return [Line("mean", middle[rows], mean[rows], BLACK, width=1.4)]

@@ -17,21 +17,21 @@ from strapdown.report.document import (
     Section,
     TableBlock,
 )
-from strapdown.report.navigation_conventions import CONVENTIONS
-from strapdown.report.navigation_error_charts import error_charts, nees_chart
-from strapdown.report.navigation_found import NavigationFound, examine
-from strapdown.report.navigation_innovation_charts import innovation_chart, nis_chart
+from strapdown.report.navigation_charts import error_charts, innovation_chart, nees_chart, nis_chart
+from strapdown.report.navigation_found import NavigationFound, NavigationTold, examine
 from strapdown.report.navigation_plan import plan_chart
-from strapdown.report.navigation_smoothing import (
+from strapdown.report.navigation_trust import trust
+from strapdown.report.navigation_words import (
+    cautions,
+    headline,
+    key_figures,
+    place_words,
     smoothing_chart,
     smoothing_table,
     smoothing_words,
 )
-from strapdown.report.navigation_told import NavigationTold
-from strapdown.report.navigation_trust import trust
-from strapdown.report.navigation_words import cautions, headline, key_figures, place_words
 
-__all__ = ["navigation_document"]
+__all__ = ["CONVENTIONS", "navigation_document"]
 
 
 def navigation_document(
@@ -216,3 +216,31 @@ def _method(found: NavigationFound, name: str) -> tuple[Block | None, ...]:
         Paragraph("To run it again and compare every byte:") if name else None,
         Paragraph(f"strapdown verify {name}", "mono") if name else None,
     )
+
+
+# Conventions of the report of a run of navigation.
+
+
+CONVENTIONS = (
+    ("Body axes", "forward, right, down; local level: north, east, down"),
+    (
+        "Place",
+        "geodetic latitude north and longitude east in deg, height over the ellipsoid in m, of the "
+        "inertial sensors",
+    ),
+    ("Velocity", "relative to the Earth, in m/s: north, east, down"),
+    ("Attitude", "roll, pitch, heading (3-2-1): right side down, nose up, clockwise are positive"),
+    ("Heading", "from true north, clockwise seen from above"),
+    ("Errors", "computed or measured less true; so the truth is the reading less the bias"),
+    (
+        "Rotation errors",
+        "vector psi about north, east, down: C_computed = exp([psi x]) C_true",
+    ),
+    ("Innovations", "observed less expected, after what was observed before at the same instant"),
+    (
+        "Bounds",
+        "hold the truth in 95 of 100 cases (1.96 standard deviations; of an ellipse in a plane "
+        "2.45) where what is stated of the sensors and the aids is right",
+    ),
+    ("Time", "s, on the record's own clock"),
+)

@@ -2,16 +2,56 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.aiding.aid import lasting
+from strapdown.config.choice import ChoiceSpec
+from strapdown.config.navigation import aids_of
+from strapdown.config.navigation_modules import make_aids
+from strapdown.constants import TWO_SIDED_95
+from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import Finding
-from strapdown.evaluation.smoother_consistency import SmootherConsistency, smoother_consistency
+from strapdown.evaluation.control_points import ControlPointScore
+from strapdown.evaluation.plane_bound import plane_bound, plane_reach
+from strapdown.evaluation.truth_comparison import (
+    SmootherConsistency,
+    TruthComparison,
+    band_of_mean,
+    compare_with_truth,
+    smoother_consistency,
+)
+from strapdown.navigation.consistency import (
+    ComponentConsistency,
+    ObservationConsistency,
+    consistency_of,
+)
 from strapdown.navigation.record import NavigationRecord
-from strapdown.report.navigation_agreement import Agreement, agreements
-from strapdown.report.navigation_errors import NavigationErrors, navigation_errors
-from strapdown.report.navigation_told import NavigationTold
+from strapdown.systems.sins.run import NavigationResult
+from strapdown.systems.sins.withholding import Withheld as WithheldScores
+from strapdown.systems.sins.withholding import withheld_aid
+from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
 
-__all__ = ["NavigationFound", "examine"]
+__all__ = [
+    "Agreement",
+    "NavigationErrors",
+    "NavigationFound",
+    "NavigationTold",
+    "Score",
+    "Withheld",
+    "agreements",
+    "chi_square_far",
+    "examine",
+    "navigation_errors",
+    "told_of",
+    "withheld_of",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,3 +114,521 @@ def examine(told: NavigationTold) -> NavigationFound:
         before = navigation_errors(replace(told, record=told.forward))
     agreed = agreements(told.record, told.lasting)
     return NavigationFound(told, agreed, navigation_errors(told), smoother, before)
+
+
+# Whether innovations are as large, and as free of memory, as the filter expected.
+
+
+Array = NDArray[np.float64]
+
+#: A root mean square of innovations beyond this many of the expected standard deviation, or below
+#: one over it, speaks against what was stated.
+FAR_OFF = 2.0
+#: Where half of the epochs are beyond so many times what was expected, the answer itself is
+#: refuted: outliers do not reach a median.
+REFUTES, LEAST_EPOCHS = 3.0, 5
+#: From so large a correlation on, errors of an aid that last matter for the bounds.
+REMEMBER = 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class Agreement:
+    """Innovations of one observation beside what was expected of them.
+
+    Components are taken one after the other, so that their innovations are independent, and the
+    normalised innovation squared of an epoch is the sum of nu²/s.
+
+    Attributes
+    ----------
+    name : str
+    labels : tuple of str
+        Of the components, with units.
+    time : ndarray, (n,), s
+    nu, sd : ndarray, (n, m)
+    weight : ndarray, (n, m)
+        0 where it was rejected.
+    consistency : ObservationConsistency
+        What they say of the filter.
+    stated : bool
+        Whether it is stated that they last.
+    """
+
+    name: str
+    labels: tuple[str, ...]
+    time: Array
+    nu: Array
+    sd: Array
+    weight: Array
+    consistency: ObservationConsistency
+    stated: bool = False
+
+    @cached_property
+    def used(self) -> NDArray[np.bool_]:
+        """Epochs of which no component was rejected, (n,)."""
+        return np.asarray((self.weight > 0.0).all(axis=1) & (self.sd > 0.0).all(axis=1))
+
+    @cached_property
+    def nis(self) -> Array:
+        """Normalised innovation squared of each epoch, (n,)."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(np.square(self.nu / self.sd).sum(axis=1))
+
+    @property
+    def freedom(self) -> int:
+        """Components of an epoch."""
+        return len(self.labels)
+
+    @property
+    def epochs(self) -> int:
+        """How many there are."""
+        return len(self.time)
+
+    @property
+    def rejected(self) -> int:
+        """Epochs of which something was not used at all."""
+        return int((self.weight <= 0.0).any(axis=1).sum())
+
+    @property
+    def weakened(self) -> int:
+        """Epochs of which something was used with less than its whole weight."""
+        some = (self.weight > 0.0) & (self.weight < 1.0)
+        return int((some.any(axis=1) & (self.weight > 0.0).all(axis=1)).sum())
+
+    @cached_property
+    def mean_nis(self) -> float:
+        """Mean over the epochs that were used; NaN where there is none."""
+        return float(self.nis[self.used].mean()) if self.used.any() else math.nan
+
+    @cached_property
+    def band(self) -> tuple[float, float]:
+        """Between which that mean is in 95 of 100 cases, where all is as stated."""
+        count = int(self.used.sum())
+        if not count:
+            return math.nan, math.nan
+        return band_of_mean(self.freedom, count)
+
+    @property
+    def ratio(self) -> float:
+        """Root mean square of the innovations in their expected standard deviations."""
+        return math.sqrt(self.mean_nis / self.freedom) if self.freedom else math.nan
+
+    @property
+    def usual(self) -> float:
+        """Half of the epochs are beyond so many times what half of them should be within."""
+        from scipy.special import chdtri
+
+        if not self.used.any():
+            return math.nan
+        half = float(chdtri(self.freedom, 0.5))
+        return math.sqrt(float(np.median(self.nis[self.used])) / half)
+
+    @property
+    def refutes(self) -> bool:
+        """Whether most epochs contradict the answer, or were refused for that, or errors last."""
+        if self.epochs < LEAST_EPOCHS:
+            return False
+        lasts = self.ratio > REFUTES and self.remembers
+        return self.usual > REFUTES or lasts or 2 * self.rejected > self.epochs
+
+    @property
+    def correlation(self) -> float:
+        """Largest correlation of a component with itself an epoch later; NaN for too few."""
+        found = [float(one.autocorrelation[0]) for one in self._long]
+        return max(found, key=abs, default=math.nan)
+
+    @property
+    def correlation_bound(self) -> float:
+        """Below which that is in 95 of 100 cases for each component, where there is no memory."""
+        return max((one.autocorrelation_bound for one in self._long), default=math.nan)
+
+    @property
+    def _long(self) -> list[ComponentConsistency]:
+        """Components with epochs enough to tell of memory."""
+        return [one for one in self.consistency.components if one.autocorrelation.size]
+
+    @property
+    def remembers(self) -> bool:
+        """Whether they hang together from epoch to epoch far more than by chance, to harm.
+
+        Errors that last do as much as independent ones of `lasting` their size: where that is no
+        more than was stated, as of a constraint whose deviation is stated for it, no bound is too
+        narrow. Where it is stated that they last, that is held to `FAR_OFF`, as a scatter is.
+        """
+        size = abs(self.correlation)
+        far = bool(size > max(REMEMBER, 2.0 * self.correlation_bound))
+        most = FAR_OFF if self.stated else 1.0
+        return far and (self.correlation < 0.0 or self.lasting > most)
+
+    @property
+    def lasting(self) -> float:
+        """`ratio`, by which independent errors would do as much: those of a first-order process."""
+        rho = min(self.correlation, 1.0 - 1.0 / max(int(self.used.sum()), 2))
+        if not rho > 0.0:
+            return self.ratio
+        return self.ratio * math.sqrt((1.0 + rho) / (1.0 - rho))
+
+    @property
+    def inside(self) -> bool:
+        """Whether the mean is within its band."""
+        return self.band[0] <= self.mean_nis <= self.band[1]
+
+    @property
+    def acceptable(self) -> bool:
+        """Whether they are within a factor of two of what was expected, and if they last."""
+        near = self.ratio < FAR_OFF and max(self.ratio, self.lasting) > 1.0 / FAR_OFF
+        return self.inside or near
+
+
+def agreements(record: NavigationRecord, lasting: Collection[str] = ()) -> tuple[Agreement, ...]:
+    """Return the innovations of each observation that has any.
+
+    Parameters
+    ----------
+    record : NavigationRecord
+    lasting : collection of str
+        Names of the aids that state that their errors last.
+    """
+    found = (
+        _agreement(name, table, (name.rpartition(".")[0] or name) in lasting)
+        for name, table in record.innovations.items()
+    )
+    return tuple(one for one in found if one.epochs)
+
+
+def chi_square_far(freedom: float) -> float:
+    """Quantile of chi-square that as few exceed as exceed three standard deviations."""
+    from scipy.special import chdtri, ndtr
+
+    return float(chdtri(freedom, 2.0 * float(ndtr(-3.0))))
+
+
+def _agreement(name: str, table: pd.DataFrame, stated: bool) -> Agreement:
+    labels = tuple(str(c)[3:] for c in table.columns if str(c).startswith("nu "))
+
+    def part(what: str) -> Array:
+        return table[[f"{what} {label}" for label in labels]].to_numpy(dtype=np.float64)
+
+    time = table.index.to_numpy(dtype=np.float64)
+    return Agreement(
+        name,
+        labels,
+        time,
+        part("nu"),
+        np.sqrt(part("s")),
+        part("weight"),
+        consistency_of(name, table),
+        stated,
+    )
+
+
+# A run of navigation beside its truth: errors, their bounds, and the two together.
+
+
+#: An instant stands for no more than so long, s, or than three of the usual steps.
+LONGEST = 1.5
+
+
+@dataclass(frozen=True)
+class Score:
+    """Errors of one quantity over a run.
+
+    Attributes
+    ----------
+    quantity, unit : str
+    rms : float
+        Over time: instants stand close where much is observed and wide apart in an outage.
+    largest : float
+    largest_at : float, s
+    bound : float
+        Root mean square of the bounds of 95 %.
+    share : float
+        Of the time in which the error is within its bound.
+    """
+
+    quantity: str
+    unit: str
+    rms: float
+    largest: float
+    largest_at: float
+    bound: float
+    share: float
+
+
+@dataclass(frozen=True, eq=False)
+class NavigationErrors:
+    """Errors beside what the run itself claims of them.
+
+    Attributes
+    ----------
+    comparison : TruthComparison
+    """
+
+    comparison: TruthComparison
+
+    @property
+    def time(self) -> Array:
+        """Of the samples that are compared, (n,), s."""
+        return self.comparison.time
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Of the comparison."""
+        return self.comparison.findings
+
+    @property
+    def nees(self) -> Array:
+        """Normalised error squared of place, velocity and attitude, (n,)."""
+        if not self.freedom:
+            return np.full(len(self.time), np.nan)
+        return self.comparison.nees["all"].to_numpy(dtype=np.float64)
+
+    @property
+    def freedom(self) -> int:
+        """Errors that it is of: those of which the run has states."""
+        return self.comparison.freedom.get("all", 0)
+
+    def error(self, column: str) -> Array:
+        """Errors of a quantity, (n,): m, m/s, deg."""
+        return self.comparison.differences[column].to_numpy(dtype=np.float64)
+
+    def bound(self, column: str) -> Array:
+        """Bounds of 95 % of them, (n,)."""
+        return TWO_SIDED_95 * self.comparison.sd[column].to_numpy(dtype=np.float64)
+
+    @cached_property
+    def scores(self) -> tuple[Score, ...]:
+        """Errors of each quantity, and of the horizontal place."""
+        units = (
+            dict.fromkeys(NED, "m") | dict.fromkeys(VELOCITY, "m/s") | dict.fromkeys(EULER, "deg")
+        )
+        found = [self._score(n, u, self.error(n), self.bound(n)) for n, u in units.items()]
+        size = np.hypot(*(self.error(n) for n in NED[:2]))
+        return self._score("horizontal", "m", size, self._plane(size)), *found
+
+    def score(self, quantity: str) -> Score:
+        """That of one quantity."""
+        return next(s for s in self.scores if s.quantity == quantity)
+
+    def _plane(self, size: Array) -> Array:
+        """Reach of the ellipse of 95 % in the direction of the horizontal error, (n,), m.
+
+        The error is within it if and only if it is within the ellipse.
+        """
+        covariance = self.comparison.covariance
+        if "horizontal" not in self.comparison.nees:
+            return plane_bound(covariance)
+        distance = np.sqrt(self.comparison.nees["horizontal"].to_numpy(dtype=np.float64))
+        return plane_reach(size, distance, covariance)
+
+    @cached_property
+    def _weight(self) -> Array:
+        """Share of the time that each instant stands for, (n,)."""
+        steps = np.diff(self.time)
+        if not steps.size:
+            return np.ones(len(self.time)) / len(self.time)
+        # Where the truth is missing for long, nothing stands for that.
+        steps = np.minimum(steps, max(LONGEST, 3.0 * float(np.median(steps))))
+        about = 0.5 * (np.append(steps, 0.0) + np.insert(steps, 0, 0.0))
+        return np.asarray(about / about.sum())
+
+    def _score(self, name: str, unit: str, error: Array, bound: Array) -> Score:
+        worst = int(np.argmax(np.abs(error)))
+        return Score(
+            name,
+            unit,
+            float(np.sqrt(self._weight @ np.square(error))),
+            float(abs(error[worst])),
+            float(self.time[worst]),
+            float(np.sqrt(self._weight @ np.square(bound))),
+            float(min(1.0, self._weight[np.abs(error) <= bound].sum())),
+        )
+
+
+def navigation_errors(told: NavigationTold) -> NavigationErrors | None:
+    """Compare a run with its truth.
+
+    Parameters
+    ----------
+    told : NavigationTold
+
+    Returns
+    -------
+    NavigationErrors or None
+        None without a truth.
+
+    Raises
+    ------
+    DataError
+        As `truth_comparison.compare_with_truth`: they have no instant in common.
+    """
+    if told.truth is None:
+        return None
+    record = told.record
+    return NavigationErrors(
+        compare_with_truth(
+            record.trajectory, record.sd.index, record.covariance, told.truth, told.ellipsoid
+        )
+    )
+
+
+# What the report of a run of navigation is made of.
+
+
+@dataclass(frozen=True)
+class Withheld:
+    """A stretch over which an aid was kept from the navigator, and what came of it.
+
+    Attributes
+    ----------
+    aid : str
+    begin, end : float, s
+    error_m : float
+        The largest horizontal distance from what was withheld.
+    bound_m : float
+        The run's own bound of 95 % at that instant: the longer half axis of its ellipse.
+    forward_m : float, optional
+        Of a run that is smoothed, what the largest distance was before.
+    """
+
+    aid: str
+    begin: float
+    end: float
+    error_m: float
+    bound_m: float
+    forward_m: float | None = None
+
+    @property
+    def inside(self) -> bool:
+        """Whether the error is within the bound."""
+        return self.error_m <= self.bound_m
+
+
+@dataclass(frozen=True, eq=False)
+class NavigationTold:
+    """A run of navigation, and what is known of it beside its own record.
+
+    Attributes
+    ----------
+    record : NavigationRecord
+    forward : NavigationRecord, optional
+        Of a run that is smoothed, what the filter alone said.
+    name, what : str
+        Of the log: its file, and what it is (``recorded log``).
+    title : str
+        Of the report; made of `name`, if empty.
+    chain : tuple of (str, str)
+        Slots and what is in them, in words.
+    fixes : mapping of str to DataFrame
+        By name of the aid, Gnss tables: drawn as points.
+    truth : DataFrame, optional
+        Trajectory table on the clock of the run.
+    truth_name : str
+        In words, as they stand after "error against".
+    points : ControlPointScore, optional
+        The path at its control points.
+    withheld : tuple of Withheld
+    findings : tuple of Finding
+    ellipsoid : Ellipsoid
+    lasting : tuple of str
+        Names of the aids that state that their errors last.
+    """
+
+    record: NavigationRecord
+    forward: NavigationRecord | None = None
+    name: str = "log"
+    what: str = ""
+    title: str = ""
+    chain: tuple[tuple[str, str], ...] = ()
+    fixes: Mapping[str, pd.DataFrame] = field(default_factory=dict)
+    truth: pd.DataFrame | None = None
+    truth_name: str = "the truth"
+    points: ControlPointScore | None = None
+    withheld: tuple[Withheld, ...] = ()
+    findings: tuple[Finding, ...] = ()
+    ellipsoid: Ellipsoid = WGS84
+    lasting: tuple[str, ...] = ()
+
+
+# What a report is told of the result of ``strapdown navigate``.
+
+
+NO_RULE = "none: every observation counts in full, however far off it is"
+
+
+def told_of(result: NavigationResult) -> NavigationTold:
+    """Return what a report is made of.
+
+    Parameters
+    ----------
+    result : NavigationResult
+
+    Returns
+    -------
+    NavigationTold
+    """
+    spec, source = result.spec, result.source
+    chain = [
+        ("Record", f"{source.name}: {source.what}"),
+        ("Pre-filter", spec.prefilter.kind),
+        ("Coarse alignment", "" if result.coarse is None else spec.coarse.kind),
+        ("Fine alignment", "" if result.fine is None else spec.fine.kind),
+        ("Mechanization", spec.mechanization.kind),
+        ("Filter", spec.filter.kind),
+        ("Error model", _kind(spec.filter, "error_model")),
+        ("Update rule", _kind(spec.filter, "update_rule") or NO_RULE),
+        ("Smoother", "" if result.forward is None else spec.smoother.kind),
+        *((f"Aid {name}", _of_aid(aid)) for name, aid in aids_of(spec).items()),
+        ("States", ", ".join(dict.fromkeys(_block(c) for c in result.record.sensors.columns))),
+    ]
+    return NavigationTold(
+        record=result.record,
+        forward=result.forward,
+        name=source.name,
+        what=source.what,
+        title=spec.title,
+        chain=tuple((slot, what) for slot, what in chain if what),
+        fixes={n: t for n, t in source.tables.items() if set(GEODETIC) <= set(t.columns)},
+        truth=source.truth,
+        truth_name=source.truth_name or "the truth",
+        points=result.points,
+        withheld=() if not result.withheld else withheld_of(withheld_aid(spec), result.withheld),
+        findings=result.findings,
+        ellipsoid=result.ellipsoid,
+        lasting=lasting(make_aids(spec)),
+    )
+
+
+def _kind(of: object, slot: str) -> str:
+    return str(getattr(getattr(of, slot, None), "kind", ""))
+
+
+def _of_aid(aid: ChoiceSpec) -> str:
+    rule = _kind(aid, "update_rule")
+    return f"{aid.kind}, update rule {rule}" if rule else aid.kind
+
+
+def withheld_of(aid: str, scores: Sequence[WithheldScores]) -> tuple[Withheld, ...]:
+    """Return stretches that were withheld as a report shows them.
+
+    Parameters
+    ----------
+    aid : str
+    scores : sequence of Withheld
+
+    Returns
+    -------
+    tuple of Withheld
+        The largest error of each, and the bound in its direction at that instant.
+    """
+    out = []
+    for one in scores:
+        told = one.told
+        worst = int(np.argmax(told.horizontal))
+        forward = None if one.smoothed is None else one.forward.largest
+        bound = float(told.bound[worst])
+        out.append(Withheld(aid, told.span.begin, told.span.end, told.largest, bound, forward))
+    return tuple(out)
+
+
+def _block(column: object) -> str:
+    return str(column).rpartition("_")[0] or str(column)

@@ -5,18 +5,20 @@ from __future__ import annotations
 import math
 
 from strapdown.evaluation.plane_bound import plane_bound
-from strapdown.report.alignment_values import instant
-from strapdown.report.crash_values import GAP, about, plain
 from strapdown.report.document import TableBlock
 from strapdown.report.navigation_found import NavigationFound
-from strapdown.report.navigation_values import (
+from strapdown.report.navigation_words import longest_outages, place_words
+from strapdown.report.values import (
+    GAP,
+    about,
     blocks_of,
     duration_words,
     half,
     length_words,
+    plain,
     share_words,
 )
-from strapdown.report.navigation_words import longest_outages, place_words
+from strapdown.report.values import alignment_values_instant as instant
 from strapdown.tables import EULER, VELOCITY
 
 __all__ = [

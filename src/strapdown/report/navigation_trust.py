@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from strapdown.errors import Finding
 from strapdown.report.alignment_trust import Trust, reason
-from strapdown.report.navigation_agreement import FAR_OFF, Agreement
-from strapdown.report.navigation_found import NavigationFound
+from strapdown.report.navigation_found import FAR_OFF, Agreement, NavigationFound
 from strapdown.tables import EULER
 
 __all__ = ["trust"]

@@ -8,13 +8,11 @@ from typing import TYPE_CHECKING
 from strapdown.errors import ConfigError, nearest
 from strapdown.report import navigation_charts as charts
 from strapdown.report.chart import Chart
-from strapdown.report.navigation_agreement import agreements
-from strapdown.report.navigation_innovation_charts import innovation_chart
+from strapdown.report.navigation_charts import innovation_chart
+from strapdown.report.navigation_found import NavigationTold, agreements, told_of
 from strapdown.report.navigation_plan import plan_chart
-from strapdown.report.navigation_result import told_of
-from strapdown.report.navigation_told import NavigationTold
 from strapdown.report.svg_chart import notebook_figure
-from strapdown.systems.sins.result import NavigationResult
+from strapdown.systems.sins.run import NavigationResult
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

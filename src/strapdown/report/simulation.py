@@ -6,9 +6,7 @@ from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
 
-from strapdown.bundle.destination import check_destination
-from strapdown.bundle.json_text import to_json
-from strapdown.bundle.seal import Seal
+from strapdown.bundle.seal import Seal, check_destination, to_json
 from strapdown.bundle.writing import write_bundle
 from strapdown.config import (
     CrashSimulationSpec,
@@ -19,8 +17,7 @@ from strapdown.config import (
 )
 from strapdown.errors import ConfigError
 from strapdown.formats.log_writers import LOG_WRITERS, log_formats, write_attitude_csv
-from strapdown.report.crash_simulation import write_crash_simulation
-from strapdown.report.stated_errors import stated_errors
+from strapdown.report.crash_simulation import stated_errors, write_crash_simulation
 from strapdown.report.trajectory_simulation import write_trajectory_simulation
 from strapdown.simulation import SCENARIOS, Motion, PulseMotion, TriadErrors, find_scenario
 from strapdown.simulation.crash_cases import CASES

@@ -2,19 +2,392 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from strapdown.report.chart import Chart, Panel, steady_range, strip_range
-from strapdown.report.mark_places import LONGEST_BESIDE, label_rows, label_side
-from strapdown.report.still_marks import entries, legend_height, write_legend
-from strapdown.report.still_panel import AXIS, LEVEL, LONG, RED, TICK, Frame
-from strapdown.report.still_scale import Scale, Tick, fitted, ticks
-from strapdown.report.svg_drawing import Drawing, text_width
+from strapdown.report.chart import (
+    Band,
+    Bars,
+    Chart,
+    Fill,
+    Line,
+    Mark,
+    Panel,
+    runs,
+    steady_range,
+    strip_range,
+)
+from strapdown.report.path_marks import LONGEST_BESIDE, label_rows, label_side
+from strapdown.report.plan_view import nice_step, tick_words
+from strapdown.report.svg_drawing import INK, Box, Drawing, overlap, text_width
 
-__all__ = ["still"]
+__all__ = [
+    "AXIS",
+    "LEVEL",
+    "LONG",
+    "RED",
+    "TICK",
+    "Frame",
+    "Scale",
+    "Tick",
+    "draw_pattern",
+    "draw_points",
+    "entries",
+    "fitted",
+    "legend_height",
+    "still",
+    "ticks",
+    "write_legend",
+]
+
+
+# Points, samples of the legend and patterns of a still.
+
+
+_SIZE = 10.0  # pixels, of letters
+_STILL_MARKS_ROW, _SAMPLE, _GAP = 15.0, 24.0, 16.0
+_POINT, _RIM = 0.4, 0.5  # radius of a point: over its size, and more in pixels
+_HATCH = 6.0  # pixels between the lines of a pattern
+
+
+def _star(points: int, inner: float, turn: float = 0.0) -> Array:
+    angle = np.arange(2 * points) * math.pi / points + math.radians(turn)
+    radius = np.where(np.arange(2 * points) % 2, inner, 1.0)
+    return np.column_stack([radius * np.sin(angle), -radius * np.cos(angle)])
+
+
+def _plus() -> Array:
+    a = 1.0 / 3.0
+    corners = [(-a, -1), (a, -1), (a, -a), (1, -a), (1, a), (a, a), (a, 1), (-a, 1), (-a, a)]
+    return np.array([*corners, (-1, a), (-1, -a), (-a, -a)], dtype=np.float64)
+
+
+def _turned(points: Array) -> Array:
+    c = math.sqrt(0.5)
+    return np.asarray(points @ np.array([[c, c], [-c, c]]))
+
+
+_OUTLINES = {
+    "square": np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]),
+    "diamond": 1.4 * np.array([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]]),
+    "triangle-up": np.array([[0.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]),
+    "triangle-down": np.array([[0.0, 1.0], [1.0, -1.0], [-1.0, -1.0]]),
+    "cross": _plus(),
+    "x": _turned(_plus()),
+    "star": 1.1 * _star(5, 0.42),
+    "pentagon": _star(5, math.cos(math.pi / 5.0)),
+    "circle": np.empty((0, 2)),
+}
+
+
+def draw_points(drawing: Drawing, line: Line, at: Array) -> None:
+    """Draw the points of a line at places in the picture, (n, 2)."""
+    drawing.points(
+        at[np.isfinite(at).all(axis=1)],
+        _OUTLINES[line.symbol],
+        _POINT * line.size + _RIM if line.size else 0.0,
+        line.colour,
+        hollow=line.hollow,
+    )
+
+
+def draw_pattern(drawing: Drawing, pattern: str, box: Box) -> None:
+    """Draw the pattern of a bar in white, within its box."""
+    left, top, right, bottom = box
+    if right - left < 0.5 or bottom - top < 0.5:
+        return
+    width, height = right - left, bottom - top
+    with drawing.within(box):
+        if pattern == ".":
+            columns = np.arange(left + 0.5 * _HATCH, right, _HATCH)
+            rows = np.arange(top + 0.5 * _HATCH, bottom, _HATCH)
+            at = np.array(np.meshgrid(columns, rows)).reshape(2, -1).T
+            drawing.points(at, _OUTLINES["circle"], 1.2, "#ffffff")
+        for sign in (1.0, -1.0) if pattern == "x" else (1.0,) if pattern == "/" else ():
+            for x in np.arange(left - height, right + height, 1.4 * _HATCH).tolist():
+                drawing.line((x, bottom), (x + sign * height, top), "#ffffff")
+        if pattern in ("-", "+"):
+            for y in np.arange(top + 0.5 * _HATCH, bottom, _HATCH).tolist():
+                drawing.line((left, y), (left + width, y), "#ffffff")
+        if pattern in ("|", "+"):
+            for x in np.arange(left + 0.5 * _HATCH, right, _HATCH).tolist():
+                drawing.line((x, top), (x, top + height), "#ffffff")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A name of the legend and what it is shown by."""
+
+    name: str
+    shown: Line | Fill | Bars
+
+
+def entries(chart: Chart) -> list[Entry]:
+    """Return the entries of a chart's legend, each name once."""
+    found: dict[str, Line | Fill | Bars] = {}
+    for panel in chart.panels:
+        lines = {line.name for line in panel.lines if line.legend}
+        # A line of a band's name is the entry of both.
+        fills = [fill for fill in panel.fills if fill.name not in lines]
+        shown: list[Line | Fill | Bars] = [*fills, *panel.lines, *panel.bars]
+        for one in shown:
+            if one.legend and one.name:
+                found.setdefault(one.name, one)
+    return [Entry(name, shown) for name, shown in found.items()]
+
+
+def _placed(legend: list[Entry], left: float, right: float) -> Iterator[tuple[Entry, float, int]]:
+    """Entries, where each begins, and its row."""
+    x, row = left, 0
+    for entry in legend:
+        wide = _SAMPLE + text_width(entry.name, _SIZE)
+        if x > left and x + wide > right:
+            x, row = left, row + 1
+        yield entry, x, row
+        x += wide + _GAP
+
+
+def legend_height(legend: list[Entry], left: float, right: float) -> float:
+    """Return the room that a legend takes below the panels, in pixels."""
+    rows = [row for _, _, row in _placed(legend, left, right)]
+    return _STILL_MARKS_ROW * (rows[-1] + 1) + 4.0 if rows else 0.0
+
+
+def write_legend(
+    drawing: Drawing, legend: list[Entry], left: float, right: float, top: float
+) -> None:
+    """Write a legend from a height downward."""
+    for entry, x, row in _placed(legend, left, right):
+        y = top + _STILL_MARKS_ROW * (row + 0.5)
+        _sample(drawing, entry.shown, x, y)
+        drawing.text((x + _SAMPLE, y), entry.name, _SIZE)
+
+
+def _sample(drawing: Drawing, shown: Line | Fill | Bars, x: float, y: float) -> None:
+    box = (x, y - 4.5, x + _SAMPLE - 6.0, y + 4.5)
+    corners = np.array([[box[0], box[1]], [box[2], box[1]], [box[2], box[3]], [box[0], box[3]]])
+    if isinstance(shown, Fill):
+        drawing.shape(corners, None, fill=shown.colour, opacity=shown.opacity)
+        return
+    if isinstance(shown, Bars):
+        drawing.shape(corners, None, fill=shown.colour)
+        if shown.pattern:
+            draw_pattern(drawing, shown.pattern, box)
+        return
+    if shown.inside:
+        drawing.shape(corners, None, fill=shown.colour, opacity=shown.inside)
+    if not shown.points:
+        drawing.line((box[0], y), (box[2], y), shown.colour, shown.width, shown.dash)
+    if shown.points or shown.dots:
+        draw_points(drawing, shown, np.array([[0.5 * (box[0] + box[2]), y]]))
+
+
+# One panel of a still: its axes, and what is drawn between them.
+
+
+RED = "#b42318"
+#: Pixels: of labels of ticks, of names of axes, of names of levels and marks, of a tick.
+TICK, AXIS, LEVEL, LONG = 10.0, 10.5, 9.5, 3.5
+_FAINT, _GRID, _SHADE = "#8a939e", "#e6e9ed", "#0072B2"
+_STILL_PANEL_POINT = 96.0 / 72.0  # pixels
+_SIDE, _RISE = 9.0, 13.0  # pixels of a label from its point
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A panel with its place in the picture and its axes.
+
+    Attributes
+    ----------
+    panel : Panel
+    box : Box
+        Left, top, right, bottom of what is between the axes.
+    x, y : Scale
+        `y` from the bottom upward; of categories from the top downward.
+    x_ticks, y_ticks : list of Tick
+    x_named, y_named : bool
+        Whether the ticks have their labels here.
+    """
+
+    panel: Panel
+    box: Box
+    x: Scale
+    y: Scale
+    x_ticks: list[Tick]
+    y_ticks: list[Tick]
+    x_named: bool = True
+    y_named: bool = True
+
+    def at(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Return points in the picture, (n, 2); NaN where an axis has no such value."""
+        left, top, right, bottom = self.box
+        across = left + (right - left) * self.x.share(x)
+        up = self.y.share(y)
+        if self.panel.categories:
+            return np.column_stack([across, top + (bottom - top) * up])
+        return np.column_stack([across, bottom - (bottom - top) * up])
+
+    def draw(self, drawing: Drawing, bands: tuple[Band, ...], marks: tuple[Mark, ...]) -> None:
+        """Draw everything but what is outside of the axes for all panels."""
+        panel, (left, top, right, bottom) = self.panel, self.box
+        with drawing.within(self.box):
+            for band in bands:
+                (x0, _), (x1, _) = self._edges([band.start, band.end])
+                corners = np.array([[x0, top], [x1, top], [x1, bottom], [x0, bottom]])
+                drawing.shape(corners, None, fill=_SHADE, opacity=0.07)
+            self._grid(drawing)
+            for fill in panel.fills:
+                self._fill(drawing, fill)
+            for bars in panel.bars:
+                self._bars(drawing, bars)
+            self._zero(drawing)
+            for level in panel.levels:
+                y = float(self.at([self.x.low], [level.y])[0, 1])
+                drawing.line((left, y), (right, y), RED, 1.2, "dash")
+            for mark in marks:
+                ((x, _),) = self._edges([mark.x])
+                drawing.line((x, top), (x, bottom), RED, 1.2, "dot")
+            for line in panel.lines:
+                self._line(drawing, line)
+        drawing.line((left, top), (left, bottom), INK, 0.8)
+        drawing.line((left, bottom), (right, bottom), INK, 0.8)
+        self._ticks(drawing)
+        self._names(drawing)
+
+    def _edges(self, x: list[float]) -> Array:
+        return self.at(x, [self.y.low] * len(x))
+
+    def _grid(self, drawing: Drawing) -> None:
+        left, top, right, bottom = self.box
+        for tick in self.x_ticks:
+            if tick.grid:
+                ((x, _),) = self._edges([tick.at])
+                drawing.line((x, top), (x, bottom), _GRID, 0.8)
+        if self.panel.bars and self.panel.categories:
+            return
+        for tick in self.y_ticks:
+            if tick.grid:
+                y = float(self.at([self.x.low], [tick.at])[0, 1])
+                drawing.line((left, y), (right, y), _GRID, 0.8)
+
+    def _fill(self, drawing: Drawing, fill: Fill) -> None:
+        low = np.maximum(fill.low, self.y.low) if self.y.log else fill.low
+        for run in runs(fill.x, low, fill.high):
+            below, above = self.at(fill.x[run], low[run]), self.at(fill.x[run], fill.high[run])
+            ring = np.vstack([below, above[::-1]])
+            drawing.area(ring[np.isfinite(ring).all(axis=1)], fill.colour, fill.opacity)
+
+    def _bars(self, drawing: Drawing, bars: Bars) -> None:
+        start = np.zeros_like(bars.values) if bars.start is None else bars.start
+        across = bool(self.panel.categories)
+        half = 0.5 * bars.width
+        for at, begin, end in zip(bars.at, start, bars.values, strict=True):
+            sides, ends = [at - half, at + half], [begin, end]
+            corners = self.at(ends, sides) if across else self.at(sides, ends)
+            if not np.isfinite(corners).all():
+                continue
+            (x0, y0), (x1, y1) = corners.min(axis=0), corners.max(axis=0)
+            drawing.shape([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], None, fill=bars.colour)
+            if bars.pattern:
+                draw_pattern(drawing, bars.pattern, (x0, y0, x1, y1))
+
+    def _zero(self, drawing: Drawing) -> None:
+        if not self.panel.bars:
+            return
+        left, top, right, bottom = self.box
+        if self.panel.categories:
+            ((x, _),) = self._edges([0.0])
+            drawing.line((x, top), (x, bottom), INK, 0.8)
+        else:
+            y = float(self.at([self.x.low], [0.0])[0, 1])
+            drawing.line((left, y), (right, y), INK, 0.8)
+
+    def _line(self, drawing: Drawing, line: Line) -> None:
+        at = self.at(line.x, line.y)
+        for run in runs(at[:, 0], at[:, 1]):
+            if line.inside:
+                drawing.area(at[run], line.colour, line.inside)
+            if not line.points:
+                drawing.curve(at[run], line.colour, _STILL_PANEL_POINT * line.width, line.dash)
+        if line.low is not None and line.high is not None:
+            self._reaches(drawing, line, line.low, line.high)
+        if line.points or line.dots:
+            draw_points(drawing, line, at)
+
+    def _reaches(self, drawing: Drawing, line: Line, low: Array, high: Array) -> None:
+        cap = np.array([0.0, 4.0])
+        for begin, end in zip(self.at(low, line.y), self.at(high, line.y), strict=True):
+            if np.isfinite([begin, end]).all():
+                drawing.line(begin, end, line.colour, 1.6)
+                for place in (begin, end):
+                    drawing.line(place - cap, place + cap, line.colour, 1.2)
+
+    def _ticks(self, drawing: Drawing) -> None:
+        left, top, right, bottom = self.box
+        for tick in self.x_ticks:
+            ((x, _),) = self._edges([tick.at])
+            if not left - 0.5 <= x <= right + 0.5:
+                continue
+            drawing.line((x, bottom), (x, bottom + LONG * (1.0 if tick.text else 0.6)), INK, 0.8)
+            if tick.text and self.x_named:
+                drawing.text((x, bottom + LONG + 8.0), tick.text, TICK, anchor="middle")
+        for tick in self.y_ticks:
+            y = float(self.at([self.x.low], [tick.at])[0, 1])
+            if not top - 0.5 <= y <= bottom + 0.5:
+                continue
+            drawing.line((left - LONG * (1.0 if tick.text else 0.6), y), (left, y), INK, 0.8)
+            if tick.text and self.y_named:
+                drawing.text((left - LONG - 3.0, y), tick.text, TICK, anchor="end")
+
+    def _names(self, drawing: Drawing) -> None:
+        """Write what stands at points, at the ends of bars, and beside levels."""
+        left, top, right, bottom = self.box
+        taken: list[Box] = []
+        for level in self.panel.levels:
+            y = float(self.at([self.x.low], [level.y])[0, 1])
+            if not top - 0.5 <= y <= bottom + 0.5:
+                continue
+            beside = len(level.label) <= LONGEST_BESIDE
+            at = (right + 4.0, y) if beside else (right, y - 0.6 * LEVEL - 1.0)
+            anchor = "start" if beside else "end"
+            # Of names at one height the first has its place, the next gives way.
+            box = drawing.box_of(at, level.label, LEVEL, anchor=anchor)
+            while any(overlap(box, other) for other in taken):
+                at = (at[0], at[1] - 2.0)
+                box = drawing.box_of(at, level.label, LEVEL, anchor=anchor)
+            taken.append(drawing.text(at, level.label, LEVEL, RED, anchor=anchor))
+        for bars in self.panel.bars:
+            self._bar_names(drawing, bars)
+        for line in self.panel.lines:
+            places = line.places or ((0, 1),) * len(line.labels)
+            at_points = self.at(line.x, line.y)
+            for (x, y), label, (side, rise) in zip(at_points, line.labels, places, strict=False):
+                if not (left - 1 <= x <= right + 1 and top - 1 <= y <= bottom + 1):
+                    continue
+                place = (x + _SIDE * side, y - _RISE * rise)
+                if abs(rise) > 1:
+                    drawing.line((x, y), place, _FAINT, 0.7)
+                anchor = {-1: "end", 0: "middle", 1: "start"}[side]
+                drawing.text(place, label, TICK, anchor=anchor, halo=not self.panel.categories)
+
+    def _bar_names(self, drawing: Drawing, bars: Bars) -> None:
+        start = np.zeros_like(bars.values) if bars.start is None else bars.start
+        across = bool(self.panel.categories)
+        for at, begin, end, label in zip(bars.at, start, bars.values, bars.labels, strict=False):
+            side = -1 if end < begin else 1
+            x, y = (self.at([end], [at]) if across else self.at([at], [end]))[0]
+            if not np.isfinite([x, y]).all():
+                continue
+            if across:
+                anchor = "start" if side > 0 else "end"
+                drawing.text((x + 5.0 * side, y), label, TICK, anchor=anchor)
+            else:
+                drawing.text((x, y - 8.0 * side), label, TICK, anchor="middle")
+
 
 Array = NDArray[np.float64]
 
@@ -296,3 +669,123 @@ def _write_marks(drawing: Drawing, chart: Chart, frame: Frame, above: float) -> 
 
 def _power(power: int) -> str:
     return "10" + str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+# Axes of a still: their ends, and where they have ticks.
+
+
+# Numbers beyond are written with a power of ten beside the axis.
+_SMALL, _LARGE = 1e-3, 1e6
+
+
+@dataclass(frozen=True)
+class Scale:
+    """An axis from `low` to `high`."""
+
+    low: float
+    high: float
+    log: bool = False
+
+    def share(self, values: ArrayLike) -> Array:
+        """Return where values lie, from 0 at the low end to 1; NaN where a log axis has none."""
+        v = np.asarray(values, dtype=np.float64)
+        if not self.log:
+            return np.asarray((v - self.low) / (self.high - self.low))
+        low, high = math.log10(self.low), math.log10(self.high)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray((np.log10(np.where(v > 0.0, v, np.nan)) - low) / (high - low))
+
+    @property
+    def power(self) -> int:
+        """Power of ten by which labels are divided."""
+        largest = max(abs(self.low), abs(self.high))
+        if self.log or _SMALL <= largest < _LARGE:
+            return 0
+        return math.floor(math.log10(largest))
+
+
+@dataclass(frozen=True)
+class Tick:
+    """A place on an axis; without a grid line, if it is between others."""
+
+    at: float
+    text: str
+    grid: bool = True
+
+
+def fitted(values: Sequence[ArrayLike], log: bool = False, margin: float = 0.05) -> Scale:
+    """Make an axis that holds values, with a margin at both ends.
+
+    Parameters
+    ----------
+    values : sequence of array_like
+        What is not finite, or not positive on a logarithmic axis, is left out.
+    log : bool
+    margin : float
+        Of what the values span.
+
+    Returns
+    -------
+    Scale
+    """
+    v = np.concatenate([np.empty(0), *(np.asarray(x, dtype=np.float64).ravel() for x in values)])
+    v = v[np.isfinite(v) & ((v > 0.0) if log else True)]
+    if not v.size:
+        return Scale(0.1, 1.0, True) if log else Scale(0.0, 1.0)
+    low, high = float(v.min()), float(v.max())
+    if log:
+        low, high = math.log10(low), math.log10(high)
+    room = margin * (high - low)
+    if not room > 1e-12 * max(abs(low), abs(high)):
+        room = 0.3 if log else 0.05 * abs(low) or 0.05
+    low, high = low - room, high + room
+    return Scale(10.0**low, 10.0**high, True) if log else Scale(low, high)
+
+
+def ticks(scale: Scale, most: int, *, step: float = 0.0, between: float = 30.0) -> list[Tick]:
+    """Choose the ticks of an axis.
+
+    Parameters
+    ----------
+    scale : Scale
+    most : int
+        Steps that it has room for.
+    step : float
+        Between them, where it is asked for; not of a logarithmic axis.
+    between : float
+        A logarithmic axis that spans less has labels at twice and five times powers of ten.
+
+    Returns
+    -------
+    list of Tick
+    """
+    if not scale.log:
+        return _even(scale, step or nice_step((scale.high - scale.low) / max(most, 1)))
+    found: list[Tick] = []
+    first, last = math.floor(math.log10(scale.low)), math.ceil(math.log10(scale.high))
+    stride = -(-(last - first) // max(most, 1))
+    for power in range(first, last + 1):
+        for digit in range(1, 10):
+            at = digit * 10.0**power
+            if not scale.low <= at <= scale.high * (1.0 + 1e-12):
+                continue
+            if digit == 1:
+                found.append(Tick(at, _short(at) if power % stride == 0 else ""))
+            elif stride == 1:
+                said = digit in (2, 5) and scale.high < between * scale.low
+                found.append(Tick(at, _short(at) if said else "", grid=False))
+    if sum(bool(tick.text) for tick in found) < 2:
+        return _even(scale, nice_step((scale.high - scale.low) / max(most, 1)))
+    return found
+
+
+def _even(scale: Scale, step: float) -> list[Tick]:
+    unit = 10.0**scale.power
+    first, last = math.ceil(scale.low / step - 1e-9), math.floor(scale.high / step + 1e-9)
+    return [
+        Tick(k * step, tick_words(k * step / unit, step / unit)) for k in range(first, last + 1)
+    ]
+
+
+def _short(value: float) -> str:
+    return f"{value:g}".replace("-", "−")

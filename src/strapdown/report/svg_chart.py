@@ -6,17 +6,22 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from textwrap import fill
+from textwrap import fill as wrapped
 from typing import TYPE_CHECKING, Any
 
-from strapdown.report.chart import Chart, Line, Panel, steady_range, strip_range
-from strapdown.report.mark_places import LONGEST_BESIDE, label_rows, label_side
-from strapdown.report.svg_areas import draw_bars, draw_fills, fill_outline, set_ticks
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+from strapdown.report.chart import Bars, Chart, Fill, Line, Panel, runs, steady_range, strip_range
+from strapdown.report.path_marks import LONGEST_BESIDE, label_rows, label_side
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
-    from matplotlib.figure import Figure
+
+__all__ = ["RoundedLayout", "draw_bars", "draw_fills", "fill_outline", "set_ticks"]
+
 
 _RED, _FAINT, _TEXT = "#b42318", "#8a939e", "#4a525c"
 _DASH: dict[str, Any] = {
@@ -105,8 +110,6 @@ def _figure(chart: Chart, caption: bool = False) -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    from strapdown.report.picture_layout import RoundedLayout
-
     class Picture(Figure):
         """Shows itself where pyplot, which would do it otherwise, was never loaded."""
 
@@ -136,7 +139,7 @@ def _figure(chart: Chart, caption: bool = False) -> Figure:
     timed = [a for p, a in zip(chart.panels, axes, strict=True) if not p.x_label]
     if timed:
         _label_marks(chart, timed[0])
-    figure.suptitle(fill(chart.title, _TITLE), x=0.01, ha="left", fontweight="bold")
+    figure.suptitle(wrapped(chart.title, _TITLE), x=0.01, ha="left", fontweight="bold")
     entries: dict[str, Any] = {}
     for axis in axes:
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
@@ -151,7 +154,7 @@ def _figure(chart: Chart, caption: bool = False) -> Figure:
             ncols=columns,
             frameon=False,
             # Nothing else below the panels gives way to a legend.
-            title=fill(chart.caption, _CAPTION) if caption else None,
+            title=wrapped(chart.caption, _CAPTION) if caption else None,
             title_fontsize=8,
             alignment="left" if caption else "center",
         )
@@ -315,3 +318,110 @@ def _plain_labels(axis: Axis, most: float = 30.0) -> None:
 
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(FuncFormatter(between))
+
+
+# What a picture's chart shows as areas: bands between curves, outlines filled, and bars.
+
+
+_INK = "#1b1f24"
+# Matplotlib's patterns are sparse where plotly's are dense.
+_PATTERN = {"": "", ".": ".."}
+
+
+def draw_fills(panel: Panel, axis: Axes) -> None:
+    """Draw the bands of a panel, below its lines."""
+    lines = {line.name for line in panel.lines if line.legend}
+    for one in panel.fills:
+        _draw_fill(one, axis, one.legend and one.name not in lines)
+
+
+def _draw_fill(fill: Fill, axis: Axes, named: bool) -> None:
+    whole = np.zeros(fill.x.size, dtype=np.bool_)
+    for run in runs(fill.x, fill.low, fill.high):
+        whole[run] = True
+    axis.fill_between(
+        fill.x,
+        fill.low,
+        fill.high,
+        where=whole.tolist(),
+        color=fill.colour,
+        alpha=fill.opacity,
+        lw=0,
+        label=fill.name if named else "_",
+    )
+
+
+def fill_outline(line: Line, axis: Axes) -> None:
+    """Fill the inside of a closed outline, or of several."""
+    for run in runs(line.x, line.y):
+        axis.fill(line.x[run], line.y[run], color=line.colour, alpha=line.inside, lw=0)
+
+
+def draw_bars(panel: Panel, axis: Axes) -> None:
+    """Draw the bars of a panel: across if it has categories, else upright."""
+    for bars in panel.bars:
+        _draw_bars(bars, axis, bool(panel.categories))
+    if panel.bars and panel.categories:
+        axis.axvline(0.0, color=_INK, lw=0.8)
+        axis.grid(visible=False, axis="y")
+        axis.margins(x=0.12)
+    elif panel.bars:
+        axis.axhline(0.0, color=_INK, lw=0.8)
+        axis.margins(y=0.12)
+
+
+def _draw_bars(bars: Bars, axis: Axes, across: bool) -> None:
+    start = np.zeros_like(bars.values) if bars.start is None else bars.start
+    style: dict[str, Any] = {
+        "color": bars.colour,
+        "label": bars.name if bars.legend else "_",
+        "lw": 0,
+    }
+    if bars.pattern:
+        style |= {"hatch": _PATTERN.get(bars.pattern, 2 * bars.pattern), "edgecolor": "#ffffff"}
+    if across:
+        axis.barh(bars.at, bars.values - start, bars.width, left=start, **style)
+    else:
+        axis.bar(bars.at, bars.values - start, bars.width, bottom=start, **style)
+    for at, end, begin, label in zip(bars.at, bars.values, start, bars.labels, strict=False):
+        side = -1 if end < begin else 1
+        axis.annotate(
+            label,
+            (end, at) if across else (at, end),
+            xytext=(4 * side, 0) if across else (0, 3 * side),
+            textcoords="offset points",
+            fontsize=7.5,
+            color=_INK,
+            ha=("left" if side > 0 else "right") if across else "center",
+            va="center" if across else ("bottom" if side > 0 else "top"),
+        )
+
+
+def set_ticks(panel: Panel, axis: Axes) -> None:
+    """Set ticks at equal steps where a panel asks for it."""
+    from matplotlib.ticker import MultipleLocator
+
+    if panel.step:
+        axis.yaxis.set_major_locator(MultipleLocator(panel.step))
+    if panel.x_step:
+        axis.xaxis.set_major_locator(MultipleLocator(panel.x_step))
+
+
+# The layout of a picture, the same every time. Loads matplotlib.
+
+
+class RoundedLayout(ConstrainedLayoutEngine):
+    """Matplotlib's constrained layout, rounded.
+
+    Its solver takes sums in the order of addresses in memory, so that the last bit of a place
+    differs from run to run, and with it the names of clips in an SVG, which are hashes.
+    """
+
+    def execute(self, fig: Figure) -> None:
+        """Place the axes of a figure, to a millionth of its size."""
+        super().execute(fig)
+        for axes in fig.axes:
+            bounds = [round(float(v), 6) for v in axes.get_position(original=True).bounds]
+            axes.set_position((bounds[0], bounds[1], bounds[2], bounds[3]), which="original")
+            # Axes whose place was set are left out of the next layout.
+            axes.set_in_layout(True)

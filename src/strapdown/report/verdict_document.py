@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from strapdown import __version__
-from strapdown.evaluation.heading_light import REASONS
+from strapdown.constants import TWO_SIDED_95
+from strapdown.evaluation.heading_light import REASONS, HeadingLight
 from strapdown.evaluation.plane_bound import plane_bound
-from strapdown.report.alignment_values import instant
-from strapdown.report.crash_values import GAP, plain
+from strapdown.report.chart import BLUE, GREY, VERMILLION, thin
 from strapdown.report.document import (
     Block,
     Document,
@@ -18,16 +21,13 @@ from strapdown.report.document import (
     KeyFigure,
     KeyFigures,
     Paragraph,
+    Picture,
     Section,
     TableBlock,
 )
-from strapdown.report.navigation_values import (
-    duration_words,
-    half,
-    length_words,
-    share_words,
-)
-from strapdown.report.verdict_picture import heading_error, light_picture, repeated_picture
+from strapdown.report.svg_drawing import INK, Drawing, text_width
+from strapdown.report.values import GAP, duration_words, half, length_words, plain, share_words
+from strapdown.report.values import alignment_values_instant as instant
 from strapdown.report.verdict_words import (
     advice_words,
     answer,
@@ -40,10 +40,18 @@ from strapdown.report.verdict_words import (
     unwitnessed_words,
     witness_words,
 )
-from strapdown.systems.sins.carried_heading import UNSEEN
-from strapdown.systems.sins.result import NavigationResult
+from strapdown.systems.sins.heading_witness import UNSEEN
+from strapdown.systems.sins.run import NavigationResult
 
-__all__ = ["light_section", "verdict_document"]
+__all__ = [
+    "LIGHTS",
+    "heading_error",
+    "light_picture",
+    "light_section",
+    "repeated_picture",
+    "verdict_document",
+]
+
 
 #: Rows of a table of the page; the files have all.
 _MOST = 12
@@ -332,3 +340,241 @@ def _looked_at(number: int) -> str:
 
 def _capital(text: str) -> str:
     return f"{text[:1].upper()}{text[1:]}"
+
+
+# Pictures of a verdict, drawn by hand: the light over time, and a run beside its repetition.
+
+
+Array = NDArray[np.float64]
+
+#: Colours of the light: those of Okabe and Ito, which the colour-blind can tell apart.
+LIGHTS = {"green": "#009E73", "amber": "#E69F00", "red": "#D55E00"}
+WIDTH, LEFT, RIGHT = 940.0, 74.0, 14.0
+SMALL, STRIP, PANEL, VERDICT_PICTURE_GAP = 12.5, 34.0, 190.0, 30.0
+#: Points of a curve that a picture shows.
+BUCKETS = 500
+
+
+@dataclass(frozen=True)
+class _Curve:
+    name: str
+    x: Array
+    y: Array
+    colour: str
+    width: float = 1.8
+    dash: str = "solid"
+    band: bool = False
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """A panel in a picture: its place, and what its edges stand for."""
+
+    top: float
+    height: float
+    begin: float
+    end: float
+    most: float
+    least: float = 0.0
+    log: bool = False
+
+    def at(self, x: Array, y: Array) -> Array:
+        across = LEFT + (x - self.begin) / (self.end - self.begin) * (WIDTH - LEFT - RIGHT)
+        ends = np.array([self.least, self.most])
+        y = np.clip(y, *ends)
+        low, high = np.log10(ends) if self.log else ends
+        share = ((np.log10(y) if self.log else y) - low) / (high - low)
+        return np.column_stack([across, self.top + self.height * (1.0 - share)])
+
+
+def heading_error(result: NavigationResult, time: Array) -> Array | None:
+    """Error of the heading at some instants, deg; None where the truth is not known."""
+    differences = result.filtered_differences
+    if differences is None or not len(differences):
+        return None
+    known = differences.index.to_numpy(dtype=np.float64)
+    error = differences["heading"].to_numpy(dtype=np.float64)
+    return np.asarray(np.interp(time, known, error, left=np.nan, right=np.nan))
+
+
+def light_picture(result: NavigationResult) -> Picture:
+    """The light of each second, and the bounds that it goes by."""
+    light = result.trust.light
+    table = light.table
+    time = table.index.to_numpy(dtype=np.float64)
+    picture = Drawing(
+        WIDTH, 40.0 + STRIP + VERDICT_PICTURE_GAP + PANEL + 62.0, "Light of the heading over time"
+    )
+    begin, end = float(time[0]), max(float(time[-1]) + 1.0, float(time[0]) + 2.0)
+    _strip(picture, light, begin, end, 8.0)
+    bound = table["bound"].to_numpy(dtype=np.float64)
+    # Decades from below the best that is known up to where it is hardly known.
+    known = min(float(np.nanmin(bound)), light.green) if np.isfinite(bound).any() else light.green
+    error = heading_error(result, time)
+    if error is not None and np.isfinite(error).any():
+        known = min(known, max(float(np.nanmedian(np.abs(error))), 1e-3))
+    least = 10.0 ** math.floor(math.log10(max(known, 1e-4)))
+    frame = _Frame(8.0 + STRIP + VERDICT_PICTURE_GAP, PANEL, begin, end, light.red, least, log=True)
+    carried = np.where(np.isfinite(table["carried"]), table["carried"], light.red)
+    curves = [
+        _Curve("bound of the run itself (95 %)", time, bound, BLUE),
+        _Curve("bound that a witness bears out (99 %)", time, carried, INK, 2.2),
+    ]
+    if error is not None:
+        name = f"error against {result.source.truth_name}"
+        curves.append(_Curve(name, time, np.abs(error), VERMILLION, 1.6, "dot"))
+    _panel(picture, frame, "heading, deg", curves, level=light.green)
+    _legend(picture, frame.top + PANEL + 44.0, curves)
+    return Picture(
+        "heading-light",
+        picture.svg(),
+        "The heading, second by second",
+        f"Above: the light. Below: what it goes by. Green needs both curves below "
+        f"{plain(light.green, 1)}° (the dashed line); what is at the top is unknown there. The "
+        "scale is one of decades.",
+        "Light of the heading over time, with the bounds that it goes by",
+    )
+
+
+def repeated_picture(result: NavigationResult) -> Picture | None:
+    """How far a run is from its repetition, beside the bounds of both; None without one."""
+    repeated = result.trust.repeated
+    if repeated is None or repeated.differences is None or repeated.record is None:
+        return None
+    table = repeated.differences
+    time = table.index.to_numpy(dtype=np.float64)
+    if len(time) < 2:
+        return None
+    begin, end = float(time[0]), float(time[-1])
+    place = np.hypot(table["north"].to_numpy(), table["east"].to_numpy())
+    turn = np.abs(table["heading"].to_numpy(dtype=np.float64))
+    picture = Drawing(WIDTH, 2 * PANEL + VERDICT_PICTURE_GAP + 100.0, "A run beside its repetition")
+    bottom = 8.0
+    both = (result.filtered, repeated.record)
+    for label, difference, bounds in (
+        ("place, m", place, [plane_bound(r.covariance) for r in both]),
+        (
+            "heading, deg",
+            turn,
+            [TWO_SIDED_95 * r.sd["heading"].to_numpy(dtype=np.float64) for r in both],
+        ),
+    ):
+        curves = [
+            _Curve("bound of the run (95 %)", result.filtered.sd.index.to_numpy(), bounds[0], BLUE),
+            _Curve(
+                "bound of the repeated run (95 %)",
+                repeated.record.sd.index.to_numpy(),
+                bounds[1],
+                GREY,
+                1.6,
+                "dash",
+            ),
+            _Curve("run and repeated run apart", time, difference, VERMILLION, 2.2),
+        ]
+        within = [c.y[(c.x >= begin) & (c.x <= end) & np.isfinite(c.y)] for c in curves]
+        # The bounds of a start, and those of an outage, would hide the rest.
+        tall = max(float(np.quantile(y, 0.98)) for y in within if len(y))
+        most = max(1.15 * tall, 1.02 * float(np.nanmax(difference)), 1e-6)
+        frame = _Frame(bottom, PANEL, begin, end, most)
+        _panel(picture, frame, label, curves, ticks=label.startswith("heading"))
+        bottom += PANEL + VERDICT_PICTURE_GAP
+    _legend(picture, bottom + 16.0, curves)
+    return Picture(
+        "repeated",
+        picture.svg(),
+        "The run and its repetition",
+        f"How far the run is from the same run {repeated.without}, beside the bounds of both.",
+        "Differences of place and heading between the run and the repeated run, beside bounds",
+    )
+
+
+def _strip(picture: Drawing, light: HeadingLight, begin: float, end: float, top: float) -> None:
+    picture.text((LEFT - 10.0, top + 0.5 * STRIP), "light", SMALL, anchor="end")
+    scale = (WIDTH - LEFT - RIGHT) / (end - begin)
+    seconds = _merged(light)
+    for first, last, colour in seconds:
+        a, b = LEFT + (first - begin) * scale, LEFT + (min(last, end) - begin) * scale
+        # Its height tells it, too, to who sees no colour.
+        up = top + {"green": 0.0, "amber": 0.25, "red": 0.5}[colour] * STRIP
+        box = [(a, up), (b, up), (b, top + STRIP), (a, top + STRIP)]
+        picture.shape(box, None, fill=LIGHTS[colour])
+        if b - a > text_width(colour, 11.0) + 10.0:
+            middle = (0.5 * (a + b), 0.5 * (up + top + STRIP))
+            picture.text(
+                middle, colour, 11.0, "#ffffff" if colour != "amber" else INK, anchor="middle"
+            )
+
+
+def _merged(light: HeadingLight) -> list[tuple[float, float, str]]:
+    """Stretches of one colour, whatever the reason."""
+    out: list[tuple[float, float, str]] = []
+    for span in light.spans:
+        if out and out[-1][2] == span.colour:
+            out[-1] = (out[-1][0], span.end, span.colour)
+        else:
+            out.append((span.begin, span.end, span.colour))
+    return out
+
+
+def _panel(
+    picture: Drawing,
+    frame: _Frame,
+    label: str,
+    curves: Sequence[_Curve],
+    *,
+    level: float | None = None,
+    ticks: bool = True,
+) -> None:
+    right, bottom = WIDTH - RIGHT, frame.top + frame.height
+    heights = _decades(frame) if frame.log else _ticks(frame.least, frame.most, 5)
+    for value in heights:
+        y = float(frame.at(np.array([frame.begin]), np.array([value]))[0, 1])
+        picture.line((LEFT, y), (right, y), "#e4e8ec", 1.0)
+        picture.text((LEFT - 8.0, y), _number(value), SMALL, anchor="end")
+    for value in _ticks(frame.begin, frame.end, 8):
+        x = float(frame.at(np.array([value]), np.array([frame.least]))[0, 0])
+        picture.line((x, bottom), (x, bottom + 4.0), INK, 1.0)
+        if ticks:
+            picture.text((x, bottom + 14.0), _number(value), SMALL, anchor="middle")
+    if ticks:
+        picture.text((right, bottom + 30.0), "time, s", SMALL, anchor="end")
+    picture.text((18.0, frame.top + 0.5 * frame.height), label, SMALL, anchor="middle", turn=-90.0)
+    if level is not None:
+        height = float(frame.at(np.array([frame.begin]), np.array([level]))[0, 1])
+        picture.line((LEFT, height), (right, height), LIGHTS["green"], 1.6, "dash")
+    with picture.within((LEFT, frame.top - 2.0, right, bottom + 2.0)):
+        for curve in curves:
+            points = frame.at(*thin(curve.x, curve.y, BUCKETS))
+            picture.shape(points, curve.colour, curve.width, curve.dash, closed=False)
+    picture.line((LEFT, frame.top), (LEFT, bottom), INK, 1.0)
+    picture.line((LEFT, bottom), (right, bottom), INK, 1.0)
+
+
+def _legend(picture: Drawing, y: float, curves: Sequence[_Curve]) -> None:
+    x = LEFT
+    for curve in curves:
+        picture.line((x, y), (x + 26.0, y), curve.colour, curve.width + 0.4, curve.dash)
+        picture.text((x + 32.0, y), curve.name, SMALL)
+        x += 50.0 + 0.86 * text_width(curve.name, SMALL)
+
+
+def _decades(frame: _Frame) -> list[float]:
+    """Powers of ten between the ends, and the upper end."""
+    low, high = math.log10(frame.least), math.log10(frame.most)
+    out = [10.0**k for k in range(math.ceil(low - 1e-9), math.floor(high + 1e-9) + 1)]
+    return out if high - math.floor(high + 1e-9) < 0.2 else [*out, frame.most]
+
+
+def _ticks(least: float, most: float, count: int) -> list[float]:
+    """Round numbers between two."""
+    step = 10.0 ** math.floor(math.log10(max(most - least, 1e-9) / count))
+    for factor in (1.0, 2.0, 5.0, 10.0):
+        if (most - least) / (factor * step) <= count:
+            step *= factor
+            break
+    first = math.ceil(least / step - 1e-9)
+    return [k * step for k in range(first, math.floor(most / step + 1e-9) + 1)]
+
+
+def _number(value: float) -> str:
+    return f"{value:.6g}".replace("-", "\u2212") if abs(value) < 1e5 else f"{value:.0f}"

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from strapdown.bundle.json_text import to_json
+from strapdown.bundle.seal import to_json
 from strapdown.evaluation.heading_light import COLOURS, REASONS
 from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.formats import csv
-from strapdown.navigation.first_inconsistency import Inconsistency
+from strapdown.navigation.consistency import Inconsistency
 from strapdown.report.document_files import write_text
 from strapdown.report.document_html import document_page
 from strapdown.report.verdict_document import verdict_document
@@ -23,8 +23,8 @@ from strapdown.report.verdict_words import (
     repeated_words,
     witness_words,
 )
-from strapdown.systems.sins.repeat_without import Repeated
-from strapdown.systems.sins.result import NavigationResult
+from strapdown.systems.sins.run import NavigationResult
+from strapdown.systems.sins.trust import Repeated
 
 __all__ = ["verdict_json", "write_verdict"]
 

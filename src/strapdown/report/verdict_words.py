@@ -8,18 +8,11 @@ import numpy as np
 
 from strapdown.evaluation.heading_light import REASONS, SURE, WITNESSES, LightSpan
 from strapdown.evaluation.plane_bound import plane_bound
-from strapdown.navigation.first_inconsistency import Inconsistency
-from strapdown.report.alignment_values import instant
-from strapdown.report.crash_values import GAP, plain
-from strapdown.report.navigation_values import (
-    duration_words,
-    half,
-    length_words,
-    share_words,
-)
-from strapdown.systems.sins.repeat_without import Repeated
-from strapdown.systems.sins.result import NavigationResult
-from strapdown.systems.sins.trust import NO_NORTH, Advice, Trust
+from strapdown.navigation.consistency import Inconsistency
+from strapdown.report.values import GAP, duration_words, half, length_words, plain, share_words
+from strapdown.report.values import alignment_values_instant as instant
+from strapdown.systems.sins.run import NavigationResult
+from strapdown.systems.sins.trust import NO_NORTH, Advice, Repeated, Trust
 
 __all__ = [
     "advice_words",

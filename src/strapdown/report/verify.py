@@ -15,21 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from strapdown.bundle.configuration_paths import resolved
-from strapdown.bundle.environment import machine, versions
+from strapdown.bundle.configuration_paths import names_file, resolved
 from strapdown.bundle.reading import read_manifest, unsealed_changes
 from strapdown.bundle.seal import MANIFEST, Seal, sha256
-from strapdown.config import (
-    AttitudeSpec,
-    CrashSimulationSpec,
-    SimulateSpec,
-    TrajectorySpec,
-)
+from strapdown.bundle.writing import machine, versions
+from strapdown.config import AttitudeSpec, CrashSimulationSpec, SimulateSpec, TrajectorySpec
+from strapdown.config.changed_options import changed_options
+from strapdown.config.crash_case_file import read_case_spec
 from strapdown.errors import DataError, StrapdownError
 from strapdown.formats import read_raw
 from strapdown.report.alignment import rerun_alignment
 from strapdown.report.attitude import write_attitude
-from strapdown.report.changed_case import changed_case
 from strapdown.report.coast import rerun_coast
 from strapdown.report.crash_case import rerun_crash
 from strapdown.report.crash_simulation import write_crash_simulation
@@ -38,7 +34,8 @@ from strapdown.report.simulation import write_simulation
 from strapdown.report.trajectory_simulation import write_trajectory_simulation
 from strapdown.systems.attitude_bench import run_bench
 
-__all__ = ["Verification", "verify"]
+__all__ = ["Verification", "changed_case", "verify"]
+
 
 # Another processor or library may round otherwise in the last places, and a long integration
 # carries that on. More than this is another result.
@@ -288,3 +285,49 @@ def _other_conditions(manifest: dict[str, Any]) -> list[str]:
         for name in sorted(now.keys() | then.keys())
         if now.get(name) != then.get(name)
     ]
+
+
+# Which options of a sealed crash case are not those of the case file that lies beside it.
+
+
+def changed_case(root: Path, manifest: dict[str, Any]) -> list[str]:
+    """Name the options in which a bundle's case file and its sealed configuration differ.
+
+    Parameters
+    ----------
+    root : Path
+        The bundle.
+    manifest : dict
+        From `read_manifest`.
+
+    Returns
+    -------
+    list of str
+        One sentence an option, with the sealed value first; empty where both say the same, or
+        where the bundle is of no crash.
+    """
+    configuration = manifest["configuration"]
+    if manifest["command"] != "crash" or not isinstance(configuration, dict):
+        return []
+    name = configuration.get("case_path")
+    if not isinstance(name, str):
+        return []
+    path = root / name
+    if not path.is_file():
+        return []
+    try:
+        told = read_case_spec(path, files=False).model_dump(mode="json", exclude_none=True)
+    except StrapdownError as error:
+        return [f"{name}: it is no case any more: {error.finding.what}"]
+    told.pop("name", None)
+    sealed = {k: v for k, v in configuration.get("case", {}).items() if k != "name"}
+    return [f"{name}: {what}" for what in changed_options(_told(sealed), _told(told))]
+
+
+def _told(value: Any) -> Any:
+    """Without the names of files, which are others in a bundle."""
+    if isinstance(value, dict):
+        return {k: _told(v) for k, v in value.items() if not names_file(k, v)}
+    if isinstance(value, list):
+        return [_told(v) for v in value]
+    return value

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from strapdown.results.answer import Answer, Cost, Share, Trials
-from strapdown.results.attitude_bench import AttitudeBench
+from strapdown.results.attitude_bench import (
+    Answer,
+    AttitudeBench,
+    AttitudeRun,
+    Cost,
+    PeerRun,
+    PositionScore,
+    Score,
+    SecondLog,
+    Share,
+    Trials,
+)
 from strapdown.results.inputs import InputFiles, Reading
 from strapdown.results.rests import GyroBiasCourse, RestStretch, SamePose
-from strapdown.results.runs import AttitudeRun, PeerRun
-from strapdown.results.scores import PositionScore, Score
-from strapdown.results.second_log import SecondLog
 
 __all__ = [
     "Answer",

@@ -17,14 +17,15 @@ agrees with his kinematics (8)-(10).
 
 from __future__ import annotations
 
-from strapdown.rotation.angles import rotation_angle, within_half_turn
 from strapdown.rotation.euler_angles import (
     dcm_from_euler,
     euler_from_dcm,
     euler_from_quaternion,
     euler_from_rotation_vector,
     quaternion_from_euler,
+    rotation_angle,
     rotation_vector_from_euler,
+    within_half_turn,
 )
 from strapdown.rotation.matrices import cross_matrix, dcm_from_quaternion, quaternion_from_dcm
 from strapdown.rotation.quaternions import compose, conjugate, normalise, rotate

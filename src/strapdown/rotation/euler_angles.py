@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown._kernels import rotation as kernel
-from strapdown.rotation.checked_rows import apply, rows_of, unit_quaternions
+from strapdown.rotation.checked_rows import apply, common_shape, rows_of, unit_quaternions
 from strapdown.rotation.matrices import dcm_from_quaternion, quaternion_from_dcm
 from strapdown.rotation.rotation_vectors import (
     quaternion_from_rotation_vector,
@@ -20,8 +20,12 @@ __all__ = [
     "euler_from_rotation_vector",
     "euler_sd",
     "quaternion_from_euler",
+    "rotation_angle",
     "rotation_vector_from_euler",
+    "unit_rotation_angle",
+    "within_half_turn",
 ]
+
 
 Array = NDArray[np.float64]
 
@@ -183,3 +187,65 @@ def euler_sd(euler_deg: ArrayLike, covariance: ArrayLike) -> Array:
     angles = np.linalg.inv(axes)
     spread = angles @ np.asarray(covariance) @ np.swapaxes(angles, -1, -2)
     return np.asarray(np.degrees(np.sqrt(np.diagonal(spread, axis1=-2, axis2=-1))))
+
+
+# Angles in degrees: between two attitudes, and brought within half a turn.
+
+
+def rotation_angle(q_1: ArrayLike, q_2: ArrayLike) -> Array:
+    """Angle of the rotation between two attitudes: the length of ``log(C_1^T C_2)``.
+
+    Parameters
+    ----------
+    q_1, q_2 : array_like, (..., 4)
+        Leading shapes are broadcast.
+
+    Returns
+    -------
+    ndarray, (...), deg
+        Between 0 and 180; right to about 1e-15 rad, however small.
+
+    Raises
+    ------
+    DataError
+        Wrong shape, a value that is not finite, or a norm that is not 1.
+    """
+    (a, lead_a), (b, lead_b) = unit_quaternions(q_1, "q_1"), unit_quaternions(q_2, "q_2")
+    leading = common_shape(lead_a, lead_b)
+    if lead_a != lead_b:
+        a = np.broadcast_to(a.reshape((*lead_a, 4)), (*leading, 4)).reshape(-1, 4)
+        b = np.broadcast_to(b.reshape((*lead_b, 4)), (*leading, 4)).reshape(-1, 4)
+    return unit_rotation_angle(a, b).reshape(leading)
+
+
+def unit_rotation_angle(q_1: Array, q_2: Array) -> Array:
+    """Angle between the attitudes of two arrays of unit quaternions, which is not checked.
+
+    Parameters
+    ----------
+    q_1, q_2 : ndarray, (n, 4)
+        Of norm 1, as this package's own functions return them.
+
+    Returns
+    -------
+    ndarray, (n,), deg
+    """
+    out = np.empty(len(q_1))
+    kernel.quats_angle(np.ascontiguousarray(q_1), np.ascontiguousarray(q_2), out)
+    return np.asarray(np.degrees(out))
+
+
+def within_half_turn(angles_deg: Array) -> Array:
+    """Bring angles within half a turn.
+
+    Parameters
+    ----------
+    angles_deg : ndarray, (...), deg
+
+    Returns
+    -------
+    ndarray, (...), deg
+        From -180 to 180; what is within already keeps every digit.
+    """
+    wrapped = np.remainder(angles_deg + 180.0, 360.0) - 180.0
+    return np.where(np.abs(angles_deg) <= 180.0, angles_deg, wrapped)

@@ -11,14 +11,185 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.errors import ConfigError, DataError
-from strapdown.sensors.parity import checked_directions
-from strapdown.sensors.voting_rule import AxisErrors, VotingRule
+from strapdown.sensors.uncertainty import BiasDrift, TriadUncertainty
 from strapdown.tables.checks import is_number
+
+__all__ = [
+    "AxisErrors",
+    "AxisEvent",
+    "AxisVote",
+    "AxisVoting",
+    "VotingRule",
+    "VotingState",
+    "checked_directions",
+    "isolable_axes",
+    "parity_matrix",
+]
+
+
+# Parity of redundant axes: what they tell of each other whatever the motion is.
+
+
+# Of the smallest over the largest singular value, and of the cosine of two parity columns.
+RANK = 1e-6
+PARALLEL = 1e-9
+
+
+def checked_directions(directions: ArrayLike) -> Array:
+    """Unit vectors, one a row, that span the space.
+
+    Raises
+    ------
+    ConfigError
+        They are no (m, 3) numbers of length one to within 1e-6, or lie in a plane.
+    """
+    h = np.asarray(directions, dtype=np.float64)
+    if h.ndim != 2 or h.shape[1] != 3 or h.shape[0] < 3 or not np.isfinite(h).all():
+        raise ConfigError("sensors.directions-shape", quantity="directions", shape=h.shape)
+    off = np.abs(np.sqrt((h**2).sum(axis=1)) - 1.0)
+    if off.max() > 1e-6:
+        raise ConfigError(
+            "sensors.row-length-or-inverse",
+            quantity="directions",
+            argmax=int(off.argmax()) + 1,
+            off=1.0 + off.max(),
+        )
+    values = np.linalg.svd(h, compute_uv=False)
+    if values[-1] < RANK * values[0]:
+        raise ConfigError("sensors.all-axes-lie-plane", quantity="directions")
+    return np.ascontiguousarray(h)
+
+
+def parity_matrix(directions: ArrayLike) -> Array:
+    """Matrix V that no motion passes: ``V H = 0``, ``V Vᵀ = I``.
+
+    Parameters
+    ----------
+    directions : array_like, (m, 3)
+        H, unit vectors along which the axes measure.
+
+    Returns
+    -------
+    ndarray, (m - 3, m)
+        The parity vector of readings z is ``p = V z``. Errors e of covariance C give it the
+        covariance ``V C Vᵀ``, and ``pᵀ (V C Vᵀ)⁻¹ p`` is chi-square with m - 3 degrees of freedom.
+        Its sign and turn are those of a singular value decomposition.
+
+    Notes
+    -----
+    Potter and Suman 1977 (AGARDograph 224, Thresholdless redundancy management with arrays of
+    skewed instruments). An axis that fails moves p along its own column of V: one of five axes or
+    more can be told by that, where no two columns are parallel.
+    """
+    h = checked_directions(directions)
+    u, _, _ = np.linalg.svd(h, full_matrices=True)
+    return np.ascontiguousarray(u[:, 3:].T)
+
+
+def isolable_axes(directions: ArrayLike) -> NDArray[np.bool_]:
+    """Which axes, where one fails, can be told from every other, (m,)."""
+    v = parity_matrix(directions)
+    m = v.shape[1]
+    if v.shape[0] < 2:
+        return np.zeros(m, dtype=bool)
+    length = np.sqrt((v**2).sum(axis=0))
+    seen = length > RANK
+    unit = v / np.where(seen, length, 1.0)
+    cosine = np.abs(unit.T @ unit) - np.eye(m)
+    return np.asarray(seen & ~(cosine > 1.0 - PARALLEL).any(axis=1))
+
+
+# When redundant axes disagree, and what is stated of them.
+
+
+@dataclass(frozen=True)
+class VotingRule:
+    """When axes are held to disagree, to have failed, and to be sound again.
+
+    Attributes
+    ----------
+    windows : tuple of float, s
+        Time constants of the means that are compared: a short one for what is large, a long one
+        for what is small. Each mean is that of all samples so far until it is as old.
+    persist : float
+        A window's chi-square must be beyond its limit for this part of its time constant.
+    learn : float, s
+        For so long the axes are compared within their stated biases; from then on, each within
+        what may have changed since.
+    readmit : float, s
+        An axis that failed is taken back after it has been within half of the limit for so long;
+        infinite is never. A disagreement of the same two is told again after so long without one.
+    false_alarm : float, 1/h
+        Expected number of samples an hour beyond a limit, of all windows and both triads, where all
+        is as stated.
+    confusion : float
+        Likelihood of the next axis over that of the one that is excluded.
+    apart : float, m
+        Largest distance between the accelerometers of two units. Lever arms are not corrected;
+        this allows for the centripetal acceleration between them, ``apart ω²``.
+
+    Raises
+    ------
+    ConfigError
+        A number is out of range.
+    """
+
+    windows: tuple[float, ...] = (0.1, 5.0)
+    persist: float = 0.5
+    learn: float = 30.0
+    readmit: float = 60.0
+    false_alarm: float = 1e-3
+    confusion: float = 1e-6
+    apart: float = 0.0
+
+    def __post_init__(self) -> None:
+        good = {
+            "windows": bool(self.windows)
+            and all(is_number(x) and 0.0 < x < math.inf for x in self.windows),
+            "persist": is_number(self.persist) and 0.0 < self.persist < math.inf,
+            "learn": is_number(self.learn) and 0.0 < self.learn < math.inf,
+            "readmit": is_number(self.readmit) and self.readmit > 0.0,
+            "false_alarm": is_number(self.false_alarm) and 0.0 < self.false_alarm < 1.0,
+            "confusion": is_number(self.confusion) and 0.0 < self.confusion < 1.0,
+            "apart": is_number(self.apart) and 0.0 <= self.apart < math.inf,
+        }
+        for name, fine in good.items():
+            if not fine:
+                raise ConfigError("sensors.will-not-do", quantity=name, value=getattr(self, name))
+
+
+@dataclass(frozen=True, eq=False)
+class AxisErrors:
+    """What is not known of m axes: arrays (m,), named as in `TriadUncertainty` and `BiasDrift`."""
+
+    noise_density: Array
+    bias: Array
+    scale: Array
+    misalignment: Array
+    g_sensitivity: Array
+    quantization: Array
+    drift: Array
+    correlation_time: Array
+
+    @classmethod
+    def of(cls, parts: Sequence[tuple[TriadUncertainty, BiasDrift, int]]) -> AxisErrors:
+        """Take axis ``part[2]`` of each triad, one an axis."""
+        names = (
+            "noise_density",
+            "bias",
+            "scale",
+            "misalignment",
+            "g_sensitivity",
+            "quantization",
+        )
+        columns = {n: np.array([t.axis(n)[k] for t, _, k in parts]) for n in names}
+        drift = np.array([d.triad[k] for _, d, k in parts])
+        time = np.array([d.correlation_time for _, d, _ in parts])
+        return cls(**columns, drift=drift, correlation_time=time)
+
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-
-__all__ = ["AxisErrors", "AxisEvent", "AxisVote", "AxisVoting", "VotingRule", "VotingState"]
 
 HOUR = 3600.0  # s
 # Gyros and accelerometers are tested apart.

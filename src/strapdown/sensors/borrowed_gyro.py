@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError
 from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
-from strapdown.sensors.onto_stamps import TriadAtStamps
 from strapdown.sensors.triad_errors import Triad, triad_of
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.sensors.uncertainty import TriadUncertainty
+from strapdown.sensors.unit_clocks import TriadAtStamps
 from strapdown.tables import GYRO
 
 Array = NDArray[np.float64]

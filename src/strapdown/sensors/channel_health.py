@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.errors import DataError, Finding
-from strapdown.sensors.equal_runs import equal_runs
+from strapdown.sensors.health_log import equal_runs
 
 __all__ = ["ChannelHealth", "Fault", "check_channel", "check_peers"]
 

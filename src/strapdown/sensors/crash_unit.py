@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.errors import ConfigError
-from strapdown.sensors.assumed import Assumed
-from strapdown.sensors.triad_errors import ZERO, Triad
-from strapdown.sensors.triad_numbers import FARTHEST, check_sd, triple
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
-from strapdown.tables.checks import is_number
+from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.sensors.triad_errors import FARTHEST, ZERO, Triad, check_sd, finite, triple
+from strapdown.sensors.uncertainty import TriadUncertainty
+from strapdown.tables import ACCEL, GYRO, SAMPLINGS, find_gaps
+from strapdown.tables.checks import check_rows, check_time, is_number
+
+__all__ = ["SHAPES", "Assumed", "UnitArrays", "assumed_shapes", "check_unit"]
+
 
 Array = NDArray[np.float64]
 
@@ -181,3 +184,273 @@ def _wrong_type(quantity: str, given: object, unit: object) -> ConfigError:
         quantity=quantity,
         type=type(given).__name__,
     )
+
+
+# What a crash unit must be before anything is made of it.
+
+
+# Stamps that agree to this part of a step are the same.
+SAME_STAMP = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class UnitArrays:
+    """The numbers of a unit whose triads share their stamps.
+
+    Attributes
+    ----------
+    time : ndarray, (n,), s
+    accelerometers : tuple of ndarray, (n, 3), m/s²
+    gyro : ndarray, (n, 3), rad/s
+    sampling : str
+    findings : tuple of Finding
+    """
+
+    time: Array
+    accelerometers: tuple[Array, ...]
+    gyro: Array
+    sampling: str
+    findings: tuple[Finding, ...]
+
+
+def check_unit(unit: CrashUnit) -> UnitArrays:
+    """Check a unit and take out its numbers.
+
+    Parameters
+    ----------
+    unit : CrashUnit
+        On the common clock, all triads at the same stamps.
+
+    Returns
+    -------
+    UnitArrays
+
+    Raises
+    ------
+    DataError
+        There is no accelerometer or no gyro, an axis is missing, a value is not finite, time
+        does not advance, or the triads' stamps or kinds of sampling differ.
+    """
+    if not unit.accelerometers:
+        raise DataError("sensors.no-accelerometer", file=unit.name, quantity="accelerometers")
+    if unit.gyro is None:
+        raise DataError("sensors.no-gyro-path-needs-turning", file=unit.name, quantity="gyro")
+    forces = tuple(_values(unit, triad, ACCEL) for triad in unit.accelerometers)
+    rates = _values(unit, unit.gyro, GYRO)
+    time = _stamps(unit.accelerometers[0])
+    samplings = set()
+    for triad in (*unit.accelerometers, unit.gyro):
+        _same_stamps(unit, triad, time)
+        samplings.add(str(triad.table.attrs["sampling"]))
+    if len(samplings) > 1:
+        raise DataError(
+            "sensors.some-triads-instantaneous-values-some", file=unit.name, quantity="sampling"
+        )
+    return UnitArrays(time, forces, rates, samplings.pop(), _gaps(unit, time))
+
+
+def _values(unit: CrashUnit, triad: RecordedTriad, columns: list[str]) -> Array:
+    source = f"{unit.name}, {triad.name}"
+    missing = [c for c in columns if c not in triad.table.columns]
+    if missing:
+        raise DataError(
+            "sensors.accelerometer-axes-missing"
+            if columns == ACCEL
+            else "sensors.gyro-axes-missing",
+            file=source,
+            quantity=missing[0],
+            missing=missing,
+        )
+    if triad.table.attrs.get("sampling") not in SAMPLINGS:
+        raise DataError(
+            "sensors.attrs-sampling",
+            file=source,
+            quantity="sampling",
+            get=triad.table.attrs.get("sampling"),
+            samplings=SAMPLINGS,
+        )
+    if len(triad.table) < 2:
+        raise DataError(
+            "sensors.too-few-samples-of-unit", file=source, quantity="time", count=len(triad.table)
+        )
+    check_time(_stamps(triad), source)
+    values = np.ascontiguousarray(triad.table[columns].to_numpy(dtype=np.float64))
+    check_rows(values, columns, source)
+    return values
+
+
+def _stamps(triad: RecordedTriad) -> Array:
+    return np.asarray(triad.table.index.to_numpy(), dtype=np.float64)
+
+
+def _same_stamps(unit: CrashUnit, triad: RecordedTriad, time: Array) -> None:
+    own = _stamps(triad)
+    slack = SAME_STAMP * float(np.median(np.diff(time)))
+    if own.size == time.size and float(np.abs(own - time).max()) <= slack:
+        return
+    raise DataError(
+        "sensors.triad-stamps-differ",
+        file=f"{unit.name}, {triad.name}",
+        quantity="time",
+        size=own.size,
+        own=own[0],
+        own_2=own[-1],
+        size_2=time.size,
+        time=time[0],
+        time_2=time[-1],
+        name=unit.accelerometers[0].name,
+    )
+
+
+def _gaps(unit: CrashUnit, time: Array) -> tuple[Finding, ...]:
+    return tuple(
+        Finding(
+            "sensors.gap-after-trigger" if gap.end > 0.0 else "sensors.gap-before-trigger",
+            file=unit.name,
+            row=gap.sample + 1,
+            quantity="time",
+            length=1000.0 * gap.length,
+            start=gap.start,
+            usual=1000.0 * gap.usual,
+        )
+        for gap in find_gaps(time)
+    )
+
+
+# What is taken of a vehicle where a unit does not measure it, and how uncertain that is.
+
+
+#: Of the two shapes in time, in the order of `assumed_shapes`, for the names of unknowns.
+SHAPES = ("by the end", "on the way")
+# A random walk that is known at its end is known to half of that half way.
+ON_THE_WAY = 0.5
+# A vehicle that has turned farther is not near to "not turning", and linear bounds end there.
+MOST_TURN = 45.0  # deg
+# No road vehicle changes its velocity by more in a crash.
+MOST_CHANGE = 60.0  # m/s
+# An assumption for longer than this is none about an impact.
+LONGEST = 10.0  # s
+
+
+@dataclass(frozen=True)
+class Assumed:
+    """What is taken for the axes that a unit has no sensor on.
+
+    Attributes
+    ----------
+    turn_sd_deg : float or triad, deg, optional
+        Where there is no gyro the vehicle is taken not to turn. Standard deviation of what each
+        of roll, pitch and heading has changed by at the end of `over`. None: a missing gyro is
+        refused.
+    delta_v_sd : float or triad, m/s, optional
+        Where there is no accelerometer along an axis, the specific force along it is taken as
+        gravity's in the attitude of the vehicle at rest, and no more, at the point that is
+        reconstructed. Standard deviation of the change of velocity along it over `over`; three
+        numbers are for the vehicle's forward, right, down. None: a missing axis is refused.
+    over : (float, float), s
+        From the trigger: when that may happen. What the vehicle does before and after is in no
+        bound.
+    because : str
+        Why it may be assumed, in words of the person who does, for the report.
+
+    Raises
+    ------
+    ConfigError
+        Neither is given, a number is negative or not finite, a turn is beyond 45 deg or a change
+        beyond 60 m/s, or `over` is no stretch of up to 10 s.
+
+    Notes
+    -----
+    In time, what an axis turns (or gains) is the sum of two independent unknowns. One grows by
+    ``u - sin(2 pi u) / (2 pi)``, the integral of a haversine, with u from 0 to 1 over `over`; it
+    has the stated standard deviation at the end. Alone it would say that half way half of the turn
+    was done, no more and no less: a turn that comes early, or a dip that comes back, would do more
+    to the velocity than any bound has, since a crash pulse acts when it acts. So another goes there
+    and back, by ``sin²(pi u)``, with half the standard deviation at the middle: as much as remains
+    unknown of a random walk half way when its end is known. The standard deviation in the middle is
+    then 0.71 of that at the end, that of a random walk as well.
+    """
+
+    turn_sd_deg: float | Triad | None = None
+    delta_v_sd: float | Triad | None = None
+    over: tuple[float, float] = (0.0, 0.15)
+    because: str = ""
+
+    def __post_init__(self) -> None:
+        if self.turn_sd_deg is None and self.delta_v_sd is None:
+            raise ConfigError("sensors.nothing-assumed", quantity="assumed")
+        turns, axes = ("roll", "pitch", "heading"), ("forward", "right", "down")
+        for name, said in (
+            ("turn_sd_deg", {"unit": "deg", "axes": turns, "most": MOST_TURN}),
+            ("delta_v_sd", {"unit": "m/s", "axes": axes, "most": MOST_CHANGE}),
+        ):
+            given = getattr(self, name)
+            if given is not None:
+                object.__setattr__(self, name, _sds(given, name, said))
+        object.__setattr__(self, "over", _stretch(self.over))
+        if not isinstance(self.because, str):
+            raise ConfigError(
+                "sensors.reason-not-text",
+                quantity="assumed, because",
+                name=type(self.because).__name__,
+            )
+
+    def sd_of(self, name: str) -> Triad:
+        """Return ``turn_sd_deg`` or ``delta_v_sd`` as three numbers; zeros where it is None."""
+        value: Triad | None = getattr(self, name)
+        return (0.0, 0.0, 0.0) if value is None else value
+
+
+def assumed_shapes(time: Array, over: tuple[float, float], sampling: str) -> Array:
+    """Rates of the two shapes at the samples, for one standard deviation of one at the end.
+
+    Parameters
+    ----------
+    time : ndarray, (n,), s
+    over : (float, float), s
+    sampling : {'instantaneous', 'mean'}
+
+    Returns
+    -------
+    ndarray, (2, n), 1/s
+        Means over the interval that ends at the stamp, or about it, so that their sum times
+        the step is exact, even where few samples are in `over`.
+    """
+    steps = np.diff(time, prepend=2.0 * time[0] - time[1])
+    after = np.append(steps[1:], steps[-1])
+    if sampling == "mean":
+        begin, end = time - steps, time
+    else:
+        begin, end = time - 0.5 * steps, time + 0.5 * after
+    return np.asarray((_grown(end, over) - _grown(begin, over)) / (end - begin))
+
+
+def _grown(time: Array, over: tuple[float, float]) -> Array:
+    """What both shapes have come to, (2, n)."""
+    u = np.clip((time - over[0]) / (over[1] - over[0]), 0.0, 1.0)
+    whole = u - np.sin(2.0 * np.pi * u) / (2.0 * np.pi)
+    return np.array([whole, ON_THE_WAY * np.sin(np.pi * u) ** 2])
+
+
+def _sds(given: object, name: str, limits: dict[str, Any]) -> Triad:
+    if finite(given):
+        given = (given, given, given)
+    quantity = f"assumed, {name}"
+    numbers = triple(given, quantity, "sensors.assumed-not-three-numbers", **limits)
+    if any(x < 0.0 or x > limits["most"] for x in numbers):
+        raise ConfigError(
+            "sensors.assumed-out-of-range", quantity=quantity, given=repr(given), **limits
+        )
+    return numbers
+
+
+def _stretch(given: object) -> tuple[float, float]:
+    try:
+        start, end = (float(x) for x in given)  # type: ignore[attr-defined]
+    except (TypeError, ValueError):
+        start = end = math.nan
+    if not (math.isfinite(start) and math.isfinite(end) and 0.0 < end - start <= LONGEST):
+        raise ConfigError(
+            "sensors.no-stretch", quantity="assumed, over", given=given, longest=LONGEST
+        )
+    return start, end

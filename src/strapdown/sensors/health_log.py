@@ -3,24 +3,35 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from strapdown.errors import DataError, Finding
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.sensors.rest import MAX_ACCEL_SD, MAX_GYRO_SD, QUIET_FACTOR, QUIET_QUANTILE, ROUNDING
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import check_columns, check_time, index_of, source_of, values_of
 
+__all__ = [
+    "Blocks",
+    "ChannelFault",
+    "HealthLog",
+    "equal_runs",
+    "health_log",
+    "intervals_of",
+    "known_median",
+    "longest_by_chance",
+    "tail_limit",
+]
+
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-
-__all__ = ["Blocks", "ChannelFault", "HealthLog", "health_log", "intervals_of"]
 
 # Long enough for a standard deviation and a mean, short enough to say when.
 BLOCK = 1.0  # s
@@ -282,3 +293,99 @@ def _blocks(log: HealthLog) -> Blocks:
 def usual(values: Array) -> float:
     """Median, nan of nothing."""
     return float(np.median(values)) if values.size else math.nan
+
+
+# What a quantity exceeds by chance, told by the tail of its own values over a record.
+
+
+def tail_limit(
+    values: ArrayLike, near: int, far: int, false_alarm: float, *, slack: float = 1.0
+) -> float:
+    """Extrapolate the tail of a record's own values.
+
+    Parameters
+    ----------
+    values : array_like, (m,)
+        Most of them sound.
+    near, far : int
+        Ranks from the largest, ``near > far``, between which the tail is told. Fewer than `far`
+        that are not sound hardly move it.
+    false_alarm : float
+        Probability that the largest of the sound ones exceeds the limit.
+    slack : float
+        Factor on the scale of the tail.
+
+    Returns
+    -------
+    float
+        ``u + slack e ln(far / false_alarm)`` with u of rank `far` and the scale
+        ``e = (u - v) / ln(near / far)``, v of rank `near`: exact for a geometric or exponential
+        tail, too high for a normal one. Infinite where there are fewer than `near` values, or
+        `far` is none.
+
+    Notes
+    -----
+    Peaks over a threshold with the shape parameter zero (Coles 2001, An Introduction to
+    Statistical Modeling of Extreme Values, section 4.2), the scale from two order statistics,
+    which a few outliers do not move.
+    """
+    x = np.asarray(values, dtype=np.float64)
+    if far < 1 or near <= far or x.size < near:
+        return math.inf
+    ordered = np.partition(x, [x.size - near, x.size - far])
+    v, u = float(ordered[x.size - near]), float(ordered[x.size - far])
+    return u + slack * (u - v) / math.log(near / far) * math.log(far / false_alarm)
+
+
+# Runs of samples that repeat a value, and how long they are where nothing is wrong.
+
+Indices = NDArray[np.int64]
+
+
+def equal_runs(v: Array) -> tuple[Indices, Indices]:
+    """Beginnings and lengths of runs of equal values; a NaN is equal to none.
+
+    Parameters
+    ----------
+    v : ndarray, (n,)
+
+    Returns
+    -------
+    starts, lengths : ndarray of int, (m,)
+    """
+    starts = np.flatnonzero(np.concatenate([[True], np.diff(v) != 0.0]))
+    return starts.astype(np.int64), np.diff(np.append(starts, v.size)).astype(np.int64)
+
+
+def longest_by_chance(repeats: Array, samples: int, false_alarm: float) -> Array:
+    """Length that a run of independent repetitions exceeds with a given probability at most.
+
+    Parameters
+    ----------
+    repeats : ndarray, (k,)
+        Probability that a sample repeats the one before it, from 0 to 1.
+    samples : int
+        Of the record: a run may begin at each.
+    false_alarm : float
+        Probability that any run of the record is longer.
+
+    Returns
+    -------
+    ndarray, (k,)
+        ``1 + ln(false_alarm / n) / ln(r)``: the expected number of runs of L and more,
+        ``n (1 - r) r^(L-1)``, is then below `false_alarm`. Infinite for r = 1.
+    """
+    r = np.clip(repeats, 1e-300, 1.0)
+    with np.errstate(divide="ignore"):
+        limit = 1.0 + math.log(false_alarm / samples) / np.log(r)
+    return np.where(r < 1.0, limit, np.inf)
+
+
+# The median of what is known.
+
+
+def known_median(values: Array, axis: int) -> Array:
+    """Return the median along an axis of what is no NaN; NaN, without a warning, of nothing."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)
+        return np.asarray(np.nanmedian(values, axis=axis))

@@ -11,13 +11,16 @@ import pandas as pd
 
 from strapdown.earth import gravity as normal_gravity
 from strapdown.errors import ConfigError, Finding
-from strapdown.sensors.health_jump import find_jumps
 from strapdown.sensors.health_log import ChannelFault, HealthLog, health_log
-from strapdown.sensors.health_noise import find_noisy
-from strapdown.sensors.health_range import find_saturated
-from strapdown.sensors.health_rest import find_implausible
-from strapdown.sensors.health_stuck import find_missing, find_stuck
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.sensors.health_tests import (
+    find_implausible,
+    find_jumps,
+    find_missing,
+    find_noisy,
+    find_saturated,
+    find_stuck,
+)
+from strapdown.sensors.uncertainty import ImuUncertainty
 
 __all__ = ["FALSE_ALARM", "TESTS", "ChannelFault", "HealthTest", "ImuHealth", "check_imu_channels"]
 

@@ -10,11 +10,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.dsp.local_slope import LocalSlope, local_slope
+from strapdown.dsp.derivative import LocalSlope, local_slope
 from strapdown.errors import ConfigError
 from strapdown.rotation import cross_matrix
-from strapdown.sensors.prepared_unit import PreparedUnit
-from strapdown.sensors.triad_numbers import triple
+from strapdown.sensors.pre_crash import PreparedUnit
+from strapdown.sensors.triad_errors import triple
 from strapdown.tables import ACCEL, GYRO, check_imu, imu_table
 from strapdown.tables.checks import check_columns
 

@@ -4,26 +4,42 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.sensors.axis_voting import AxisVoting, VotingState
-from strapdown.sensors.fused_axes import fused_drift, fused_noise, fused_uncertainty
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
-from strapdown.sensors.known_median import known_median
-from strapdown.sensors.mounted_unit import MountedUnit
-from strapdown.sensors.unit_checks import SAME_STAMP
-from strapdown.sensors.vote_events import VoteEvent, told_events
-from strapdown.sensors.voting_rule import AxisErrors, VotingRule
+from strapdown.sensors.axis_voting import (
+    AxisErrors,
+    AxisEvent,
+    AxisVote,
+    AxisVoting,
+    VotingRule,
+    VotingState,
+)
+from strapdown.sensors.crash_unit import SAME_STAMP
+from strapdown.sensors.health_log import WORDS, known_median
+from strapdown.sensors.uncertainty import BiasDrift, ImuUncertainty, TriadUncertainty
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import check_columns, check_time, index_of, source_of, values_of
 
-Array = NDArray[np.float64]
+__all__ = [
+    "MountedUnit",
+    "UnitVoting",
+    "UnitVotingState",
+    "VoteEvent",
+    "VotedImu",
+    "fused_drift",
+    "fused_noise",
+    "fused_uncertainty",
+    "told_events",
+    "vote_units",
+]
 
-__all__ = ["MountedUnit", "UnitVoting", "UnitVotingState", "VoteEvent", "VotedImu", "vote_units"]
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,3 +285,162 @@ def vote_units(
     rate = float((time.size - 1) / (time[-1] - time[0]))
     voting = UnitVoting(units, rate, VotingRule() if rule is None else rule)
     return voting.advance(voting.begin(), tables)[1]
+
+
+# One of several inertial units on a body: its errors, and how it is turned in the body.
+
+
+# Of a mounting: how far it may be from a rotation.
+ROTATION = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class MountedUnit:
+    """What is known of a unit before it is switched on.
+
+    Attributes
+    ----------
+    name : str
+    uncertainty : ImuUncertainty
+        Its noise, bias, scale factor and so on, of its own axes; the misalignment with that of its
+        mounting.
+    mounting : array_like, (3, 3)
+        ``C``, with which a vector in the unit's axes becomes one in body axes, ``C v``.
+
+    Raises
+    ------
+    ConfigError
+        The mounting is no rotation.
+    """
+
+    name: str
+    uncertainty: ImuUncertainty
+    mounting: ArrayLike = field(default_factory=lambda: np.eye(3))
+
+    def __post_init__(self) -> None:
+        c = np.asarray(self.mounting, dtype=np.float64)
+        good = c.shape == (3, 3) and np.isfinite(c).all()
+        if not good or np.abs(c @ c.T - np.eye(3)).max() > ROTATION or np.linalg.det(c) < 0.0:
+            raise ConfigError("sensors.mounting-no-rotation", file=self.name, quantity="mounting")
+        object.__setattr__(self, "mounting", c)
+
+
+# What a vote of units decided, in words.
+
+
+@dataclass(frozen=True)
+class VoteEvent:
+    """Something that the vote decided.
+
+    Attributes
+    ----------
+    kind : {'excluded', 'readmitted', 'disagree'}
+    channels : tuple of str
+        As ``A.gyro_x``; of a disagreement the most likely.
+    time, since : float, s
+        When it was decided, and from when on the disagreement has lasted.
+    size : float, rad/s or m/s²
+        How far the first channel is off what the others tell.
+    chi_square, limit : float
+    finding : Finding
+    """
+
+    kind: str
+    channels: tuple[str, ...]
+    time: float
+    since: float
+    size: float
+    chi_square: float
+    limit: float
+    finding: Finding
+
+
+def told_events(
+    vote: AxisVote, time: Array, columns: Sequence[str], unit: str, before: int
+) -> list[VoteEvent]:
+    """Events of a vote in words; `before` samples went before the segment."""
+    return [_event(e, time, columns, unit, before) for e in vote.events]
+
+
+def _event(
+    event: AxisEvent, time: Array, columns: Sequence[str], unit: str, before: int
+) -> VoteEvent:
+    channels = tuple(columns[k] for k in event.axes)
+    when = float(time[event.row])
+    step = float(time[1] - time[0]) if time.size > 1 else 0.0
+    since = float(time[event.since]) if event.since >= 0 else float(time[0] + event.since * step)
+    code = {
+        "readmitted": "sensors.channel-readmitted",
+        "excluded": "sensors.channel-excluded",
+        "disagree": "sensors.channels-disagree",
+    }[event.kind]
+    if event.kind == "excluded" and len(channels) > 1:
+        code = "sensors.unit-excluded"
+    finding = Finding(
+        code,
+        row=before + event.row + 1,
+        quantity=channels[0],
+        channels=[_words(c) for c in channels],
+        name=channels[0].split(".")[0],
+        time=when,
+        since=since,
+        size=abs(event.size),
+        unit=unit,
+        chi_square=event.chi_square,
+        limit=event.limit,
+    )
+    return VoteEvent(
+        event.kind, channels, when, since, event.size, event.chi_square, event.limit, finding
+    )
+
+
+def _words(channel: str) -> str:
+    name, column = channel.rsplit(".", 1)
+    return f"{WORDS[column]} of unit {name}"
+
+
+# What is not known of the vector that redundant axes tell together.
+
+Mask = NDArray[np.bool_]
+
+
+def fused_noise(voting: AxisVoting, used: Mask) -> Array:
+    """Noise density of the fused axes at each sample.
+
+    Parameters
+    ----------
+    voting : AxisVoting
+    used : ndarray of bool, (n, m)
+        Axes that the vector is made of.
+
+    Returns
+    -------
+    ndarray, (n, 3), u/√Hz
+    """
+    out = np.empty((len(used), 3))
+    code = used @ (2 ** np.arange(used.shape[1], dtype=np.int64))
+    for value in np.unique(code):
+        at = code == value
+        mask = used[int(np.argmax(at))]
+        covariance = voting.covariance(mask, voting.errors.noise_density**2)
+        out[at] = np.sqrt(np.diagonal(covariance))
+    return out
+
+
+def fused_uncertainty(voting: AxisVoting) -> TriadUncertainty:
+    """Noise, bias, scale, misalignment and g-sensitivity of the vector of all axes."""
+    e, everything = voting.errors, np.ones(len(voting.errors.bias), dtype=bool)
+    parts: dict[str, Any] = {}
+    for name in ("noise_density", "bias", "scale", "misalignment", "g_sensitivity"):
+        variance = np.asarray(getattr(e, name)) ** 2
+        x, y, z = np.sqrt(np.diagonal(voting.covariance(everything, variance))).tolist()
+        parts[name] = (x, y, z)
+    return TriadUncertainty(**parts)
+
+
+def fused_drift(voting: AxisVoting) -> BiasDrift:
+    """Drift of the bias of the vector of all axes."""
+    e, everything = voting.errors, np.ones(len(voting.errors.bias), dtype=bool)
+    x, y, z = np.sqrt(np.diagonal(voting.covariance(everything, e.drift**2))).tolist()
+    # The shortest: what the slower ones do is allowed for too early.
+    return BiasDrift((x, y, z), float(e.correlation_time.min()))

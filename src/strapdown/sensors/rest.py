@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from strapdown.errors import DataError
-from strapdown.results.rests import RestStretch
+from strapdown.results.rests import GyroBiasCourse, RestStretch
 from strapdown.sensors.triad_errors import triad_of
 from strapdown.tables import ACCEL, GYRO
+
+__all__ = [
+    "find_rests_of_every_grade",
+    "find_shaking_rests",
+    "gyro_bias_at",
+    "gyro_bias_from_rests",
+    "without_gyro_bias",
+]
+
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -207,3 +217,246 @@ def of_one_bias(rests: list[RestStretch]) -> tuple[RestStretch, ...]:
     return tuple(
         r for r in rests if np.linalg.norm(np.subtract(r.gyro_mean, least.gyro_mean)) <= SAME_BIAS
     )
+
+
+# Rests that are shaken: a parked car with people in it, a sensor on a running machine.
+
+
+# What shakes about one attitude has means over half a second that stay; what drives does not.
+# In a car of 2 to 14 m/s on streets and in one on a motorway, no window of 4 s had means that
+# scatter by less than 0.33 deg/s and 0.084 m/s² (both axes' worth together); parked with people
+# getting in and doors slammed they scatter by 0.03 to 0.19 deg/s and 0.004 to 0.061 m/s².
+SHAKING_REST_WINDOW = 4.0  # s
+BLOCKS = 8
+STEP = 1.0  # s
+MAX_GYRO_SCATTER = 0.0044  # rad/s, 0.25 deg/s: root of the summed variances of the block means
+MAX_ACCEL_SCATTER = 0.065  # m/s²
+# A hand or a foot exceeds these whatever its means do, and so does a vibrating motor mount.
+SHAKING_REST_MAX_GYRO_SD = 0.1  # rad/s
+SHAKING_REST_MAX_ACCEL_SD = 1.0  # m/s²
+NEAR_GRAVITY = (0.8 * 9.81, 1.2 * 9.81)  # m/s²
+
+
+def find_shaking_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
+    """Find stretches that shake about one attitude, from what is slow in the signals.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        An Imu table with acceleration.
+
+    Returns
+    -------
+    tuple of RestStretch
+        In order of time, each at least 4 s long, of grade ``shaking``; those that
+        `sensors.rest.find_rests` finds are found again where they last so long. Empty without
+        an accelerometer: a gyro alone cannot tell a parked car from a straight road.
+
+    Notes
+    -----
+    A window of 4 s is cut into eight parts. It is a rest where the means of the parts of the
+    gyro stay within 0.25 deg/s, and those of the specific force within 65 mm/s². Motion at a
+    constant velocity on a perfect road is the same to every inertial sensor: this is why the
+    limits are what roads do not keep, and why the grade says so.
+    """
+    if not set(ACCEL) <= set(imu.columns):
+        return ()
+    time = imu.index.to_numpy(dtype=np.float64)
+    values = imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64)
+    spans: list[tuple[float, float]] = []
+    for start in np.arange(time[0], time[-1] - SHAKING_REST_WINDOW + 1e-9, STEP):
+        if not _shakes_in_place(time, values, float(start)):
+            continue
+        if spans and start <= spans[-1][1]:
+            spans[-1] = (spans[-1][0], float(start) + SHAKING_REST_WINDOW)
+        else:
+            spans.append((float(start), float(start) + SHAKING_REST_WINDOW))
+    return of_one_bias([rest_between(imu, a, b, grade="shaking") for a, b in spans])
+
+
+def _shakes_in_place(time: Array, values: Array, start: float) -> bool:
+    edges = np.searchsorted(time, start + np.linspace(0.0, SHAKING_REST_WINDOW, BLOCKS + 1))
+    if np.diff(edges).min() < 3:
+        return False
+    whole = values[edges[0] : edges[-1]]
+    mean, variance = whole.mean(axis=0), whole.var(axis=0)
+    if (
+        np.sqrt(variance[:3].sum()) > SHAKING_REST_MAX_GYRO_SD
+        or np.sqrt(variance[3:].sum()) > SHAKING_REST_MAX_ACCEL_SD
+    ):
+        return False
+    size = float(np.sqrt(mean[3:] @ mean[3:]))
+    if not NEAR_GRAVITY[0] <= size <= NEAR_GRAVITY[1]:
+        return False
+    if np.sqrt(mean[:3] @ mean[:3]) > MAX_MEAN_RATE:
+        return False
+    means = np.add.reduceat(whole, edges[:-1] - edges[0], axis=0) / np.diff(edges)[:, None]
+    scatter = means.var(axis=0)
+    return bool(
+        np.sqrt(scatter[:3].sum()) <= MAX_GYRO_SCATTER
+        and np.sqrt(scatter[3:].sum()) <= MAX_ACCEL_SCATTER
+    )
+
+
+def find_rests_of_every_grade(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
+    """Find the still rests of a log, and between them those that shake.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        An Imu table.
+
+    Returns
+    -------
+    tuple of RestStretch
+        In order of time, none overlapping another. A shaking rest that meets a still one is
+        one rest: it reaches as far as both do, and is of grade ``shaking``, where it is longer
+        by more than a window on either side; else the still one stands as it is.
+    """
+    still = list(find_rests(imu))
+    found: list[RestStretch] = []
+    for shaking in find_shaking_rests(imu):
+        inside = [r for r in still if r.start < shaking.end and shaking.start < r.end]
+        start = min([shaking.start, *(r.start for r in inside)])
+        end = max([shaking.end, *(r.end for r in inside)])
+        covered = sum(r.end - r.start for r in inside)
+        if inside and end - start - covered <= SHAKING_REST_WINDOW:
+            continue
+        still = [r for r in still if r not in inside]
+        whole = rest_between(imu, start, end, grade="shaking") if inside else shaking
+        found.append(replace(whole, grade="shaking"))
+    # A still rest may reach into two shaking ones.
+    return _apart(sorted([*still, *found], key=lambda r: r.start), imu)
+
+
+def _apart(rests: list[RestStretch], imu: pd.DataFrame) -> tuple[RestStretch, ...]:
+    apart: list[RestStretch] = []
+    for rest in rests:
+        if apart and rest.start <= apart[-1].end:
+            last = apart.pop()
+            rest = rest_between(imu, last.start, max(last.end, rest.end), grade="shaking")
+        apart.append(rest)
+    return tuple(apart)
+
+
+# The bias of a gyro over a log, from its rests.
+
+
+# A simulation without noise knows its means to rounding.
+LEAST_SD = 1e-12  # rad/s
+
+
+def gyro_bias_from_rests(rests: Sequence[RestStretch]) -> GyroBiasCourse:
+    """Estimate the bias of a gyro, and how it drifts, from the rests of a log.
+
+    Parameters
+    ----------
+    rests : sequence of RestStretch
+        At least one, in order of time. The rate of the Earth is part of what is found: up to
+        15 deg/h, and not the same in two poses.
+
+    Returns
+    -------
+    GyroBiasCourse
+        A weighted average, a straight line by least squares, and the rests themselves, between
+        which `gyro_bias_at` interpolates. Where the rests scatter by more than their own sd,
+        the sd of average and slope are widened by the ratio (Birge 1932,
+        doi:10.1103/PhysRev.40.207).
+
+    Raises
+    ------
+    DataError
+        There is no rest, or they are not in order of time.
+    """
+    if not rests:
+        raise DataError("sensors.no-stationary-stretch-found-take", quantity="gyro bias")
+    time = np.array([0.5 * (r.start + r.end) for r in rests])
+    if (np.diff(time) <= 0.0).any():
+        raise DataError("sensors.rests-not-order-time", quantity="gyro bias")
+    mean = np.array([r.gyro_mean for r in rests], dtype=np.float64)
+    sd = np.maximum(np.array([_mean_sd(r) for r in rests]), LEAST_SD)
+    weight = sd**-2.0
+    average = (weight * mean).sum(axis=0) / weight.sum(axis=0)
+    average_sd = weight.sum(axis=0) ** -0.5
+    if len(rests) == 1:
+        return GyroBiasCourse(
+            _floats(time),
+            _triples(mean),
+            _triples(sd),
+            *_triples([average, average_sd]),
+            *[None] * 3,
+        )
+    scatter = np.sqrt((weight * (mean - average) ** 2).sum(axis=0) / (len(rests) - 1))
+    drift, drift_sd = _slope(time, mean, weight)
+    average_sd = average_sd * np.maximum(1.0, scatter)
+    return GyroBiasCourse(
+        _floats(time),
+        _triples(mean),
+        _triples(sd),
+        *_triples([average, average_sd]),
+        *_triples([drift, drift_sd, scatter]),
+    )
+
+
+def _mean_sd(rest: RestStretch) -> tuple[float, float, float]:
+    # A rest that was made by hand may carry no sd of its mean; that of its samples is wider.
+    return rest.gyro_sd if rest.gyro_mean_sd is None else rest.gyro_mean_sd
+
+
+def _slope(time: Array, mean: Array, weight: Array) -> tuple[Array, Array]:
+    middle = (weight * time[:, None]).sum(axis=0) / weight.sum(axis=0)
+    from_middle = time[:, None] - middle
+    lever = (weight * from_middle**2).sum(axis=0)
+    slope = (weight * from_middle * mean).sum(axis=0) / lever
+    sd = lever**-0.5
+    if len(time) > 2:
+        level = (weight * mean).sum(axis=0) / weight.sum(axis=0)
+        left = mean - level - slope * from_middle
+        sd = sd * np.maximum(1.0, np.sqrt((weight * left**2).sum(axis=0) / (len(time) - 2)))
+    return slope, sd
+
+
+def _floats(values: Array) -> tuple[float, ...]:
+    return tuple(float(v) for v in values)
+
+
+def _triples(rows: ArrayLike) -> tuple[tuple[float, float, float], ...]:
+    return tuple((float(x), float(y), float(z)) for x, y, z in np.asarray(rows))
+
+
+def gyro_bias_at(course: GyroBiasCourse, time: ArrayLike) -> Array:
+    """Bias at any instants.
+
+    Parameters
+    ----------
+    course : GyroBiasCourse
+    time : array_like, (n,), s
+
+    Returns
+    -------
+    ndarray, (n, 3), rad/s
+        On straight lines between the middles of the rests; that of the first rest before it,
+        and that of the last after it.
+    """
+    at, mean = np.asarray(time, dtype=np.float64), np.array(course.mean)
+    return np.column_stack([np.interp(at, course.time, mean[:, k]) for k in range(3)])
+
+
+def without_gyro_bias(imu: pd.DataFrame, course: GyroBiasCourse) -> pd.DataFrame:
+    """Take the bias off the rates of a log.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        An Imu table; it is not changed.
+    course : GyroBiasCourse
+
+    Returns
+    -------
+    DataFrame
+        An Imu table.
+    """
+    out = imu.copy()
+    out.attrs = dict(imu.attrs)
+    out[GYRO] = imu[GYRO].to_numpy(dtype=np.float64) - gyro_bias_at(course, imu.index)
+    return out

@@ -13,22 +13,32 @@ from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.sensors.borrowed_gyro import check_lenders, turned_gyro
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
 from strapdown.sensors.low_pass import time_constant
-from strapdown.sensors.onto_stamps import TriadAtStamps, allowed_stamps, at_rows, onto_stamps
-from strapdown.sensors.synchronise_findings import clipped_findings, cut_findings, end_findings
 from strapdown.sensors.triad_channels import TriadChannels, triad_channels
+from strapdown.sensors.triad_errors import finite
 from strapdown.sensors.unit_clocks import (
+    TriadAtStamps,
     UnitChannels,
     UnitClock,
+    allowed_stamps,
+    at_rows,
     clocks_by_correlation,
     clocks_by_trigger,
+    onto_stamps,
 )
-from strapdown.sensors.units_together import check_options, check_rate, compare_sizes
 from strapdown.sensors.unmeasured import with_filled_axes, with_gyro
-from strapdown.tables import ACCEL, GYRO
+from strapdown.tables import ACCEL, GYRO, SAMPLINGS
+
+__all__ = [
+    "METHODS",
+    "SynchronisedUnit",
+    "SynchronisedUnits",
+    "check_options",
+    "compare_sizes",
+    "synchronise",
+]
+
 
 Array = NDArray[np.float64]
-
-__all__ = ["SynchronisedUnit", "SynchronisedUnits", "synchronise"]
 
 LEAST_STAMPS = 8
 
@@ -337,3 +347,230 @@ def _own(u: SynchronisedUnit) -> tuple[TriadAtStamps, ...]:
 def _last(u: SynchronisedUnit) -> tuple[TriadAtStamps, ...]:
     """The parts behind which there is no wider range."""
     return (*u.accelerometers[-1:], *(() if u.gyro is None or u.lender else (u.gyro,)))
+
+
+# What a person should know of records that were brought to common stamps.
+
+
+# Less of a record than this may be left out without a word.
+WORTH_A_WORD = 0.1  # s
+
+
+def end_findings(
+    units: Sequence[tuple[str, Sequence[TriadAtStamps]]],
+) -> list[Finding]:
+    """Samples near the ends of a record, which a low-pass had to continue."""
+    found = []
+    for name, parts in units:
+        for t in parts:
+            if t.whole.all():
+                continue
+            inner, time = np.flatnonzero(t.whole), t.triad.table.index.to_numpy()
+            found.append(
+                Finding(
+                    "sensors.low-pass-at-ends" if inner.size else "sensors.low-pass-nowhere-whole",
+                    file=f"{name}, {t.triad.name}",
+                    quantity="time",
+                    begin=time[inner[0]] if inner.size else None,
+                    end=time[inner[-1]] if inner.size else None,
+                    noise_factor=float(t.noise_factor.max() / np.median(t.noise_factor)),
+                )
+            )
+    return found
+
+
+def clipped_findings(
+    units: Sequence[tuple[str, Sequence[TriadAtStamps]]],
+) -> list[Finding]:
+    """Samples at the end of the range, where the low-pass hides them from all that comes later."""
+    found = []
+    for name, parts in units:
+        for t in parts:
+            if t.method not in ("decimated", "averaged"):
+                continue
+            time = t.triad.table.index.to_numpy()
+            gyro = GYRO[0] in t.triad.table.columns
+            for k, column in enumerate(GYRO if gyro else ACCEL):
+                rows = np.flatnonzero(t.clipped[:, k])
+                if rows.size:
+                    found.append(
+                        Finding(
+                            "sensors.gyro-clipped-before-resampling"
+                            if gyro
+                            else "sensors.accel-clipped-before-resampling",
+                            file=f"{name}, {t.triad.name}",
+                            quantity=column,
+                            size=rows.size,
+                            time=time[rows[0]],
+                            time_2=time[rows[-1]],
+                        )
+                    )
+    return found
+
+
+def cut_findings(spans: Sequence[tuple[str, float, float]], time: Array) -> list[Finding]:
+    """What was left out of the longest record, because another is shorter.
+
+    Parameters
+    ----------
+    spans : sequence of (source, first, last)
+        What every part can serve, s on the common clock.
+    time : ndarray, (n,), s
+        What all serve.
+    """
+    latest, earliest = max(spans, key=lambda s: s[1]), min(spans, key=lambda s: s[2])
+    first, last = min(spans, key=lambda s: s[1]), max(spans, key=lambda s: s[2])
+    found = []
+    if time[0] - first[1] > WORTH_A_WORD:
+        found.append(
+            Finding(
+                "sensors.begins-last-before-not-used",
+                file=latest[0],
+                quantity="time",
+                latest=latest[1],
+                first=first[0],
+                first_2=first[1],
+            )
+        )
+    if last[2] - time[-1] > WORTH_A_WORD:
+        found.append(
+            Finding(
+                "sensors.ends-first-after-not-used",
+                file=earliest[0],
+                quantity="time",
+                earliest=earliest[2],
+                last=last[0],
+                last_2=last[2],
+            )
+        )
+    return found
+
+
+# What units of one vehicle must be together: names, options, sizes of what they measured.
+
+
+METHODS = ("trigger", "correlation")
+# Rates of one rigid body differ by this factor when one is in deg/s.
+DEGREES_APART = (40.0, 80.0)
+# And specific forces by this when one is in g; they differ from place to place, too.
+G_APART = (8.0, 12.0)
+# Common stamps that are closer than this make work, and no knowledge.
+MOST_FASTER = 10.0
+
+
+def check_options(
+    units: Sequence[CrashUnit], method: str, rate: float, reference: str | None, sampling: str
+) -> None:
+    """Check what was asked of `synchronise`.
+
+    Raises
+    ------
+    ConfigError
+        There is no unit, two have one name, or an option is not understood.
+    """
+    if not units:
+        raise ConfigError("sensors.no-units-given", quantity="units")
+    names = [u.name for u in units]
+    twice = sorted({n for n in names if names.count(n) > 1})
+    if twice:
+        raise ConfigError("sensors.two-units-called", quantity="name", twice=twice[0])
+    if method not in METHODS:
+        raise ConfigError(
+            "sensors.no-way-synchronise",
+            quantity="method",
+            method=method,
+            word=str(method),
+            known=METHODS,
+        )
+    if sampling not in SAMPLINGS:
+        raise ConfigError(
+            "sensors.common-sampling-unknown",
+            quantity="sampling",
+            sampling=sampling,
+            word=str(sampling),
+            known=SAMPLINGS,
+        )
+    if not (finite(rate) and rate > 0.0):
+        raise ConfigError("sensors.common-rate-not-positive", quantity="rate", rate=rate)
+    if reference is not None and reference not in names:
+        raise ConfigError(
+            "sensors.reference-unit-not-among",
+            quantity="reference",
+            reference=reference,
+            word=reference,
+            known=names,
+        )
+
+
+def check_rate(rate: float, steps: Sequence[float]) -> None:
+    """Refuse common stamps that no record has anything to say of.
+
+    Parameters
+    ----------
+    rate : float, Hz
+    steps : sequence of float, s
+        Of the records.
+
+    Raises
+    ------
+    ConfigError
+        The rate is more than ten times that of the fastest.
+    """
+    fastest = 1.0 / min(steps)
+    if rate > MOST_FASTER * fastest:
+        raise ConfigError(
+            "sensors.hz-more-than-times-hz",
+            quantity="rate",
+            rate=rate,
+            most_faster=MOST_FASTER,
+            fastest=fastest,
+        )
+
+
+def compare_sizes(
+    units: Sequence[tuple[TriadChannels | None, tuple[TriadChannels, ...]]],
+) -> list[Finding]:
+    """Compare what units of one rigid body measured, for units of measurement.
+
+    Parameters
+    ----------
+    units : sequence of (gyro or None, accelerometers)
+
+    Returns
+    -------
+    list of Finding
+        Specific forces that differ by about 9.8.
+
+    Raises
+    ------
+    DataError
+        Rates differ by about 57, and they are the same everywhere on the body.
+    """
+    turning = [(gyro.source, _spread(gyro)) for gyro, _ in units if gyro is not None]
+    for one, size in turning:
+        for other, more in turning:
+            if size > 0.0 and DEGREES_APART[0] < more / size < DEGREES_APART[1]:
+                raise DataError(
+                    "sensors.rates-times-those-same-body",
+                    file=other,
+                    quantity="gyro",
+                    more=more / size,
+                    one=one,
+                )
+    forces = [(force[-1].source, _spread(force[-1])) for _, force in units if force]
+    return [
+        Finding(
+            "sensors.specific-force-varies-times-much",
+            file=other,
+            quantity="accel",
+            more=more / size,
+            one=one,
+        )
+        for one, size in forces
+        for other, more in forces
+        if size > 0.0 and G_APART[0] < more / size < G_APART[1]
+    ]
+
+
+def _spread(channels: TriadChannels) -> float:
+    return math.sqrt(sum(float(g.values.var(axis=0).sum()) for g in channels.groups))

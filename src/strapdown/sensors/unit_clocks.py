@@ -4,21 +4,35 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.dsp.decimation import Resampled, decimate, low_pass_design, mean_samples
 from strapdown.dsp.delay import Delay, EvenSignal, find_delay
+from strapdown.dsp.interpolation import interpolate, interpolated_means
+from strapdown.dsp.samples import even_step
 from strapdown.errors import DataError, Finding
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
 from strapdown.sensors.low_pass import time_constant
-from strapdown.sensors.triad_channels import TriadChannels
-from strapdown.sensors.triad_numbers import check_sd
+from strapdown.sensors.saturation import RangeLimits, find_limits
+from strapdown.sensors.triad_channels import OVER_RANGE, AxisGroup, TriadChannels
+from strapdown.sensors.triad_errors import check_sd
+
+__all__ = [
+    "TriadAtStamps",
+    "UnitClock",
+    "allowed_stamps",
+    "at_rows",
+    "clocks_by_correlation",
+    "clocks_by_trigger",
+    "onto_stamps",
+]
+
 
 Array = NDArray[np.float64]
-
-__all__ = ["UnitClock", "clocks_by_correlation", "clocks_by_trigger"]
 
 # Triggers and correlation that differ by more standard deviations contradict each other.
 CONTRADICTION = 4.0
@@ -200,3 +214,258 @@ def _length(channels: TriadChannels) -> EvenSignal:
             square += np.interp(time, g.time, values) ** 2
     shift = 0.5 * step if channels.sampling == "mean" else 0.0
     return EvenSignal(channels.start - shift, step, np.sqrt(square)[:, None])
+
+
+# Channels of a triad at common stamps: a faster one without aliasing, a slower interpolated.
+
+Flags = NDArray[np.bool_]
+
+# Stamps that agree to this part of a step are the same.
+SAME_STAMP = 1e-3
+# A rate that is higher by less is the same, of a clock that is off.
+SAME_RATE = 1.01
+# A sample at this part of the range was held there.
+AT_END = 0.999
+
+
+@dataclass(frozen=True, eq=False)
+class TriadAtStamps:
+    """A triad at the common stamps.
+
+    Attributes
+    ----------
+    triad : RecordedTriad
+        Its `uncertainty` is the recorded one: the density of the noise at low frequencies, which
+        is what integrals see, is as it was. What a single sample scatters by is `noise`.
+    noise_factor : ndarray, (n, 3)
+        Standard deviation of a sample per that of a recorded sample, exact for white noise.
+    noise : ndarray, (n, 3), u
+        Standard deviation of each sample by the stated density: ``density/√dt``, dt the recorded
+        step, times `noise_factor`.
+    clipped : ndarray of bool, (n, 3)
+        Whether a recorded sample at the end of the range counts in the sample.
+    whole : ndarray of bool, (n,)
+        False where the end of the record was continued to make the sample.
+    method : str
+        'as recorded', 'decimated', 'averaged' or 'interpolated'.
+    """
+
+    triad: RecordedTriad
+    noise_factor: Array
+    noise: Array
+    clipped: Flags
+    whole: Flags
+    method: str
+
+
+def allowed_stamps(
+    channels: TriadChannels, offset: float, rate: float, sampling: str
+) -> tuple[float, float]:
+    """First and last common stamp that a triad can serve.
+
+    Parameters
+    ----------
+    channels : TriadChannels
+    offset : float, s
+        Common time is the unit's stamp less this.
+    rate : float, Hz
+    sampling : {'instantaneous', 'mean'}
+        Of the output.
+    """
+    lows, highs = [], []
+    for g in channels.groups:
+        own = g.step if channels.sampling == "mean" else 0.0
+        low, high = g.time[0], g.time[-1]
+        if _is_faster(g, rate):
+            # Means of means need the whole of the first step; a kernel its middle.
+            low, high = (low - own, high) if sampling == "mean" else (low - own / 2, high - own / 2)
+            low += 1.0 / rate if sampling == "mean" else 0.0
+        elif not _same_kind_and_rate(g, channels.sampling, rate, sampling):
+            low, high = low - own / 2, high - own / 2
+            if sampling == "mean":
+                shift = 1.0 / rate if own == 0.0 else 0.5 / rate
+                low, high = low + shift, high + (0.0 if own == 0.0 else 0.5 / rate)
+        lows.append(low - offset)
+        highs.append(high - offset)
+    return float(max(lows)), float(min(highs))
+
+
+def onto_stamps(
+    channels: TriadChannels,
+    triad: RecordedTriad,
+    columns: list[str],
+    offset: float,
+    stamps: Array,
+    rate: float,
+    sampling: str,
+    attenuation: float,
+) -> tuple[TriadAtStamps, list[Finding]]:
+    """Bring a triad to common stamps.
+
+    Parameters
+    ----------
+    channels : TriadChannels
+    triad : RecordedTriad
+        What `channels` are of.
+    columns : list of str
+    offset : float, s
+        Common time is the unit's stamp less this.
+    stamps : ndarray, (n,), s
+        On the common clock, within `allowed_stamps`.
+    rate : float, Hz
+    sampling : {'instantaneous', 'mean'}
+    attenuation : float, dB
+        Of what would be aliased, for instantaneous output.
+
+    Raises
+    ------
+    DataError
+        Faster samples are not even, or the record is shorter than the low-pass.
+    """
+    n = len(stamps)
+    values, factor, noise = (np.empty((n, 3)) for _ in range(3))
+    clipped, whole = np.zeros((n, 3), dtype=bool), np.ones(n, dtype=bool)
+    limits = np.array(triad.uncertainty.axis("full_scale"))
+    steps = np.array(triad.uncertainty.axis("quantization"))
+    density = np.array(triad.uncertainty.axis("noise_density"))
+    methods, findings = [], []
+    for g in channels.groups:
+        axes = list(g.axes)
+        # What reads more than it is said to be able to has another end, and is not cut there.
+        over = np.abs(g.values).max(axis=0) > OVER_RANGE * limits[axes]
+        stated = np.where(over, np.inf, limits[axes])
+        ends = find_limits(g.time, g.values, stated, steps[axes])
+        held = ends.clipped | (np.abs(g.values) >= AT_END * stated)
+        at, method = _resample(channels, g, held, offset, stamps, rate, sampling, attenuation)
+        values[:, axes], factor[:, axes] = at.values, at.noise_factor[:, None]
+        if method == "interpolated":
+            values[:, axes] = _held(g, held, at.values, stamps + offset, ends)
+        noise[:, axes] = at.noise_factor[:, None] * density[axes] / np.sqrt(g.step)
+        clipped[:, axes] = at.touched
+        whole &= at.whole
+        methods.append(method)
+        findings += _said(channels.source, [columns[a] for a in axes], g, method, rate)
+    table = pd.DataFrame(values, index=pd.Index(stamps, name="time"), columns=columns)
+    table.attrs = {**triad.table.attrs, "sampling": sampling, "source": channels.source}
+    order = ("decimated", "averaged", "interpolated", "as recorded")
+    result = TriadAtStamps(
+        RecordedTriad(table, triad.uncertainty, triad.name, absent=triad.absent),
+        factor,
+        noise,
+        clipped,
+        whole,
+        next(m for m in order if m in methods),
+    )
+    return result, findings
+
+
+def at_rows(triad: TriadAtStamps, stamps: Array, rate: float) -> TriadAtStamps:
+    """The same triad at some of its stamps.
+
+    Parameters
+    ----------
+    triad : TriadAtStamps
+    stamps : ndarray, (m,), s
+        Consecutive, among those of the triad.
+    rate : float, Hz
+        Of both.
+    """
+    table = triad.triad.table
+    first = round((stamps[0] - float(table.index[0])) * rate)
+    rows = slice(first, first + len(stamps))
+    part = table.iloc[rows]
+    part.attrs = dict(table.attrs)
+    return TriadAtStamps(
+        replace(triad.triad, table=part, held=None),
+        triad.noise_factor[rows],
+        triad.noise[rows],
+        triad.clipped[rows],
+        triad.whole[rows],
+        triad.method,
+    )
+
+
+def _held(g: AxisGroup, held: Flags, values: Array, at: Array, ends: RangeLimits) -> Array:
+    """Values between samples, at the end of the range where the nearest sample was held there.
+
+    A polynomial through a held stretch swings about it: the end would no longer be seen for one.
+    """
+    nearest = np.clip(np.rint((at - g.time[0]) / g.step).astype(np.int64), 0, len(g.time) - 1)
+    inside = np.clip(values, ends.lower, ends.upper)
+    end = np.where(g.values[nearest] > 0.0, ends.upper, ends.lower)
+    return np.where(held[nearest], end, inside)
+
+
+def _is_faster(g: AxisGroup, rate: float) -> bool:
+    return 1.0 / g.step > SAME_RATE * rate
+
+
+def _same_kind_and_rate(g: AxisGroup, own: str, rate: float, wanted: str) -> bool:
+    return own == wanted and abs(g.step * rate - 1.0) < SAME_RATE - 1.0
+
+
+def _resample(
+    channels: TriadChannels,
+    g: AxisGroup,
+    held: Flags,
+    offset: float,
+    stamps: Array,
+    rate: float,
+    sampling: str,
+    attenuation: float,
+) -> tuple[Resampled, str]:
+    own = g.step if channels.sampling == "mean" else 0.0
+    at = stamps + offset
+    if _is_faster(g, rate):
+        try:
+            step = even_step(g.time)
+        except DataError as error:
+            raise error.replaced(file=channels.source) from None
+        try:
+            if sampling == "mean":
+                return mean_samples(
+                    g.values,
+                    g.time[0],
+                    step,
+                    at,
+                    1.0 / rate,
+                    sampling=channels.sampling,
+                    marked=held,
+                ), "averaged"
+            design = low_pass_design(step, rate, attenuation=attenuation)
+            return decimate(
+                g.values, g.time[0] - 0.5 * own, step, at, design, marked=held
+            ), "decimated"
+        except DataError as error:
+            raise error.replaced(file=channels.source) from None
+    if _same_kind_and_rate(g, channels.sampling, rate, sampling):
+        first = int(np.argmin(np.abs(g.time - at[0])))
+        near = g.time[first : first + len(at)]
+        if len(near) == len(at) and np.abs(near - at).max() < SAME_STAMP * g.step:
+            rows = slice(first, first + len(at))
+            one = np.ones(len(at))
+            return Resampled(g.values[rows], one, one > 0.0, held[rows]), "as recorded"
+        return interpolate(g.time, g.values, at, marked=held), "interpolated"
+    centred = g.time - 0.5 * own
+    if sampling == "mean" and own == 0.0:
+        return interpolated_means(centred, g.values, at, 1.0 / rate, marked=held), "interpolated"
+    middle = at - (0.5 / rate if sampling == "mean" else 0.0)
+    return interpolate(centred, g.values, middle, marked=held), "interpolated"
+
+
+def _said(source: str, names: list[str], g: AxisGroup, method: str, rate: float) -> list[Finding]:
+    own = 1.0 / g.step
+    # Of a like rate and other instants only, nothing is lost that a person should know of.
+    if method != "interpolated" or own * SAME_RATE > rate:
+        return []
+    return [
+        Finding(
+            "sensors.hz-slower-than-common-stamps",
+            file=source,
+            quantity="time",
+            names=names,
+            own=own,
+            rate=rate,
+            own_2=own / 8.0,
+        )
+    ]

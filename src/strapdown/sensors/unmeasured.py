@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError, Finding
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
 from strapdown.sensors.triad_errors import Triad
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.tables import ACCEL, GYRO
 
 Array = NDArray[np.float64]

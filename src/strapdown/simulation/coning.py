@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
 from strapdown.errors import ConfigError
-from strapdown.simulation.flat_motion import FlatMotion
+from strapdown.simulation.motion import FlatMotion
 
 Array = NDArray[np.float64]
 
@@ -160,3 +161,176 @@ class Coning(FlatMotion):
         u -= (u @ n) * n
         u /= np.linalg.norm(u)
         return u, np.cross(n, u), n
+
+
+# Sculling: a body that swings about one axis and is shaken along another, in closed form.
+
+Complex = NDArray[np.complex128]
+Whole = NDArray[np.int64]
+# Harmonics kept on each side: J_m(pi) of the next is under 1e-24.
+HARMONICS = 28
+
+
+@dataclass(frozen=True)
+class Sculling(FlatMotion):
+    """An angular vibration, and a linear one of the same frequency along a body axis across it.
+
+    The body turns by ``α sin Ωt`` about n. Along the body axis e, which stands across n, it is
+    accelerated by ``B sin(Ωt + ψ)``. In phase (ψ = 0) this drives it along n x e with a steady
+    ``B J1(α)``, though no accelerometer reads a steady force; in quadrature (ψ = 90°) what is
+    left of a cycle is distance.
+
+    Attributes
+    ----------
+    swing : float, deg
+        α, above 0 and at most 180.
+    push : float, m/s²
+        B.
+    frequency : float, Hz
+    duration : float, s
+    phase : float, deg
+        ψ.
+    swing_axis, push_axis : tuple of float
+        n and e in body axes, across each other; any length but zero.
+    q_nb : tuple of float
+        Mean attitude, scalar first.
+
+    Raises
+    ------
+    ConfigError
+        A number is out of its range, or the axes do not stand across each other.
+
+    Notes
+    -----
+    With ``z = e + i (n x e)`` the acceleration is ``B exp(iα sin Ωt) sin(Ωt + ψ)``, by
+    Jacobi and Anger (DLMF 10.12.1) a sum of ``B/2i (J[m-1](α) exp(iψ) - J[m+1](α) exp(-iψ))
+    exp(imΩt)``, whose integrals are closed.
+    """
+
+    swing: float
+    push: float
+    frequency: float
+    duration: float
+    phase: float = 0.0
+    swing_axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    push_axis: tuple[float, float, float] = (0.0, 1.0, 0.0)
+    q_nb: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        for name, value, most, unit in (
+            ("swing", self.swing, 180.0, "deg"),
+            ("push", self.push, np.inf, "m/s2"),
+            ("frequency", self.frequency, np.inf, "Hz"),
+            ("duration", self.duration, np.inf, "s"),
+        ):
+            if not (0.0 < value <= most and np.isfinite(value)):
+                raise ConfigError(
+                    "simulation.sculling-out-of-range"
+                    if np.isfinite(most)
+                    else "simulation.sculling-not-positive",
+                    quantity=name,
+                    value=value,
+                    unit=unit,
+                    most=most,
+                )
+        if not np.isfinite(self.phase):
+            raise ConfigError("simulation.no-angle", quantity="phase", phase=self.phase)
+        n, e = np.asarray(self.swing_axis), np.asarray(self.push_axis)
+        length = float(np.linalg.norm(n) * np.linalg.norm(e))
+        if not (np.isfinite(length) and length > 0.0 and abs(n @ e) <= 1e-9 * length):
+            raise ConfigError(
+                "simulation.do-not-stand-across-each",
+                quantity="push_axis",
+                swing_axis=self.swing_axis,
+                push_axis=self.push_axis,
+            )
+
+    @property
+    def drift(self) -> float:
+        """The steady acceleration along n x e, ``B J1(α) cos ψ``, m/s²."""
+        from scipy.special import j1
+
+        return float(self.push * j1(self._alpha) * np.cos(self._psi))
+
+    def rate(self, time: ArrayLike) -> Array:
+        """Body rate, (n, 3), rad/s, at instants (n,) in s."""
+        phase = self._cycle(time)
+        return np.asarray(self._alpha * self._omega * np.cos(phase)[:, None] * self._triad[0])
+
+    def angle(self, time: ArrayLike) -> Array:
+        """Integral of the body rate from time zero, (n, 3), rad."""
+        phase = self._cycle(time)
+        return np.asarray(self._alpha * np.sin(phase)[:, None] * self._triad[0])
+
+    def shake(self, time: ArrayLike) -> Array:
+        """Acceleration in body axes, (n, 3), m/s²: specific force but for gravity."""
+        phase = self._cycle(time) + self._psi
+        return np.asarray(self.push * np.sin(phase)[:, None] * self._triad[1])
+
+    def shake_sum(self, time: ArrayLike) -> Array:
+        """Integral of `shake` from time zero, axis by axis, (n, 3), m/s."""
+        phase = self._cycle(time) + self._psi
+        swept = (np.cos(self._psi) - np.cos(phase)) / self._omega
+        return np.asarray(self.push * swept[:, None] * self._triad[1])
+
+    def attitude(self, time: ArrayLike) -> Array:
+        """Exact attitude ``q_nb``, (n, 4)."""
+        turn = rotation.quaternion_from_rotation_vector(self.angle(time))
+        return rotation.compose(np.asarray(self.q_nb, dtype=np.float64), turn)
+
+    def acceleration(self, time: ArrayLike) -> Array:
+        """Exact acceleration, north-east-down, (n, 3), m/s²."""
+        return rotation.rotate(self.attitude(time), self.shake(time))
+
+    def velocity(self, time: ArrayLike) -> Array:
+        """Exact velocity since time zero, north-east-down, (n, 3), m/s."""
+        t, m, g, turned = self._harmonics(time)
+        return self._local(t * g[HARMONICS] + turned @ np.where(m == 0, 0.0, g))
+
+    def position(self, time: ArrayLike) -> Array:
+        """Exact position since time zero, north-east-down, (n, 3), m."""
+        t, m, g, turned = self._harmonics(time)
+        # Of a velocity (exp(imp) - 1)/(im Omega) the integral is that again over im Omega, less
+        # t over im Omega.
+        slow = np.where(m == 0, 0.0, g / (1j * np.where(m == 0, 1, m) * self._omega))
+        return self._local(0.5 * t * t * g[HARMONICS] + turned @ slow - t * slow.sum())
+
+    def _harmonics(self, time: ArrayLike) -> tuple[Array, Whole, Complex, Complex]:
+        """Times, numbers of the harmonics, their amplitudes, and ``int exp(im Omega t) dt``."""
+        from scipy.special import jv
+
+        t = np.asarray(time, dtype=np.float64)
+        m = np.arange(-HARMONICS, HARMONICS + 1)
+        turn = np.exp(1j * self._psi)
+        g = self.push / 2j * (jv(m - 1, self._alpha) * turn - jv(m + 1, self._alpha) / turn)
+        full = np.exp(1j * np.outer(self._cycle(t), m)) - 1.0
+        return t, m, g, full / (1j * np.where(m == 0, 1, m) * self._omega)
+
+    def _local(self, z: Complex) -> Array:
+        _, e, side = self._triad
+        body = z.real[:, None] * e + z.imag[:, None] * side
+        return rotation.rotate(np.asarray(self.q_nb, dtype=np.float64), body)
+
+    @property
+    def _alpha(self) -> float:
+        return float(np.radians(self.swing))
+
+    @property
+    def _psi(self) -> float:
+        return float(np.radians(self.phase))
+
+    @property
+    def _omega(self) -> float:
+        return 2.0 * np.pi * self.frequency
+
+    def _cycle(self, time: ArrayLike) -> Array:
+        # Whole cycles are taken away before pi makes them inexact.
+        cycles = np.fmod(np.asarray(time, dtype=np.float64) * self.frequency, 1.0)
+        return np.asarray(2.0 * np.pi * cycles)
+
+    @cached_property
+    def _triad(self) -> tuple[Array, Array, Array]:
+        n = np.asarray(self.swing_axis, dtype=np.float64)
+        e = np.asarray(self.push_axis, dtype=np.float64)
+        n, e = n / np.linalg.norm(n), e / np.linalg.norm(e)
+        return n, e, np.cross(n, e)

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import ConfigError
 from strapdown.simulation.earth_motion import EarthMotion, Kinematics, Origin, check_duration
-from strapdown.simulation.euler_motion import (
-    euler_attitude,
-    euler_body_acceleration,
-    euler_body_rate,
-)
+from strapdown.simulation.motion import euler_attitude, euler_body_acceleration, euler_body_rate
 from strapdown.simulation.place_integral import PlaceIntegral, integrate_velocity
 
 Array = NDArray[np.float64]
@@ -181,3 +179,206 @@ class CrashMotion(EarthMotion):
     @cached_property
     def _moved(self) -> PlaceIntegral:
         return integrate_velocity(self._velocity, self.breaks, self.origin, self.ellipsoid)
+
+
+# What happens to a vehicle before, in and after an impact, laid down as pulses one by one.
+
+
+Kind = Literal["front", "side", "rear", "rollover"]
+
+#: Where the numbers of a scenario come from, if from nowhere else.
+CHOSEN = "chosen here"
+ROLL, PITCH, HEADING = 0, 1, 2
+# In which brakes take hold, about.
+_RAMP = 0.2  # s
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Where and how a vehicle comes to what happens, and how it comes to rest.
+
+    Attributes
+    ----------
+    origin : Origin
+        Of the vehicle's centre of mass at time zero.
+    heading_deg : float, deg
+    stand : float, s
+        Stationary stretch at the beginning, level.
+    towing : float, m/s²
+        Mean of the acceleration up to the speed of entry; it peaks at twice that.
+    coast : float, s
+        At that speed, until it happens.
+    friction : float
+        Of the tyres on the road afterwards, on the mean over the slide, which peaks at twice it;
+        times g, it takes the speed, and it stops the yaw, half a wheelbase of 1.3 m from the
+        centre of mass. Zero for none.
+    after : float, s
+        How long the motion goes on after the last impact is over, at the least.
+    ellipsoid : Ellipsoid
+
+    Raises
+    ------
+    ConfigError
+        A number is negative or not finite, or the mean acceleration is zero.
+    """
+
+    origin: Origin = field(default_factory=lambda: Origin(45.0, 20.0, 100.0))
+    heading_deg: float = 0.0
+    stand: float = 3.0
+    towing: float = 2.0
+    coast: float = 0.5
+    friction: float = 0.4
+    after: float = 1.0
+    ellipsoid: Ellipsoid = WGS84
+
+    def __post_init__(self) -> None:
+        for name in ("stand", "coast", "friction", "after"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise ConfigError("simulation.value", quantity=name, value=getattr(self, name))
+        if not 0.0 < self.towing < math.inf:
+            raise ConfigError("simulation.towing", quantity="towing", towing=self.towing)
+
+
+class CrashCourse:
+    """Pulses as they are laid down; `time` is where the next begins.
+
+    Vectors come in the axes of the vehicle as it heads at the beginning of the pulse, and level:
+    forward, right, down.
+    """
+
+    def __init__(self, setting: Setting) -> None:
+        self.setting = setting
+        self.time = setting.stand
+        self.pulses: list[HaversinePulse] = []
+
+    def approach(self, speed: float) -> None:
+        """Come to a speed from rest, and coast."""
+        if not 0.0 <= speed < math.inf:
+            raise ConfigError("simulation.speed", quantity="entry_speed", speed=speed)
+        if speed > 0.0:
+            length = speed / self.setting.towing
+            self.push(length, (speed, 0.0, 0.0))
+            self.time += length
+        self.time += self.setting.coast
+
+    def push(
+        self, length: float, change: Triple = _ZERO, rates: Triple = _ZERO, *, delay: float = 0.0
+    ) -> None:
+        """Change velocity (vehicle axes, m/s) and rates of the angles (deg/s) in one pulse.
+
+        Time does not go on: what is pushed next overlaps.
+        """
+        start = self.time + delay
+        heading = math.radians(self.heading(start))
+        sin, cos = math.sin(heading), math.cos(heading)
+        ahead, right, down = change
+        north, east = cos * ahead - sin * right, sin * ahead + cos * right
+        self.pulses.append(HaversinePulse(start, length, (north, east, down), rates))
+
+    def lean(self, axis: int, angle_deg: float, length: float, *, delay: float = 0.0) -> None:
+        """Turn by an angle, from rest to rest, in two pulses."""
+        half, rates = 0.5 * length, [0.0, 0.0, 0.0]
+        for k, sign in enumerate((1.0, -1.0)):
+            rates[axis] = sign * angle_deg / half
+            self.push(half, rates=(rates[0], rates[1], rates[2]), delay=delay + k * half)
+
+    def nod(self, axis: int, angle_deg: float, there: float = 0.2, back: float = 0.4) -> None:
+        """Turn by an angle in one time, and back in another."""
+        if angle_deg != 0.0:
+            self.lean(axis, angle_deg, there)
+            self.lean(axis, -angle_deg, back, delay=there)
+
+    def shift(self, way: Triple, length: float, *, delay: float = 0.0) -> None:
+        """Move by a way in m beside the motion, from rest to rest, in two pulses."""
+        half = 0.5 * length
+        for k, sign in enumerate((1.0, -1.0)):
+            x, y, z = (sign * w / half for w in way)
+            self.push(half, (x, y, z), delay=delay + k * half)
+
+    def brake(self, deceleration: float) -> None:
+        """Brake to a stop at a constant deceleration that comes and goes in about 0.2 s.
+
+        Pulses that each begin in the middle of the one before add up to a constant between.
+        """
+        speed = float(np.hypot(*self.velocity()[:2]))
+        count = max(1, round(speed / (deceleration * _RAMP)))
+        ramp = speed / (deceleration * count)
+        for k in range(count):
+            self.push(2.0 * ramp, (-speed / count, 0.0, 0.0), delay=k * ramp)
+        self.time += (count + 1) * ramp
+
+    def slide(self, gyration_squared: float) -> None:
+        """Let friction take all speed over ground and all yaw rate, in one pulse."""
+        grip = self.setting.friction * STANDARD_GRAVITY
+        north, east, _ = self.velocity()
+        yaw = sum(p.rate_change[HEADING] for p in self.pulses)
+        lasting = max(math.hypot(north, east), abs(math.radians(yaw)) * gyration_squared / 1.3)
+        if grip == 0.0 or lasting == 0.0:
+            return
+        length = lasting / grip
+        self.pulses.append(
+            HaversinePulse(self.time, length, (-north, -east, 0.0), (0.0, 0.0, -yaw))
+        )
+
+    def heading(self, time: float) -> float:
+        """Heading at an instant, deg."""
+        at = np.array([time])
+        turned = (p.rate_change[HEADING] * float(p.gathered(at)[0]) for p in self.pulses)
+        return self.setting.heading_deg + math.fsum(turned)
+
+    def velocity(self) -> Triple:
+        """Velocity north, east, down when all pulses so far are over, m/s."""
+        north, east, down = (math.fsum(p.velocity_change[k] for p in self.pulses) for k in range(3))
+        return north, east, down
+
+    def motion(self) -> CrashMotion:
+        """Motion from time zero until all is over, and `after` from now."""
+        end = max([self.time + self.setting.after, *(p.end for p in self.pulses)])
+        return CrashMotion(
+            end,
+            self.setting.origin,
+            _ZERO,
+            tuple(self.pulses),
+            heading_deg=self.setting.heading_deg,
+            ellipsoid=self.setting.ellipsoid,
+        )
+
+
+@dataclass(frozen=True)
+class CrashScenario:
+    """A motion with an impact in it, or with what could be taken for one.
+
+    Attributes
+    ----------
+    name, summary : str
+    source : str
+        Where its numbers come from.
+    motion : CrashMotion
+        Of the vehicle's centre of mass.
+    start : float, s
+        When it happens, on the clock of the motion.
+    impacts : tuple of float, s
+        When each impact begins; none where there is no crash.
+    delta_v : tuple of triples, m/s
+        What each impact does to the velocity of the centre of mass: forward, right, down as the
+        vehicle heads when it begins.
+    kind : {'front', 'side', 'rear', 'rollover'}, optional
+        Of the first impact.
+    parameters : mapping
+        What it was made with, SI and deg.
+    """
+
+    name: str
+    summary: str
+    source: str
+    motion: CrashMotion
+    start: float
+    impacts: tuple[float, ...] = ()
+    delta_v: tuple[Triple, ...] = ()
+    kind: Kind | None = None
+    parameters: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def is_crash(self) -> bool:
+        """Whether there is an impact."""
+        return bool(self.impacts)

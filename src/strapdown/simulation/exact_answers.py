@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.sensors.crash_unit import Mounting
-from strapdown.simulation.between_samples import mean_between
 from strapdown.simulation.crash_motion import CrashMotion
+from strapdown.simulation.imu import mean_between
 from strapdown.simulation.mounted_motion import MountedMotion
 from strapdown.simulation.vehicle_points import point_kinematics
 

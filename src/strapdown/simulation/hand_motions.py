@@ -2,8 +2,158 @@
 
 from __future__ import annotations
 
-from strapdown.simulation.gesture import Gesture, gesture
-from strapdown.simulation.minimum_jerk import Track
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown.errors import ConfigError
+from strapdown.simulation.minimum_jerk import STILL, Track
+from strapdown.simulation.motion import FlatMotion, Quaternion, euler_attitude, euler_body_rate
+from strapdown.simulation.rate_integral import RateIntegral, integrate_rate
+
+# Motions of a hand: from rest to rest, in rotation and in place.
+
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Gesture(FlatMotion):
+    """Six coordinates, each moving from value to value with least jerk.
+
+    Where all tracks hold, the rate, the velocity and the acceleration are exactly zero, and
+    wherever the values are those of another rest, or whole turns away, the pose is that pose to
+    the last bit (the quaternion apart from its sign).
+
+    Attributes
+    ----------
+    duration : float, s
+    roll, pitch, heading : Track, deg
+        3-2-1 angles from the initial attitude; any number of turns.
+    north, east, down : Track, m
+    q_nb : tuple of float
+        Initial attitude, scalar first.
+
+    Raises
+    ------
+    ConfigError
+        The duration is not positive.
+    """
+
+    duration: float
+    roll: Track = STILL
+    pitch: Track = STILL
+    heading: Track = STILL
+    north: Track = STILL
+    east: Track = STILL
+    down: Track = STILL
+    q_nb: Quaternion = (1.0, 0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.duration < np.inf:
+            raise ConfigError(
+                "simulation.motion-cannot-last", quantity="duration", duration=self.duration
+            )
+
+    def rate(self, time: ArrayLike) -> Array:
+        """Body rate.
+
+        Parameters
+        ----------
+        time : array_like, (n,), s
+
+        Returns
+        -------
+        ndarray, (n, 3), rad/s
+        """
+        angles, rates, _ = self._turned(time)
+        return euler_body_rate(angles, rates)
+
+    def angle(self, time: ArrayLike) -> Array:
+        """Integral of the body rate from time zero.
+
+        Parameters
+        ----------
+        time : array_like, (n,), s
+            Before zero and after the end the integral stays as it is there.
+
+        Returns
+        -------
+        ndarray, (n, 3), rad
+            Within 1e-14 rad and rounding (`rate_integral.integrate_rate`); exactly constant at
+            rest.
+        """
+        return self._integral(time)
+
+    def attitude(self, time: ArrayLike) -> Array:
+        """Exact attitude.
+
+        Parameters
+        ----------
+        time : array_like, (n,), s
+
+        Returns
+        -------
+        ndarray, (n, 4)
+            ``q_nb``, continuous in sign.
+        """
+        return euler_attitude(self._turned(time)[0], self.q_nb)
+
+    def acceleration(self, time: ArrayLike) -> Array:
+        """Acceleration without gravity; (n, 3), north-east-down, m/s²."""
+        return self._moved(time)[2]
+
+    def velocity(self, time: ArrayLike) -> Array:
+        """Velocity; (n, 3), north-east-down, m/s."""
+        return self._moved(time)[1]
+
+    def position(self, time: ArrayLike) -> Array:
+        """Position; (n, 3), north-east-down, m."""
+        return self._moved(time)[0]
+
+    def _turned(self, time: ArrayLike) -> tuple[Array, Array, Array]:
+        return _evaluate((self.roll, self.pitch, self.heading), time)
+
+    def _moved(self, time: ArrayLike) -> tuple[Array, Array, Array]:
+        return _evaluate((self.north, self.east, self.down), time)
+
+    @cached_property
+    def _integral(self) -> RateIntegral:
+        knots = [*self.roll.times, *self.pitch.times, *self.heading.times]
+        inside = [t for t in knots if 0.0 < t < self.duration]
+        return integrate_rate(self.rate, [0.0, *inside, self.duration])
+
+
+def gesture(poses: Sequence[Sequence[float]], duration: float) -> Gesture:
+    """Make a gesture from a list of poses at which everything stops.
+
+    Parameters
+    ----------
+    poses : sequence of (time, roll, pitch, heading, north, east, down)
+        s, deg, m; rising times.
+    duration : float, s
+
+    Returns
+    -------
+    Gesture
+
+    Raises
+    ------
+    ConfigError
+        As `Track` and `Gesture`.
+    """
+    times, *columns = (tuple(float(x) for x in column) for column in zip(*poses, strict=True))
+    roll, pitch, heading, north, east, down = (Track(times, values) for values in columns)
+    return Gesture(duration, roll, pitch, heading, north, east, down)
+
+
+def _evaluate(tracks: tuple[Track, Track, Track], time: ArrayLike) -> tuple[Array, Array, Array]:
+    values, first, second = zip(*(track.evaluate(time) for track in tracks), strict=True)
+    return np.column_stack(values), np.column_stack(first), np.column_stack(second)
+
 
 # Lies for 5 s, is turned about as fast as a hand can, and lies again from 9 s on. The three
 # angles change at different times, so that the axis of the turn never stays.
@@ -62,3 +212,83 @@ PHONE = gesture(
     ],
     33.0,
 )
+
+
+# A phone that is taken up and put back again and again, as drawn by a seed.
+
+
+@dataclass(frozen=True)
+class Handling(FlatMotion):
+    """Random gestures, each from a place on the table back to that very pose.
+
+    Between two gestures it lies for 1.5 to 5 s. A gesture has three to seven moves of 0.6 to 1.6 s
+    with least jerk, to rolls of up to ±60°, pitches of up to ±70°, headings of up to ±120°, and
+    places up to 0.3 m north or south, east or west, and 0.1 to 0.5 m above the table; then 1 to
+    1.5 s back to where it lay.
+
+    Attributes
+    ----------
+    duration : float, s
+        At least 5; the last rest takes what no gesture fits into.
+    seed : int
+        The same seed is the same motion on every machine.
+
+    Raises
+    ------
+    ConfigError
+        The duration is under 5 s.
+    """
+
+    duration: float
+    seed: int
+
+    def __post_init__(self) -> None:
+        if not 5.0 <= self.duration < np.inf:
+            raise ConfigError(
+                "simulation.no-gesture-fits-into", quantity="duration", duration=self.duration
+            )
+
+    @cached_property
+    def gestures(self) -> Gesture:
+        """The motion that was drawn."""
+        draw = np.random.Generator(np.random.PCG64(self.seed)).integers
+        home = (0.0,) * 6
+        poses: list[tuple[float, ...]] = [(0.0, *home)]
+        tenths = 0  # whole numbers, so that no machine rounds a time otherwise
+        while True:
+            tenths += int(draw(15, 51))
+            rows: list[tuple[float, ...]] = [(tenths / 10, *home)]
+            for _ in range(int(draw(3, 8))):
+                tenths += int(draw(6, 17))
+                turned = (draw(-60, 61), draw(-70, 71), draw(-120, 121))
+                moved = (draw(-30, 31) / 100, draw(-30, 31) / 100, draw(-50, -9) / 100)
+                rows.append((tenths / 10, *(float(x) for x in (*turned, *moved))))
+            tenths += int(draw(10, 16))
+            rows.append((tenths / 10, *home))
+            if tenths / 10 > self.duration - 1.5:
+                return gesture(poses, self.duration)
+            poses += rows
+
+    def rate(self, time: ArrayLike) -> Array:
+        """Body rate; (n, 3), rad/s, exactly zero at rest."""
+        return self.gestures.rate(time)
+
+    def angle(self, time: ArrayLike) -> Array:
+        """Integral of the body rate from time zero; (n, 3), rad, as `Gesture.angle`."""
+        return self.gestures.angle(time)
+
+    def attitude(self, time: ArrayLike) -> Array:
+        """Exact attitude ``q_nb``; (n, 4)."""
+        return self.gestures.attitude(time)
+
+    def acceleration(self, time: ArrayLike) -> Array:
+        """Acceleration without gravity; (n, 3), north-east-down, m/s²."""
+        return self.gestures.acceleration(time)
+
+    def velocity(self, time: ArrayLike) -> Array:
+        """Velocity; (n, 3), north-east-down, m/s."""
+        return self.gestures.velocity(time)
+
+    def position(self, time: ArrayLike) -> Array:
+        """Position; (n, 3), north-east-down, m."""
+        return self.gestures.position(time)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +15,9 @@ from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import ConfigError
 from strapdown.simulation.earth_motion import EarthMotion, Kinematics, Origin, check_duration
-from strapdown.simulation.euler_motion import euler_attitude, euler_body_rate
 from strapdown.simulation.minimum_jerk import STILL, Track
+from strapdown.simulation.motion import euler_attitude, euler_body_rate
 from strapdown.simulation.place_integral import PlaceIntegral, integrate_velocity
-from strapdown.simulation.track_integral import integrate_track
-from strapdown.simulation.waves import Wave, sum_waves
 
 Array = NDArray[np.float64]
 
@@ -255,3 +254,227 @@ def rocking_stand(
         heading_waves=tuple(heading_waves),
         ellipsoid=ellipsoid,
     )
+
+
+# A course as tracks of speed, turn rate and climb, laid by one manoeuvre after another.
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a vehicle can do.
+
+    Attributes
+    ----------
+    acceleration : float, m/s²
+        Of its speed.
+    lateral : float, m/s²
+        In a turn.
+    bank_deg : float, deg
+    climb_deg : float, deg
+        Up or down.
+    """
+
+    acceleration: float = 12.0
+    lateral: float = 12.0
+    bank_deg: float = 75.0
+    climb_deg: float = 75.0
+
+
+@dataclass
+class Course:
+    """Tracks that grow by one manoeuvre after another.
+
+    Attributes
+    ----------
+    time : float, s
+        Up to here it is laid.
+    limits : Limits
+    speed, turn_rate, climb : list of (time, value)
+        m/s, deg/s, deg.
+    """
+
+    limits: Limits
+    speed: list[tuple[float, float]]
+    turn_rate: list[tuple[float, float]] = field(default_factory=lambda: [(0.0, 0.0)])
+    climb: list[tuple[float, float]] = field(default_factory=lambda: [(0.0, 0.0)])
+    time: float = 0.0
+
+    def move(
+        self, points: list[tuple[float, float]], start: float, length: float, to: float
+    ) -> None:
+        """Let a coordinate hold until `start`, and come to a value with least jerk."""
+        if start > points[-1][0]:
+            points.append((start, points[-1][1]))
+        if length > 0.0:
+            points.append((start + length, to))
+
+    @property
+    def speed_now(self) -> float:
+        """Speed at the end of what is laid, m/s."""
+        return self.speed[-1][1]
+
+    @property
+    def climb_now(self) -> float:
+        """Angle of climb there, deg."""
+        return self.climb[-1][1]
+
+    def moving_speed(self, code: str) -> float:
+        """Speed there; an error of this code where it is zero."""
+        if self.speed_now <= 0.0:
+            raise ConfigError(code, quantity="speed")
+        return self.speed_now
+
+    def level_speed(self, code: str) -> float:
+        """Horizontal part of it, m/s."""
+        return self.moving_speed(code) * math.cos(math.radians(self.climb_now))
+
+
+class Manoeuvre(Protocol):
+    """What a vehicle is told to do."""
+
+    def lay(self, course: Course) -> None:
+        """Add it to a course."""
+        ...
+
+
+def lay_course(
+    manoeuvres: Sequence[tuple[str, Manoeuvre]], speed: float, limits: Limits
+) -> tuple[float, Track, Track, Track]:
+    """Lay manoeuvres one after another.
+
+    Parameters
+    ----------
+    manoeuvres : sequence of (str, Manoeuvre)
+        Each with its name for messages.
+    speed : float, m/s
+        At time zero, along the path.
+    limits : Limits
+
+    Returns
+    -------
+    duration : float, s
+    speed, turn_rate, climb : Track
+        m/s, deg/s, deg; from time zero.
+
+    Raises
+    ------
+    ConfigError
+        There is none, or one cannot be done; the message says which, counted from 1.
+    """
+    if not 0.0 <= speed < math.inf:
+        raise ConfigError("simulation.vehicle-cannot-begin", quantity="speed", speed=speed)
+    if not manoeuvres:
+        raise ConfigError("simulation.none", quantity="manoeuvres")
+    course = Course(limits, [(0.0, speed)])
+    for number, (name, manoeuvre) in enumerate(manoeuvres, start=1):
+        try:
+            manoeuvre.lay(course)
+        except ConfigError as error:
+            f = error.finding
+            raise ConfigError(f, quantity=f"manoeuvre {number}, {name}, {f.quantity}") from None
+    return course.time, _track(course.speed), _track(course.turn_rate), _track(course.climb)
+
+
+def _track(points: list[tuple[float, float]]) -> Track:
+    times, values = zip(*points, strict=True)
+    return Track(times, values)
+
+
+def check_length(value: float, name: str = "duration") -> None:
+    """Refuse what is no length of a manoeuvre."""
+    if not 0.0 < value < math.inf:
+        raise ConfigError("simulation.not-above-zero", quantity=name, value=value)
+
+
+# Oscillations of a coordinate as sums of sines.
+
+
+@dataclass(frozen=True)
+class Wave:
+    """``amplitude sin(2 pi t/period + phase)``.
+
+    Attributes
+    ----------
+    amplitude : float
+        Unit of the coordinate.
+    period : float, s
+    phase_deg : float, deg
+
+    Raises
+    ------
+    ConfigError
+        A number is not finite, or the period is not positive.
+    """
+
+    amplitude: float
+    period: float
+    phase_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.period < math.inf:
+            raise ConfigError(
+                "simulation.wave-cannot-period", quantity="period", period=self.period
+            )
+        if not (math.isfinite(self.amplitude) and math.isfinite(self.phase_deg)):
+            raise ConfigError("simulation.amplitude-or-phase-not-finite", quantity="wave")
+
+
+def sum_waves(waves: Sequence[Wave], time: Array) -> tuple[Array, Array, Array]:
+    """Sum of waves and its first two derivatives by time.
+
+    Parameters
+    ----------
+    waves : sequence of Wave
+    time : ndarray, (n,), s
+
+    Returns
+    -------
+    value, first, second : ndarray, (n,)
+        Zero without waves.
+    """
+    value, first, second = np.zeros(time.size), np.zeros(time.size), np.zeros(time.size)
+    for wave in waves:
+        omega = 2.0 * math.pi / wave.period
+        # Whole periods are taken away without rounding, so that late phases are as good as early.
+        phase = 2.0 * math.pi * (np.fmod(time, wave.period) / wave.period)
+        phase += math.radians(wave.phase_deg)
+        high, level = wave.amplitude * np.sin(phase), wave.amplitude * np.cos(phase)
+        value += high
+        first += omega * level
+        second -= omega * omega * high
+    return value, first, second
+
+
+# Integral of a track, in closed form.
+
+
+def integrate_track(track: Track, time: Array) -> Array:
+    """Integral of a track from its first time.
+
+    Parameters
+    ----------
+    track : Track
+    time : ndarray, (n,), s
+        Not before the track's first time.
+
+    Returns
+    -------
+    ndarray, (n,), unit of the track times s
+
+    Notes
+    -----
+    The integral of the quintic of least jerk is ``5/2 x^4 - 3 x^5 + x^6``, one half over the whole.
+    """
+    times, values = np.asarray(track.times), np.asarray(track.values)
+    if len(times) == 1:
+        return np.asarray(values[0] * (time - times[0]))
+    lengths, changes = np.diff(times), np.diff(values)
+    before = np.r_[0.0, np.cumsum(lengths * (values[:-1] + 0.5 * changes))]
+    k = np.searchsorted(times, time, side="right") - 1
+    inner = np.clip(k, 0, len(lengths) - 1)
+    since = time - times[inner]
+    x = np.clip(since / lengths[inner], 0.0, 1.0)
+    moved = x * x * x * x * (2.5 - x * (3.0 - x))
+    within = values[inner] * since + changes[inner] * lengths[inner] * moved
+    after = before[-1] + values[-1] * (time - times[-1])
+    return np.asarray(np.where(k >= len(lengths), after, before[inner] + within))

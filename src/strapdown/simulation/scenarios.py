@@ -12,8 +12,7 @@ from dataclasses import dataclass, field
 from strapdown.errors import ConfigError
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation.coning import Coning
-from strapdown.simulation.hand_motions import INTENSIVE, PHONE, TABLE_TO_TABLE
-from strapdown.simulation.handling import Handling
+from strapdown.simulation.hand_motions import INTENSIVE, PHONE, TABLE_TO_TABLE, Handling
 from strapdown.simulation.motion import Motion, Pulse, PulseMotion
 from strapdown.simulation.smooth_random import SmoothRandom
 

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError
-from strapdown.sensors.error_draws import child
+from strapdown.sensors.error_chain import child
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import is_number
 

@@ -10,9 +10,8 @@ from numpy.polynomial import polynomial
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.errors import ConfigError
-from strapdown.simulation.euler_motion import Quaternion, euler_attitude, euler_body_rate
-from strapdown.simulation.flat_motion import FlatMotion
 from strapdown.simulation.minimum_jerk import minimum_jerk
+from strapdown.simulation.motion import FlatMotion, Quaternion, euler_attitude, euler_body_rate
 from strapdown.simulation.rate_integral import RateIntegral, integrate_rate
 
 Array = NDArray[np.float64]

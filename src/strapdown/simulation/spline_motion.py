@@ -9,15 +9,20 @@ from functools import cached_property
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import ConfigError
-from strapdown.simulation.earth_motion import MOST_NORTHERN, EarthMotion, Kinematics, Origin
-from strapdown.simulation.euler_motion import euler_attitude, euler_body_rate
-from strapdown.simulation.path_attitude import along_velocity
+from strapdown.simulation.earth_motion import (
+    MOST_NORTHERN,
+    EarthMotion,
+    Kinematics,
+    Origin,
+    check_duration,
+)
+from strapdown.simulation.motion import euler_attitude, euler_body_rate
 from strapdown.simulation.path_motion import MOST_PITCH
-from strapdown.simulation.quintic_spline import Spline, quintic
+from strapdown.simulation.place_integral import PlaceIntegral, integrate_velocity
 from strapdown.tables import EULER, check_trajectory, places_of
 
 Array = NDArray[np.float64]
@@ -254,3 +259,262 @@ def _unwrapped(angles: Array) -> Array:
     steps = np.diff(angles)
     turns = np.cumsum(np.rint(steps / 360.0))
     return np.asarray(np.r_[angles[:1], angles[1:] - 360.0 * turns])
+
+
+# Splines of the fifth degree with their derivatives.
+
+
+_DEGREE = 5  # continuous to the fourth derivative
+
+
+@dataclass(frozen=True, eq=False)
+class Spline:
+    """Quintic spline of m coordinates: knots (p + 1,), coefficients (p, 6, m)."""
+
+    knots: Array
+    coefficients: Array
+
+    def __call__(self, time: Array) -> tuple[Array, Array, Array]:
+        """Value and first two derivatives, (n, m) each."""
+        from strapdown._kernels.piecewise import polynomials
+
+        shape = (time.size, self.coefficients.shape[2])
+        value, first, second = np.empty(shape), np.empty(shape), np.empty(shape)
+        polynomials(self.knots, self.coefficients, time, value, first, second)
+        return value, first, second
+
+
+def quintic(time: ArrayLike, values: ArrayLike) -> Spline:
+    """Spline of the fifth degree through values, whose third and fourth derivatives end at zero.
+
+    Parameters
+    ----------
+    time : array_like, (n,), s
+        Two or more, rising.
+    values : array_like, (n, m)
+
+    Returns
+    -------
+    Spline
+        With continuous fourth derivative: of all curves through the values the one of least mean
+        square third derivative. Two values give a straight line.
+    """
+    from scipy.interpolate import make_interp_spline
+
+    t, rows = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    zero = np.zeros(rows.shape[1])
+    if len(t) == 2:
+        slope = (rows[1] - rows[0]) / (t[1] - t[0])
+        coefficients = np.zeros((1, _DEGREE + 1, rows.shape[1]))
+        coefficients[0, -2], coefficients[0, -1] = slope, rows[0]
+        return Spline(t, coefficients)
+    ends = [(3, zero), (4, zero)]
+    spline = make_interp_spline(t, rows, k=_DEGREE, bc_type=(ends, ends))  # type: ignore[arg-type]
+    knots = np.unique(spline.t)
+    # Taylor coefficients at the left of each piece, highest power first.
+    powers = [spline(knots[:-1], nu=k) / math.factorial(k) for k in range(_DEGREE, -1, -1)]
+    return Spline(knots, np.ascontiguousarray(np.stack(powers, axis=1)))
+
+
+# A path through waypoints, in time or at a speed.
+
+
+def through_waypoints(
+    places: Sequence[tuple[float, float, float]],
+    *,
+    times: Sequence[float] | None = None,
+    speeds: Sequence[float] | None = None,
+    most_acceleration: float = 30.0,
+    ellipsoid: Ellipsoid = WGS84,
+) -> SplineMotion:
+    """A vehicle without roll, nose along its path.
+
+    Parameters
+    ----------
+    places : sequence of (lat_deg, lon_deg, alt)
+        deg, deg, m; two or more.
+    times : sequence of float, s
+        From zero, one a place.
+    speeds : sequence of float, m/s
+        Instead of times: the mean speed along the straight line from each place to the next.
+    most_acceleration : float, m/s²
+        Of the spline through the places.
+    ellipsoid : Ellipsoid
+
+    Returns
+    -------
+    SplineMotion
+
+    Raises
+    ------
+    ConfigError
+        Neither or both of times and speeds are given, or not as many as there are places or legs,
+        a place is repeated, or as `SplineMotion`.
+    """
+    rows = np.array(places, dtype=np.float64).reshape(-1, 3)
+    if (times is None) == (speeds is None):
+        raise ConfigError("simulation.neither-times-nor-speeds-or", quantity="places")
+    same = np.flatnonzero(np.all(np.diff(rows, axis=0) == 0.0, axis=1))
+    if same.size:
+        k = int(same[0])
+        raise ConfigError("simulation.before", quantity=f"place {k + 2}")
+    stamps = _times(rows, speeds, ellipsoid) if speeds is not None else np.array(times, dtype=float)
+    return SplineMotion(
+        stamps,
+        rows,
+        None,
+        ellipsoid,
+        most_acceleration,
+    )
+
+
+def _times(places: Array, speeds: Sequence[float], ellipsoid: Ellipsoid) -> Array:
+    if len(speeds) != len(places) - 1:
+        raise ConfigError(
+            "simulation.speeds-legs", quantity="speed", count=len(speeds), count_2=len(places) - 1
+        )
+    for k, speed in enumerate(speeds):
+        if not 0.0 < speed < math.inf:
+            raise ConfigError("simulation.speed-2", quantity=f"place {k + 2}, speed", speed=speed)
+    from strapdown._kernels.earth import radii
+
+    times = [0.0]
+    for (lat, lon, alt), (to_lat, to_lon, to_alt), speed in zip(
+        places[:-1], places[1:], speeds, strict=True
+    ):
+        # The straight line on the ground at the middle; it only shares out time.
+        middle = math.radians(0.5 * (lat + to_lat))
+        meridian, transverse = radii(
+            math.sin(middle), ellipsoid.semi_major_axis, ellipsoid.eccentricity_squared
+        )
+        height = 0.5 * (alt + to_alt)
+        north = (meridian + height) * math.radians(to_lat - lat)
+        across = math.remainder(to_lon - lon, 360.0)
+        east = (transverse + height) * math.cos(middle) * math.radians(across)
+        times.append(times[-1] + math.hypot(north, east, to_alt - alt) / speed)
+    return np.array(times)
+
+
+# Attitude of a vehicle whose nose points along its velocity.
+
+
+def along_velocity(velocity: Array, acceleration: Array) -> tuple[Array, Array]:
+    """3-2-1 angles of a body without roll, nose along the velocity, and their rates.
+
+    Parameters
+    ----------
+    velocity : ndarray, (n, 3), m/s
+        North, east, down; its horizontal part is not zero.
+    acceleration : ndarray, (n, 3), m/s²
+        Derivatives of its components.
+
+    Returns
+    -------
+    angles, rates : ndarray, (n, 3), deg and deg/s
+        Roll, pitch (up where it climbs), heading within ±180.
+    """
+    north, east, down = velocity.T
+    d_north, d_east, d_down = acceleration.T
+    level2 = north * north + east * east
+    level = np.sqrt(level2)
+    d_level = (north * d_north + east * d_east) / level
+    still = np.zeros(len(velocity))
+    angles = [still, np.arctan2(-down, level), np.arctan2(east, north)]
+    rates = [
+        still,
+        (down * d_level - d_down * level) / (level2 + down * down),
+        (north * d_east - east * d_north) / level2,
+    ]
+    return np.degrees(angles).T, np.degrees(rates).T
+
+
+# A vehicle whose velocity is a mean and a sine in each of north, east and down.
+
+Triple = tuple[float, float, float]
+# Part of the duration: what a few hundred megabytes hold of an integral's panels.
+_LEAST_PERIOD = 1e-5
+
+
+@dataclass(frozen=True)
+class SineVelocityMotion(EarthMotion):
+    """``v = mean + amplitude sin(2 pi t/period + phase)``, without roll, nose along the velocity.
+
+    The motion of ``pyins.sim.generate_sine_velocity_motion``, in closed form: velocity, attitude
+    and their derivatives; the place is their integral to rounding. Pitch is that of the path, nose
+    up where it climbs.
+
+    Attributes
+    ----------
+    duration : float, s
+    origin : Origin
+    mean_velocity : tuple of float, m/s
+        North, east, down.
+    amplitude : tuple of float, m/s
+    period : float, s
+    phase_deg : tuple of float, deg
+        The default makes an ellipse of latitude and longitude where the mean is zero.
+    ellipsoid : Ellipsoid
+
+    Raises
+    ------
+    ConfigError
+        The duration is not positive, the period is under 1e-5 of it, or the vehicle comes to a
+        stop, where its path has no direction.
+    """
+
+    duration: float
+    origin: Origin
+    mean_velocity: Triple
+    amplitude: Triple = (0.0, 0.0, 0.0)
+    period: float = 60.0
+    phase_deg: Triple = (0.0, 90.0, 0.0)
+    ellipsoid: Ellipsoid = WGS84
+
+    def __post_init__(self) -> None:
+        check_duration(self.duration)
+        least = self.duration * _LEAST_PERIOD
+        if not least <= self.period < math.inf:
+            raise ConfigError(
+                "simulation.velocity-change-period",
+                quantity="period",
+                period=self.period,
+                least=least,
+                duration=self.duration,
+            )
+        cycle = np.linspace(0.0, min(self.period, self.duration), 4097)
+        speed = np.hypot(*self._velocity(cycle)[:, :2].T)
+        if speed.min() <= _LEAST * speed.max():
+            raise ConfigError(
+                "simulation.horizontal-speed-falls-path-no",
+                quantity="mean_velocity, amplitude",
+                speed=speed.min(),
+            )
+
+    @property
+    def breaks(self) -> Sequence[float]:
+        """Every half period, s."""
+        count = max(1, math.ceil(2.0 * self.duration / self.period))
+        return [*(0.5 * self.period * k for k in range(count)), self.duration]
+
+    def kinematics(self, time: Array) -> Kinematics:
+        """State at instants; as `EarthMotion.kinematics`."""
+        v = self._velocity(time)
+        omega = 2.0 * math.pi / self.period
+        dv = omega * np.asarray(self.amplitude) * np.cos(self._phase(time))
+        turned, turning = along_velocity(v, dv)
+        q_nb = euler_attitude(turned, (1.0, 0.0, 0.0, 0.0))
+        return Kinematics(self._moved(time), v, dv, q_nb, euler_body_rate(turned, turning), turned)
+
+    def _phase(self, time: Array) -> Array:
+        # Whole periods are taken away without rounding, so that late phases are as good as early.
+        part = np.fmod(time, self.period) / self.period
+        return np.asarray(2.0 * math.pi * part[:, None] + np.radians(self.phase_deg))
+
+    def _velocity(self, time: Array) -> Array:
+        return np.asarray(
+            self.mean_velocity + np.asarray(self.amplitude) * np.sin(self._phase(time))
+        )
+
+    @cached_property
+    def _moved(self) -> PlaceIntegral:
+        return integrate_velocity(self._velocity, self.breaks, self.origin, self.ellipsoid)

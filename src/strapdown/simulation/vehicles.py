@@ -2,14 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
+import numpy as np
+
+from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import WGS84, Ellipsoid
-from strapdown.simulation.course import Limits, Manoeuvre, lay_course
+from strapdown.errors import ConfigError
 from strapdown.simulation.earth_motion import Origin
-from strapdown.simulation.path_motion import PathMotion
-from strapdown.simulation.waves import Wave
+from strapdown.simulation.minimum_jerk import Track, minimum_jerk
+from strapdown.simulation.path_motion import (
+    Course,
+    Limits,
+    Manoeuvre,
+    PathMotion,
+    Wave,
+    check_length,
+    integrate_track,
+    lay_course,
+)
 
 #: What each vehicle may do. A car's grip and a sporting aircraft's wing are just above 1 g and
 #: 4 g; a large ship does a tenth of a car.
@@ -157,3 +170,348 @@ def _laid(
         climb=climbs,
         ellipsoid=ellipsoid,
     )
+
+
+# What a vehicle can be told to do.
+
+
+# Largest over mean slope of a move with least jerk.
+_PEAK = 15.0 / 8.0
+# What a ramp covers is integrated with this many nodes.
+_NODES = 32
+
+
+@dataclass(frozen=True)
+class Accelerate:
+    """Come to another speed with least jerk; it may fall too.
+
+    Attributes
+    ----------
+    to : float, m/s
+    duration : float, s
+        The largest acceleration is 15/8 of the mean.
+    """
+
+    to: float
+    duration: float
+
+    def lay(self, course: Course) -> None:
+        """Add it to a course."""
+        if not 0.0 <= self.to < math.inf:
+            raise ConfigError(
+                "simulation.speed-negative",
+                quantity="to",
+                speed=self.to,
+            )
+        check_length(self.duration)
+        greatest = _PEAK * abs(self.to - course.speed_now) / self.duration
+        if greatest > course.limits.acceleration:
+            least = self.duration * greatest / course.limits.acceleration
+            raise ConfigError(
+                "simulation.acceleration-too-large",
+                quantity="duration",
+                speed=course.speed_now,
+                to=self.to,
+                duration=self.duration,
+                greatest=greatest,
+                limit=course.limits.acceleration,
+                least=least,
+            )
+        course.move(course.speed, course.time, self.duration, self.to)
+        course.time += self.duration
+
+
+@dataclass(frozen=True)
+class Brake(Accelerate):
+    """Come down to another speed; as `Accelerate`, but it must be lower."""
+
+    def lay(self, course: Course) -> None:
+        """Add it to a course."""
+        if self.to >= course.speed_now:
+            raise ConfigError(
+                "simulation.braking-not-slower",
+                quantity="to",
+                speed=course.speed_now,
+                to=self.to,
+            )
+        super().lay(course)
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Brake to a stop, and stand.
+
+    Attributes
+    ----------
+    braking, stay : float, s
+    """
+
+    braking: float
+    stay: float = 0.0
+
+    def lay(self, course: Course) -> None:
+        """Add it to a course."""
+        Brake(0.0, self.braking).lay(course)
+        if not 0.0 <= self.stay < math.inf:
+            raise ConfigError(
+                "simulation.stay-negative",
+                quantity="stay",
+                stay=self.stay,
+            )
+        course.time += self.stay
+
+
+@dataclass(frozen=True)
+class Straight:
+    """Go on as it is, or stand, for a time.
+
+    Attributes
+    ----------
+    duration : float, s
+    """
+
+    duration: float
+
+    def lay(self, course: Course) -> None:
+        """Add it to a course."""
+        check_length(self.duration)
+        course.time += self.duration
+
+
+@dataclass(frozen=True)
+class Along:
+    """Go straight on for a distance.
+
+    Attributes
+    ----------
+    distance : float, m
+        Along the path.
+    """
+
+    distance: float
+
+    def lay(self, course: Course) -> None:
+        """Add it to a course."""
+        check_length(self.distance, "distance")
+        course.time += self.distance / course.moving_speed("simulation.distance-at-rest")
+
+
+@dataclass(frozen=True)
+class Turn:
+    """Turn on a radius.
+
+    Attributes
+    ----------
+    angle_deg : float, deg
+        Of the whole turn with its ramps, positive to the right.
+    radius : float, m
+        Between the ramps, level.
+    ramp : float, s
+        The turn rate comes and goes in this with least jerk; where the angle is too small for two
+        ramps at the full rate, in less.
+    """
+
+    angle_deg: float
+    radius: float
+    ramp: float = 1.0
+
+    def lay(self, course: Course) -> None:
+        """Add it to a course."""
+        check_length(self.radius, "radius")
+        speed, most = course.level_speed("simulation.turn-at-rest"), course.limits.lateral
+        lateral = speed * speed / self.radius
+        if lateral > most:
+            raise ConfigError(
+                "simulation.radius-too-small",
+                quantity="radius",
+                speed=speed,
+                radius=self.radius,
+                lateral=lateral,
+                limit=most,
+                least=speed * speed / most,
+                slowest=math.sqrt(most * self.radius),
+            )
+        _turn(course, self.angle_deg, math.degrees(speed / self.radius), self.ramp)
+
+
+@dataclass(frozen=True)
+class BankedTurn:
+    """Turn at a bank, so that it is felt straight down.
+
+    Attributes
+    ----------
+    angle_deg : float, deg
+        Of the whole turn with its ramps, positive to the right.
+    bank_deg : float, deg
+        Between the ramps; the turn rate is ``g tan(bank)/(v cos climb)``.
+    ramp : float, s
+        As in `Turn`.
+    """
+
+    angle_deg: float
+    bank_deg: float
+    ramp: float = 3.0
+
+    def lay(self, course: Course) -> None:
+        """Add it to a course."""
+        most = course.limits.bank_deg
+        if not 0.0 < self.bank_deg <= most:
+            raise ConfigError(
+                "simulation.bank-out-of-range",
+                quantity="bank",
+                bank=self.bank_deg,
+                most=most,
+            )
+        lateral = STANDARD_GRAVITY * math.tan(math.radians(self.bank_deg))
+        rate = math.degrees(lateral / course.level_speed("simulation.turn-at-rest"))
+        _turn(course, self.angle_deg, rate, self.ramp)
+
+
+@dataclass(frozen=True)
+class Climb:
+    """Climb or descend.
+
+    Attributes
+    ----------
+    angle_deg : float, deg
+        Of the path over the horizon, down if negative.
+    height : float, m, optional
+        What is gained or lost until the path is level again; without it, on until `Level`.
+    ramp : float, s
+        In which the angle comes and goes.
+    """
+
+    angle_deg: float
+    height: float | None = None
+    ramp: float = 3.0
+
+    def lay(self, course: Course) -> None:
+        """Add it to a course."""
+        most = course.limits.climb_deg
+        if not 0.0 < abs(self.angle_deg) <= most:
+            raise ConfigError(
+                "simulation.climb-out-of-range",
+                quantity="angle",
+                angle=self.angle_deg,
+                most=most,
+            )
+        speed = course.moving_speed("simulation.climb-at-rest")
+        check_length(self.ramp, "ramp")
+        if self.height is None:
+            course.move(course.climb, course.time, self.ramp, self.angle_deg)
+            course.time += self.ramp
+            return
+        check_length(self.height, "height")
+        if course.climb_now != 0.0:
+            raise ConfigError(
+                "simulation.climb-not-from-level",
+                quantity="height",
+            )
+        steep = abs(self.angle_deg)
+        x, w = np.polynomial.legendre.leggauss(_NODES)
+        rising = np.sin(np.radians(steep * minimum_jerk(0.5 * (1.0 + x))[0]))
+        ramps = speed * self.ramp * float(w @ rising)
+        hold = (self.height - ramps) / (speed * math.sin(math.radians(steep)))
+        if hold < 0.0:
+            raise ConfigError(
+                "simulation.climb-ramps-too-high",
+                quantity="height",
+                ramp=self.ramp,
+                gain=ramps,
+                height=self.height,
+            )
+        course.move(course.climb, course.time, self.ramp, self.angle_deg)
+        course.move(course.climb, course.time + self.ramp + hold, self.ramp, 0.0)
+        course.time += 2.0 * self.ramp + hold
+
+
+@dataclass(frozen=True)
+class Level:
+    """Leave a climb.
+
+    Attributes
+    ----------
+    ramp : float, s
+    """
+
+    ramp: float = 3.0
+
+    def lay(self, course: Course) -> None:
+        """Add it to a course."""
+        check_length(self.ramp, "ramp")
+        course.move(course.climb, course.time, self.ramp, 0.0)
+        course.time += self.ramp
+
+
+@dataclass(frozen=True)
+class LaneChange:
+    """Go over to a lane beside this one.
+
+    Attributes
+    ----------
+    offset : float, m
+        To the right.
+    duration : float, s
+        The course leaves and comes back in it, each by two ramps of a quarter.
+    """
+
+    offset: float
+    duration: float
+
+    def lay(self, course: Course) -> None:
+        """Add it to a course."""
+        check_length(self.duration)
+        speed, most = course.level_speed("simulation.lane-change-at-rest"), course.limits.lateral
+        quarter = 0.25 * self.duration
+        times = tuple(quarter * k for k in range(5))
+        shape = Track(times, (0.0, 1.0, 0.0, -1.0, 0.0))
+        x, w = np.polynomial.legendre.leggauss(_NODES)
+        inner = (np.asarray(times[:-1])[:, None] + 0.5 * quarter * (1.0 + x)).ravel()
+        turned = np.radians(integrate_track(shape, inner))
+        weight = 0.5 * quarter * np.tile(w, 4)
+
+        def reached(rate: float) -> float:
+            return float(speed * (weight @ np.sin(rate * turned)))
+
+        # The course never turns by more than 60 deg, below which the offset grows with the rate.
+        steepest = math.radians(60.0) / float(turned.max())
+        rate = _solve(reached, abs(self.offset), steepest)
+        if rate is None or speed * math.radians(rate) > most:
+            raise ConfigError(
+                "simulation.lane-change-too-fast",
+                quantity="duration",
+                offset=self.offset,
+                duration=self.duration,
+                speed=speed,
+                limit=most,
+            )
+        side = math.copysign(rate, self.offset)
+        for k, value in enumerate((side, 0.0, -side, 0.0)):
+            course.move(course.turn_rate, course.time + quarter * k, quarter, value)
+        course.time += self.duration
+
+
+def _turn(course: Course, angle: float, rate: float, ramp: float) -> None:
+    if not (math.isfinite(angle) and angle != 0.0):
+        raise ConfigError(
+            "simulation.turn-by-no-angle",
+            quantity="angle",
+            angle=angle,
+        )
+    check_length(ramp, "ramp")
+    whole = abs(angle) / rate
+    ramp = min(ramp, whole)
+    side = math.copysign(rate, angle)
+    course.move(course.turn_rate, course.time, ramp, side)
+    course.move(course.turn_rate, course.time + whole, ramp, 0.0)
+    course.time += whole + ramp
+
+
+def _solve(reached: Callable[[float], float], wanted: float, highest: float) -> float | None:
+    from scipy.optimize import brentq
+
+    if wanted == 0.0:
+        return 0.0
+    if reached(highest) < wanted:
+        return None
+    return float(brentq(lambda r: reached(r) - wanted, 0.0, highest, xtol=1e-14))

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import ConfigError
 from strapdown.simulation.earth_motion import EarthMotion, Kinematics, Origin
-from strapdown.simulation.euler_motion import euler_attitude, euler_body_rate
 from strapdown.simulation.minimum_jerk import Track
+from strapdown.simulation.motion import euler_attitude, euler_body_rate
 from strapdown.simulation.path_motion import MOST_PITCH
 from strapdown.simulation.place_integral import PlaceIntegral, integrate_velocity
 

@@ -12,12 +12,12 @@ import pandas as pd
 
 from strapdown.config.alignment import AxesTable, LogTable
 from strapdown.config.alignment_file import MAY_BE_EMPTY, STAGES
-from strapdown.config.slots import SLOTS, Slot, options_of
+from strapdown.config.choice import SLOTS, Slot, options_of
 from strapdown.config.toml_text import ASK, Asked, Page, inline, string
 from strapdown.errors import Finding
 from strapdown.formats.recording import Recording
-from strapdown.sensors.axes_matrix import NAMED_AXES
 from strapdown.sensors.catalogue import SENSORS, load_sensor
+from strapdown.sensors.triad_errors import NAMED_AXES
 from strapdown.systems.alignment_source import body_record
 
 __all__ = ["AlignmentDraft", "draft_alignment", "listed_kinds", "log_table_keys", "toml_value"]

@@ -2,38 +2,55 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
-from strapdown.alignment.alignment import Alignment
-from strapdown.alignment.carry import carried_attitude, carry
-from strapdown.alignment.coarse import CoarseAlignment
+from strapdown.alignment.alignment import Alignment, CoarseAlignment, Site
 from strapdown.alignment.fine import FineAlignment
 from strapdown.alignment.fine_result import FineResult
-from strapdown.alignment.observability import Manoeuvre, manoeuvres_after
-from strapdown.alignment.site import Site
-from strapdown.config.alignment import AlignmentSpec
-from strapdown.config.choice import make_choice
+from strapdown.alignment.readiness import (
+    Manoeuvre,
+    carried_attitude,
+    carry,
+    coarse_readiness,
+    manoeuvres_after,
+)
+from strapdown.config.alignment import AlignmentSpec, ReferenceTable
+from strapdown.config.choice import SLOTS, make_choice
 from strapdown.config.navigation_modules import sensors_of
-from strapdown.config.slots import SLOTS
+from strapdown.dsp.outliers import REPLACED, OutlierDesign
+from strapdown.dsp.samples import even_step
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import DataError, Finding
 from strapdown.prefilter import Prefilter, PrefilterReport
+from strapdown.prefilter.prefilter import LOW_RATE
 from strapdown.results.inputs import InputFiles
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
-from strapdown.systems.alignment_health import channel_findings
-from strapdown.systems.alignment_outliers import saying_outliers
-from strapdown.systems.alignment_readiness import AlignmentReadiness, alignment_readiness
+from strapdown.rotation import within_half_turn
+from strapdown.sensors.health_log import LEAST_SAMPLES
+from strapdown.sensors.imu_health import ChannelFault, check_imu_channels
+from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.alignment_source import AlignmentSource, read_alignment_source
 from strapdown.systems.attitude_source import input_files
 from strapdown.systems.one_thread import one_thread
 from strapdown.systems.progress import Progress, silent
-from strapdown.tables.checks import source_of
+from strapdown.tables import ACCEL, EULER, GYRO
+from strapdown.tables.checks import index_of, source_of, values_of
 
-__all__ = ["AlignmentResult", "run_alignment"]
+__all__ = [
+    "AlignmentReadiness",
+    "AlignmentResult",
+    "alignment_readiness",
+    "channel_findings",
+    "reference_offset",
+    "run_alignment",
+    "saying_outliers",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,3 +249,346 @@ def _at(
     if abs(answer.time - time) < 0.5 * step:
         return replace(answer, findings=())
     return replace(carry(imu, answer, time, site, sensors), findings=())
+
+
+# Channels of a record that do not read anything: told, or refused, before it is aligned.
+
+
+#: Faults that are seen in the samples themselves. Noise, jumps and levels are left to the
+#: alignments: a vehicle that people enter shows them, too.
+SILENT = ("missing", "stuck", "dead", "saturated")
+#: Part of a record that may be without a channel.
+MOST = 0.01
+
+
+def channel_findings(imu: pd.DataFrame, sensors: ImuUncertainty) -> tuple[Finding, ...]:
+    """Find channels that read nothing for a part of a record.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        Imu table as it was recorded, body axes.
+    sensors : ImuUncertainty
+
+    Returns
+    -------
+    tuple of Finding
+        Stretches that are short; or that no channel ever changes.
+
+    Raises
+    ------
+    DataError
+        A channel is stuck, dead, saturated or without numbers for more than a hundredth of the
+        record.
+    """
+    if len(imu) < LEAST_SAMPLES:
+        # So short a record is refused by each alignment, with what would be long enough.
+        return _made_up(imu)
+    faults = [f for f in check_imu_channels(imu, sensors).faults if f.kind in SILENT]
+    for channel in dict.fromkeys(f.channel for f in faults):
+        own = [f for f in faults if f.channel == channel]
+        lost = sum(f.last - f.first + 1 for f in own)
+        # One that is dead all the time is refused by each alignment in its own words.
+        whole = lost == len(imu)
+        if lost > MOST * len(imu) and not (whole and _alone(channel, faults)):
+            worst = max(own, key=lambda f: f.last - f.first)
+            said = worst.finding
+            time = index_of(imu)
+            before, after = worst.begin - float(time[0]), float(time[-1]) - worst.end
+            part = (
+                "alignment.channel-lost-align-before"
+                if before >= after
+                else "alignment.channel-lost-align-after"
+            )
+            raise DataError(
+                "alignment.channel-lost" if whole else part,
+                file=said.file,
+                row=said.row,
+                quantity=said.quantity,
+                reason=said,
+                share=lost / len(imu),
+                before=before,
+                end=worst.end,
+            )
+    return (*(f.finding for f in faults), *_made_up(imu))
+
+
+def _alone(channel: str, faults: Sequence[ChannelFault]) -> bool:
+    """Whether another channel of its triad goes on."""
+    triad = channel.split("_")[0]
+    return len({f.channel for f in faults if f.channel.startswith(triad)}) < len(GYRO)
+
+
+def _made_up(imu: pd.DataFrame) -> tuple[Finding, ...]:
+    columns = [c for c in [*GYRO, *ACCEL] if c in imu.columns]
+    if np.ptp(values_of(imu, columns), axis=0).any():
+        return ()
+    return (
+        Finding(
+            "alignment.no-channel-changes",
+            file=source_of(imu),
+            quantity="gyro, accel",
+            count=len(imu),
+        ),
+    )
+
+
+# Whether outliers may be why a record could not be aligned.
+
+
+#: Of the samples of a channel: fewer are no reason, more are its habit and no outliers.
+LEAST, ALIGNMENT_OUTLIERS_MOST = 1e-3, 0.03
+
+#: How many times its usual scatter over a second makes a channel loud; and for how much of a record
+#: that can be no habit of it.
+LOUD, MOST_LOUD = 10.0, 0.25
+LEAST_SECONDS = 8
+
+
+@contextmanager
+def saying_outliers(imu: pd.DataFrame, report: PrefilterReport | None) -> Iterator[None]:
+    """Add to an error that samples stand out: those that a pre-filter left, or all without one.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        Imu table that is aligned inside.
+    report : PrefilterReport or None
+        Of the pre-filter that it has passed.
+    """
+    try:
+        yield
+    except DataError as error:
+        faults = () if report is None else _faults(report)
+        if faults:
+            raise _after_prefilter(error, faults[0]) from None
+        found = None if report is not None else _outliers(imu)
+        if found is None:
+            raise _with_unquiet(error, imu) from None
+        channel, rows = found
+        f = error.finding
+        first = float(imu.index[rows[0]])
+        raise DataError(
+            "alignment.outliers",
+            file=f.file,
+            row=f.row,
+            quantity=f.quantity,
+            reason=f,
+            count=len(rows),
+            channel=channel,
+            first=first,
+        ) from None
+
+
+def _faults(report: PrefilterReport) -> tuple[Finding, ...]:
+    """What a pre-filter found, but for the caution that goes with a low rate."""
+    return tuple(f for f in report.findings if f.code != LOW_RATE)
+
+
+def _after_prefilter(error: DataError, said: Finding) -> DataError:
+    f = error.finding
+    return DataError(
+        "alignment.fails-after-prefilter",
+        file=f.file,
+        row=f.row if said.row is None else said.row,
+        quantity=f.quantity,
+        reason=f,
+        of_what=said.quantity,
+        reason_2=said,
+    )
+
+
+def _with_unquiet(error: DataError, imu: pd.DataFrame) -> DataError:
+    """The error with the stretch in which the record is least like itself."""
+    found = _unquiet(imu)
+    if found is None:
+        return error
+    channel, begin, end, ratio = found
+    f = error.finding
+    return DataError(
+        "alignment.channel-scatters",
+        file=f.file,
+        row=f.row,
+        quantity=f.quantity,
+        reason=f,
+        channel=channel,
+        begin=begin,
+        end=end,
+        ratio=ratio,
+    )
+
+
+def _unquiet(imu: pd.DataFrame) -> tuple[str, float, float, float] | None:
+    """The channel that scatters far more than it usually does, from when to when, how much."""
+    columns = [c for c in [*GYRO, *ACCEL] if c in imu.columns]
+    time = index_of(imu)
+    size = max(2, round(1.0 / float(np.median(np.diff(time)))))
+    count = len(imu) // size
+    if count < LEAST_SECONDS:
+        return None
+    blocks = values_of(imu, columns)[: count * size].reshape(count, size, len(columns))
+    scatter = blocks.std(axis=1)
+    usual = np.median(scatter, axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.where(usual > 0.0, scatter / usual, 0.0)
+    second, channel = (int(k) for k in np.unravel_index(ratio.argmax(), ratio.shape))
+    worst = float(ratio[second, channel])
+    loud = ratio[:, channel] > LOUD
+    if worst < LOUD or loud.mean() > MOST_LOUD:
+        return None
+    first, last = second, second
+    while first > 0 and loud[first - 1]:
+        first -= 1
+    while last + 1 < count and loud[last + 1]:
+        last += 1
+    begin, end = float(time[first * size]), float(time[(last + 1) * size - 1])
+    return columns[channel], begin, end, worst
+
+
+def _outliers(imu: pd.DataFrame) -> tuple[str, np.ndarray] | None:
+    """The channel that has most of them, and its samples."""
+    columns = [c for c in [*GYRO, *ACCEL] if c in imu.columns]
+    try:
+        even_step(index_of(imu))
+    except DataError:
+        return None
+    design = OutlierDesign()
+    values = np.ascontiguousarray(values_of(imu, columns))
+    _, screened = design.advance(design.begin(len(columns)), values, True)
+    flagged = screened.flags == REPLACED
+    share = flagged.mean(axis=0)
+    share[share > ALIGNMENT_OUTLIERS_MOST] = 0.0
+    worst = int(share.argmax())
+    if share[worst] < LEAST:
+        return None
+    return columns[worst], np.flatnonzero(flagged[:, worst]) + screened.first
+
+
+# How accurate an alignment is after how long: coarse over shorter parts, fine epoch by epoch.
+
+
+Array = NDArray[np.float64]
+
+#: Lengths that are tried, from this many seconds to the whole record, evenly in their logarithm.
+ALIGNMENT_READINESS_LEAST, TRIES = 15.0, 16
+
+
+@dataclass(frozen=True, eq=False)
+class AlignmentReadiness:
+    """Alignment time against accuracy.
+
+    Attributes
+    ----------
+    against : {'truth', 'reference', 'answer'}
+        What the differences are from: the truth of a simulation, a reference that is stated, or
+        the answer of the whole record.
+    coarse, fine : DataFrame
+        By time since the start in s: ``roll_sd``, ``pitch_sd``, ``heading_sd`` and
+        ``roll_off``, ``pitch_off``, ``heading_off``, deg; NaN where nothing is known. The fine
+        one is empty where there was none.
+    refused : tuple of (float, Finding)
+        Lengths at which the coarse alignment found no attitude, and why.
+    """
+
+    against: str
+    coarse: pd.DataFrame
+    fine: pd.DataFrame
+    refused: tuple[tuple[float, Finding], ...]
+
+
+def alignment_readiness(
+    way: CoarseAlignment,
+    imu: pd.DataFrame,
+    site: Site,
+    sensors: ImuUncertainty,
+    gnss: pd.DataFrame | None,
+    attitude: pd.DataFrame,
+    fine: FineResult | None,
+    truth: pd.DataFrame | None,
+    reference: ReferenceTable | None,
+) -> AlignmentReadiness:
+    """Align over shorter parts of a record, and lay the errors beside their bounds.
+
+    Parameters
+    ----------
+    way : CoarseAlignment
+    imu : DataFrame
+        Imu table of the whole record.
+    site : Site
+    sensors : ImuUncertainty
+    gnss : DataFrame, optional
+        Gnss table.
+    attitude : DataFrame
+        Attitude table of the answer over the record.
+    fine : FineResult, optional
+    truth : DataFrame, optional
+        Attitude table.
+    reference : ReferenceTable, optional
+
+    Returns
+    -------
+    AlignmentReadiness
+    """
+    begin = float(imu.index[0])
+    against = "answer" if truth is None else "truth"
+    offset = np.zeros(3)
+    if truth is None and reference is not None:
+        against = "reference"
+        offset = reference_offset(attitude, reference)
+    known = attitude if truth is None else truth
+    lengths = _lengths(float(imu.index[-1]) - begin)
+    found = coarse_readiness(way, imu, site, sensors, gnss, lengths, known).table
+    refused = found["refused"].notna().to_numpy()
+    coarse = found[~refused]
+    sd = coarse[[f"{a}_sd" for a in EULER]].to_numpy(dtype=np.float64)
+    off = coarse[[f"{a}_error" for a in EULER]].to_numpy(dtype=np.float64) + offset
+    return AlignmentReadiness(
+        against,
+        _table(coarse.index.to_numpy(dtype=np.float64), np.hstack([sd, off])),
+        _fine(fine, begin, known, offset),
+        tuple(zip(found.index[refused].tolist(), found["refused"][refused].tolist(), strict=True)),
+    )
+
+
+def reference_offset(attitude: pd.DataFrame, reference: ReferenceTable) -> Array:
+    """The answer less a stated attitude, (3,), deg; NaN where it says nothing."""
+    stated = np.array(
+        [
+            np.nan if x is None else x
+            for x in (reference.roll_deg, reference.pitch_deg, reference.heading_deg)
+        ]
+    )
+    row = 0 if reference.at == "start" else -1
+    return np.asarray(within_half_turn(values_of(attitude, EULER)[row] - stated))
+
+
+def _lengths(whole: float) -> list[float]:
+    if whole <= ALIGNMENT_READINESS_LEAST:
+        return [whole]
+    return [float(x) for x in np.geomspace(ALIGNMENT_READINESS_LEAST, whole, TRIES)]
+
+
+def _fine(
+    fine: FineResult | None, begin: float, known: pd.DataFrame, offset: Array
+) -> pd.DataFrame:
+    if fine is None:
+        return _table(np.empty(0), np.empty((0, 6)))
+    # The first row is what was assumed before the first epoch.
+    history = fine.history.iloc[1:]
+    time = history.index.to_numpy(dtype=np.float64)
+    sd = history[[f"{a}_sd" for a in EULER]].to_numpy(dtype=np.float64)
+    off = _off(history[EULER].to_numpy(dtype=np.float64), time, known) + offset
+    return _table(time - begin, np.hstack([sd, off]))
+
+
+def _off(angles: Array, time: Array, known: pd.DataFrame) -> Array:
+    """Angles less those that are known at the nearest stamps, deg."""
+    stamps = known.index.to_numpy(dtype=np.float64)
+    at = np.clip(np.searchsorted(stamps, time), 1, len(stamps) - 1)
+    at -= (time - stamps[at - 1] < stamps[at] - time).astype(np.int64)
+    return np.asarray(within_half_turn(angles - values_of(known, EULER)[at]))
+
+
+def _table(time: Array, rows: Array) -> pd.DataFrame:
+    columns = [f"{a}_{what}" for what in ("sd", "off") for a in EULER]
+    return pd.DataFrame(rows, index=pd.Index(time, name="time"), columns=columns)

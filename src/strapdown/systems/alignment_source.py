@@ -19,13 +19,13 @@ from strapdown.formats.gnss_files import files_of_fixes, read_gnss
 from strapdown.formats.recording import ReadOptions, Recording, StatedStart
 from strapdown.results.inputs import InputFiles, Reading
 from strapdown.rotation import euler_from_dcm
-from strapdown.sensors.axes_matrix import (
+from strapdown.sensors.catalogue import load_sensor
+from strapdown.sensors.triad_errors import (
     NAMED_AXES,
     axes_letters,
     check_axes_matrix,
     report_transposed,
 )
-from strapdown.sensors.catalogue import load_sensor
 from strapdown.simulation import Origin, StationaryMotion, Wave, rocking_stand, simulate_imu
 from strapdown.systems.attitude_source import input_files, sensor_file
 from strapdown.systems.part_of_log import part_of_log

@@ -2,59 +2,75 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown import rotation
+from strapdown.alignment.levelling import level
 from strapdown.attitude import AttitudeAlgorithm, make_algorithm, run_attitude
 from strapdown.attitude.cost import count_cost
-from strapdown.config import AttitudeSpec, specify
+from strapdown.config import AttitudeSpec, LogSpec, ScenarioSpec, specify
+from strapdown.constants import GYRO_SUMS, GYRO_UNITS
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.evaluation.differences import largest_differences
-from strapdown.evaluation.known import known_at
-from strapdown.evaluation.place_scores import score_places
+from strapdown.evaluation.differences import known_at, largest_differences
+from strapdown.evaluation.position_references import score_places
 from strapdown.evaluation.reference_points import score_references
+from strapdown.formats import read_log
+from strapdown.formats.references import read_reference_words
+from strapdown.formats.unit_words import factor_of, parse_unit
 from strapdown.increments import increments_from_imu
 from strapdown.results.attitude_bench import AttitudeBench
-from strapdown.sensors.rest import find_rests
-from strapdown.systems.attitude_answer import Evidence, find_answer
-from strapdown.systems.attitude_evidence import find_evidence, worst_evidence
-from strapdown.systems.attitude_judgement import judge_runs, judge_truth, judge_turns, truth_score
-from strapdown.systems.attitude_known import gather_references, read_second, truth_of_second
-from strapdown.systems.attitude_peers import run_beside
-from strapdown.systems.attitude_request import (
-    ALL_ALGORITHMS,
-    as_text,
-    as_texts,
-    exists,
-    one_of_each,
-    sort_references,
-    source_spec,
+from strapdown.results.inputs import InputFiles
+from strapdown.results.rests import RestStretch
+from strapdown.sensors.rest import find_rests, gyro_bias_from_rests, without_gyro_bias
+from strapdown.simulation import SCENARIOS, find_scenario
+from strapdown.systems.attitude_answer import Evidence, find_answer, find_evidence, worst_evidence
+from strapdown.systems.attitude_known import (
+    gather_references,
+    judge_runs,
+    judge_truth,
+    judge_turns,
+    read_second,
+    run_beside,
+    truth_of_second,
+    truth_score,
 )
-from strapdown.systems.attitude_shares import (
-    between_samples,
-    find_shares,
-    own_truth,
+from strapdown.systems.attitude_source import (
+    Source,
+    describe,
+    input_files,
+    read_options,
+    read_source,
+    with_truth,
 )
-from strapdown.systems.attitude_source import Source, describe, read_source, with_truth
-from strapdown.systems.attitude_start import find_gyro_bias, initial_attitude, without_bias
 from strapdown.systems.attitude_sweep import (
     Grounds,
+    between_samples,
     choose_factors,
+    find_shares,
+    gather,
+    not_judged,
+    own_truth,
     refuse_no_rate,
     sweep_rates,
+    trial_names,
+    worst_sweep,
 )
-from strapdown.systems.attitude_trials import gather, not_judged, trial_names, worst_sweep
 from strapdown.systems.part_of_log import check_part, part_of_log
 from strapdown.systems.progress import Progress, silent
-
-Array = NDArray[np.float64]
+from strapdown.tables import GYRO
 
 __all__ = ["bench_attitude", "run_bench"]
+
+
+Array = NDArray[np.float64]
 
 
 def bench_attitude(
@@ -365,3 +381,350 @@ def _grounds(
     clean = None if source.clean is None else source.clean.loc[imu.index]
     own = own_truth(imu, clean, known, q_nb, spec.interpolation)
     return Grounds(imu, q_nb, own, known, references, spec.interpolation)
+
+
+# What was asked of the attitude bench, in whatever form it was said, as a specification.
+
+
+#: What ``all`` stands for: Alexiev's four, Runge-Kutta, and 1 to 4 increments.
+ALL_ALGORITHMS = (
+    *("naive", "euler", "dcm", "quaternion", "rk4"),
+    *(f"rotvec:samples={n}" for n in (1, 2, 3, 4)),
+)
+
+
+def as_text(value: object) -> str:
+    """A text as it is; three numbers as the text that means them."""
+    if isinstance(value, str | Path):
+        return str(value).strip()
+    return ",".join(str(v) for v in np.asarray(value).ravel().tolist())
+
+
+def as_texts(values: object) -> list[str]:
+    """One text or many, or none."""
+    if values is None:
+        return []
+    if isinstance(values, str | Path):
+        return [str(values)]
+    return [str(v) for v in values] if isinstance(values, Iterable) else [str(values)]
+
+
+def source_spec(
+    text: str,
+    rate: float | None,
+    seed: int | None,
+    reading: dict[str, Any],
+    sampling: str | None,
+    trials: int = 1,
+    rates: Sequence[float] = (),
+    sensor: str | Path | None = None,
+) -> list[ScenarioSpec] | list[LogSpec]:
+    """Specify a scenario, as often as there are trials, or a log.
+
+    Parameters
+    ----------
+    text : str
+        Name of a scenario, or path of a log.
+    rate : float or None, Hz
+    seed : int or None
+    reading : dict
+        What was said about reading a log; None where nothing was.
+    sampling : str or None
+    trials : int
+        Seeds of a scenario.
+    rates : sequence of float, Hz
+        That will be tried; a scenario without a rate is sampled at the highest.
+    sensor : str, Path or None
+        Of a scenario.
+
+    Returns
+    -------
+    list of ScenarioSpec or LogSpec
+
+    Raises
+    ------
+    ConfigError
+        There is no such thing, or something was said that the other kind needs.
+    """
+    if trials < 1:
+        raise ConfigError("attitude.no-number-trials", quantity="--trials", trials=trials)
+    name = text.strip().lower()
+    if not name:
+        raise ConfigError("attitude.nothing-named", quantity="source")
+    if name in SCENARIOS:
+        if given := [key for key, value in reading.items() if value is not None]:
+            raise ConfigError("attitude.scenario-not-read-file", quantity=name, given=given)
+        first = 0 if seed is None else seed
+        highest = max((float(r) for r in rates), default=100.0)
+        return [
+            specify(
+                ScenarioSpec,
+                name=name,
+                rate_hz=highest if rate is None else rate,
+                sampling=(sampling or "instantaneous").lower(),
+                seed=first + k,
+                sensor=None if sensor is None else str(sensor),
+            )
+            for k in range(trials)
+        ]
+    if seed is not None:
+        raise ConfigError("attitude.recorded-log-no-noise-drawn", quantity="seed")
+    if sensor is not None:
+        raise ConfigError("attitude.recorded-log-sensor", quantity="sensor")
+    if trials > 1:
+        raise ConfigError("attitude.recorded-log-not-drawn-again", quantity="--trials")
+    if not exists(text) and not Path(text).suffix and len(Path(text).parts) == 1:
+        find_scenario(name)  # says which names there are
+    said = {key: value for key, value in reading.items() if value is not None}
+    return [specify(LogSpec, path=str(Path(text)), sampling=sampling, rate_hz=rate, **said)]
+
+
+def one_of_each(
+    sources: Iterable[ScenarioSpec | LogSpec],
+) -> list[ScenarioSpec | LogSpec]:
+    """Refuse a source that is named twice: it would count as two trials.
+
+    Raises
+    ------
+    ConfigError
+    """
+    found: list[ScenarioSpec | LogSpec] = []
+    for source in sources:
+        if source in found:
+            name = source.name if isinstance(source, ScenarioSpec) else source.path
+            raise ConfigError("attitude.named-twice-trial-does-not", file=name, quantity="source")
+        found.append(source)
+    return found
+
+
+def exists(text: str) -> bool:
+    """Tell whether a text is the path of something; sentences and odd characters are not."""
+    if text in ("", "none", "rest", "rests"):
+        return False
+    try:
+        return Path(text).exists()
+    except (OSError, ValueError):
+        return False
+
+
+def sort_references(items: Sequence[str]) -> tuple[tuple[str, ...], str | None]:
+    """Sort references into sentences and the path of a truth."""
+    words: list[str] = []
+    truth: str | None = None
+    for item in items:
+        path = Path(item)
+        if not exists(item):
+            if " " not in item.strip() and path.suffix:
+                raise ConfigError("attitude.no-such-file", file=item, quantity="reference")
+            words.append(item)
+        elif path.is_dir():
+            raise ConfigError("attitude.folder", file=item, quantity="reference")
+        elif (listed := read_reference_words(path)) is not None:
+            words += listed
+        elif truth is None:
+            truth = str(path)
+        else:
+            raise ConfigError(
+                "attitude.two-attitude-truths-given", quantity="reference", truth=truth, item=item
+            )
+    return tuple(words), truth
+
+
+# Where a run of the attitude bench starts, and what is taken off its rates.
+
+
+def find_gyro_bias(
+    spec: AttitudeSpec, source: Source, rests: tuple[RestStretch, ...]
+) -> tuple[dict[str, Any], tuple[InputFiles, ...]]:
+    """Find what is to be taken off the rates.
+
+    Parameters
+    ----------
+    spec : AttitudeSpec
+    source : Source
+    rests : tuple of RestStretch
+
+    Returns
+    -------
+    bias : dict
+        ``rad_per_s`` about forward, right, down, or None; ``from``, in words.
+    inputs : tuple of InputFiles
+        Files that it was taken from.
+
+    Raises
+    ------
+    DataError
+        There is no rest to take it from.
+    ConfigError
+        It was not understood.
+    """
+    if spec.gyro_bias_path is not None:
+        options = read_options(spec.source) if isinstance(spec.source, LogSpec) else None
+        other = read_log(spec.gyro_bias_path, options)
+        found = find_rests(other.imu)
+        if not found:
+            raise DataError(
+                "attitude.no-stationary-stretch-second-or", file=other.name, quantity="gyro bias"
+            )
+        longest = max(found, key=lambda r: r.end - r.start)
+        files = input_files("gyro-bias", spec.gyro_bias_path, other.files)
+        return _bias_of(longest, f"{longest.end - longest.start:.4g} s of rest in {other.name}"), (
+            files,
+        )
+    choice = spec.gyro_bias.lower()
+    if choice == "none":
+        return {"rad_per_s": None, "from": "not removed: nothing was asked for"}, ()
+    if choice in ("rest", "rests"):
+        if not rests:
+            raise DataError(
+                "attitude.no-stationary-stretch-second-or-2", file=source.name, quantity="gyro bias"
+            )
+        if choice == "rests" and len(rests) > 1:
+            course = gyro_bias_from_rests(rests)
+            where = (
+                f"course over {len(rests)} rests from {rests[0].start:.3f} to "
+                f"{rests[-1].end:.3f} s, straight between them; shown: their average"
+            )
+            return {"rad_per_s": list(course.average), "from": where}, ()
+        first = rests[0]
+        return _bias_of(first, f"mean over the rest {first.start:.3f}–{first.end:.3f} s"), ()
+    numbers, unit = _stated_bias(spec.gyro_bias)
+    bias = [v * factor_of(unit, GYRO_UNITS) for v in numbers]
+    return {"rad_per_s": bias, "from": f"stated: {spec.gyro_bias}"}, ()
+
+
+def without_bias(
+    spec: AttitudeSpec, imu: pd.DataFrame, bias: dict[str, Any], rests: tuple[RestStretch, ...]
+) -> pd.DataFrame:
+    """Take a bias that was found off the rates of a log.
+
+    Parameters
+    ----------
+    spec : AttitudeSpec
+    imu : DataFrame
+        An Imu table; it is not changed.
+    bias : dict
+        From `find_gyro_bias`.
+    rests : tuple of RestStretch
+
+    Returns
+    -------
+    DataFrame
+    """
+    if bias["rad_per_s"] is None:
+        return imu
+    if spec.gyro_bias.lower() == "rests" and len(rests) > 1:
+        return without_gyro_bias(imu, gyro_bias_from_rests(rests))
+    less = imu.copy()
+    less[GYRO] = imu[GYRO].to_numpy() - np.asarray(bias["rad_per_s"])
+    return less
+
+
+def _bias_of(rest: RestStretch, where: str) -> dict[str, Any]:
+    return {"rad_per_s": list(rest.gyro_mean), "from": where}
+
+
+def _stated_bias(text: str) -> tuple[list[float], str]:
+    match = re.fullmatch(r"([^,]+),([^,]+),\s*([+-]?[\d.]+(?:e[+-]?\d+)?)\s*(\D.*)?", text, re.I)
+    try:
+        if match is None:
+            raise ValueError
+        numbers = [float(match.group(k)) for k in (1, 2, 3)]
+        if not np.isfinite(numbers).all():
+            raise ValueError
+    except ValueError:
+        raise ConfigError("attitude.no-bias", quantity="--gyro-bias", text=text) from None
+    unit = parse_unit((match.group(4) or "rad/s").strip(), "gyro")
+    if unit in GYRO_SUMS:
+        raise ConfigError(
+            "attitude.increment-bias-rate", quantity="--gyro-bias", unit=unit, gyro_units=GYRO_UNITS
+        )
+    return numbers, unit
+
+
+def initial_attitude(
+    text: str, source: Source, rests: tuple[RestStretch, ...], findings: list[Finding]
+) -> tuple[Array, dict[str, Any], float]:
+    """Attitude at the start of the run, in words, and where the run starts."""
+    start = float(source.imu.index[0])
+    at_rest = bool(rests) and rests[0].start - start <= 1.0 and rests[0].accel_mean is not None
+    choice = text.strip().lower()
+    if choice == "auto":
+        choice = "truth" if source.truth is not None else "level" if at_rest else "zero"
+        how = {
+            "truth": "from the truth",
+            "level": "levelled; heading zero, because nothing says what it is",
+            "zero": "zero, because none was given and the log does not begin at rest with an "
+            "accelerometer",
+        }[choice]
+    else:
+        how = {"truth": "from the truth", "level": "levelled; heading zero", "zero": "zero"}.get(
+            choice, "given"
+        )
+    if choice == "truth":
+        q_nb, begin = _first_truth(source, start)
+    elif choice == "level":
+        q_nb, begin = _levelled(source, rests, at_rest, findings), start
+    elif choice == "zero":
+        q_nb, begin = np.array([1.0, 0.0, 0.0, 0.0]), start
+    else:
+        q_nb, begin = rotation.quaternion_from_euler(_three_angles(text)), start
+    roll, pitch, heading = (float(a) for a in rotation.euler_from_quaternion(q_nb))
+    words = {
+        "roll_deg": roll,
+        "pitch_deg": pitch,
+        "heading_deg": heading,
+        "time_s": begin,
+        "from": how,
+        "method": choice if choice in ("truth", "level", "zero") else "given",
+    }
+    return q_nb, words, begin
+
+
+def _first_truth(source: Source, start: float) -> tuple[Array, float]:
+    if source.truth is None:
+        raise ConfigError("attitude.log-no-truth-take", file=source.name, quantity="--initial")
+    stamps = source.imu.index.to_numpy(dtype=np.float64)
+    # Scored or not, an attitude that is known is one to start from.
+    known = known_at(source.truth, np.ones(len(source.truth), dtype=bool), stamps)
+    good = np.flatnonzero(known.counts)
+    if not good.size:
+        raise ConfigError(
+            "attitude.truth-nowhere-known-sample-between",
+            file=source.name,
+            quantity="--initial",
+            stamps=stamps[0],
+            stamps_2=stamps[-1],
+        )
+    begin = float(stamps[good[0]])
+    return known.q_nb[good[0]], begin
+
+
+def _levelled(
+    source: Source, rests: tuple[RestStretch, ...], at_rest: bool, findings: list[Finding]
+) -> Array:
+    if not at_rest:
+        raise ConfigError(
+            "attitude.levelling-needs-accelerometer-log-begins",
+            file=source.name,
+            quantity="--initial",
+        )
+    assert rests[0].accel_mean is not None
+    roll, pitch = level(rests[0].accel_mean)
+    if abs(roll) > 90.0:
+        findings.append(
+            Finding(
+                "attitude.levelled-upside-down-roll", file=source.name, quantity="accel", roll=roll
+            )
+        )
+    return rotation.quaternion_from_euler([roll, pitch, 0.0])
+
+
+def _three_angles(text: str) -> list[float]:
+    try:
+        angles = [float(part) for part in text.split(",")]
+    except ValueError:
+        angles = []
+    if len(angles) != 3 or not (np.abs(angles) <= 1e6).all():
+        raise ConfigError("attitude.no-attitude", quantity="--initial", text=text)
+    return angles

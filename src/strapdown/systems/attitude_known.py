@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,19 +11,24 @@ from numpy.typing import NDArray
 
 from strapdown.config import AttitudeSpec, ScenarioSpec
 from strapdown.errors import ConfigError, Finding
-from strapdown.evaluation.known import known_at
-from strapdown.evaluation.place_references import PlaceReference, is_place, parse_place
-from strapdown.evaluation.reference_points import references_from_words
-from strapdown.evaluation.rest_references import same_pose_candidates, tilt_references
-from strapdown.evaluation.second_log import align_second_log
-from strapdown.evaluation.second_log_truth import second_clock, truth_from_second_log
+from strapdown.evaluation.differences import error_angles, known_at
+from strapdown.evaluation.position_references import PlaceReference, is_place, parse_place
+from strapdown.evaluation.reference_points import (
+    references_from_words,
+    same_pose_candidates,
+    score_references,
+    tilt_references,
+)
+from strapdown.evaluation.second_log import align_second_log, second_clock, truth_from_second_log
 from strapdown.formats import read_log
 from strapdown.formats.recording import Recording
+from strapdown.peers import PEERS, align_heading, run_peers
+from strapdown.results.attitude_bench import AttitudeRun, PeerRun, Score, SecondLog
 from strapdown.results.rests import RestStretch, SamePose
-from strapdown.results.second_log import SecondLog
 from strapdown.sensors.rest import find_rests
 from strapdown.simulation import find_scenario
 from strapdown.systems.attitude_source import Source, input_files
+from strapdown.tables import QUATERNION, THETA, attitude_table, find_gaps
 
 Array = NDArray[np.float64]
 
@@ -185,3 +191,196 @@ def truth_of_second(source: Source, second: Second, imu: pd.DataFrame, q_nb: Arr
         q_start=q_nb,
     )
     return replace(source, truth=truth, scored=np.ones(len(truth), dtype=bool), findings=findings)
+
+
+# What is to be thought of the runs of the attitude bench.
+
+
+# Within this of ±90° of pitch the kinematics of Euler angles amplify every error tenfold.
+NEAR_POLE = 5.7  # deg: 1/cos = 10
+# A step that turns by more than this says little of what happened within it.
+LARGE_STEP = 0.5  # rad
+
+
+def passed_pole(run: AttitudeRun) -> bool:
+    """Tell whether a run came so near ±90° of pitch that its angles are not to be trusted."""
+    return run.diagnostics.get("closest_to_pole_deg", 90.0) < NEAR_POLE
+
+
+def truth_score(run: AttitudeRun, source: Source) -> list[Score]:
+    """Compare a run with the truth, where there is one.
+
+    Parameters
+    ----------
+    run : AttitudeRun
+    source : Source
+
+    Returns
+    -------
+    list of Score
+        One, or none. Errors are rotation angles in deg over the samples that count.
+    """
+    if source.truth is None or source.scored is None:
+        return []
+    errors = error_angles(run.attitude, source.truth[source.scored])
+    if errors.empty:
+        return []
+    return [
+        Score(
+            algorithm=run.algorithm,
+            against="truth",
+            time=float(errors.index[-1]),
+            error_deg=float(errors.iloc[-1]),
+            rms_deg=float(np.sqrt((errors**2).mean())),
+            max_deg=float(errors.max()),
+        )
+    ]
+
+
+def judge_turns(scores: list[Score]) -> list[Finding]:
+    """Say where the turns that were stated are not those that the gyro saw."""
+    findings = {}
+    for score in scores:
+        if score.turned_deg is None or score.expected_deg is None:
+            continue
+        off = (score.turned_deg - score.expected_deg) / 360.0
+        if abs(off) > 0.5:
+            findings[score.against] = Finding(
+                "attitude.says-turns-gyro-turned",
+                quantity="reference",
+                against=score.against,
+                expected_deg=score.expected_deg / 360.0,
+                turned_deg=score.turned_deg / 360.0,
+            )
+    return list(findings.values())
+
+
+def judge_truth(source: Source, span: tuple[float, float]) -> list[Finding]:
+    """Say where the truth tells of a small part of the log only."""
+    if source.truth is None or source.scored is None or not source.scored.any():
+        return []
+    counted = source.truth.index[source.scored]
+    covered = float(counted[-1] - counted[0])
+    if covered >= 0.5 * (span[1] - span[0]):
+        return []
+    return [
+        Finding(
+            "attitude.covers-rest-nothing-known",
+            file=source.name,
+            quantity="truth",
+            severity="note",
+            covered=covered,
+            span=span[1] - span[0],
+        )
+    ]
+
+
+def judge_runs(runs: list[AttitudeRun], increments: pd.DataFrame) -> list[Finding]:
+    """Say what in the runs themselves, or in their steps, is not to be trusted.
+
+    Parameters
+    ----------
+    runs : list of AttitudeRun
+        On the same samples.
+    increments : DataFrame
+        The Increments table that they ran over.
+
+    Returns
+    -------
+    list of Finding
+    """
+    findings = []
+    for run in runs:
+        if passed_pole(run):
+            findings.append(
+                Finding(
+                    "attitude.near-vertical-pitch"
+                    if run.diagnostics["closest_to_pole_deg"]
+                    else "attitude.through-vertical-pitch",
+                    quantity=run.algorithm,
+                    apart_deg=run.diagnostics["closest_to_pole_deg"],
+                    time=run.diagnostics["closest_to_pole_time_s"],
+                )
+            )
+    turn = np.sqrt((increments[THETA].to_numpy() ** 2).sum(axis=1))
+    # Gaps have been reported when the log was read.
+    turn[[gap.sample - 1 for gap in find_gaps(runs[0].attitude.index)]] = 0.0
+    largest = int(turn.argmax())
+    if turn[largest] > LARGE_STEP:
+        findings.append(
+            Finding(
+                "attitude.single-step-turns-rate-says",
+                quantity="gyro",
+                turn_deg=np.degrees(turn[largest]),
+                index=increments.index[largest],
+            )
+        )
+    return findings
+
+
+# Other libraries' filters over the log of the bench.
+
+
+#: A filter that would take longer is left out, and a finding says so.
+LONGEST = 60.0  # s
+
+
+def run_beside(
+    names: Sequence[str],
+    source: Source,
+    imu: pd.DataFrame,
+    q_nb: Array,
+    references: pd.DataFrame,
+    findings: list[Finding],
+) -> tuple[PeerRun, ...]:
+    """Run the filters that are named, and compare them with what is known.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of `peers.PEERS`, one filter as in ``ahrs:madgwick``, or ``all``.
+    source : Source
+        With the truth, where there is one.
+    imu : DataFrame
+        The samples as used.
+    q_nb : ndarray, (4,)
+        Attitude at the start.
+    references : DataFrame
+    findings : list of Finding
+        What was left out is added.
+
+    Returns
+    -------
+    tuple of PeerRun
+        With an accelerometer alone a filter cannot tell the heading: its own zero is turned to
+        the truth at the first instant that counts, where there is one.
+
+    Raises
+    ------
+    ConfigError
+        A library is unknown, or not installed.
+    """
+    if not names:
+        return ()
+    wanted = list(PEERS) if [n.lower() for n in names] == ["all"] else list(names)
+    runs, found = run_peers(wanted, imu, q_nb, longest_s=LONGEST)
+    findings += found
+    out = []
+    for label, aiding, attitude in runs:
+        if aiding == "gyro+accel" and source.truth is not None and source.scored is not None:
+            attitude = _headed(attitude, source.truth[source.scored])
+        run = AttitudeRun(label, label, "", attitude, {})
+        scores = [*truth_score(run, source), *score_references(run, references, imu)]
+        out.append(PeerRun(label, aiding, attitude, tuple(scores)))
+    return tuple(out)
+
+
+def _headed(attitude: pd.DataFrame, truth: pd.DataFrame) -> pd.DataFrame:
+    inside = truth[(truth.index >= attitude.index[0]) & (truth.index <= attitude.index[-1])]
+    if inside.empty:
+        return attitude
+    row = int(np.searchsorted(attitude.index.to_numpy(), float(inside.index[0])))
+    q = align_heading(
+        attitude[QUATERNION].to_numpy(), inside[QUATERNION].to_numpy(dtype=np.float64)[0], row
+    )
+    return attitude_table(attitude.index.to_numpy(), q)

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.attitude import AttitudeAlgorithm, attitude_history
+from strapdown import rotation
+from strapdown.attitude import AttitudeAlgorithm, RotationVector, attitude_history
 from strapdown.attitude.algorithm import Steps, steps_of
+from strapdown.attitude.cost import run_single, single_increments
+from strapdown.config import LogSpec, ScenarioSpec
 from strapdown.errors import ConfigError, DivergenceError, Finding
-from strapdown.evaluation.known import Errors, Known
+from strapdown.evaluation.differences import Errors, Known, angles_to_errors
 from strapdown.evaluation.reference_points import reference_errors
 from strapdown.increments import increments_from_imu
-from strapdown.systems.attitude_shares import OwnTruth
+from strapdown.results.attitude_bench import AttitudeBench, AttitudeRun, Share, Trials
+from strapdown.rotation.euler_angles import unit_rotation_angle
 from strapdown.systems.progress import Progress
 from strapdown.tables import DTHETA, QUATERNION, THETA, increments_table
 
@@ -265,3 +270,353 @@ def _largest_reference(q: Array, references: pd.DataFrame, used: pd.DataFrame) -
         return np.nan
     attitude = pd.DataFrame(q, index=used.index, columns=QUATERNION)
     return max(reference_errors(attitude, references))
+
+
+# Whose the error is: the sensor's, the algorithm's, or single precision's.
+
+
+#: What stands for the truth of the algorithm alone on a log: of fourth order from rates and of
+#: sixth from increments, whatever the steps.
+MOST_ACCURATE = RotationVector(samples=4, coefficients="fit")
+
+
+@dataclass(frozen=True)
+class OwnTruth:
+    """What an algorithm without error, on a sensor without error or with it, would say.
+
+    Attributes
+    ----------
+    known : Known
+        On a simulation the exact attitude, turned to begin where the run does; on a log that of
+        the most accurate algorithm.
+    clean : DataFrame or None
+        The Imu table without the sensor's errors, on a simulation.
+    """
+
+    known: Known
+    clean: pd.DataFrame | None
+
+    @property
+    def exact(self) -> bool:
+        """Whether it is the truth itself, and not an estimate."""
+        return self.clean is not None
+
+
+def own_truth(
+    imu: pd.DataFrame,
+    clean: pd.DataFrame | None,
+    truth: Known | None,
+    q_nb: Array,
+    interpolation: str,
+) -> OwnTruth:
+    """Find what the algorithms' own errors are to be measured against.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        The samples as used.
+    clean : DataFrame or None
+        The same without the sensor's errors, for a simulation.
+    truth : Known or None
+    q_nb : ndarray, (4,)
+        Attitude at the start.
+    interpolation : str
+
+    Returns
+    -------
+    OwnTruth
+    """
+    if clean is not None and truth is not None:
+        # An algorithm is not to blame for a start that was given otherwise: the truth is turned
+        # to begin there.
+        start = rotation.compose(q_nb, rotation.conjugate(truth.q_nb[0]))
+        return OwnTruth(replace(truth, q_nb=rotation.compose(start, truth.q_nb)), clean)
+    increments = increments_from_imu(imu, interpolation)
+    best = attitude_history(MOST_ACCURATE, increments, q_nb)
+    return OwnTruth(Known(best, np.ones(len(best), dtype=bool)), None)
+
+
+def between_samples(imu: pd.DataFrame, q_nb: Array) -> tuple[float, float] | None:
+    """Estimate what the course of the rate between the samples matters.
+
+    Parameters
+    ----------
+    imu : DataFrame
+    q_nb : ndarray, (4,)
+
+    Returns
+    -------
+    tuple of float, or None
+        Rotation angle at the end, and the largest, in deg, between the attitude from rates that
+        run along chords and from rates that run along cubics; None for mean rates, between
+        which nothing runs.
+    """
+    if imu.attrs["sampling"] == "mean":
+        return None
+    chord, cubic = (
+        attitude_history(MOST_ACCURATE, increments_from_imu(imu, how), q_nb)
+        for how in ("linear", "cubic")
+    )
+    final, _, largest = angles_to_errors(unit_rotation_angle(chord, cubic))
+    return final, largest
+
+
+def find_shares(
+    algorithms: Sequence[AttitudeAlgorithm],
+    runs: Sequence[AttitudeRun],
+    imu: pd.DataFrame,
+    own: OwnTruth,
+    truth: Known | None,
+    q_nb: Array,
+    interpolation: str,
+) -> tuple[Share, ...]:
+    """Split the error of each run.
+
+    Parameters
+    ----------
+    algorithms : sequence of AttitudeAlgorithm
+    runs : sequence of AttitudeRun
+        In the same order.
+    imu : DataFrame
+        The samples that they ran on.
+    own : OwnTruth
+    truth : Known or None
+    q_nb : ndarray, (4,)
+    interpolation : str
+
+    Returns
+    -------
+    tuple of Share
+        On a simulation an error is exactly the algorithm's own, turned on by the sensor's:
+        ``q_true^-1 q = (q_true^-1 q_clean)(q_clean^-1 q)``, so that their rotation vectors add up
+        to within half their product.
+    """
+    clean = None if own.clean is None else increments_from_imu(own.clean, interpolation)
+    rounded = single_increments(imu, interpolation)
+    # On a log the sensor's share is what the most accurate algorithm is off by.
+    of_sensor = None if truth is None or own.exact else truth.errors(own.known.q_nb)
+    shares = []
+    for algorithm, run in zip(algorithms, runs, strict=True):
+        q = run.attitude[QUATERNION].to_numpy()
+        if clean is None:
+            mine, sensor = own.known.errors(q), of_sensor
+        else:
+            q_clean = attitude_history(algorithm, clean, q_nb)
+            mine = own.known.errors(q_clean)
+            sensor = angles_to_errors(unit_rotation_angle(q, q_clean))
+        assert mine is not None
+        apart = unit_rotation_angle(run_single(algorithm, rounded, q_nb), q)
+        shares.append(Share(run.algorithm, mine, sensor, angles_to_errors(apart)))
+    return tuple(shares)
+
+
+def best_error(
+    own: OwnTruth, truth: Known | None, imu: pd.DataFrame, q_nb: Array, interpolation: str
+) -> Errors | None:
+    """Error against the truth that no algorithm can do away with: that of sensor and start.
+
+    Parameters
+    ----------
+    own : OwnTruth
+    truth : Known or None
+    imu : DataFrame
+    q_nb : ndarray, (4,)
+    interpolation : str
+
+    Returns
+    -------
+    tuple of float, or None
+        Final, RMS and largest, deg.
+    """
+    if truth is None:
+        return None
+    if own.clean is None:
+        return truth.errors(own.known.q_nb)
+    with_errors, without = (
+        attitude_history(MOST_ACCURATE, increments_from_imu(table, interpolation), q_nb)
+        for table in (imu, own.clean)
+    )
+    sensor = rotation.compose(rotation.conjugate(without), with_errors)
+    return truth.errors(rotation.compose(own.known.q_nb, sensor))
+
+
+# Several logs or seeds together, so that a rank is not luck.
+
+
+#: Decimals of a degree beyond which two errors differ by rounding alone.
+ROUNDED = 9
+CONFIDENCE = 0.95
+_KIND = ["algorithm", "meaning"]
+_NUMBERS = [
+    *("rate_hz", "own_deg", "final_deg", "rms_deg"),
+    *("max_deg", "reference_deg", "error_deg"),
+]
+# Rates halve from cell to cell: one that is nearer than the root of two is the same.
+NEAR = 2.0**0.5
+
+
+def trial_names(sources: Sequence[ScenarioSpec | LogSpec]) -> list[str]:
+    """Names of trials: of logs their path's last part, of a scenario its seed.
+
+    Parameters
+    ----------
+    sources : sequence of ScenarioSpec or LogSpec
+
+    Returns
+    -------
+    list of str
+        All different.
+    """
+    names = [
+        f"{s.name}, seed {s.seed}" if isinstance(s, ScenarioSpec) else Path(s.path).name
+        for s in sources
+    ]
+    return [n if names.count(n) == 1 else f"{n} ({k + 1})" for k, n in enumerate(names)]
+
+
+def gather(benches: Sequence[AttitudeBench], names: Sequence[str]) -> Trials:
+    """Put the errors of several benches together.
+
+    Parameters
+    ----------
+    benches : sequence of AttitudeBench
+        Of the same algorithms.
+    names : sequence of str
+        Of the trials.
+
+    Returns
+    -------
+    Trials
+        The interval of the mean is Student's; `luck` is the one-sided probability, by
+        Student's test of paired differences, that the next algorithm is in truth no worse.
+    """
+    rows = []
+    for name, bench in zip(names, benches, strict=True):
+        full = bench.sweep[(bench.sweep["factor"] == 1) & (bench.sweep["meaning"] == "drop")]
+        for _, cell in full.iterrows():
+            rows.append(
+                {"trial": name}
+                | {key: cell[key] for key in ("algorithm", "error_deg", "own_deg")}
+                | {key: cell[key] for key in ("rms_deg", "final_deg")}
+            )
+    errors = pd.DataFrame(rows)
+    return Trials(tuple(names), errors, rank(errors))
+
+
+def rank(errors: pd.DataFrame) -> pd.DataFrame:
+    """Rank algorithms by their mean error over trials.
+
+    Parameters
+    ----------
+    errors : DataFrame
+        ``trial``, ``algorithm``, ``error_deg``.
+
+    Returns
+    -------
+    DataFrame
+        As `results.Trials.ranking`.
+    """
+    from scipy import stats
+
+    by = errors.pivot(index="trial", columns="algorithm", values="error_deg")
+    order = by.mean().round(ROUNDED).sort_values(kind="stable").index
+    count = len(by)
+    rows = []
+    for k, name in enumerate(order):
+        values = by[name].to_numpy(dtype=np.float64)
+        mean, spread = float(values.mean()), np.nan
+        if count > 1:
+            spread = float(stats.t.ppf(0.5 + CONFIDENCE / 2.0, count - 1) * stats.sem(values))
+        luck = np.nan
+        if k + 1 < len(order) and count > 1:
+            luck = _luck(by[order[k + 1]].to_numpy(dtype=np.float64) - values)
+        rows.append(
+            {
+                "algorithm": name,
+                "mean_deg": mean,
+                # An angle between attitudes lies between 0 and 180 deg, and so does its mean.
+                "low_deg": float(np.maximum(0.0, mean - spread)),
+                "high_deg": min(180.0, mean + spread),
+                "luck": luck,
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _luck(worse_by: Array) -> float:
+    """Probability that differences with this mean come of a mean that is not positive."""
+    from scipy import stats
+
+    spread = float(worse_by.std(ddof=1))
+    # Rounding alone tells nothing apart.
+    if float(np.abs(worse_by).max()) < 10.0**-ROUNDED:
+        return 0.5
+    if spread <= 1e-12 * max(1.0, float(np.abs(worse_by).max())):
+        return float(worse_by.mean() < 0.0)
+    t = float(worse_by.mean()) / (spread / np.sqrt(len(worse_by)))
+    return float(stats.t.sf(t, len(worse_by) - 1))
+
+
+def worst_sweep(sweeps: Sequence[pd.DataFrame]) -> pd.DataFrame:
+    """Cell by cell the largest errors of several sweeps.
+
+    Parameters
+    ----------
+    sweeps : sequence of DataFrame
+        As `results.AttitudeBench.sweep`, over the same algorithms.
+
+    Returns
+    -------
+    DataFrame
+        The cells of the first for which each of the others has a rate that is no more than
+        `NEAR` times higher; its highest such is taken. The rate of a cell is the highest among
+        those taken: each trial is judged at that rate or below.
+
+    Raises
+    ------
+    ConfigError
+        There is none.
+    """
+    first, *others = sweeps
+    rows = []
+    by_kind = [dict(list(other.groupby(_KIND))) for other in others]
+    for cell in first.to_dict("records"):
+        taken = [cell]
+        for kinds in by_kind:
+            cells = kinds[cell["algorithm"], cell["meaning"]]
+            near = cells[cells["rate_hz"] <= NEAR * cell["rate_hz"]]
+            if len(near):
+                taken.append(near.loc[near["rate_hz"].idxmax()])
+        if len(taken) == len(sweeps):
+            numbers = pd.DataFrame([[float(row[name]) for name in _NUMBERS] for row in taken])
+            rows.append(cell | dict(zip(_NUMBERS, numbers.max(), strict=True)))
+    if not rows:
+        raise ConfigError("attitude.no-rate-common-all-trials", quantity="--rates")
+    return pd.DataFrame(rows)[list(first.columns)]
+
+
+def not_judged(known: Sequence[bool], names: Sequence[str]) -> tuple[Finding, ...]:
+    """Say which trials have nothing known, where others have.
+
+    Parameters
+    ----------
+    known : sequence of bool
+        Whether anything is known of the attitude, trial by trial.
+    names : sequence of str
+
+    Returns
+    -------
+    tuple of Finding
+    """
+    if not any(known):
+        return ()
+    return tuple(
+        Finding(
+            "attitude.nothing-known-attitude-algorithms-own",
+            file=name,
+            quantity="reference",
+            severity="note",
+        )
+        for there, name in zip(known, names, strict=True)
+        if not there
+    )

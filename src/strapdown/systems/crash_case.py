@@ -2,32 +2,53 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from strapdown.config.crash_case import CaseSpec, TriadSpec
+import pandas as pd
+
+from strapdown.config.crash_case import AssumedSpec, CaseSpec, ReferenceSpec, TriadSpec, UnitSpec
+from strapdown.constants import TWO_SIDED_95
+from strapdown.crash.delta_v import delta_v
+from strapdown.crash.delta_v_bound import body_delta_v_bound
 from strapdown.crash.entry import Entry
-from strapdown.crash.event_rule import EventRule
-from strapdown.crash.gnss_start import GnssEntry
+from strapdown.crash.events import EventRule
+from strapdown.crash.gnss_entry import GnssEntry
 from strapdown.crash.monte_carlo import PathSamples, sample_paths
 from strapdown.crash.path import CrashPath
-from strapdown.errors import Finding
+from strapdown.crash.reference_path import PathComparison, compare_with_reference
+from strapdown.crash.severity import SEVERITY_MODELS, find_severity_model
+from strapdown.crash.severity_model import InjuryRisk, SeverityModel, injury_risk
+from strapdown.crash.unit_reconstruction import UnitReconstruction
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.crash_record import CrashRecord
 from strapdown.formats.crash_records import read_crash_record
+from strapdown.formats.crash_triad import triad_of_channels
 from strapdown.formats.gnss_files import files_of_fixes, read_gnss
 from strapdown.formats.named_columns import read_reference_path
 from strapdown.results.inputs import InputFiles
-from strapdown.sensors.crash_unit import CrashUnit
+from strapdown.sensors.catalogue import load_sensor
+from strapdown.sensors.crash_unit import Assumed, CrashUnit, Mounting, RecordedTriad
+from strapdown.sensors.uncertainty import stated_uncertainty
 from strapdown.systems.attitude_source import input_files, sensor_file
-from strapdown.systems.case_references import ReferenceAnswer, compare_reference
-from strapdown.systems.case_severity import SeverityAnswer, case_severity
-from strapdown.systems.case_units import case_unit
 from strapdown.systems.crash_reconstruction import CrashReconstruction, reconstruct_crash
 from strapdown.systems.one_thread import one_thread
 from strapdown.systems.progress import Progress, silent
 
-__all__ = ["CaseResult", "run_case", "whole_records"]
+__all__ = [
+    "CaseResult",
+    "ReferenceAnswer",
+    "SeverityAnswer",
+    "case_severity",
+    "case_unit",
+    "compare_reference",
+    "main_event",
+    "run_case",
+    "whole_records",
+]
+
 
 # Numbers that a Monte Carlo may hold at once: half a gigabyte.
 MOST_NUMBERS = 64_000_000
@@ -254,3 +275,271 @@ def _samples(path: CrashPath, runs: int, seed: int) -> tuple[PathSamples | None,
             most=most,
         )
     ]
+
+
+# The recorders of a case, from its file and the records.
+
+
+# Quantity of a record's channels, and the triad of the catalogue.
+TRIADS = {"acceleration": "accel", "rate": "gyro"}
+
+
+def case_unit(spec: UnitSpec, records: Mapping[str, CrashRecord]) -> CrashUnit:
+    """Make a unit of what the case says of it.
+
+    Parameters
+    ----------
+    spec : UnitSpec
+    records : dict of str to CrashRecord
+        By path.
+
+    Returns
+    -------
+    CrashUnit
+
+    Raises
+    ------
+    DataError
+        A channel is not there, or cannot be used.
+    ConfigError
+        A sensor, a key or a number is none.
+    """
+    count = len(spec.accelerometers)
+    accelerometers = tuple(
+        _triad(spec, triad, records, "acceleration", _name(triad, "accelerometer", k, count))
+        for k, triad in enumerate(spec.accelerometers, start=1)
+    )
+    gyro = None
+    if spec.gyro is not None:
+        gyro = _triad(spec, spec.gyro, records, "rate", spec.gyro.name or "gyro")
+    return CrashUnit(
+        spec.name,
+        accelerometers,
+        gyro,
+        Mounting(spec.position_m, spec.angles_deg, spec.position_sd_m, spec.angles_sd_deg),
+        gyro_from=spec.gyro_from,
+        trigger=spec.trigger_s,
+        trigger_sd=spec.trigger_sd_s,
+        assumed=None if spec.assumed is None else _assumed(spec.assumed),
+    )
+
+
+def _name(triad: TriadSpec, kind: str, number: int, count: int) -> str:
+    return triad.name or (kind if count == 1 else f"{kind} {number}")
+
+
+def _assumed(spec: AssumedSpec) -> Assumed:
+    return Assumed(spec.turn_sd_deg, spec.delta_v_sd_m_per_s, spec.over_s, spec.because)
+
+
+def _triad(
+    unit: UnitSpec,
+    spec: TriadSpec,
+    records: Mapping[str, CrashRecord],
+    quantity: str,
+    name: str,
+) -> RecordedTriad:
+    table = triad_of_channels(
+        records[spec.path],
+        {axis: spec.channels[axis] for axis in ("x", "y", "z") if axis in spec.channels},
+        quantity=quantity,
+        unit=spec.unit,
+        time=spec.time,
+        time_unit=spec.time_unit,
+        rate_hz=spec.rate_hz,
+        sampling=spec.sampling,
+    )
+    sensor = None if spec.sensor is None else load_sensor(spec.sensor)
+    try:
+        uncertainty = stated_uncertainty(TRIADS[quantity], spec.uncertainty, sensor)
+    except ConfigError as error:
+        raise error.replaced(file=f"{unit.name}, {name}") from None
+    return RecordedTriad(table, uncertainty, name)
+
+
+# The answers of a case beside what else is known of the crash.
+
+
+AXES = {"forward": (1.0, 0.0, 0.0), "right": (0.0, 1.0, 0.0)}
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceAnswer:
+    """One unit's answer beside something else that is known.
+
+    Attributes
+    ----------
+    spec : ReferenceSpec
+    unit : str
+        Whose answer it is.
+    table : DataFrame or None
+        Of a path, as read.
+    path : PathComparison or None
+    span : tuple of float, s
+        Of a change of velocity.
+    delta_v, sd : float, m/s
+        Ours over the span; NaN for a path.
+    consistent : bool
+        Whether the difference is within the 95 % bound of both together.
+    """
+
+    spec: ReferenceSpec
+    unit: str
+    table: pd.DataFrame | None
+    path: PathComparison | None
+    span: tuple[float, float]
+    delta_v: float
+    sd: float
+    consistent: bool
+
+
+def compare_reference(
+    spec: ReferenceSpec,
+    unit: UnitReconstruction,
+    gravity: float,
+    tables: Mapping[str, pd.DataFrame],
+) -> ReferenceAnswer:
+    """Hold one unit against one reference.
+
+    Parameters
+    ----------
+    spec : ReferenceSpec
+    unit : UnitReconstruction
+    gravity : float, m/s²
+    tables : dict of str to DataFrame
+        Reference paths, by path of their file.
+
+    Returns
+    -------
+    ReferenceAnswer
+
+    Raises
+    ------
+    DataError
+        The reference and the record have no time in common.
+    ConfigError
+        Nothing says over which span a change of velocity is meant: there is no event.
+    """
+    if spec.path is not None:
+        table = tables[spec.path]
+        found = compare_with_reference(unit.path, table)
+        return ReferenceAnswer(
+            spec,
+            unit.name,
+            table,
+            found,
+            (unit.path.time[0], unit.path.time[-1]),
+            math.nan,
+            math.nan,
+            found.consistent,
+        )
+    assert spec.delta_v_m_per_s is not None
+    number = main_event(unit)
+    if spec.over_s is not None:
+        start, end = spec.over_s
+    elif number is not None:
+        event = unit.events.events[number]
+        start, end = event.time_zero, event.end
+    else:
+        raise ConfigError(
+            "crash.no-event-no-span-stated",
+            quantity=f"references, {spec.name}, over_s",
+            name=unit.name,
+        )
+    try:
+        change = delta_v(unit.acceleration, start, end, across_gaps=True)
+    except DataError as error:
+        raise DataError(
+            "crash.reference-span-outside-record",
+            file=unit.name,
+            quantity="over_s",
+            name=spec.name,
+            reason=error.finding,
+        ) from None
+    _, rest_sd = unit.at_point.resting_force(gravity)
+    bound = body_delta_v_bound(unit.at_point.effects, change.weights, rest_sd=rest_sd)
+    if spec.axis == "resultant":
+        value, sd = change.resultant, bound.along(change.vector)
+    else:
+        axis = AXES[spec.axis]
+        value = float(change.vector @ axis)
+        sd = bound.along(axis)
+    together = TWO_SIDED_95 * math.hypot(sd, spec.delta_v_sd_m_per_s)
+    near = abs(value - spec.delta_v_m_per_s) <= together
+    return ReferenceAnswer(spec, unit.name, None, None, (start, end), value, sd, near)
+
+
+# What published models say of the severity of a case.
+
+
+@dataclass(frozen=True, eq=False)
+class SeverityAnswer:
+    """What one model says, or why it says nothing.
+
+    Attributes
+    ----------
+    model : SeverityModel
+    risk : InjuryRisk or None
+    because : Finding or None
+        Why there is none.
+    """
+
+    model: SeverityModel
+    risk: InjuryRisk | None
+    because: Finding | None = None
+
+
+def main_event(unit: UnitReconstruction) -> int | None:
+    """Return the number, from 0, of the event in which the velocity changed most.
+
+    Returns
+    -------
+    int or None
+        None where there is no event.
+    """
+    if not unit.body:
+        return None
+    return max(range(len(unit.body)), key=lambda k: unit.body[k].event.resultant)
+
+
+def case_severity(spec: CaseSpec, unit: UnitReconstruction) -> tuple[SeverityAnswer, ...]:
+    """Ask the models that the case names, or all that fit the type of the crash.
+
+    Parameters
+    ----------
+    spec : CaseSpec
+    unit : UnitReconstruction
+        Whose event of the largest change is meant.
+
+    Returns
+    -------
+    tuple of SeverityAnswer
+        Empty without an event. A model that is not valid here, or lacks an input, says why.
+
+    Raises
+    ------
+    ConfigError
+        A model is unknown.
+    """
+    number = main_event(unit)
+    if number is None:
+        return ()
+    whole, kind = unit.body[number].event, unit.types[number].name
+    inputs: dict[str, float | str] = {"delta_v": whole.resultant, "crash_type": kind}
+    inputs |= spec.options.severity_inputs
+    names = spec.options.severity
+    models = [find_severity_model(name) for name in names] if names is not None else _fitting(kind)
+    sd = {"delta_v": whole.bound.along(whole.delta_v.vector)}
+    answers = []
+    for model in models:
+        try:
+            answers.append(SeverityAnswer(model, injury_risk(model, inputs, sd)))
+        except DataError as error:
+            answers.append(SeverityAnswer(model, None, error.finding))
+    return tuple(answers)
+
+
+def _fitting(kind: str) -> list[SeverityModel]:
+    """Models of this type alone, or those of all crashes where there are none."""
+    own = [m for m in SEVERITY_MODELS.values() if kind in m.applies.get("crash_type", ())]
+    return own or [m for m in SEVERITY_MODELS.values() if not m.applies]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,23 +12,20 @@ import pandas as pd
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.at_point import AtPoint
 from strapdown.crash.combine_units import combine_units
-from strapdown.crash.compare_units import compare_units
+from strapdown.crash.compare_units import UnitComparison, compare_units
 from strapdown.crash.entry import Entry
-from strapdown.crash.event_rule import PART_563, EventRule
-from strapdown.crash.gnss_start import GnssEntry, start_from_gnss
-from strapdown.crash.prepare_together import prepare_together
+from strapdown.crash.events import PART_563, EventRule
+from strapdown.crash.gnss_entry import GnssEntry, start_from_gnss
+from strapdown.crash.prepare import prepare_together
 from strapdown.crash.reconstruction_summary import summary_table, unit_line
-from strapdown.crash.unit_comparison import UnitComparison
-from strapdown.crash.unit_reconstruction import (
-    PEAK_WINDOW,
-    UnitReconstruction,
-    reconstruct_unit,
-)
-from strapdown.errors import ConfigError, Finding
+from strapdown.crash.unit_reconstruction import PEAK_WINDOW, UnitReconstruction, reconstruct_unit
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.mechanization import NorthEastDown
 from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.sensors.synchronise import SynchronisedUnits, synchronise
-from strapdown.systems.crash_options import check_crash_options
+from strapdown.sensors.triad_errors import FARTHEST, finite, triple
+
+__all__ = ["check_crash_options"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,4 +214,88 @@ def _no_mean(units: Sequence[AtPoint]) -> Finding:
         "crash.units-disagree-no-mean-told",
         file=", ".join(u.name for u in units),
         quantity="combine",
+    )
+
+
+# What is asked of `reconstruct_crash`, checked before any work is done.
+
+
+def check_crash_options(
+    units: object,
+    entry: object,
+    point: object,
+    window: object,
+    preparation: object,
+    peak_window: object,
+    rule: object,
+    gravity: object,
+    mechanization: object,
+) -> None:
+    """Check the arguments whose kind or size no later stage would name.
+
+    Raises
+    ------
+    DataError
+        There is no unit.
+    ConfigError
+        An argument is of another kind, or out of range.
+    """
+    _check_units(units)
+    if not (entry is None or isinstance(entry, Entry | GnssEntry)):
+        raise _wrong_type("entry", entry)
+    place = triple(point, "point", "sensors.point-not-three-numbers")
+    if math.hypot(*place) > FARTHEST:
+        raise ConfigError(
+            "crash.vehicle-origin", quantity="point", place=place, hypot=math.hypot(*place)
+        )
+    if window is not None:
+        _check_window(window)
+    if not (preparation is None or isinstance(preparation, Mapping)):
+        raise _wrong_type("preparation", preparation)
+    names = {unit.name for unit in units}  # type: ignore[attr-defined]
+    for name, given in (preparation or {}).items():
+        if name in names and not isinstance(given, Mapping):
+            raise ConfigError(
+                "crash.preparation-of-unit-of-wrong-type",
+                quantity=f"preparation, {name}",
+                type=type(given).__name__,
+            )
+        if name not in names and isinstance(given, Mapping):
+            raise ConfigError(
+                "crash.preparation-of-unknown-unit", quantity="preparation", name=name
+            )
+    if not (finite(peak_window) and peak_window > 0.0):  # type: ignore[operator]
+        raise ConfigError("crash.no-length", quantity="peak_window", peak_window=peak_window)
+    if not isinstance(rule, EventRule):
+        raise _wrong_type("rule", rule)
+    if not isinstance(gravity, int | float):
+        raise _wrong_type("gravity", gravity)
+    if not (mechanization is None or isinstance(mechanization, NorthEastDown)):
+        raise _wrong_type("mechanization", mechanization)
+
+
+def _check_units(units: object) -> None:
+    if isinstance(units, CrashUnit):
+        raise ConfigError("crash.unit-list-needed", file=units.name, quantity="units")
+    if units is None or (isinstance(units, Sequence) and not units):
+        raise DataError("crash.no-units-given", quantity="units")
+    if not isinstance(units, Sequence) or isinstance(units, str):
+        raise _wrong_type("units", units)
+    for unit in units:
+        if not isinstance(unit, CrashUnit):
+            raise _wrong_type("units", unit)
+
+
+def _check_window(window: Any) -> None:
+    try:
+        begin, end = (float(x) for x in window)
+    except (TypeError, ValueError):
+        begin = end = math.nan
+    if not (math.isfinite(begin) and math.isfinite(end) and begin < end):
+        raise ConfigError("crash.window-not-a-pair", quantity="window", window=window)
+
+
+def _wrong_type(quantity: str, given: object) -> ConfigError:
+    return ConfigError(
+        f"crash.{quantity}-of-wrong-type", quantity=quantity, type=type(given).__name__
     )

@@ -27,8 +27,8 @@ from strapdown.simulation import (
     simulate_imu,
     through_waypoints,
 )
-from strapdown.simulation import manoeuvres as steps
-from strapdown.simulation.course import Manoeuvre
+from strapdown.simulation import vehicles as steps
+from strapdown.simulation.path_motion import Manoeuvre
 from strapdown.simulation.vehicles import LIMITS
 from strapdown.simulation.walking import GAITS, walk
 

@@ -42,20 +42,30 @@ References              none                   ``time`` s, ``kind`` (``known``, 
 
 from __future__ import annotations
 
-from strapdown.tables.attitude import attitude_table, check_attitude
-from strapdown.tables.barometer import (
+from strapdown.tables.aiding import (
     BAROMETER,
+    BODY_VELOCITY,
+    HEADING,
+    ODOMETER,
     barometer_from_pressure,
     barometer_table,
-    check_barometer,
-)
-from strapdown.tables.body_velocity import (
-    BODY_VELOCITY,
     body_velocity_table,
+    check_barometer,
     check_body_velocity,
+    check_heading,
+    check_odometer,
+    heading_table,
+    odometer_from_distance,
+    odometer_table,
 )
-from strapdown.tables.checks import values_of
-from strapdown.tables.columns import (
+from strapdown.tables.attitude import (
+    REFERENCE_KINDS,
+    attitude_table,
+    check_attitude,
+    check_references,
+    references_table,
+)
+from strapdown.tables.checks import (
     ACCEL,
     DR,
     DTHETA,
@@ -72,30 +82,30 @@ from strapdown.tables.columns import (
     THETA,
     VELOCITY,
     VELOCITY_SD,
+    Gap,
+    find_gaps,
+    values_of,
 )
-from strapdown.tables.gaps import Gap, find_gaps
 from strapdown.tables.gnss import GNSS, check_gnss, gnss_table
-from strapdown.tables.heading import HEADING, check_heading, heading_table
-from strapdown.tables.imu import SAMPLINGS, check_imu, imu_table
-from strapdown.tables.increments import check_increments, increments_table
-from strapdown.tables.motion_increments import (
+from strapdown.tables.imu import (
     MOTION,
+    SAMPLINGS,
+    check_imu,
+    check_increments,
     check_motion_increments,
+    imu_table,
+    increments_table,
     motion_increments_table,
 )
-from strapdown.tables.odometer import (
-    ODOMETER,
-    check_odometer,
-    odometer_from_distance,
-    odometer_table,
-)
-from strapdown.tables.references import REFERENCE_KINDS, check_references, references_table
-from strapdown.tables.trajectory import TRAJECTORY, check_trajectory, places_of, trajectory_table
-from strapdown.tables.trajectory_errors import (
+from strapdown.tables.trajectory import (
+    TRAJECTORY,
     TRAJECTORY_ERROR,
+    check_trajectory,
     check_trajectory_error,
     check_trajectory_sd,
+    places_of,
     trajectory_error_table,
+    trajectory_table,
 )
 
 __all__ = [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from numbers import Real
 
 import numpy as np
@@ -230,3 +231,77 @@ def check_steps(table: pd.DataFrame, source: str | None) -> None:
             dt=dt[row],
             time=time[row],
         )
+
+
+# Names of the columns.
+
+
+GYRO = ["gyro_x", "gyro_y", "gyro_z"]
+ACCEL = ["accel_x", "accel_y", "accel_z"]
+MAG = ["mag_x", "mag_y", "mag_z"]
+THETA = ["theta_x", "theta_y", "theta_z"]
+DTHETA = ["dtheta_x", "dtheta_y", "dtheta_z"]
+PHI = ["phi_x", "phi_y", "phi_z"]
+DV = ["dv_x", "dv_y", "dv_z"]
+DR = ["dr_x", "dr_y", "dr_z"]
+QUATERNION = ["q_w", "q_x", "q_y", "q_z"]
+EULER = ["roll", "pitch", "heading"]
+GEODETIC = ["lat", "lon", "alt"]
+VELOCITY = ["VN", "VE", "VD"]
+NED = ["north", "east", "down"]
+POSITION_SD = ["north_sd", "east_sd", "down_sd"]
+VELOCITY_SD = ["VN_sd", "VE_sd", "VD_sd"]
+REFERENCE = ["time", "kind", "since", *EULER, "turns", "axis", "sd"]
+
+
+# Holes in a record.
+
+
+@dataclass(frozen=True)
+class Gap:
+    """A hole in a record.
+
+    Attributes
+    ----------
+    start, end : float, s
+        The stamps on its two sides.
+    usual : float, s
+        The step that the record usually keeps.
+    sample : int
+        Position of the sample after the gap, counted from 0.
+    """
+
+    start: float
+    end: float
+    usual: float
+    sample: int
+
+    @property
+    def length(self) -> float:
+        """Length of the gap in s."""
+        return self.end - self.start
+
+
+def find_gaps(time: ArrayLike) -> list[Gap]:
+    """Find the steps that are far longer than a record's own habit.
+
+    Parameters
+    ----------
+    time : array_like, (n,), s
+        Increasing stamps. Bursts, as of a phone that sends over a network, are a habit: a
+        gap is a step of more than three times the step that 95 % of the steps do not exceed.
+
+    Returns
+    -------
+    list of Gap
+        In order of time.
+    """
+    stamps = np.asarray(time, dtype=np.float64)
+    steps = np.diff(stamps)
+    if steps.size < 2:
+        return []
+    usual = float(np.quantile(steps, 0.95, method="lower"))
+    return [
+        Gap(float(stamps[k]), float(stamps[k + 1]), usual, int(k) + 1)
+        for k in np.flatnonzero(steps > 3.0 * usual)
+    ]

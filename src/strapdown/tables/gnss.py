@@ -10,6 +10,10 @@ from strapdown.dsp.running_integral import running_integral
 from strapdown.errors import DataError
 from strapdown.frames import place_difference
 from strapdown.tables.checks import (
+    GEODETIC,
+    POSITION_SD,
+    VELOCITY,
+    VELOCITY_SD,
     check_columns,
     check_latitude,
     check_rows,
@@ -20,7 +24,6 @@ from strapdown.tables.checks import (
     source_of,
     values_of,
 )
-from strapdown.tables.columns import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
 
 Array = NDArray[np.float64]
 

@@ -8,16 +8,26 @@ from numpy.typing import ArrayLike
 
 from strapdown.errors import DataError
 from strapdown.tables.checks import (
+    ACCEL,
+    DR,
+    DTHETA,
+    DV,
+    GYRO,
+    MAG,
+    PHI,
+    THETA,
     as_array,
     check_columns,
     check_rows,
     check_same_length,
+    check_steps,
     check_time,
+    checked_values,
     index_of,
+    joined,
     source_of,
     values_of,
 )
-from strapdown.tables.columns import ACCEL, GYRO, MAG
 
 SAMPLINGS = ("instantaneous", "mean")
 
@@ -119,3 +129,124 @@ def check_imu(table: pd.DataFrame) -> None:
         )
     check_time(index_of(table), source)
     check_rows(values_of(table, columns), columns, source)
+
+
+# Increments tables: the rate alone, step by step, before any algorithm.
+
+
+INCREMENTS = ["dt", *THETA, *DTHETA]
+
+
+def increments_table(
+    time: ArrayLike, dt: ArrayLike, theta: ArrayLike, dtheta: ArrayLike | None = None
+) -> pd.DataFrame:
+    """Make an Increments table.
+
+    Parameters
+    ----------
+    time : array_like, (n,), s
+        End of each step.
+    dt : array_like, (n,), s
+        Length of each step.
+    theta : array_like, (n, 3), rad
+        Integral of the body rate over the step.
+    dtheta : array_like, (n, 3), rad, optional
+        Change of the body rate over the step times `dt`; zero, where it is not known.
+
+    Returns
+    -------
+    DataFrame
+
+    Raises
+    ------
+    DataError
+        Shapes disagree, a value is not finite, or a step has no positive length.
+    """
+    change = np.zeros_like(theta, dtype=np.float64) if dtheta is None else dtheta
+    table = joined(time, INCREMENTS, None, dt=(dt, None), theta=(theta, 3), dtheta=(change, 3))
+    check_increments(table)
+    return table
+
+
+def check_increments(table: pd.DataFrame) -> None:
+    """Check an Increments table.
+
+    Parameters
+    ----------
+    table : DataFrame
+
+    Raises
+    ------
+    DataError
+        A column is missing, a value is not finite, time does not advance, a step is not
+        positive, or a step begins before the one before it has ended.
+    """
+    checked_values(table, INCREMENTS)
+    check_steps(table, source_of(table))
+
+
+# MotionIncrements tables: how a body turned and moved over each step, ready for navigation.
+
+
+MOTION = ["dt", *PHI, *DV, *DR]
+
+
+def motion_increments_table(
+    time: ArrayLike,
+    dt: ArrayLike,
+    phi: ArrayLike,
+    dv: ArrayLike,
+    dr: ArrayLike,
+    source: str | None = None,
+) -> pd.DataFrame:
+    """Make a MotionIncrements table.
+
+    With ``C`` from the body at an instant of the step to the body at its start, relative to
+    inertial space:
+
+    Parameters
+    ----------
+    time : array_like, (n,), s
+        End of each step.
+    dt : array_like, (n,), s
+        Length of each step.
+    phi : array_like, (n, 3), rad
+        Rotation vector of ``C`` at the end of the step: the turn with its coning.
+    dv : array_like, (n, 3), m/s
+        ``int C f dt`` over the step, in the body axes of its start: the velocity that specific
+        force gave, with rotation and sculling.
+    dr : array_like, (n, 3), m
+        ``int int C f dt dt`` over the step, in the same axes: the distance that it gave, with
+        scrolling.
+    source : str, optional
+        Name for messages.
+
+    Returns
+    -------
+    DataFrame
+
+    Raises
+    ------
+    DataError
+        As `check_motion_increments`.
+    """
+    table = joined(time, MOTION, source, dt=(dt, None), phi=(phi, 3), dv=(dv, 3), dr=(dr, 3))
+    check_motion_increments(table)
+    return table
+
+
+def check_motion_increments(table: pd.DataFrame) -> None:
+    """Check a MotionIncrements table.
+
+    Parameters
+    ----------
+    table : DataFrame
+
+    Raises
+    ------
+    DataError
+        A column is missing, a value is not finite, time does not advance, a step is not
+        positive, or a step begins before the one before it has ended.
+    """
+    checked_values(table, MOTION)
+    check_steps(table, source_of(table))

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from strapdown.estimation.influence import Influence, check_rising
+from strapdown.estimation.robust import Influence, check_rising
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,8 @@ from typing import ClassVar
 import numpy as np
 import pandas as pd
 
-from strapdown.aiding.aid import Epochs, TableAid
-from strapdown.aiding.view import DISPLACEMENT, View
-from strapdown.estimation.observation import Observation
+from strapdown.aiding.aid import DISPLACEMENT, Epochs, TableAid, View
+from strapdown.estimation.covariance import Observation
 from strapdown.tables.checks import check_columns, index_of, source_of, values_of
 
 

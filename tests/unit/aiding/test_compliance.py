@@ -11,7 +11,7 @@ from tests.aided_drives import CarriedMotion, drive, estimate, gnss_of, navigato
 
 from strapdown import rotation
 from strapdown.aiding.gnss import Gnss
-from strapdown.aiding.no_slip import NoSlip
+from strapdown.aiding.vehicle import NoSlip
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError
 

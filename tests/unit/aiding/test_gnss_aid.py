@@ -9,10 +9,10 @@ import pytest
 
 from strapdown import earth, rotation
 from strapdown._kernels.steady_motion import steady_motion
+from strapdown.aiding.aid import View
 from strapdown.aiding.gnss import Gnss
-from strapdown.aiding.view import View
 from strapdown.errors import ConfigError, DataError
-from strapdown.estimation.rotation_vector_model import RotationVectorModel
+from strapdown.estimation.error_model import RotationVectorModel
 from strapdown.estimation.sensor_blocks import accel_bias, accel_scale, gyro_bias, gyro_scale
 from strapdown.mechanization import MECHANIZATIONS
 from strapdown.nav_state import NavState

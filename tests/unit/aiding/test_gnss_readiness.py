@@ -13,13 +13,18 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import town_drive as town
 from strapdown.aiding.gnss import Gnss
-from strapdown.aiding.gnss_clock import check_overlap, find_time_offset, time_offset
-from strapdown.aiding.gnss_delay import find_velocity_delay, velocity_delay
+from strapdown.aiding.gnss_clock import (
+    check_overlap,
+    find_time_offset,
+    find_velocity_delay,
+    time_offset,
+    velocity_delay,
+)
 from strapdown.aiding.gnss_readiness import gnss_readiness
 from strapdown.errors import DataError
 from strapdown.sensors.triad_errors import ImuErrors
 from strapdown.simulation import simulate_imu
-from strapdown.simulation.gnss_faults import Frozen, Outage, Outliers, inject_gnss_faults
+from strapdown.simulation.gnss import Frozen, Outage, Outliers, inject_gnss_faults
 from strapdown.tables import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD, gnss_table
 
 

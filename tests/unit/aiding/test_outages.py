@@ -12,17 +12,20 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from aided_drives import drive, error_now, gnss_of, navigator_of, run
 from strapdown.aiding.barometer import Barometer
-from strapdown.aiding.body_velocity import BodyVelocity
 from strapdown.aiding.gnss import Gnss
 from strapdown.aiding.heading import Heading
-from strapdown.aiding.no_slip import NoSlip
-from strapdown.aiding.odometer import Odometer
-from strapdown.aiding.zero_rate import ZeroRate
-from strapdown.aiding.zero_velocity import ZeroVelocity
-from strapdown.simulation.barometer import PressureHeight, simulate_barometer
-from strapdown.simulation.body_velocity import VelocityLog, simulate_body_velocity
-from strapdown.simulation.heading import Compass, simulate_heading
-from strapdown.simulation.odometer import WheelSpeed, simulate_odometer
+from strapdown.aiding.standstill import ZeroRate, ZeroVelocity
+from strapdown.aiding.vehicle import BodyVelocity, NoSlip, Odometer
+from strapdown.simulation.aiding_sensors import (
+    Compass,
+    PressureHeight,
+    VelocityLog,
+    WheelSpeed,
+    simulate_barometer,
+    simulate_body_velocity,
+    simulate_heading,
+    simulate_odometer,
+)
 
 SEEDS = range(5)
 LOST = 40.0

@@ -13,9 +13,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from aided_drives import drive, gnss_of, increments_of, navigator_of, run
 from strapdown.aiding.gnss import Gnss
-from strapdown.aiding.standstill_detectors import STANDSTILL_DETECTORS
-from strapdown.aiding.zero_rate import ZeroRate
-from strapdown.aiding.zero_velocity import ZeroVelocity
+from strapdown.aiding.standstill import STANDSTILL_DETECTORS, ZeroRate, ZeroVelocity
 from strapdown.errors import ConfigError
 
 RATE_SD, FORCE_SD = 0.01, 0.1

@@ -7,9 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from strapdown.aiding.correlated import longer_by
-from strapdown.aiding.standstill_thresholds import STANDSTILL_THRESHOLDS, WIDTH, otsu
-from strapdown.aiding.zero_velocity import ZeroVelocity
+from strapdown.aiding.aid import longer_by
+from strapdown.aiding.standstill import STANDSTILL_THRESHOLDS, WIDTH, ZeroVelocity, otsu
 from strapdown.errors import ConfigError
 
 STEP = 0.005

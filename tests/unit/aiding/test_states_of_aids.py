@@ -14,18 +14,21 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from aided_drives import GYRO_BIAS, drive, estimate, gnss_of, navigator_of, run
 from strapdown import rotation
 from strapdown.aiding.barometer import Barometer
-from strapdown.aiding.body_velocity import BodyVelocity
 from strapdown.aiding.gnss import Gnss
 from strapdown.aiding.heading import Heading
-from strapdown.aiding.no_slip import NoSlip
-from strapdown.aiding.odometer import Odometer
-from strapdown.aiding.zero_rate import ZeroRate
-from strapdown.aiding.zero_velocity import ZeroVelocity
+from strapdown.aiding.standstill import ZeroRate, ZeroVelocity
+from strapdown.aiding.vehicle import BodyVelocity, NoSlip, Odometer
 from strapdown.errors import ConfigError
-from strapdown.simulation.barometer import PressureHeight, simulate_barometer
-from strapdown.simulation.body_velocity import VelocityLog, simulate_body_velocity
-from strapdown.simulation.heading import Compass, simulate_heading
-from strapdown.simulation.odometer import WheelSpeed, simulate_odometer
+from strapdown.simulation.aiding_sensors import (
+    Compass,
+    PressureHeight,
+    VelocityLog,
+    WheelSpeed,
+    simulate_barometer,
+    simulate_body_velocity,
+    simulate_heading,
+    simulate_odometer,
+)
 
 RUNS = 20
 UNTIL = 66.0

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
-from strapdown.aiding.view import View
-from strapdown.aiding.zero_rate import ZeroRate
-from strapdown.estimation.rotation_vector_model import RotationVectorModel
+from strapdown.aiding.aid import View
+from strapdown.aiding.standstill import ZeroRate
+from strapdown.estimation.error_model import RotationVectorModel
 from strapdown.estimation.sensor_blocks import (
     accel_bias,
     accel_scale,

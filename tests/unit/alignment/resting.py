@@ -8,10 +8,9 @@ import numpy as np
 import pandas as pd
 
 from strapdown import rotation
-from strapdown.alignment.alignment import Alignment
-from strapdown.alignment.site import Site
+from strapdown.alignment.alignment import Alignment, Site
 from strapdown.sensors.catalogue import load_sensor
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.simulation import ImuErrors, Origin, StationaryMotion, TriadErrors, simulate_imu
 
 SITE = Site(55.0, 37.0, 200.0)

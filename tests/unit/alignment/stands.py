@@ -7,16 +7,13 @@ import functools
 import numpy as np
 
 from strapdown import rotation
-from strapdown.alignment.site import Site
+from strapdown.alignment.alignment import Site
 from strapdown.sensors.catalogue import load_sensor
-from strapdown.sensors.error_chain import apply
-from strapdown.sensors.error_draws import child
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.sensors.error_chain import apply, child
+from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
 from strapdown.simulation import ImuErrors, StationaryMotion, simulate_imu
 from strapdown.simulation.earth_motion import Origin
-from strapdown.simulation.path_motion import PathMotion
-from strapdown.simulation.waves import Wave
+from strapdown.simulation.path_motion import PathMotion, Wave
 from strapdown.tables import ACCEL, GYRO, QUATERNION, imu_table
 
 ORIGIN = Origin(55.0, 37.0, 150.0)

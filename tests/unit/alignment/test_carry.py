@@ -16,7 +16,7 @@ from stands import SITE, changed, chi_square, ideal, phi, rocking, unit
 
 from strapdown import rotation
 from strapdown.alignment.alignment import Alignment
-from strapdown.alignment.carry import carry
+from strapdown.alignment.readiness import carry
 from strapdown.errors import DataError
 
 

@@ -13,11 +13,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from stands import IDEAL, ORIGIN, SITE, ideal, phi, rocking, still
 
-from strapdown.alignment.inertial_fit import _wahba
-from strapdown.alignment.inertial_frame import InertialFrame
-from strapdown.alignment.known_heading import KnownHeading
-from strapdown.alignment.levelling_alone import Levelling
-from strapdown.alignment.site import Site
+from strapdown.alignment.alignment import Site
+from strapdown.alignment.inertial_frame import InertialFrame, _wahba
+from strapdown.alignment.levelling import KnownHeading, Levelling
 from strapdown.alignment.two_vector import TwoVector
 from strapdown.simulation.earth_motion import Origin
 

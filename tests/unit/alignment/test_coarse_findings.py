@@ -13,10 +13,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from stands import ORIGIN, SITE, changed, chi_square, phi, rocking, still, unit
 
+from strapdown.alignment.alignment import Site
 from strapdown.alignment.inertial_frame import InertialFrame
-from strapdown.alignment.known_heading import KnownHeading
-from strapdown.alignment.levelling_alone import Levelling
-from strapdown.alignment.site import Site
+from strapdown.alignment.levelling import KnownHeading, Levelling
 from strapdown.alignment.two_vector import TwoVector
 from strapdown.errors import ConfigError, DataError
 from strapdown.simulation.earth_motion import Origin

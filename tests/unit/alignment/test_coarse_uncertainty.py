@@ -14,13 +14,11 @@ sys.path.insert(0, str(Path(__file__).parent))
 from stands import IDEAL, SITE, chi_square, ideal, phi, rocking, still, unit, with_errors
 
 from strapdown.alignment.inertial_frame import InertialFrame
-from strapdown.alignment.known_heading import KnownHeading
-from strapdown.alignment.levelling_alone import Levelling
+from strapdown.alignment.levelling import KnownHeading, Levelling
 from strapdown.alignment.two_vector import TwoVector
 from strapdown.errors import DataError
-from strapdown.sensors.imu_uncertainty import BiasDrift, ImuUncertainty
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.sensors.uncertainty import BiasDrift, ImuUncertainty, TriadUncertainty
 
 STATIC = [TwoVector(), InertialFrame("start"), InertialFrame("end")]
 DEG_H = np.radians(1.0) / 3600.0

@@ -13,14 +13,12 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from resting import SITE, UNCERTAINTY, resting, roughly
 
-from strapdown.alignment.claims import heading_floor_deg, refuse_false_claims
-from strapdown.alignment.fine import FineAlignment
-from strapdown.alignment.known_heading import KnownHeading
-from strapdown.alignment.north import latitude_findings
-from strapdown.alignment.outliers import outlier_findings
+from strapdown.alignment.fine import FineAlignment, heading_floor_deg, refuse_false_claims
+from strapdown.alignment.levelling import KnownHeading
+from strapdown.alignment.record_checks import latitude_findings, outlier_findings
 from strapdown.errors import DataError, DivergenceError
 from strapdown.sensors.catalogue import load_sensor
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.simulation import Origin, StationaryMotion, simulate_imu
 from strapdown.tables import GYRO
 

@@ -17,13 +17,11 @@ from strapdown import rotation
 from strapdown.alignment.fine import FineAlignment
 from strapdown.alignment.fine_result import FINE_COLUMNS
 from strapdown.errors import ConfigError, DataError
-from strapdown.estimation.covariances import COVARIANCES
-from strapdown.estimation.error_models import ERROR_MODELS
-from strapdown.estimation.quaternion_model import QuaternionModel
+from strapdown.estimation.covariance import COVARIANCES
+from strapdown.estimation.error_model import ERROR_MODELS, QuaternionModel
 from strapdown.mechanization import NorthEastDown, WanderAzimuth
 from strapdown.prefilter import PREFILTERS
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
 from strapdown.tables import ACCEL, GYRO
 
 DEG_PER_HOUR = np.radians(1.0) / 3600.0

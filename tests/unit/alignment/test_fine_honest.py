@@ -15,15 +15,14 @@ from resting import Rest, roughly
 from stands import with_errors
 
 from strapdown import rotation
+from strapdown.alignment.alignment import Site
 from strapdown.alignment.fine import FineAlignment
-from strapdown.alignment.known_heading import KnownHeading
-from strapdown.alignment.site import Site
+from strapdown.alignment.levelling import KnownHeading
 from strapdown.errors import DataError
 from strapdown.sensors.catalogue import load_sensor
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.simulation import ImuErrors, Origin, StationaryMotion, simulate_imu
-from strapdown.simulation.path_motion import PathMotion
-from strapdown.simulation.waves import Wave
+from strapdown.simulation.path_motion import PathMotion, Wave
 from strapdown.tables import QUATERNION
 
 SENSOR = load_sensor("fog-1000")

@@ -16,8 +16,7 @@ from stands import ORIGIN, SITE, chi_square, ideal, phi, still, unit
 from strapdown.alignment.gnss_course import GnssCourse
 from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.catalogue import load_sensor
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
 from strapdown.simulation.minimum_jerk import Track
 from strapdown.simulation.path_motion import PathMotion

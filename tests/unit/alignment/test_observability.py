@@ -14,7 +14,7 @@ from resting import SITE, UNCERTAINTY, resting, roughly
 
 from strapdown import rotation
 from strapdown.alignment.fine import FineAlignment
-from strapdown.alignment.observability import STAY, manoeuvres_after, null_space
+from strapdown.alignment.readiness import STAY, manoeuvres_after, null_space
 from strapdown.alignment.stationary import (
     LEAST_STRETCHES,
     Standing,
@@ -22,10 +22,10 @@ from strapdown.alignment.stationary import (
     rate_observation,
     still_observations,
 )
+from strapdown.estimation.covariance import Joseph
 from strapdown.estimation.error_filter import ErrorFilter
-from strapdown.estimation.joseph import Joseph
-from strapdown.estimation.resting_sensors import resting_states
-from strapdown.estimation.rotation_vector_model import RotationVectorModel
+from strapdown.estimation.error_model import RotationVectorModel
+from strapdown.estimation.sensor_blocks import resting_states
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown
 from strapdown.simulation import ImuErrors, Origin, StationaryMotion, TriadErrors, simulate_imu

@@ -13,10 +13,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 from stands import ORIGIN, SITE, chi_square, unit
 
 from strapdown.alignment.inertial_frame import InertialFrame
-from strapdown.alignment.known_heading import KnownHeading
+from strapdown.alignment.levelling import KnownHeading
 from strapdown.alignment.two_vector import TwoVector
-from strapdown.simulation.path_motion import PathMotion
-from strapdown.simulation.waves import Wave
+from strapdown.simulation.path_motion import PathMotion, Wave
 
 RUNS = 15
 

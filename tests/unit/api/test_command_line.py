@@ -8,7 +8,7 @@ import shutil
 
 import numpy as np
 
-from strapdown.bundle import environment
+from strapdown.bundle import writing as environment
 from strapdown.formats.log_writers import LOG_WRITERS
 from strapdown.tables import imu_table
 

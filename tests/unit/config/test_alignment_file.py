@@ -14,10 +14,17 @@ from strapdown.config.alignment_file import (
     alignment_spec,
     read_alignment_spec,
 )
-from strapdown.config.choice import ChoiceSpec, choice_form, make_choice
-from strapdown.config.slots import GIVEN, SLOTS, UNITS, options_of
+from strapdown.config.choice import (
+    GIVEN,
+    SLOTS,
+    UNITS,
+    ChoiceSpec,
+    choice_form,
+    make_choice,
+    options_of,
+)
 from strapdown.errors import ConfigError
-from strapdown.estimation.robust_update import RobustUpdate
+from strapdown.estimation.robust import RobustUpdate
 from strapdown.mechanization import NorthEastDown
 
 GOOD = """\

@@ -9,9 +9,9 @@ import pytest
 
 from strapdown.config.case_keys import canonical
 from strapdown.config.crash_case import CaseSpec
-from strapdown.config.quantities import keys_of
 from strapdown.config.spec import TableSpec
 from strapdown.config.toml_file import read_toml
+from strapdown.config.wanted import keys_of
 
 PAGE = (Path(__file__).parents[3] / "docs" / "case.md").read_text(encoding="utf-8")
 

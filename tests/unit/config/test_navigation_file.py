@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from strapdown.config import navigation as tables
+from strapdown.config.choice import SLOTS, options_of
 from strapdown.config.navigation_file import (
     NAVIGATION_STAGES,
     navigation_spec,
     read_navigation_spec,
 )
-from strapdown.config.slots import SLOTS, options_of
 from strapdown.config.spec import TableSpec
 from strapdown.errors import ConfigError
 

@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from toml_documents import Document
 
-from strapdown.config.toml_lines import key_lines, line_of
+from strapdown.config.toml_file import key_lines, line_of
 
 EXAMPLE = """\
 title = "a # b"  # comment

@@ -17,9 +17,8 @@ from strapdown.crash.at_point import at_point
 from strapdown.crash.entry import Entry
 from strapdown.crash.path import reconstruct_path
 from strapdown.crash.prepare import prepare_unit
-from strapdown.sensors.assumed import Assumed, assumed_shapes
-from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.sensors.crash_unit import Assumed, CrashUnit, RecordedTriad, assumed_shapes
+from strapdown.sensors.uncertainty import TriadUncertainty
 
 G = 9.80665
 SPEED, CHANGE, OVER = 15.0, 16.0, (0.0, 0.15)

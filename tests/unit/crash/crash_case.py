@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
-from strapdown.sensors.prepared_unit import Levelling, PreparedUnit
+from strapdown.sensors.pre_crash import Levelling, PreparedUnit
 from strapdown.sensors.rest import rest_between
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.tables import ACCEL, GYRO
 
 RATE = 200.0

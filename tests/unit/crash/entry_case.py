@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from strapdown import rotation
-from strapdown.crash.entry_priors import EntryPriors
+from strapdown.crash.entry_sensitivity import EntryPriors
 from strapdown.frames import place_difference
 from strapdown.nav_state import NavState
 from strapdown.sensors.error_chain import apply
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.simulation import ImuErrors, Origin, TriadErrors, car, simulate_imu
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
-from strapdown.simulation.manoeuvres import Accelerate, Brake, Straight, Turn
+from strapdown.simulation.vehicles import Accelerate, Brake, Straight, Turn
 from strapdown.tables import ACCEL, GYRO, imu_table
 
 ORIGIN = Origin(45.0, 20.0, 80.0)

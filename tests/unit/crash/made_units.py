@@ -9,7 +9,7 @@ import pandas as pd
 
 from strapdown import rotation
 from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.sensors.uncertainty import TriadUncertainty
 
 G = 9.80665
 LOW = TriadUncertainty(

@@ -11,11 +11,10 @@ from tests.unit.crash.crash_case import RATE, prepared
 
 from strapdown import rotation
 from strapdown.crash.acceleration import body_acceleration
-from strapdown.crash.angle_rates import angle_rates
 from strapdown.crash.at_point import AtPoint, at_point
 from strapdown.crash.delta_v import delta_v
 from strapdown.crash.delta_v_bound import body_delta_v_bound, resolved_delta_v_bound
-from strapdown.crash.entry import Entry
+from strapdown.crash.entry import Entry, angle_rates
 from strapdown.crash.leg import VELOCITY
 from strapdown.crash.monte_carlo import sample_paths
 from strapdown.crash.reference_path import compare_with_reference

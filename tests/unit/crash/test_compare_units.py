@@ -10,10 +10,9 @@ import pytest
 
 from strapdown import Entry, reconstruct_crash, rotation
 from strapdown.crash.at_point import at_point
-from strapdown.crash.combine_units import combine_units
+from strapdown.crash.combine_units import combine_units, least_variance
 from strapdown.crash.compare_units import compare_units
-from strapdown.crash.match_axes import signed_permutations
-from strapdown.crash.mean_weights import least_variance
+from strapdown.crash.mounting_checks import signed_permutations
 from strapdown.crash.unit_differences import (
     difference_covariance,
     joint_covariance,
@@ -22,10 +21,9 @@ from strapdown.crash.unit_differences import (
 from strapdown.crash.window_weights import window_weights
 from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
-from strapdown.sensors.prepared_unit import Levelling, PreparedUnit
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
-from strapdown.simulation.case_recording import record_case
-from strapdown.simulation.crash_cases import CASES
+from strapdown.sensors.pre_crash import Levelling, PreparedUnit
+from strapdown.sensors.uncertainty import TriadUncertainty
+from strapdown.simulation.crash_cases import CASES, record_case
 from strapdown.tables import ACCEL, GYRO, imu_table
 
 G = 9.80665

@@ -6,10 +6,15 @@ import numpy as np
 import pytest
 
 from strapdown.crash.acceleration import Acceleration
-from strapdown.crash.crash_type import classify_crash, classify_crashes, side_of
+from strapdown.crash.crash_type import (
+    PASSENGER_CAR,
+    TippingBody,
+    classify_crash,
+    classify_crashes,
+    side_of,
+)
 from strapdown.crash.delta_v import event_delta_v
 from strapdown.crash.events import detect_events
-from strapdown.crash.tipping import PASSENGER_CAR, TippingBody
 from strapdown.errors import ConfigError, DataError
 
 SMALL = 0.01 * np.eye(3)

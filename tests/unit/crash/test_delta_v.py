@@ -16,11 +16,12 @@ from strapdown.crash.delta_v import (
     cumulative_delta_v,
     delta_v,
     event_delta_v,
+    maximum_delta_v,
+    recorder_delta_v,
     trailing_delta_v,
+    trajectory_delta_v,
 )
 from strapdown.crash.events import detect_events
-from strapdown.crash.recorder_delta_v import maximum_delta_v, recorder_delta_v
-from strapdown.crash.trajectory_delta_v import trajectory_delta_v
 from strapdown.crash.window_weights import resolved_weights, window_weights
 from strapdown.errors import ConfigError, DataError
 from strapdown.tables import imu_table

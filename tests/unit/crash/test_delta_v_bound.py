@@ -7,14 +7,10 @@ import pandas as pd
 import pytest
 from scipy.stats import norm
 
-from strapdown.crash.delta_v_bound import (
-    DeltaVBound,
-    body_delta_v_bound,
-    resolved_delta_v_bound,
-)
+from strapdown.crash.delta_v_bound import DeltaVBound, body_delta_v_bound, resolved_delta_v_bound
 from strapdown.crash.entry import Entry
 from strapdown.crash.path import CrashPath
-from strapdown.crash.sample_effects import SampleEffects
+from strapdown.crash.unit_effects import SampleEffects
 from strapdown.errors import DataError
 
 STEP = 0.01

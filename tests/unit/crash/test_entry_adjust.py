@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from strapdown.crash.entry_adjust import Problem, adjust, weigh
+from strapdown.crash.entry_estimate import Problem, adjust, weigh
 
 M, W, P, S = 12, 4, 5, 3
 GROUPS = np.array([0, 0, 1, -1])

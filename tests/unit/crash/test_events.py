@@ -12,8 +12,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from pulses import KMH, Pulse, means, stamps
 
 from strapdown.crash.acceleration import Acceleration
-from strapdown.crash.event_rule import PART_563, EventRule
-from strapdown.crash.events import detect_events
+from strapdown.crash.events import PART_563, EventRule, detect_events
 from strapdown.errors import ConfigError, DataError
 
 FRONT = Pulse((-7.2, 0.0, 0.0))

@@ -27,14 +27,14 @@ from entry_case import (
     errors_of,
 )
 
-from strapdown.crash.entry_priors import EntryPriors, FixCorrelation
+from strapdown.crash.entry_sensitivity import EntryPriors, FixCorrelation
 from strapdown.crash.gnss_entry import entry_state_from_gnss
 from strapdown.errors import ConfigError, DataError
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.simulation import ImuErrors, TriadErrors, car, simulate_imu
 from strapdown.simulation.crash_motion import CrashMotion, HaversinePulse
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
-from strapdown.simulation.manoeuvres import Straight
+from strapdown.simulation.vehicles import Straight
 from strapdown.tables import GEODETIC, VELOCITY
 
 RUNS = 200

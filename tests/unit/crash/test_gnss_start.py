@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 
 from strapdown.crash.at_point import at_point
-from strapdown.crash.entry_priors import FixCorrelation
-from strapdown.crash.gnss_start import CONTRIBUTOR, GnssEntry, start_from_gnss
+from strapdown.crash.entry_sensitivity import FixCorrelation
+from strapdown.crash.gnss_entry import CONTRIBUTOR, GnssEntry, start_from_gnss
 from strapdown.crash.path import reconstruct_path
 from strapdown.crash.prepare import prepare_unit
 from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.sensors.synchronise import synchronise
-from strapdown.simulation.crash_course import Setting
+from strapdown.simulation.crash_motion import Setting
 from strapdown.simulation.crash_recording import record_crash
-from strapdown.simulation.front_impacts import pole_impact
+from strapdown.simulation.crash_scenarios import pole_impact
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
 from strapdown.simulation.mounted_motion import MountedMotion
-from strapdown.simulation.paper_recorders import paper_units
+from strapdown.simulation.recorder_design import paper_units
 from strapdown.systems.crash_reconstruction import reconstruct_crash
 from strapdown.tables import GEODETIC, NED, VELOCITY
 
@@ -148,7 +148,7 @@ def test_priors_are_of_the_vehicles_axes(monkeypatch):
         seen["priors"] = priors
         raise DataError("enough", quantity="test", remedy="none")
 
-    monkeypatch.setattr("strapdown.crash.gnss_start.entry_state_from_gnss", stop)
+    monkeypatch.setattr("strapdown.crash.gnss_entry.entry_state_from_gnss", stop)
     with pytest.raises(DataError, match="enough"):
         start_from_gnss(at, GnssEntry(simulate_gnss(CRASH.motion, RECEIVER)), (0.0, 0.0, 0.0))
     assert seen["priors"].accel.axis("bias") == pytest.approx((0.2, 0.1, 0.3))

@@ -12,9 +12,8 @@ from scipy.optimize import brentq, minimize
 from strapdown.crash.indices.asi import asi
 from strapdown.crash.indices.flail_space import flail_space
 from strapdown.crash.indices.hic import hic
-from strapdown.crash.indices.moving_means import largest_mean, moving_means
 from strapdown.crash.indices.olc import olc
-from strapdown.crash.indices.phaseless import four_pole
+from strapdown.crash.indices.pulse import four_pole, largest_mean, moving_means
 from strapdown.crash.indices.thiv import thiv
 from strapdown.errors import ConfigError, DataError
 

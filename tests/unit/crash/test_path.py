@@ -10,7 +10,7 @@ from tests.unit.crash.crash_case import RATE, prepared
 
 from strapdown import rotation
 from strapdown._kernels.perturbed_runs import perturbed_runs
-from strapdown.crash.combined_effects import combine_effects
+from strapdown.crash.combine_units import combine_effects
 from strapdown.crash.delta_v_bound import resolved_delta_v_bound
 from strapdown.crash.entry import Entry
 from strapdown.crash.leg import PLACE, VELOCITY
@@ -20,7 +20,7 @@ from strapdown.crash.unit_effects import unit_effects
 from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.sensors.lever_arm import move_unit
-from strapdown.sensors.prepared_unit import Levelling
+from strapdown.sensors.pre_crash import Levelling
 from strapdown.simulation import ImuErrors, simulate_imu
 from strapdown.simulation.crash_motion import CrashMotion, HaversinePulse
 from strapdown.simulation.earth_motion import Origin

@@ -14,15 +14,18 @@ from pulses import Pulse, stamps
 from strapdown import rotation
 from strapdown.crash.acceleration import Acceleration
 from strapdown.crash.delta_v import delta_v
-from strapdown.crash.pdof import ned_pdof, pdof, pdof_gradient, pdof_sd
-from strapdown.crash.pdof_convention import (
+from strapdown.crash.pdof import (
     CONVENTIONS,
     clock_of,
     direction_of_clock,
     from_convention,
+    ned_pdof,
+    pdof,
+    pdof_gradient,
+    pdof_interval,
+    pdof_sd,
     to_convention,
 )
-from strapdown.crash.pdof_interval import pdof_interval
 from strapdown.crash.pdof_sensitivity import pdof_by_shift, pdof_by_window
 from strapdown.errors import ConfigError, DataError
 

@@ -16,9 +16,9 @@ from strapdown.crash.compare_units import compare_units
 from strapdown.crash.prepare import prepare_unit
 from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.crash_unit import Mounting
-from strapdown.sensors.prepared_unit import FROM_GRAVITY
+from strapdown.sensors.pre_crash import FROM_GRAVITY
 from strapdown.sensors.synchronise import synchronise
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.tables import ACCEL, GYRO
 
 _spec = importlib.util.spec_from_file_location(

@@ -20,7 +20,7 @@ from strapdown.sensors.synchronise import synchronise
 from strapdown.simulation.crash_recording import record_crash
 from strapdown.simulation.crash_scenarios import CRASHES
 from strapdown.simulation.mounted_motion import MountedMotion
-from strapdown.simulation.paper_recorders import paper_units
+from strapdown.simulation.recorder_design import paper_units
 from strapdown.systems.crash_reconstruction import reconstruct_crash
 from strapdown.tables import ACCEL, NED
 

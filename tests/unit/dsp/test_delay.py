@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from strapdown.dsp.delay import EvenSignal, find_delay
-from strapdown.dsp.lag_correlation import lag_correlation
+from strapdown.dsp.delay import EvenSignal, find_delay, lag_correlation
 from strapdown.errors import DataError
 
 

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from strapdown.dsp.decimation import decimate
-from strapdown.dsp.fir_decimation import fir_decimation
+from strapdown.dsp.decimation import decimate, fir_decimation
 from strapdown.errors import ConfigError
 
 STEP = 1e-3

@@ -7,11 +7,8 @@ import numpy as np
 import pytest
 
 from strapdown.errors import ConfigError
-from strapdown.estimation.adaptive_scale import AdaptiveScale, ScaleState
-from strapdown.estimation.influence_huber import Huber
-from strapdown.estimation.influence_tukey import Tukey
-from strapdown.estimation.influences import INFLUENCES
-from strapdown.estimation.joseph import Joseph
+from strapdown.estimation.covariance import Joseph
+from strapdown.estimation.robust import INFLUENCES, AdaptiveScale, Huber, ScaleState, Tukey
 
 H, ONE = np.ones((1, 1)), np.ones(1)
 

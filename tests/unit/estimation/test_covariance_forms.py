@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from strapdown.errors import ConfigError, DataError
-from strapdown.estimation.covariances import COVARIANCES
-from strapdown.estimation.update_rule import Step
+from strapdown.estimation.covariance import COVARIANCES, Step
 
 FORMS = sorted(COVARIANCES)
 

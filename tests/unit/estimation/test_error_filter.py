@@ -9,13 +9,9 @@ import pytest
 
 from strapdown._kernels.compensation import compensate
 from strapdown.errors import DivergenceError
-from strapdown.estimation.covariances import COVARIANCES
+from strapdown.estimation.covariance import COVARIANCES, Joseph, Observation
 from strapdown.estimation.error_filter import ErrorFilter
-from strapdown.estimation.error_models import ERROR_MODELS
-from strapdown.estimation.joseph import Joseph
-from strapdown.estimation.observation import Observation
-from strapdown.estimation.quaternion_model import QuaternionModel
-from strapdown.estimation.rotation_vector_model import RotationVectorModel
+from strapdown.estimation.error_model import ERROR_MODELS, QuaternionModel, RotationVectorModel
 from strapdown.estimation.sensor_blocks import (
     accel_bias,
     accel_misalignment,

@@ -13,11 +13,9 @@ from strapdown._kernels import psi_model
 from strapdown._kernels.compensation import compensate
 from strapdown._kernels.level import Q_LB
 from strapdown.ellipsoids import WGS84, find_ellipsoid
+from strapdown.estimation.covariance import Joseph, Observation
 from strapdown.estimation.error_filter import ErrorFilter
-from strapdown.estimation.joseph import Joseph
-from strapdown.estimation.observation import Observation
-from strapdown.estimation.quaternion_model import QuaternionModel
-from strapdown.estimation.rotation_vector_model import RotationVectorModel
+from strapdown.estimation.error_model import QuaternionModel, RotationVectorModel
 from strapdown.estimation.sensor_blocks import accel_bias, gauss_markov, gyro_bias, gyro_scale
 from strapdown.estimation.sensor_states import stack
 from strapdown.mechanization.wander_azimuth import WanderAzimuth

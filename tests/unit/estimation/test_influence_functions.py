@@ -8,11 +8,7 @@ import pytest
 from scipy.integrate import quad
 
 from strapdown.errors import ConfigError
-from strapdown.estimation.influence_hampel import Hampel
-from strapdown.estimation.influence_huber import Huber
-from strapdown.estimation.influence_igg3 import Igg3
-from strapdown.estimation.influence_tukey import Tukey
-from strapdown.estimation.influences import INFLUENCES
+from strapdown.estimation.robust import INFLUENCES, Hampel, Huber, Igg3, Tukey
 
 ALL = [made() for made in INFLUENCES.values()]
 ROBUST = [f for f in ALL if f.name != "none"]

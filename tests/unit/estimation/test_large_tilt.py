@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.estimation.covariances import COVARIANCES
-from strapdown.estimation.error_filter import ErrorFilter
-from strapdown.estimation.large_tilt import is_large, unlearnt_force
-from strapdown.estimation.rotation_vector_model import RotationVectorModel
+from strapdown.estimation.covariance import COVARIANCES
+from strapdown.estimation.error_filter import ErrorFilter, is_large, unlearnt_force
+from strapdown.estimation.error_model import RotationVectorModel
 from strapdown.estimation.sensor_blocks import accel_bias, gyro_bias
 from strapdown.mechanization import MECHANIZATIONS
 from strapdown.nav_state import NavState

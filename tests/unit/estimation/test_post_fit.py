@@ -5,14 +5,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from strapdown.estimation.influence_hampel import Hampel
-from strapdown.estimation.influence_huber import Huber
-from strapdown.estimation.influence_igg3 import Igg3
-from strapdown.estimation.influence_none import LeastSquares
-from strapdown.estimation.influence_tukey import Tukey
-from strapdown.estimation.influences import INFLUENCES
-from strapdown.estimation.post_fit import post_fit
-from strapdown.estimation.robust_update import RobustUpdate
+from strapdown.estimation.robust import (
+    INFLUENCES,
+    Hampel,
+    Huber,
+    Igg3,
+    LeastSquares,
+    RobustUpdate,
+    Tukey,
+    post_fit,
+)
 
 parameter = st.floats(0.2, 4.0)
 FUNCTIONS = st.one_of(

@@ -12,8 +12,8 @@ from strapdown import rotation
 from strapdown._kernels.compensation import compensate
 from strapdown.ellipsoids import WGS84
 from strapdown.errors import ConfigError
-from strapdown.estimation.covariances import COVARIANCES
-from strapdown.estimation.quaternion_model import QuaternionModel
+from strapdown.estimation.covariance import COVARIANCES
+from strapdown.estimation.error_model import QuaternionModel
 from strapdown.estimation.sensor_blocks import (
     accel_bias,
     accel_misalignment,

@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 
 from strapdown.errors import ConfigError
-from strapdown.estimation.covariances import COVARIANCES
-from strapdown.estimation.influence_huber import Huber
-from strapdown.estimation.influence_tukey import Tukey
-from strapdown.estimation.influences import INFLUENCES
-from strapdown.estimation.paper_update import PaperUpdate
-from strapdown.estimation.robust_update import RobustUpdate
-from strapdown.estimation.ud import BiermanThornton
-from strapdown.estimation.update_rules import UPDATE_RULES
+from strapdown.estimation.covariance import COVARIANCES, BiermanThornton
+from strapdown.estimation.robust import (
+    INFLUENCES,
+    UPDATE_RULES,
+    Huber,
+    PaperUpdate,
+    RobustUpdate,
+    Tukey,
+)
 
 ALL = sorted(INFLUENCES)
 ROBUST = [name for name in ALL if name != "none"]

@@ -7,8 +7,7 @@ import pytest
 
 from strapdown.ellipsoids import WGS84
 from strapdown.errors import ConfigError
-from strapdown.estimation.error_model import PHYSICAL, Segment
-from strapdown.estimation.rotation_vector_model import RotationVectorModel
+from strapdown.estimation.error_model import PHYSICAL, RotationVectorModel, Segment
 from strapdown.estimation.sensor_blocks import (
     accel_bias,
     accel_scale,

@@ -19,15 +19,14 @@ from strapdown.estimation.sensor_blocks import (
     lever_arm,
     mounting,
     random_walk,
+    standard_states,
     time_offset,
 )
-from strapdown.estimation.standard_states import standard_states
-from strapdown.estimation.states import StateLayout
+from strapdown.estimation.sensor_states import StateLayout
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.error_chain import apply
-from strapdown.sensors.imu_uncertainty import BiasDrift, ImuUncertainty
 from strapdown.sensors.triad_errors import TriadErrors
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.sensors.uncertainty import BiasDrift, ImuUncertainty, TriadUncertainty
 
 XYZ = ("x", "y", "z")
 

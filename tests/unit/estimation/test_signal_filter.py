@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from strapdown.errors import ConfigError
-from strapdown.estimation.covariances import COVARIANCES
+from strapdown.estimation.covariance import COVARIANCES
 from strapdown.estimation.signal_filter import SignalFilter
 
 STEP = 1e-3

@@ -8,9 +8,14 @@ import pytest
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY as G
 from strapdown.errors import ConfigError, DataError
-from strapdown.evaluation.dead_reckoning import dead_reckon, growth_laws
-from strapdown.evaluation.place_references import is_place, parse_place
-from strapdown.evaluation.place_scores import SensorErrors, score_places
+from strapdown.evaluation.position_references import (
+    SensorErrors,
+    dead_reckon,
+    growth_laws,
+    is_place,
+    parse_place,
+    score_places,
+)
 from strapdown.formats.references import read_reference_words
 from strapdown.results import AttitudeRun
 from strapdown.sensors.rest import rest_between

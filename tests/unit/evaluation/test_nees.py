@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import kstest
 
 from strapdown.errors import DataError
-from strapdown.evaluation.nees import band_of_mean, bounds, normalised_squares
+from strapdown.evaluation.truth_comparison import band_of_mean, bounds, normalised_squares
 
 
 def test_squares_are_those_of_the_inverse_also_with_units_far_apart():

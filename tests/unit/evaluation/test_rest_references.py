@@ -12,13 +12,11 @@ from strapdown.evaluation.reference_points import (
     in_words,
     parse_reference,
     references_from_words,
-    score_references,
-    with_tilt,
-)
-from strapdown.evaluation.rest_references import (
     same_pose_candidates,
+    score_references,
     tilt_references,
     tilt_sd_deg,
+    with_tilt,
 )
 from strapdown.formats.references import read_reference_words
 from strapdown.results import AttitudeRun, RestStretch

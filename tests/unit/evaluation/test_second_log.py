@@ -7,9 +7,13 @@ import pytest
 
 from strapdown import rotation
 from strapdown.errors import DataError
-from strapdown.evaluation.clock_alignment import coarse_offset
-from strapdown.evaluation.second_log import align_second_log
-from strapdown.evaluation.second_log_truth import first_clock, second_clock, truth_from_second_log
+from strapdown.evaluation.second_log import (
+    align_second_log,
+    coarse_offset,
+    first_clock,
+    second_clock,
+    truth_from_second_log,
+)
 from strapdown.tables import QUATERNION, attitude_table, imu_table
 
 OFFSET, DRIFT = 0.1237, 50e-6  # s; 50 ppm

@@ -11,12 +11,13 @@ import pytest
 from strapdown import rotation
 from strapdown.ellipsoids import ELLIPSOIDS
 from strapdown.errors import DataError
-from strapdown.evaluation.trajectory_at import interpolation_cost, trajectory_at
 from strapdown.evaluation.trajectory_differences import (
     ROTATION_ERROR,
+    interpolation_cost,
+    summarise_differences,
+    trajectory_at,
     trajectory_differences,
 )
-from strapdown.evaluation.trajectory_summary import summarise_differences
 from strapdown.frames import (
     ecef_from_geodetic,
     geodetic_from_ecef,

@@ -16,7 +16,7 @@ from strapdown.mechanization import NorthEastDown
 from strapdown.mechanization.state_error import state_error
 from strapdown.nav_state import NavState
 from strapdown.simulation.earth_motion import Origin
-from strapdown.simulation.sine_velocity import SineVelocityMotion
+from strapdown.simulation.spline_motion import SineVelocityMotion
 from strapdown.tables import trajectory_table
 
 MOTION = SineVelocityMotion(

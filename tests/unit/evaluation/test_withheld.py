@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import town_drive as town
 from strapdown.errors import ConfigError
-from strapdown.evaluation.withheld import (
+from strapdown.evaluation.gnss_outages import (
     score_withheld,
     scores_table,
     spans_to_withhold,

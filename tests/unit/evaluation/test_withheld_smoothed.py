@@ -14,16 +14,17 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import town_drive as town
 from strapdown import rotation
-from strapdown.aiding.no_slip import NoSlip
+from strapdown.aiding.vehicle import NoSlip
 from strapdown.errors import ConfigError
-from strapdown.evaluation.withheld import blinded, score_withheld
-from strapdown.evaluation.withheld_smoothed import (
+from strapdown.evaluation.gnss_outages import (
+    blinded,
     end_of_what_tells,
     score_of_smoothed,
+    score_withheld,
     score_withheld_smoothed,
 )
 from strapdown.frames import place_difference
-from strapdown.navigation.damping import DAMPINGS
+from strapdown.navigation.filter_options import DAMPINGS
 from strapdown.navigation.record import Span
 from strapdown.navigation.recorder import FullRecorder
 from strapdown.navigation.smoother import RauchTungStriebel

@@ -18,9 +18,8 @@ from strapdown.attitude import ALGORITHMS, make_algorithm, run_attitude
 from strapdown.attitude.cost import memory, step_kernel
 from strapdown.errors import ConfigError, DataError
 from strapdown.export_c import export_c
-from strapdown.export_c.interface import SHAPES
-from strapdown.export_c.kernels import Kernels
-from strapdown.export_c.syntax import UntranslatableError
+from strapdown.export_c.kernels import Kernels, UntranslatableError
+from strapdown.export_c.program import SHAPES
 from strapdown.export_c.translate import Translator
 from strapdown.increments import increments_from_imu
 from strapdown.tables import GYRO, QUATERNION, imu_table

@@ -9,7 +9,7 @@ import pytest
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats.gnss_files import GnssOptions, read_gnss
 from strapdown.tables import GNSS, check_gnss
-from strapdown.tables.columns import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
+from strapdown.tables.checks import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
 
 KF = [
     "456300.000 30.44478468337 114.47186919892 21.26567 0.010 0.009 0.019",

@@ -10,7 +10,7 @@ import pytest
 
 from strapdown.errors import DataError
 from strapdown.formats.gnss_files import GnssOptions, read_gnss
-from strapdown.tables.columns import GEODETIC, POSITION_SD, VELOCITY_SD
+from strapdown.tables.checks import GEODETIC, POSITION_SD, VELOCITY_SD
 
 # 2024-01-15 23:59:59.5 UTC.
 LATE = 1705363199.5

@@ -8,7 +8,7 @@ import pytest
 from strapdown import frames, rotation
 from strapdown.errors import DataError
 from strapdown.formats.gnss_files import GnssOptions, read_gnss
-from strapdown.tables.columns import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
+from strapdown.tables.checks import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
 
 NOTE = "% (lat/lon/height=WGS84/ellipsoidal,Q=1:fix,2:float,3:sbas,4:dgps,5:single,6:ppp,ns=# of)"
 LEVEL = "latitude(deg) longitude(deg)  height(m)   Q  ns   sdn(m)   sde(m)   sdu(m)"

@@ -19,7 +19,7 @@ from strapdown.formats import read_log
 from strapdown.formats.inference import Signals, infer_signals
 from strapdown.formats.inference.clock import infer_time_faults, infer_time_unit
 from strapdown.formats.inference.conclusion import posterior
-from strapdown.formats.inference.turn import signed_permutations, turns
+from strapdown.formats.inference.rotation_rate import signed_permutations, turns
 from strapdown.formats.recording import ReadOptions
 from strapdown.tables import ACCEL, GYRO, MAG
 

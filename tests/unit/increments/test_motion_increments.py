@@ -15,7 +15,7 @@ from strapdown.increments import (
     increments_from_imu,
     motion_increments,
 )
-from strapdown.increments.accuracy import ORDERS
+from strapdown.increments.motion import ORDERS
 from strapdown.tables import ACCEL, DR, DV, GYRO, MOTION, PHI, THETA, imu_table
 
 _spec = importlib.util.spec_from_file_location(

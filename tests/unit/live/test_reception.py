@@ -16,12 +16,11 @@ from strapdown.config.navigation_modules import sensors_of
 from strapdown.errors import ConfigError
 from strapdown.formats.log_writers import LOG_WRITERS
 from strapdown.live.clock import MachineClock
-from strapdown.live.received import live_spec, write_received
-from strapdown.live.run import receive, result_of
+from strapdown.live.run import live_spec, receive, result_of, write_received
 from strapdown.live.sources import LineSource, open_source
 from strapdown.navigation.recorder import FullRecorder
-from strapdown.systems.sins.build import make_chain
 from strapdown.systems.sins.drive import run_batch
+from strapdown.systems.sins.run import make_chain
 
 FIXES = ["lat", "lon", "alt", "VN", "VE", "VD"]
 SD = ["north_sd", "east_sd", "down_sd", "VN_sd", "VE_sd", "VD_sd"]

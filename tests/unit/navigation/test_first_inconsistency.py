@@ -12,8 +12,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from innovations import exactly, innovation_table
 
-from strapdown.navigation.consistency import consistency_of_all
-from strapdown.navigation.first_inconsistency import inconsistencies
+from strapdown.navigation.consistency import consistency_of_all, inconsistencies
 
 
 def found(lasting=(), **tables):

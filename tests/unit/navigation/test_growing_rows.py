@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from strapdown.navigation.growing_rows import GrowingRows
+from strapdown.navigation.record import GrowingRows
 
 
 def test_every_value_keeps_its_rows():

@@ -11,11 +11,10 @@ from tests import aided_drives
 
 from strapdown.aiding.gnss import Gnss
 from strapdown.errors import ConfigError, DivergenceError
-from strapdown.estimation.covariances import COVARIANCES
+from strapdown.estimation.covariance import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter
-from strapdown.estimation.error_models import ERROR_MODELS
-from strapdown.estimation.influence_tukey import Tukey
-from strapdown.estimation.paper_update import PaperUpdate
+from strapdown.estimation.error_model import ERROR_MODELS
+from strapdown.estimation.robust import PaperUpdate, Tukey
 from strapdown.estimation.sensor_blocks import accel_bias, gauss_markov, gyro_bias, gyro_scale
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown, WanderAzimuth
@@ -23,7 +22,7 @@ from strapdown.mechanization.state_error import state_error
 from strapdown.nav_state import NavState
 from strapdown.navigation import navigator as navigator_module
 from strapdown.navigation.compiled_engine import compiled
-from strapdown.navigation.damping import Feedforward
+from strapdown.navigation.filter_options import Feedforward
 from strapdown.navigation.navigator import Navigator, with_states
 from strapdown.sensors.triad_errors import ImuErrors
 from strapdown.simulation import Origin, SineVelocityMotion, simulate_imu

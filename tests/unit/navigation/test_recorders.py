@@ -6,16 +6,14 @@ import numpy as np
 import pytest
 
 from strapdown.errors import ConfigError, DataError
-from strapdown.estimation.covariance import Innovations
-from strapdown.estimation.covariances import COVARIANCES
+from strapdown.estimation.covariance import COVARIANCES, Innovations
 from strapdown.estimation.error_filter import ErrorFilter
-from strapdown.estimation.rotation_vector_model import RotationVectorModel
+from strapdown.estimation.error_model import RotationVectorModel
 from strapdown.estimation.sensor_blocks import accel_bias, gyro_bias
 from strapdown.mechanization import MECHANIZATIONS
 from strapdown.nav_state import NavState
 from strapdown.navigation.navigator import Navigator
-from strapdown.navigation.piece import Mark, NavigationPiece, Seen
-from strapdown.navigation.record import Event, Span
+from strapdown.navigation.record import Event, Mark, NavigationPiece, Seen, Span
 from strapdown.navigation.recorder import FullRecorder, IntervalRecorder
 
 MODEL = RotationVectorModel((1e-6,) * 3, (1e-4,) * 3, (gyro_bias(1e-7), accel_bias(2e-4)))

@@ -11,13 +11,14 @@ import pytest
 from tests.aided_drives import begin, drive, gnss_of, increments_of, navigator_of, truth_at
 
 from strapdown.aiding.gnss import Gnss
-from strapdown.aiding.no_slip import NoSlip
+from strapdown.aiding.vehicle import NoSlip
 from strapdown.errors import ConfigError
-from strapdown.estimation.quaternion_model import QuaternionModel
+from strapdown.estimation.error_model import QuaternionModel
 from strapdown.mechanization import NorthEastDown
 from strapdown.mechanization.state_error import state_error
 from strapdown.nav_state import NavState
-from strapdown.navigation import node_rows, smoothing_tape
+from strapdown.navigation import engine as node_rows
+from strapdown.navigation import smoother as smoothing_tape
 from strapdown.navigation.recorder import FullRecorder, IntervalRecorder
 from strapdown.navigation.smoother import RauchTungStriebel
 from strapdown.rotation import dcm_from_quaternion
@@ -211,7 +212,7 @@ def test_where_a_large_tilt_was_corrected_less_is_known_of_what_it_told(mechaniz
     )
     sd = [np.sqrt(np.diagonal(r.covariance, axis1=1, axis2=2)) for r in (forward, smoothed)]
     assert (sd[1] <= sd[0] * (1.0 + 1e-9)).all()
-    monkeypatch.setattr("strapdown.navigation.going.unlearnt_force", lambda *_: None)
+    monkeypatch.setattr("strapdown.navigation.navigator.unlearnt_force", lambda *_: None)
     linear, _ = both(made, tilt_sd=tilt)
     # Vertical velocity after the first turns: 3 deg of tilt are 0.5 g 0.05**2 = 13 mm/s², which
     # are as much as the accelerometers' bias is known to by then.

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from strapdown.errors import DataError
-from strapdown.estimation.influence_none import LeastSquares
-from strapdown.estimation.robust_update import RobustUpdate
+from strapdown.estimation.robust import LeastSquares, RobustUpdate
 from strapdown.prefilter import RobustFir, RobustWd
 from strapdown.tables import imu_table
 

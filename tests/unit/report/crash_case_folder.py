@@ -12,9 +12,8 @@ import pandas as pd
 
 from strapdown import CrashUnit, Entry, Mounting, RecordedTriad, reconstruct_crash
 from strapdown.config.crash_case import CaseSpec
-from strapdown.sensors.catalogue import load_sensor
-from strapdown.sensors.catalogue_keys import KEYS
-from strapdown.sensors.sensor_uncertainty import SPREADS, uncertainty_of
+from strapdown.sensors.catalogue import KEYS, load_sensor
+from strapdown.sensors.uncertainty import SPREADS, uncertainty_of
 from strapdown.tables import ACCEL, GYRO
 
 

@@ -10,8 +10,8 @@ import pytest
 
 from strapdown import rotation
 from strapdown.evaluation.differences import attitude_at
-from strapdown.report.attitude_body import MOST_FRAMES, body_caption, body_figure
 from strapdown.report.attitude_numbers import chosen_run
+from strapdown.report.attitude_page import MOST_FRAMES, body_caption, body_figure
 
 TURNING = 4  # box and three axes
 

@@ -9,8 +9,7 @@ import pytest
 from matplotlib.lines import Line2D
 
 from strapdown.report.chart import BLUE, VERMILLION, Bars, Chart, Fill, Line, Panel, runs
-from strapdown.report.plotly_areas import see_through
-from strapdown.report.plotly_chart import figure
+from strapdown.report.plotly_chart import figure, see_through
 from strapdown.report.svg_chart import draw, notebook_figure
 
 T = np.array([0.0, 1.0, 2.0, 3.0, 4.0])

@@ -8,15 +8,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from strapdown.report.attitude_answer_charts import (
+from strapdown.report.attitude_charts import (
     LEAST_ERROR,
     answer_charts,
+    charts,
     judgement_charts,
     share_basis,
 )
-from strapdown.report.attitude_charts import charts
 from strapdown.report.chart import DASHES, SERIES_COLOURS, Chart, Level, Line, Mark, Panel, look
-from strapdown.report.label_places import PLACES, place_labels
+from strapdown.report.path_marks import PLACES, place_labels
 from strapdown.report.plotly_chart import figure
 from strapdown.report.svg_chart import draw, notebook_figure
 

@@ -10,21 +10,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from strapdown.bundle.json_text import to_json
+from strapdown.bundle.seal import to_json
 from strapdown.config.crash_case import AssumedSpec, ReferenceSpec
 from strapdown.config.crash_case_file import read_case_spec
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import read_raw
-from strapdown.report.changed_case import changed_case
 from strapdown.report.crash_case import file_name
-from strapdown.report.crash_csv import signals_table, trajectory_table, write_table
-from strapdown.report.crash_json import crash_json
+from strapdown.report.crash_json import crash_json, signals_table, trajectory_table, write_table
 from strapdown.report.crash_limits import limitations
-from strapdown.report.crash_values import spaced
 from strapdown.report.simulation import simulate
-from strapdown.systems.case_references import compare_reference
-from strapdown.systems.case_severity import case_severity, main_event
-from strapdown.systems.crash_case import run_case
+from strapdown.report.values import spaced
+from strapdown.report.verify import changed_case
+from strapdown.systems.crash_case import case_severity, compare_reference, main_event, run_case
 
 USUAL = {
     "Ringing of the structure is not seen at this rate",

@@ -13,15 +13,18 @@ from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.crash.delta_v_bound import body_delta_v_bound
 from strapdown.crash.pdof_sensitivity import pdof_by_shift
 from strapdown.report.chart import SERIES_COLOURS
-from strapdown.report.crash_budget import delta_v_budget
-from strapdown.report.crash_delta_v import delta_v_chart, delta_v_half_widths
+from strapdown.report.crash_charts import (
+    delta_v_budget,
+    delta_v_chart,
+    delta_v_half_widths,
+    risk_chart,
+)
 from strapdown.report.crash_moments import event_marks, marks_apart, path_moments
-from strapdown.report.crash_risk import risk_chart
+from strapdown.report.crash_signals import flags_in_vehicle_axes, in_vehicle_axes
 from strapdown.report.plotly_chart import figure
-from strapdown.report.recorded_lines import flags_in_vehicle_axes, in_vehicle_axes
 from strapdown.report.svg_chart import draw
 from strapdown.sensors.crash_unit import Mounting
-from strapdown.systems.case_severity import main_event
+from strapdown.systems.crash_case import main_event
 from strapdown.tables import EULER, NED
 
 ALONE = ("IMU1",)

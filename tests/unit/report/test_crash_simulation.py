@@ -18,8 +18,7 @@ from strapdown import simulate, verify
 from strapdown.constants import TWO_SIDED_95
 from strapdown.formats import read_raw
 from strapdown.report import crash_simulation
-from strapdown.simulation.case_recording import record_case
-from strapdown.simulation.crash_cases import CASES
+from strapdown.simulation.crash_cases import CASES, record_case
 from strapdown.simulation.crash_scenarios import CRASHES
 from strapdown.simulation.exact_answers import ExactAnswers
 from strapdown.tables import ACCEL, GYRO, NED

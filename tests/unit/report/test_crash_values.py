@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from strapdown.crash.pdof_interval import AngleInterval
-from strapdown.report.crash_values import (
+from strapdown.crash.pdof import AngleInterval
+from strapdown.report.values import (
     about,
     angle_range,
     instant,

@@ -13,10 +13,16 @@ import pytest
 
 from strapdown.errors import DataError
 from strapdown.report.chart import Chart
-from strapdown.report.document import Animation, Document, KeyFigure, KeyFigures, Picture
+from strapdown.report.document import (
+    Animation,
+    Document,
+    KeyFigure,
+    KeyFigures,
+    Picture,
+    plain_document,
+)
 from strapdown.report.document_data import draw_stills
 from strapdown.report.document_html import document_page
-from strapdown.report.document_text import plain_document
 
 sys.path.insert(0, str(Path(__file__).parent))
 from rich_document import EVIL, picture, rich_document

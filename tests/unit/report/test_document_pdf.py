@@ -26,8 +26,7 @@ from strapdown.report.document import (
 )
 from strapdown.report.document_data import draw_stills
 from strapdown.report.document_html import document_page
-from strapdown.report.document_pdf import write_pdf
-from strapdown.report.pdf_letters import shown
+from strapdown.report.document_pdf import shown, write_pdf
 
 sys.path.insert(0, str(Path(__file__).parent))
 from rich_document import EVIL, picture, rich_document

@@ -14,9 +14,8 @@ from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.report.document_data import draw_stills
 from strapdown.report.document_files import drawings, write_drawings
 from strapdown.report.navigation_document import navigation_document
-from strapdown.report.navigation_found import examine
+from strapdown.report.navigation_found import examine, told_of, withheld_of
 from strapdown.report.navigation_json import navigation_json
-from strapdown.report.navigation_result import told_of, withheld_of
 from strapdown.systems.sins.run import run_navigation
 
 FILE = """
@@ -137,7 +136,7 @@ def test_the_terminal_says_what_the_page_says(result, capsys):
 
 
 def test_scores_of_what_was_withheld_are_told_as_they_are():
-    from strapdown.evaluation.withheld import WithheldScore
+    from strapdown.evaluation.gnss_outages import WithheldScore
     from strapdown.navigation.record import Span
     from strapdown.systems.sins.withholding import Withheld
 

@@ -20,16 +20,18 @@ from strapdown.evaluation.plane_bound import PLANE_95, plane_bound
 from strapdown.frames import ned_from_geodetic
 from strapdown.navigation.record import Span
 from strapdown.report import navigation_charts as charts
-from strapdown.report.navigation_agreement import agreements
-from strapdown.report.navigation_error_charts import error_charts, nees_chart
-from strapdown.report.navigation_errors import navigation_errors
-from strapdown.report.navigation_innovation_charts import innovation_chart, nis_chart
-from strapdown.report.navigation_plan import plan_chart
-from strapdown.report.navigation_plan_bounds import ellipse_rows
-from strapdown.report.navigation_strip import strip
+from strapdown.report.navigation_charts import (
+    error_charts,
+    innovation_chart,
+    nees_chart,
+    nis_chart,
+    strip,
+)
+from strapdown.report.navigation_found import agreements, navigation_errors
+from strapdown.report.navigation_plan import ellipse_rows, plan_chart
 from strapdown.report.navigation_thinning import broken, kept_rows, thin_fill
-from strapdown.report.navigation_values import heading_shown, unwrapped
 from strapdown.report.plotly_chart import figure
+from strapdown.report.values import heading_shown, unwrapped
 
 
 def named(panel, start):

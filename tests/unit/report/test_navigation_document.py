@@ -14,7 +14,7 @@ from strapdown.errors import DataError, Finding
 from strapdown.report.document import ChartBlock, Items, KeyFigures, Paragraph, TableBlock
 from strapdown.report.document_html import document_page
 from strapdown.report.navigation_document import navigation_document
-from strapdown.report.navigation_found import examine
+from strapdown.report.navigation_found import Withheld, examine
 from strapdown.report.navigation_tables import (
     end_table,
     error_table,
@@ -24,15 +24,9 @@ from strapdown.report.navigation_tables import (
     state_table,
     withheld_table,
 )
-from strapdown.report.navigation_told import Withheld
 from strapdown.report.navigation_trust import trust
-from strapdown.report.navigation_values import (
-    distance_over_ground,
-    duration_words,
-    length_words,
-    share_words,
-)
 from strapdown.report.navigation_words import cautions, headline, key_figures
+from strapdown.report.values import distance_over_ground, duration_words, length_words, share_words
 
 
 def plain(text):

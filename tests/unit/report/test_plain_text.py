@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from strapdown.report.plain_text import plain_text
+from strapdown.report.document import plain_text
 
 
 @pytest.mark.parametrize(

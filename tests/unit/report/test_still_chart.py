@@ -22,8 +22,7 @@ from strapdown.report.chart import (
     Mark,
     Panel,
 )
-from strapdown.report.still_chart import still
-from strapdown.report.still_scale import Scale, fitted, ticks
+from strapdown.report.still_chart import Scale, fitted, still, ticks
 from strapdown.report.svg_drawing import overlap, text_width
 
 SVG = "{http://www.w3.org/2000/svg}"

@@ -18,7 +18,7 @@ from strapdown.report import attitude_tables as tables
 from strapdown.report.attitude import attitude_json, attitude_page, write_attitude
 from strapdown.report.attitude_view import KINDS
 from strapdown.report.attitude_words import headline
-from strapdown.report.page import render
+from strapdown.report.document_html import render
 from strapdown.report.verify import _difference
 
 EVIL = "</script><script>alert(1)</script><img src=x onerror=alert(2)>"

@@ -12,7 +12,7 @@ from strapdown.frames import geodetic_from_ned
 from strapdown.report.path_marks import View
 from strapdown.report.plotly_chart import figure
 from strapdown.report.svg_chart import draw, notebook_figure
-from strapdown.report.trajectory_charts import MOST_POINTS, trajectory_chart
+from strapdown.report.trajectory_simulation import MOST_POINTS, trajectory_chart
 from strapdown.tables import trajectory_table
 
 PLACE = (55.75, 37.62, 150.0)

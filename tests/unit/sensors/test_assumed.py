@@ -10,10 +10,9 @@ import pytest
 
 from strapdown import rotation
 from strapdown.errors import ConfigError, DataError
-from strapdown.sensors.assumed import Assumed, assumed_shapes
-from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
+from strapdown.sensors.crash_unit import Assumed, CrashUnit, Mounting, RecordedTriad, assumed_shapes
 from strapdown.sensors.synchronise import synchronise
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.sensors.unmeasured import (
     assumed_findings,
     axis_names,

@@ -8,7 +8,7 @@ import pytest
 from strapdown import rotation
 from strapdown.errors import ConfigError
 from strapdown.formats.columns import parse_axes
-from strapdown.sensors.axes_matrix import (
+from strapdown.sensors.triad_errors import (
     NAMED_AXES,
     axes_letters,
     check_axes_matrix,

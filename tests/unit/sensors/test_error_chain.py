@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from strapdown.errors import ConfigError, DataError
-from strapdown.sensors.error_chain import apply, compensate
-from strapdown.sensors.transfer_curve import input_of, transfer
+from strapdown.sensors.error_chain import apply, compensate, input_of, transfer
 from strapdown.sensors.triad_errors import TriadErrors
 
 U = 2.0**-53

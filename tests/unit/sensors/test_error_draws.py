@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, norm
 
-from strapdown.sensors import error_draws as draws
+from strapdown.sensors import error_chain as draws
 
 ALARM = 1e-6
 ONE = (1.0, 1.0, 1.0)
@@ -69,7 +69,7 @@ def test_the_mean_of_a_gauss_markov_process_has_its_allan_deviation(step, size):
 
 
 def test_the_factor_from_bias_instability_is_the_peak_of_that_curve():
-    from strapdown.sensors.catalogue_keys import ALLAN_OF_GAUSS_MARKOV
+    from strapdown.sensors.catalogue import ALLAN_OF_GAUSS_MARKOV
 
     x = np.linspace(0.5, 5.0, 450_001)
     peak = np.sqrt(gauss_markov_allan(x).max())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from strapdown.sensors.high_g_bias import bias_from_lower_range
+from strapdown.sensors.range_merge import bias_from_lower_range
 
 
 def test_the_mean_and_its_sd_are_right_over_many_draws():

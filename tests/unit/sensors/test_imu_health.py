@@ -10,12 +10,10 @@ import pytest
 
 from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.catalogue import SENSORS, load_sensor
-from strapdown.sensors.equal_runs import equal_runs, longest_by_chance
-from strapdown.sensors.error_chain import apply
-from strapdown.sensors.error_draws import child
+from strapdown.sensors.error_chain import apply, child
+from strapdown.sensors.health_log import equal_runs, longest_by_chance, tail_limit
 from strapdown.sensors.imu_health import TESTS, check_imu_channels
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
-from strapdown.sensors.tail_limit import tail_limit
+from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.simulation import (
     ImuErrors,
     Origin,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import savgol_coeffs, savgol_filter
 
-from strapdown.dsp.local_slope import local_slope
+from strapdown.dsp.derivative import local_slope
 from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.lever_arm import move_imu
 from strapdown.tables import ACCEL, imu_table

@@ -9,15 +9,17 @@ import pytest
 
 from strapdown.errors import ConfigError, DataError
 from strapdown.rotation import dcm_from_euler
-from strapdown.sensors.axis_voting import AxisVoting
+from strapdown.sensors.axis_voting import (
+    AxisErrors,
+    AxisVoting,
+    VotingRule,
+    isolable_axes,
+    parity_matrix,
+)
 from strapdown.sensors.catalogue import SENSORS, load_sensor
-from strapdown.sensors.error_chain import apply
-from strapdown.sensors.error_draws import child
-from strapdown.sensors.imu_uncertainty import BiasDrift, ImuUncertainty
-from strapdown.sensors.parity import isolable_axes, parity_matrix
+from strapdown.sensors.error_chain import apply, child
 from strapdown.sensors.redundant_units import MountedUnit, UnitVoting, vote_units
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
-from strapdown.sensors.voting_rule import AxisErrors, VotingRule
+from strapdown.sensors.uncertainty import BiasDrift, ImuUncertainty, TriadUncertainty
 from strapdown.simulation import ImuErrors, SmoothRandom, simulate_imu
 from strapdown.simulation.sensor_faults import (
     Dead,

@@ -7,7 +7,7 @@ import pytest
 
 from strapdown.errors import DataError
 from strapdown.results import RestStretch
-from strapdown.sensors.rest_bias import gyro_bias_at, gyro_bias_from_rests, without_gyro_bias
+from strapdown.sensors.rest import gyro_bias_at, gyro_bias_from_rests, without_gyro_bias
 from strapdown.tables import GYRO, imu_table
 
 

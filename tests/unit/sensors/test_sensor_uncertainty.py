@@ -8,10 +8,12 @@ from scipy.stats import chi2
 
 from strapdown.errors import ConfigError
 from strapdown.sensors.catalogue import load_sensor
-from strapdown.sensors.crash_priors import crash_priors
-from strapdown.sensors.sensor_uncertainty import uncertainty_of
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
-from strapdown.sensors.uncertainty_draws import draw_errors
+from strapdown.sensors.uncertainty import (
+    TriadUncertainty,
+    crash_priors,
+    draw_errors,
+    uncertainty_of,
+)
 
 G = 9.80665
 EVERYTHING = TriadUncertainty(

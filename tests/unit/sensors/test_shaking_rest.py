@@ -5,8 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from strapdown.sensors.rest import find_rests, rest_between, sd_of_mean
-from strapdown.sensors.shaking_rest import find_rests_of_every_grade, find_shaking_rests
+from strapdown.sensors.rest import (
+    find_rests,
+    find_rests_of_every_grade,
+    find_shaking_rests,
+    rest_between,
+    sd_of_mean,
+)
 from strapdown.tables import ACCEL, imu_table
 
 RATE = 100.0

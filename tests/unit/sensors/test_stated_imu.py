@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 
 from strapdown.errors import ConfigError
-from strapdown.sensors.catalogue import load_sensor
-from strapdown.sensors.catalogue_keys import ALLAN_OF_GAUSS_MARKOV
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
-from strapdown.sensors.stated_imu import stated_imu
+from strapdown.sensors.catalogue import ALLAN_OF_GAUSS_MARKOV, load_sensor
+from strapdown.sensors.uncertainty import ImuUncertainty, stated_imu
 
 DEG_H = math.radians(1.0) / 3600.0
 GYRO = {"bias_sd_deg_per_h": 0.01, "noise_density_deg_per_sqrt_h": 0.002}

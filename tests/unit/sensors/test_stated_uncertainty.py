@@ -9,8 +9,7 @@ import pytest
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError
 from strapdown.sensors.catalogue import load_sensor
-from strapdown.sensors.sensor_uncertainty import uncertainty_of
-from strapdown.sensors.stated_uncertainty import stated_uncertainty
+from strapdown.sensors.uncertainty import stated_uncertainty, uncertainty_of
 
 
 def test_stated_in_units_of_the_keys() -> None:

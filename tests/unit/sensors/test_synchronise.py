@@ -10,7 +10,7 @@ from strapdown import rotation
 from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
 from strapdown.sensors.synchronise import synchronise
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.tables import ACCEL, GYRO
 
 AT_REST = np.array([0.0, 0.0, -9.8])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from strapdown import rotation
-from strapdown.simulation.flat_motion import FlatMotion
+from strapdown.simulation.motion import FlatMotion
 
 
 @dataclass(frozen=True)

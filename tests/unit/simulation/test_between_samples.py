@@ -16,12 +16,7 @@ from strapdown.simulation import (
     Ringing,
     simulate_imu,
 )
-from strapdown.simulation.between_samples import (
-    low_passed,
-    low_passed_at,
-    mean_between,
-    mean_over,
-)
+from strapdown.simulation.imu import low_passed, low_passed_at, mean_between, mean_over
 
 STILL = CrashMotion(1.0, Origin(45.0, 20.0, 100.0))
 RINGING = Ringing(0.1031, 98.0665, 195.0, 0.03, (1.0, -2.0, 2.0))

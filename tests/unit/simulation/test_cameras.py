@@ -17,10 +17,8 @@ from pushed_motion import Pushed
 
 from strapdown import frames, rotation
 from strapdown.errors import ConfigError, DataError
-from strapdown.simulation.camera_path import path_from_cameras
-from strapdown.simulation.cameras import Camera, film, paper_cameras
-from strapdown.simulation.earth_motion import Origin
-from strapdown.simulation.stationary import StationaryMotion
+from strapdown.simulation.cameras import Camera, film, paper_cameras, path_from_cameras
+from strapdown.simulation.earth_motion import Origin, StationaryMotion
 
 MOTION = Pushed()
 MARKER = (-0.4, 0.3, -0.5)

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from strapdown.errors import ConfigError
-from strapdown.simulation.case_recording import SPEED_SD, record_case
-from strapdown.simulation.crash_cases import CASES, find_case
+from strapdown.simulation.crash_cases import CASES, SPEED_SD, find_case, record_case
 from strapdown.simulation.crash_recording import record_crash
 from strapdown.simulation.crash_scenarios import CRASHES
 from strapdown.tables import NED, POSITION_SD

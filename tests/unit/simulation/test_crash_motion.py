@@ -20,9 +20,8 @@ from strapdown import frames, rotation
 from strapdown.ellipsoids import ELLIPSOIDS
 from strapdown.errors import ConfigError
 from strapdown.simulation.crash_motion import CrashMotion, HaversinePulse
-from strapdown.simulation.earth_motion import Origin
-from strapdown.simulation.sine_velocity import SineVelocityMotion
-from strapdown.simulation.stationary import StationaryMotion
+from strapdown.simulation.earth_motion import Origin, StationaryMotion
+from strapdown.simulation.spline_motion import SineVelocityMotion
 
 PULSE = HaversinePulse(0.1, 0.113, (-7.2, 1.0, 0.3), (10.0, -20.0, 87.0))
 CRASH = CrashMotion(0.75, Origin(45.0, 20.0, 100.0), (7.1, 0.0, 0.0), (PULSE,), heading_deg=30.0)

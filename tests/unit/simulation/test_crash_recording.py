@@ -19,11 +19,16 @@ from strapdown.errors import ConfigError
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.sensors.error_chain import compensate
 from strapdown.sensors.triad_errors import TriadErrors
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
-from strapdown.simulation.between_samples import low_passed
+from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.simulation.crash_recording import record_crash
-from strapdown.simulation.paper_recorders import HIGH_G_BIAS, paper_units
-from strapdown.simulation.recorder_design import RecorderDesign, TriadDesign, WarmUp
+from strapdown.simulation.imu import low_passed
+from strapdown.simulation.recorder_design import (
+    HIGH_G_BIAS,
+    RecorderDesign,
+    TriadDesign,
+    WarmUp,
+    paper_units,
+)
 
 G = 9.80665
 MOTION = Pushed()

@@ -10,11 +10,19 @@ import pytest
 from strapdown import rotation
 from strapdown.errors import ConfigError
 from strapdown.simulation import CRASHES, Origin, Setting, find_crash
-from strapdown.simulation.crash_course import CrashCourse
-from strapdown.simulation.front_impacts import frontal_impact, oblique_impact, pole_impact
-from strapdown.simulation.near_crashes import hard_braking, kerb
-from strapdown.simulation.other_impacts import rear_impact, rollover, side_impact, two_impacts
-from strapdown.simulation.plane_impact import blow
+from strapdown.simulation.crash_motion import CrashCourse
+from strapdown.simulation.crash_scenarios import (
+    blow,
+    frontal_impact,
+    hard_braking,
+    kerb,
+    oblique_impact,
+    pole_impact,
+    rear_impact,
+    rollover,
+    side_impact,
+    two_impacts,
+)
 
 IMPACTS = [name for name, c in CRASHES.items() if c.is_crash]
 OTHERS = [name for name, c in CRASHES.items() if not c.is_crash]

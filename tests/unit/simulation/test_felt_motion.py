@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from strapdown import rotation
 from strapdown._kernels import earth
 from strapdown.simulation import Origin, SineVelocityMotion, car, through_waypoints
-from strapdown.simulation.manoeuvres import Accelerate, LaneChange, Turn
+from strapdown.simulation.vehicles import Accelerate, LaneChange, Turn
 
 PLACE = Origin(55.75, 37.62, 150.0)
 MOTIONS = {

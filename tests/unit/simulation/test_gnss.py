@@ -10,7 +10,7 @@ from strapdown.frames import place_difference
 from strapdown.simulation import Origin, StationaryMotion, car
 from strapdown.simulation.crash_motion import CrashMotion, HaversinePulse
 from strapdown.simulation.gnss import FALSE_POSITION, GnssReceiver, simulate_gnss
-from strapdown.simulation.manoeuvres import Straight, Turn
+from strapdown.simulation.vehicles import Straight, Turn
 from strapdown.tables import GEODETIC, VELOCITY
 
 TURNING = car(

@@ -7,7 +7,7 @@ import pytest
 
 from strapdown.errors import ConfigError
 from strapdown.frames import place_difference
-from strapdown.simulation.gnss_faults import (
+from strapdown.simulation.gnss import (
     Frozen,
     GrowingBias,
     Outage,

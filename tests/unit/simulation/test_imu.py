@@ -18,7 +18,7 @@ from strapdown.simulation import (
     TriadErrors,
     simulate_imu,
 )
-from strapdown.simulation.flat_motion import FlatMotion
+from strapdown.simulation.motion import FlatMotion
 from strapdown.tables import ACCEL, GYRO
 
 

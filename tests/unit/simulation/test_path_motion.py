@@ -31,7 +31,8 @@ from strapdown.simulation import (
     ship,
     simulate_imu,
 )
-from strapdown.simulation.manoeuvres import (
+from strapdown.simulation.path_motion import integrate_track
+from strapdown.simulation.vehicles import (
     Accelerate,
     Along,
     BankedTurn,
@@ -43,7 +44,6 @@ from strapdown.simulation.manoeuvres import (
     Straight,
     Turn,
 )
-from strapdown.simulation.track_integral import integrate_track
 
 PLACE = Origin(55.75, 37.62, 150.0)
 

@@ -24,7 +24,7 @@ from strapdown.simulation import (
     simulate_imu,
     through_waypoints,
 )
-from strapdown.simulation.quintic_spline import quintic
+from strapdown.simulation.spline_motion import quintic
 
 PLACES = [
     (43.5850, 39.7203, 80.0),

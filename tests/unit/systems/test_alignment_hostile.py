@@ -8,14 +8,13 @@ import pytest
 from strapdown.cli.align_options import spec_of_flags
 from strapdown.errors import ConfigError, DataError
 from strapdown.report.alignment_charts import attitude_chart
+from strapdown.report.alignment_document import headline, key_figures, limits
 from strapdown.report.alignment_trust import bounds_hold, trust
-from strapdown.report.alignment_values import rate_words
-from strapdown.report.alignment_words import headline, key_figures, limits
+from strapdown.report.values import rate_words
 from strapdown.sensors.catalogue import load_sensor
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.simulation import Origin, StationaryMotion, Wave, rocking_stand, simulate_imu
-from strapdown.systems.alignment_health import channel_findings
-from strapdown.systems.alignment_run import run_alignment
+from strapdown.systems.alignment_run import channel_findings, run_alignment
 from strapdown.tables import ACCEL, GYRO
 
 PLACE = Origin(55.0, 37.0, 100.0)

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
-from strapdown.alignment.carry import carried_attitude, carry
+from strapdown.alignment.alignment import Site
 from strapdown.alignment.coarse_alignments import COARSE_ALIGNMENTS
-from strapdown.alignment.site import Site
+from strapdown.alignment.readiness import carried_attitude, carry
 from strapdown.config.alignment_file import alignment_spec
 from strapdown.errors import ConfigError
 from strapdown.report.alignment_trust import answer_error, trust
 from strapdown.sensors.catalogue import load_sensor
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.simulation import Origin, StationaryMotion, simulate_imu
 from strapdown.systems.alignment_run import run_alignment
 from strapdown.systems.alignment_source import read_alignment_source

@@ -8,14 +8,13 @@ import pytest
 from strapdown import rotation
 from strapdown.attitude import Quaternion, run_attitude
 from strapdown.errors import ConfigError, DataError
-from strapdown.evaluation.differences import attitude_at
-from strapdown.evaluation.known import Known, known_at
+from strapdown.evaluation.differences import Known, attitude_at, known_at
 from strapdown.formats.log_writers import LOG_WRITERS
 from strapdown.increments import increments_from_imu
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation import find_scenario, simulate_imu
-from strapdown.simulation.handling import Handling
+from strapdown.simulation.hand_motions import Handling
 from strapdown.systems.attitude_bench import bench_attitude
 from strapdown.tables import ACCEL, GYRO, QUATERNION, attitude_table, imu_table
 

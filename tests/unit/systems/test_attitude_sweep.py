@@ -9,13 +9,13 @@ import pytest
 
 from strapdown.attitude import make_algorithm
 from strapdown.errors import ConfigError
-from strapdown.evaluation.known import Known
+from strapdown.evaluation.differences import Known
 from strapdown.increments import increments_from_imu
 from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
 from strapdown.systems.attitude_bench import bench_attitude
-from strapdown.systems.attitude_shares import OwnTruth
 from strapdown.systems.attitude_sweep import (
     Grounds,
+    OwnTruth,
     choose_factors,
     chosen_samples,
     sum_increments,

@@ -13,7 +13,7 @@ from strapdown.errors import ConfigError
 from strapdown.formats.log_writers import LOG_WRITERS
 from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
 from strapdown.systems.attitude_bench import bench_attitude
-from strapdown.systems.attitude_trials import rank, trial_names, worst_sweep
+from strapdown.systems.attitude_sweep import rank, trial_names, worst_sweep
 
 ALGORITHMS = ["naive", "quaternion"]
 

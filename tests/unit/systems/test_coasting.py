@@ -22,8 +22,7 @@ from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation import simulate_imu
 from strapdown.systems.coasting import stated
 from strapdown.systems.coasting.forecast import QUANTITIES
-from strapdown.systems.coasting.motion import stated_motion
-from strapdown.systems.coasting.stated import forecast_of_sensor, sensor_of
+from strapdown.systems.coasting.stated import forecast_of_sensor, sensor_of, stated_motion
 from strapdown.tables import ACCEL, GYRO, imu_table
 
 G = 9.806

@@ -21,7 +21,7 @@ from strapdown.formats.crash_records import read_crash_record
 from strapdown.formats.crash_triad import triad_of_channels
 from strapdown.simulation.crash_recording import record_crash
 from strapdown.simulation.crash_scenarios import find_crash
-from strapdown.simulation.paper_recorders import paper_units
+from strapdown.simulation.recorder_design import paper_units
 from strapdown.systems.crash_draft import draft_case, read_records
 
 G = 9.80665

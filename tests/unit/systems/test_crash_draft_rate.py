@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from strapdown.systems.crash_draft.stated_rate import stated_rate
+from strapdown.systems.crash_draft.table_parts import stated_rate
 
 
 @pytest.mark.parametrize(

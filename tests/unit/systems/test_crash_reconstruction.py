@@ -15,7 +15,7 @@ from strapdown.simulation.crash_recording import record_crash
 from strapdown.simulation.crash_scenarios import CRASHES
 from strapdown.simulation.earth_motion import Origin
 from strapdown.simulation.mounted_motion import MountedMotion
-from strapdown.simulation.paper_recorders import paper_units
+from strapdown.simulation.recorder_design import paper_units
 from strapdown.tables import NED
 
 DESIGNS = {d.name: d for d in paper_units()}

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from strapdown.config.crash_case import CaseSpec
-from strapdown.config.crash_checks.entry import check_entry
-from strapdown.config.crash_checks.options import check_options
-from strapdown.config.crash_checks.places import check_places
-from strapdown.config.crash_checks.references import check_references
-from strapdown.config.crash_checks.triads import check_triads
-from strapdown.config.crash_checks.units import check_units
+from strapdown.config.crash_checks.entry import (
+    check_entry,
+    check_options,
+    check_places,
+    check_references,
+)
+from strapdown.config.crash_checks.units import check_triads, check_units
 from strapdown.config.crash_checks.written import Written
 
 __all__ = ["Written", "check_case"]

@@ -6,10 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from strapdown.config.case_wanted import what_to_write
-from strapdown.config.shown import shown, shown_key
-from strapdown.config.toml_file import TomlFile
-from strapdown.config.toml_lines import KeyPath
+from strapdown.config.toml_file import KeyPath, TomlFile, shown, shown_key
+from strapdown.config.wanted import what_to_write
 from strapdown.errors import ConfigError, Finding
 
 __all__ = ["Written"]

@@ -8,9 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.crash.indices.moving_means import moving_means
-from strapdown.crash.indices.phaseless import four_pole
-from strapdown.crash.indices.pulse import checked
+from strapdown.crash.indices.pulse import checked, four_pole, moving_means
 from strapdown.errors import ConfigError
 
 __all__ = ["ASI_AVERAGES", "Asi", "asi"]

@@ -9,9 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.crash.indices.crossings import cubic, first_reach
-from strapdown.crash.indices.moving_means import largest_mean
-from strapdown.crash.indices.pulse import checked, from_start, integrals
+from strapdown.crash.indices.pulse import (
+    checked,
+    cubic,
+    first_reach,
+    from_start,
+    integrals,
+    largest_mean,
+)
 from strapdown.errors import ConfigError, DataError, Finding
 
 __all__ = ["FlailSpace", "flail_space"]

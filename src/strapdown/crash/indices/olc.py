@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.crash.indices.crossings import cubic, first_reach
-from strapdown.crash.indices.pulse import checked, from_start, integrals
+from strapdown.crash.indices.pulse import checked, cubic, first_reach, from_start, integrals
 from strapdown.errors import ConfigError, Finding
 
 __all__ = ["Olc", "olc"]

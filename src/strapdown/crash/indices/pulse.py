@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.dsp.running_integral import running_integral
-from strapdown.errors import DataError
+from strapdown.errors import ConfigError, DataError
 
 Array = NDArray[np.float64]
 # Stamps are rounded; steps that differ by more than this share are not one rate.
@@ -122,3 +124,197 @@ def integrals(time: Array, values: Array) -> tuple[Array, Array]:
     first = running_integral(time, values)
     grown = h * first[:-1] + h * h * (2.0 * values[:-1] + values[1:]) / 6.0
     return first, np.concatenate([first[:1], np.cumsum(grown, axis=0)])
+
+
+# When a quantity that is known with its slope first reaches a level.
+
+
+def cubic(time: Array, values: Array, slopes: Array, at: float) -> tuple[float, float]:
+    """Value and slope between samples, along the cubic that the two neighbours share.
+
+    Exact for the double integral of an acceleration that is linear between samples.
+
+    Parameters
+    ----------
+    time, values, slopes : ndarray, (n,)
+    at : float
+        Within the record.
+    """
+    k = int(np.clip(np.searchsorted(time, at, side="right") - 1, 0, time.size - 2))
+    h = float(time[k + 1] - time[k])
+    u = (at - float(time[k])) / h
+    y0, y1 = float(values[k]), float(values[k + 1])
+    m0, m1 = h * float(slopes[k]), h * float(slopes[k + 1])
+    a = 2.0 * (y0 - y1) + m0 + m1
+    b = 3.0 * (y1 - y0) - 2.0 * m0 - m1
+    return ((a * u + b) * u + m0) * u + y0, ((3.0 * a * u + 2.0 * b) * u + m0) / h
+
+
+def first_reach(time: Array, values: Array, slopes: Array, level: float) -> float | None:
+    """Return the first instant at which a quantity comes up to a level from below.
+
+    Parameters
+    ----------
+    time, values, slopes : ndarray, (n,)
+    level : float
+
+    Returns
+    -------
+    float or None
+        None where it stays below. A touch within one step that both its ends are below is not
+        seen.
+    """
+    above = np.flatnonzero(values >= level)
+    if not above.size:
+        return None
+    k = int(above[0])
+    if k == 0:
+        return float(time[0])
+    from scipy.optimize import brentq
+
+    def short(at: float) -> float:
+        return cubic(time, values, slopes, at)[0] - level
+
+    # The value at a knot is that of the samples to rounding: a root there has no change of sign.
+    if short(float(time[k])) <= 0.0:
+        return float(time[k])
+    return float(brentq(short, float(time[k - 1]), float(time[k]), xtol=1e-15, rtol=1e-14))
+
+
+# Means over a window that moves, exact where the record is linear between its samples.
+
+
+def moving_means(time: Array, values: Array, width: float) -> tuple[Array, Array]:
+    """Means over every window that begins or ends at a sample.
+
+    Parameters
+    ----------
+    time : ndarray, (n,), s
+    values : ndarray, (n,) or (n, k)
+    width : float, s
+        No whole number of samples is needed.
+
+    Returns
+    -------
+    starts : ndarray, (m,), s
+        Where the windows begin, ascending.
+    means : ndarray, (m,) or (m, k)
+
+    Raises
+    ------
+    DataError
+        The record is shorter than the window.
+    """
+    # Stamps are sums of steps: a record as long as its window may miss it by rounding.
+    last = time[-1] - width
+    if last < time[0] - 1e-9 * width:
+        raise DataError(
+            "crash.record-shorter-than-window",
+            quantity="time",
+            time=time[-1] - time[0],
+            width=width,
+        )
+    last = max(float(last), float(time[0]))
+    starts = np.concatenate([time[time <= last], time[time >= time[0] + width] - width, [last]])
+    starts = np.unique(np.clip(starts, time[0], last))
+    flat = values.reshape(values.shape[0], -1)
+    total = running_integral(time, flat)
+    ends = np.minimum(starts + width, time[-1])
+    means = (
+        _integral_at(time, flat, total, ends) - _integral_at(time, flat, total, starts)
+    ) / width
+    return starts, means.reshape(starts.size, *values.shape[1:])
+
+
+def largest_mean(time: Array, values: Array, width: float) -> tuple[float, float]:
+    """Return the mean of greatest size, with its sign, and the start of its window.
+
+    Exact for a record that is linear between samples: between two neighbouring windows the mean
+    is a parabola, whose vertex is where the values at both ends of the window are equal.
+
+    Parameters
+    ----------
+    time, values : ndarray, (n,)
+    width : float, s
+
+    Returns
+    -------
+    mean, start : float
+    """
+    starts, means = moving_means(time, values, width)
+    slope = np.interp(starts + width, time, values) - np.interp(starts, time, values)
+    inner = np.flatnonzero(slope[:-1] * slope[1:] < 0.0)
+    at = starts[inner] + (starts[inner + 1] - starts[inner]) * slope[inner] / (
+        slope[inner] - slope[inner + 1]
+    )
+    total = running_integral(time, values[:, None])
+    vertex = (
+        _integral_at(time, values[:, None], total, at + width)
+        - _integral_at(time, values[:, None], total, at)
+    )[:, 0] / width
+    starts, means = np.concatenate([starts, at]), np.concatenate([means, vertex])
+    k = int(np.argmax(np.abs(means)))
+    return float(means[k]), float(starts[k])
+
+
+def _integral_at(time: Array, values: Array, total: Array, at: Array) -> Array:
+    """Integral from the first sample to any instants, of values linear between samples."""
+    k = np.clip(np.searchsorted(time, at, side="right") - 1, 0, time.size - 2)
+    h = (time[k + 1] - time[k])[:, None]
+    into = (at - time[k])[:, None]
+    slope = (values[k + 1] - values[k]) / h
+    return np.asarray(total[k] + into * (values[k] + 0.5 * into * slope))
+
+
+# The four-pole Butterworth low-pass without phase of EN 1317-1:2010.
+
+#: What the cut-off frequency belongs to.
+CUTOFFS = ("whole", "pass")
+# Record that is put before and after, in s, as T/HIS does for EN 1317-1:2010.
+PADDING = 0.5
+# Both passes together fall by 1/(1 + (f/each)^4), which is 3 dB at this share of their own
+# cut-off, 0.8022.
+PASS_SHARE = (math.sqrt(2.0) - 1.0) ** 0.25
+
+
+def four_pole(time: Array, values: Array, frequency: float, cutoff: str = "whole") -> Array:
+    """Filter forward and backward with two poles each.
+
+    Parameters
+    ----------
+    time : ndarray, (n,), s
+        Of one step.
+    values : ndarray, (n,) or (n, k)
+    frequency : float, Hz
+    cutoff : {'whole', 'pass'}
+        Whether the filter as a whole is 3 dB down there, or each pass (the whole then 6 dB).
+
+    Returns
+    -------
+    ndarray
+        Of the shape of `values`. Before and after the record its point mirror is put, half a
+        second of it or as much as there is, so that a record that rests at its ends starts
+        and stops without a transient.
+
+    Raises
+    ------
+    DataError
+        The steps differ, or the record is sampled at less than ten times the frequency.
+    ConfigError
+        The cut-off is of neither kind.
+    """
+    from scipy.signal import butter, sosfiltfilt
+
+    if cutoff not in CUTOFFS:
+        raise ConfigError(
+            "crash.no-kind-cut-off", quantity="cutoff", cutoff=cutoff, word=cutoff, known=CUTOFFS
+        )
+    step = step_of(time)
+    if 1.0 / step < 10.0 * frequency:
+        raise DataError(
+            "crash.rate-hz-less-than-ten", quantity="time", step=1.0 / step, frequency=frequency
+        )
+    each = frequency / PASS_SHARE if cutoff == "whole" else frequency
+    sections = butter(2, each, fs=1.0 / step, output="sos")
+    padding = min(round(PADDING / step), time.size - 1)
+    return np.asarray(sosfiltfilt(sections, values, axis=0, padtype="odd", padlen=padding))

@@ -9,10 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.crash.indices.crossings import cubic, first_reach
-from strapdown.crash.indices.moving_means import largest_mean
-from strapdown.crash.indices.phaseless import four_pole
-from strapdown.crash.indices.pulse import checked, from_start, integrals
+from strapdown.crash.indices.pulse import (
+    checked,
+    cubic,
+    first_reach,
+    four_pole,
+    from_start,
+    integrals,
+    largest_mean,
+)
 from strapdown.dsp.running_integral import running_integral
 from strapdown.errors import ConfigError, DataError, Finding
 

@@ -11,23 +11,16 @@ from strapdown.config.coast import CoastSpec
 from strapdown.config.navigation import NavigationSpec, aids_of
 from strapdown.config.navigation_modules import sensors_of
 from strapdown.errors import ConfigError
+from strapdown.evaluation.gnss_outages import WithheldScore, blinded, score_of, spans_to_withhold
 from strapdown.evaluation.plane_bound import PLANE_95, plane_bound
-from strapdown.evaluation.withheld import WithheldScore, blinded, score_of, spans_to_withhold
 from strapdown.navigation.navigator import Navigator, NavigatorState
-from strapdown.navigation.piece import NavigationPiece
-from strapdown.navigation.record import Span
+from strapdown.navigation.record import NavigationPiece, Span
 from strapdown.navigation.recorder import record_of
-from strapdown.systems.coasting.forecast import (
-    QUANTITIES,
-    Forecast,
-    courses,
-    forecast,
-    variances,
-)
+from strapdown.systems.coasting.forecast import QUANTITIES, Forecast, courses, forecast, variances
 from strapdown.systems.part_of_log import check_part
 from strapdown.systems.progress import Progress, silent
-from strapdown.systems.sins.build import make_chain
 from strapdown.systems.sins.chain import Chain, ChainState
+from strapdown.systems.sins.run import make_chain
 from strapdown.systems.sins.source import NavigationSource
 from strapdown.systems.sins.withholding import SETTLED, WithheldRun, withheld_runs
 from strapdown.tables import ACCEL, GYRO

@@ -11,7 +11,7 @@ from strapdown.config.navigation_modules import sensors_of
 from strapdown.errors import ConfigError, Finding
 from strapdown.results.inputs import InputFiles
 from strapdown.sensors.catalogue import load_sensor
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.attitude_source import input_files, sensor_file
 from strapdown.systems.coasting.forecast import Forecast
 from strapdown.systems.coasting.recorded import RecordedCoast, coast_of_run

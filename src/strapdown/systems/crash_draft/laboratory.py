@@ -5,18 +5,24 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.config.toml_text import Page, instant, plain, string
 from strapdown.constants import GYRO_UNITS, STANDARD_GRAVITY
-from strapdown.errors import DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
+from strapdown.formats.crash_velocity import mean_accelerations_of
+from strapdown.formats.named_columns import read_reference_path
 from strapdown.systems.crash_draft.parts import Clock, Part, Skipped
 
-Array = NDArray[np.float64]
+__all__ = ["KnownPath", "as_accelerations", "known_path", "laboratory_parts", "reference_tables"]
 
-__all__ = ["laboratory_parts"]
+
+Array = NDArray[np.float64]
 
 _AXIS_WORD = re.compile(r"(?<![A-Za-z])([XYZ])[RGL]?(?![A-Za-z])(?:[ -]?AXIS)?", re.I)
 _FAILED = ("failed", "no data", "questionable", "meaningless")
@@ -148,3 +154,116 @@ def _part(
         ),
         skipped,
     )
+
+
+# Changes of velocity, as event data recorders keep them, as what accelerometers would have.
+
+
+# 49 CFR 563.8, Table III: a change of velocity is kept to ±10 %.
+RECORDER = {"scale_bound_percent": 10.0, "misalignment_sd_deg": 2.0}
+
+
+def as_accelerations(part: Part) -> Part:
+    """Mean accelerations over the intervals of a table of changes of velocity.
+
+    Parameters
+    ----------
+    part : Part
+        Of kind ``velocity``, with values in m/s.
+    """
+    time = part.time
+    from_zero = bool(0.0 < time[0] <= 1.5 * (time[1] - time[0]))
+    columns, stamps = [], time
+    for k in range(3):
+        stamps, mean = mean_accelerations_of(time, part.values[:, k], from_zero=from_zero)
+        columns.append(mean)
+    return replace(
+        part,
+        kind="acceleration",
+        time=stamps,
+        values=np.column_stack(columns),
+        zeroed=True,
+        sampling="",
+        uncertainty=RECORDER,
+        basis="what 49 CFR 563.8 asks of a recorder: 10 % of the change of velocity",
+        notes=(*part.notes, "changes of velocity; mean accelerations are made of them"),
+    )
+
+
+# A path that another instrument measured, among the records: a reference to hold the answer to.
+
+
+# A path that is counted from the trigger has it within this.
+LONGEST = 10.0  # s
+
+
+@dataclass(frozen=True)
+class KnownPath:
+    """A path as the case names it.
+
+    Attributes
+    ----------
+    path : str
+    name : str
+    start, end : float, s
+    """
+
+    path: str
+    name: str
+    start: float
+    end: float
+
+    @property
+    def at_trigger(self) -> bool:
+        """Whether its time may count from the trigger."""
+        return self.start <= 0.0 <= self.end and self.end - self.start < LONGEST
+
+
+def known_path(path: str, record: CrashRecord) -> KnownPath | None:
+    """Take a record for the path of a point, where it has time, north, east and down.
+
+    Parameters
+    ----------
+    path : str
+        As the case names it.
+    record : CrashRecord
+    """
+    if len(record.files) != 1 or not {"north", "east", "down"} <= _words(record):
+        return None
+    try:
+        table: pd.DataFrame = read_reference_path(record.path)
+    except (ConfigError, DataError):
+        return None
+    return KnownPath(path, record.path.stem, float(table.index[0]), float(table.index[-1]))
+
+
+def _words(record: CrashRecord) -> set[str]:
+    return {
+        c.name.lower().split("[")[0].split("(")[0].split("_m")[0].strip() for c in record.channels
+    }
+
+
+def reference_tables(page: Page, paths: list[KnownPath]) -> None:
+    """A table for each; one whose time does not count from the trigger stays a comment."""
+    for one in paths:
+        page.blank()
+        page.say(
+            f"---- '{plain(one.name)}' is a path, and no record of a recorder: the answers are "
+            "held against it, and do not use it."
+        )
+        lines = (
+            "[[references]]",
+            'kind = "path"',
+            f"name = {string(one.name)}",
+            'source = ""                         # how it was measured, as you like',
+            f"path = {string(one.path)}",
+        )
+        if one.at_trigger:
+            page.say("assumed: its time counts from the trigger, its place is that of the point")
+            page.lines += lines
+            continue
+        page.say(
+            f"Its time goes from {instant(one.start)} to {instant(one.end)} s, and must count from "
+            "the trigger: make a copy whose time does, name it here, and take the # away."
+        )
+        page.lines += [f"# {line}" for line in lines]

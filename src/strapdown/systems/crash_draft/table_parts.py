@@ -2,27 +2,39 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.constants import TIME_UNITS
 from strapdown.errors import DataError
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.formats.crash_stamps import last_midnight
 from strapdown.formats.crash_units import factor_of
+from strapdown.formats.inference.clock import infer_time_unit, mean_step
+from strapdown.formats.inference.conclusion import THRESHOLD
 from strapdown.formats.stamps import EPOCH
 from strapdown.systems.crash_draft.header_words import Heading, read_heading
-from strapdown.systems.crash_draft.parts import Part, Skipped
-from strapdown.systems.crash_draft.stated_rate import stated_rate
-from strapdown.systems.crash_draft.table_clock import evenly, find_clock, likely_rate
-from strapdown.systems.crash_draft.table_triads import group_columns
+from strapdown.systems.crash_draft.parts import Clock, Part, Skipped
+from strapdown.systems.crash_draft.triad_kind import pulse_samples
+
+__all__ = [
+    "LEAST_SAMPLES",
+    "Group",
+    "evenly",
+    "find_clock",
+    "group_columns",
+    "likely_rate",
+    "stated_rate",
+    "table_parts",
+]
+
 
 Array = NDArray[np.float64]
-
-__all__ = ["LEAST_SAMPLES", "table_parts"]
 
 #: A crash of a tenth of a second, at the slowest rate that shows it.
 LEAST_SAMPLES = 8
@@ -202,3 +214,389 @@ def _heading(channel: CrashChannel) -> Heading:
     elif channel.quantity in ("displacement", "force"):
         own = replace(own, quantity="other")
     return own
+
+
+# Which columns of a table of unknown layout belong together as triads.
+
+
+# A sensor that feels a crash steps off by more than this many of its usual steps; a temperature
+# stands far from zero for its spread, and does not.
+FEELS, TABLE_TRIADS_FAR = 6.0, 10.0
+
+
+@dataclass(frozen=True)
+class Group:
+    """Columns of one triad.
+
+    Attributes
+    ----------
+    columns : dict of str to str
+        Axis to column.
+    quantity : str
+        ``acceleration``, ``rate``, ``velocity``, or empty where headings do not tell.
+    unit : str
+        Of the headings; empty where they do not tell.
+    by_heading : bool
+        Whether headings tell the axes.
+    label : str
+        What tells it from others.
+    """
+
+    columns: dict[str, str]
+    quantity: str
+    unit: str
+    by_heading: bool
+    label: str
+
+
+def group_columns(
+    columns: Mapping[str, Array], headings: Mapping[str, Heading]
+) -> tuple[list[Group], list[tuple[str, str]]]:
+    """Group columns into triads.
+
+    Parameters
+    ----------
+    columns : dict of str to ndarray
+        Without the clock, in their order.
+    headings : dict of str to Heading
+
+    Returns
+    -------
+    groups : list of Group
+    left : list of (str, str)
+        Columns that belong to none, and why.
+    """
+    left: list[tuple[str, str]] = []
+    open_: dict[str, Array] = {}
+    for name, values in columns.items():
+        quantity = headings[name].quantity
+        if quantity in ("other", "time", "counter"):
+            what = {
+                "time": "a second clock, or one that goes back",
+                "counter": "a count of samples",
+            }
+            left.append((name, what.get(quantity, "its heading names something else")))
+        elif not np.isfinite(values).any():
+            left.append((name, "it is empty"))
+        elif np.ptp(values[np.isfinite(values)]) == 0.0 and not headings[name].axis:
+            left.append((name, "it is constant"))
+        else:
+            open_[name] = values
+    groups, rest = _by_heading(open_, headings)
+    more, dropped = _by_order(rest, headings)
+    order = {name: k for k, name in enumerate(columns)}
+    groups = sorted([*groups, *more], key=lambda g: min(order[c] for c in g.columns.values()))
+    return groups, [*left, *dropped]
+
+
+def _by_heading(
+    columns: Mapping[str, Array], headings: Mapping[str, Heading]
+) -> tuple[list[Group], dict[str, Array]]:
+    found: dict[tuple[str, str], dict[str, str]] = {}
+    spoiled: set[tuple[str, str]] = set()
+    for name in columns:
+        said = headings[name]
+        if not said.axis:
+            continue
+        # Roll, pitch and yaw are words of one triad, each with a stem of its own.
+        key = (said.quantity, said.stem)
+        axes = found.setdefault(key, {})
+        if said.axis in axes:
+            spoiled.add(key)
+        axes[said.axis] = name
+    groups: list[Group] = []
+    rest = dict(columns)
+    for key, axes in found.items():
+        quantity, stem = key
+        # A lone letter that is no axis by the company it keeps is left to the numbers.
+        if key in spoiled or (len(axes) < 2 and not quantity):
+            continue
+        units = {headings[c].unit for c in axes.values()} - {""}
+        if len(units) > 1:
+            continue
+        ordered = {a: axes[a] for a in "xyz" if a in axes}
+        groups.append(Group(ordered, quantity, next(iter(units), ""), True, stem))
+        for column in axes.values():
+            rest.pop(column)
+    return _joined(groups, headings), rest
+
+
+def _joined(groups: list[Group], headings: Mapping[str, Heading]) -> list[Group]:
+    """Single channels of one quantity with axes that do not meet are one triad."""
+    out: list[Group] = []
+    for group in groups:
+        mate = next(
+            (
+                k
+                for k, other in enumerate(out)
+                if len(group.columns) == 1
+                and other.quantity == group.quantity
+                and other.unit == group.unit
+                and not set(other.columns) & set(group.columns)
+            ),
+            None,
+        )
+        if mate is None:
+            out.append(group)
+            continue
+        other = out[mate]
+        both = {**other.columns, **group.columns}
+        ordered = {a: both[a] for a in "xyz" if a in both}
+        out[mate] = Group(ordered, group.quantity, group.unit, True, other.label)
+    return out
+
+
+def _by_order(
+    columns: Mapping[str, Array], headings: Mapping[str, Heading]
+) -> tuple[list[Group], list[tuple[str, str]]]:
+    """Threes of neighbouring columns; of those that are too many, the ones that feel least go."""
+    names = list(columns)
+    dropped: list[tuple[str, str]] = []
+    dull = [n for n in names if not headings[n].quantity and _is_dull(columns[n])]
+    while len(names) % 3 and dull:
+        name = dull.pop()
+        names.remove(name)
+        dropped.append((name, "nothing happens in it when the others feel the crash"))
+    groups: list[Group] = []
+    for run in _runs(names, headings):
+        for k in range(0, len(run) - len(run) % 3, 3):
+            three = run[k : k + 3]
+            said = headings[three[0]]
+            groups.append(
+                Group(
+                    dict(zip("xyz", three, strict=True)),
+                    said.quantity,
+                    said.unit,
+                    False,
+                    said.stem.rstrip("0123456789 "),
+                )
+            )
+        over = run[len(run) - len(run) % 3 :]
+        if over and headings[over[0]].quantity:
+            axes = dict(zip("xyz", over, strict=False))
+            said = headings[over[0]]
+            groups.append(Group(axes, said.quantity, said.unit, False, said.stem))
+        else:
+            dropped += [(n, "it makes no three with its neighbours") for n in over]
+    return groups, dropped
+
+
+def _runs(names: Sequence[str], headings: Mapping[str, Heading]) -> list[list[str]]:
+    """Neighbours of one quantity and unit, as far as headings tell."""
+    runs: list[list[str]] = []
+    for name in names:
+        said = headings[name]
+        before = headings[runs[-1][-1]] if runs else None
+        if before and (before.quantity, before.unit) == (said.quantity, said.unit):
+            runs[-1].append(name)
+        else:
+            runs.append([name])
+    return runs
+
+
+def _is_dull(values: Array) -> bool:
+    kept = values[np.isfinite(values)]
+    spread = float(kept.std())
+    if spread == 0.0:
+        return True
+    steps = np.abs(np.diff(kept))
+    nonzero = steps[steps > 0.0]
+    usual = max(float(np.median(steps)), float(nonzero.min(initial=np.inf)))
+    if not np.isfinite(usual):
+        return True
+    return (
+        float(steps.max()) < FEELS * usual and abs(float(kept.mean())) > TABLE_TRIADS_FAR * spread
+    )
+
+
+# The time column of a table of unknown layout, and its unit.
+
+
+RATES = (50.0, 100.0, 200.0, 400.0, 500.0, 1000.0, 2000.0, 5000.0, 10_000.0, 20_000.0)
+# Four fifths of the power of a frontal impact, s.
+USUAL_PULSE = 0.06
+
+# Steps that differ by less than this of their mean are even; rounding moves a stamp by no more than
+# twice what it moves a step, as the line goes through two that are rounded, and a step not twice.
+EVEN, ROUNDED, STEP = 0.01, 2.0, 1.05
+# Steps of a clock stay within this of their median, but for as many as this part of them.
+REGULAR, IRREGULAR_PART = 0.5, 0.05
+# Rates at which what happens in a crash is recorded; a sum that grows is no clock.
+SLOWEST, FASTEST = 5.0, 200_000.0  # Hz
+
+
+def find_clock(
+    columns: Mapping[str, Array], headings: Mapping[str, Heading]
+) -> tuple[Clock, Array | None]:
+    """Find the time column.
+
+    Parameters
+    ----------
+    columns : dict of str to ndarray, (n,)
+        Those that hold numbers, in their order.
+    headings : dict of str to Heading
+        Of each.
+
+    Returns
+    -------
+    clock : Clock
+        With an empty `column` where there is none.
+    time : ndarray, (n,), s, or None
+        By the likeliest unit.
+
+    Notes
+    -----
+    A column is a clock where it grows in nearly equal steps. One that is named so goes first;
+    of the others one that does not count samples, then the first. A column that grows by one
+    counts samples, or milliseconds at 1 kHz: that its name must tell.
+    """
+    growing = [name for name, values in columns.items() if _grows(values)]
+    named = [name for name in growing if headings[name].quantity == "time"]
+    plain = [name for name in growing if headings[name].quantity == ""]
+    steady = [name for name in plain if not _counts(columns[name])]
+    counts = [name for name in plain if _counts(columns[name])]
+    for names, why in (
+        (named, "by its heading"),
+        (steady, "it grows in equal steps"),
+        (counts, "it grows in steps of one"),
+    ):
+        if not names:
+            continue
+        # A clock that says its unit goes before one that does not.
+        name = next((n for n in names if headings[n].unit in TIME_UNITS), names[0])
+        return _clock(name, columns[name], headings[name], why)
+    return Clock("", "", "no column grows in equal steps", math.nan, math.nan), None
+
+
+def likely_rate(values: Array) -> float:
+    """A usual rate at which the pulse lasts as long as one does, for numbers without time.
+
+    Parameters
+    ----------
+    values : ndarray, (n, k)
+    """
+    samples = pulse_samples(values)
+    return min(RATES, key=lambda rate: abs(math.log(max(samples, 1) / rate / USUAL_PULSE)))
+
+
+def _clock(name: str, values: Array, heading: Heading, why: str) -> tuple[Clock, Array]:
+    step = mean_step(values)
+    if heading.unit in TIME_UNITS:
+        factor = TIME_UNITS[heading.unit]
+        rate = 1.0 / (step * factor)
+        # Dates and times of day are read in ns, which no heading says.
+        names_it = heading.unit != "ns" or "ns" in name.lower() or "nano" in name.lower()
+        how = f"{why}, which names the unit" if names_it else f"{why}; a time of day, read in ns"
+        return Clock(name, heading.unit, how, step, rate), values * factor
+    said = infer_time_unit(_whole(values))
+    shares = {str(v): p for v, p in ((said.value, said.confidence), *said.alternatives) if v}
+    within = {u: p for u, p in shares.items() if SLOWEST <= 1.0 / (step * TIME_UNITS[u]) <= FASTEST}
+    # A step of one is a count as often as it is a millisecond.
+    total = sum(within.values()) + (1.0 if _counts(values) and heading.quantity != "time" else 0.0)
+    best = max(within, key=lambda u: within[u], default="s")
+    rate = 1.0 / (step * TIME_UNITS[best])
+    told = f"{why}; a step of {step:.6g} {best} is {rate:.5g} samples a second"
+    if within and within[best] >= THRESHOLD * total:
+        return Clock(name, best, told, step, rate), values * TIME_UNITS[best]
+    kinds = [
+        f'"{u}" makes {1.0 / (step * TIME_UNITS[u]):.5g} samples a second' for u in within or ("s",)
+    ]
+    if _counts(values):
+        kinds.append(
+            "if it counts samples, delete `time` and `time_unit` and write `rate_hz` instead"
+        )
+    return Clock(name, "", why, step, rate, "; ".join(kinds)), values * TIME_UNITS[best]
+
+
+def evenly(clock: Clock, time: Array) -> tuple[Clock, Array]:
+    """Stamps that are rounded, or written late, made even; others as they are.
+
+    Parameters
+    ----------
+    clock : Clock
+    time : ndarray, (n,), s
+
+    Returns
+    -------
+    clock : Clock
+        With `stated` where the case must state the rate.
+    time : ndarray, (n,), s
+
+    Notes
+    -----
+    The stamps of an even clock that are rounded to q stay within q of it, and their steps differ
+    by q. Several samples that are missing bend the line by more.
+    """
+    count = np.arange(time.size)
+    steps = np.diff(time)
+    mean = float((time[-1] - time[0]) / max(time.size - 1, 1))
+    spread = float(np.ptp(steps)) if steps.size else 0.0
+    if not clock.unit or spread <= EVEN * mean:
+        return clock, time
+    off = time - time[0] - count * mean
+    if float(np.ptp(off)) > ROUNDED * spread or spread > STEP * mean:
+        return clock, time
+    told = f"its stamps are rounded: evenly spaced within {1e3 * float(np.ptp(off)):.2g} ms"
+    even = replace(clock, rate=1.0 / mean, stated=True, why=f"{clock.why}; {told}", rate_why=told)
+    return even, time[0] + count * mean
+
+
+def _whole(values: Array) -> NDArray[np.float64] | NDArray[np.int64]:
+    """Whole numbers as such: clocks that count ticks say so."""
+    whole = np.round(values)
+    if np.array_equal(whole, values) and np.abs(values).max(initial=0.0) < 2.0**53:
+        return whole.astype(np.int64)
+    return values
+
+
+def _counts(values: Array) -> bool:
+    return bool(np.all(np.diff(values) == 1.0))
+
+
+def _grows(values: Array) -> bool:
+    if values.size < 2 or not np.isfinite(values).all():
+        return False
+    steps = np.diff(values)
+    usual = float(np.median(steps))
+    if usual <= 0.0 or np.count_nonzero(steps <= 0.0) > IRREGULAR_PART * steps.size:
+        return False
+    off = np.count_nonzero(np.abs(steps - usual) > REGULAR * usual)
+    return bool(off <= max(IRREGULAR_PART * steps.size, 0 if steps.size < 20 else 1))
+
+
+# The rate of a record without time, where a line above its table states one.
+
+
+_RATE = re.compile(
+    r"(?<![\w.,])(\d+(?:[.,]\d+)?)\s*(k?)\s*(?:hz|sps|s/s|samples?\s*(?:/|per)\s*s)", re.I
+)
+# A filter's limit is in Hz, too.
+_OTHER = re.compile(
+    r"filter|cfc|band ?width|bandbreite|cut.?off|grenzfrequenz|low.?pass|tiefpass", re.I
+)
+
+
+def stated_rate(remarks: Sequence[str]) -> tuple[float, str] | None:
+    """Find the samples a second that lines above a table state.
+
+    Parameters
+    ----------
+    remarks : sequence of str
+
+    Returns
+    -------
+    (rate, line) or None
+        In Hz; None where no line states one, or two state different ones.
+    """
+    found: dict[float, str] = {}
+    for line in remarks:
+        if _OTHER.search(line):
+            continue
+        for said in _RATE.finditer(line):
+            # A comma of three digits parts thousands in one country and decimals in another.
+            if re.fullmatch(r"\d+[.,]\d{3}", said[1]):
+                return None
+            rate = float(said[1].replace(",", ".")) * (1000.0 if said[2] else 1.0)
+            if SLOWEST <= rate <= FASTEST:
+                found.setdefault(rate, line)
+    return next(iter(found.items())) if len(found) == 1 else None

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.aiding.view import DISPLACEMENT, ROTATION, VELOCITY
+from strapdown.aiding.aid import DISPLACEMENT, ROTATION, VELOCITY
 from strapdown.estimation.error_filter import ErrorFilter
 
 __all__ = ["errors_by_antenna"]

@@ -10,8 +10,7 @@ from statistics import median
 import numpy as np
 
 from strapdown.errors import ConfigError
-from strapdown.navigation.piece import NavigationPiece, Seen
-from strapdown.navigation.record import Event, Span
+from strapdown.navigation.record import Event, NavigationPiece, Seen, Span
 from strapdown.tables.checks import is_number
 
 __all__ = ["Deliveries", "DeliveriesState"]

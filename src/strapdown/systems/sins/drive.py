@@ -16,7 +16,7 @@ from strapdown.navigation.record import Event, NavigationRecord, Span
 from strapdown.navigation.recorder import FullRecorder, Recorder
 from strapdown.systems.progress import Progress, silent
 from strapdown.systems.sins.chain import Chain, ChainState
-from strapdown.systems.sins.piece import Aligned, ChainPiece
+from strapdown.systems.sins.modes import Aligned, ChainPiece
 from strapdown.tables import ACCEL, GYRO, check_imu
 from strapdown.tables.checks import check_columns, source_of, values_of
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from strapdown.aiding.heading import Heading
 from strapdown.evaluation.heading_light import RECENT, SURE, seconds_of
 from strapdown.navigation.record import NavigationRecord
-from strapdown.systems.sins.carried_heading import CarriedHeading
 from strapdown.systems.sins.chain import Chain
+from strapdown.systems.sins.heading_witness import CarriedHeading
 from strapdown.tables.checks import index_of
 
 __all__ = ["AgreeingSources", "agreeing_sources"]

@@ -8,6 +8,7 @@ the heading it has from the motion since then: from no start, no alignment, no h
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,24 +17,44 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from strapdown import rotation
+from strapdown._kernels.attitude import quaternion_advance
 from strapdown.aiding.gnss import Gnss
 from strapdown.constants import MAD_TO_SD
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
 from strapdown.errors import DataError, DivergenceError
-from strapdown.estimation.error_filter import ErrorFilter
-from strapdown.estimation.filter_state import FilterState
-from strapdown.evaluation.heading_light import doubted
-from strapdown.evaluation.trajectory_at import trajectory_at
+from strapdown.estimation.covariance import Joseph
+from strapdown.estimation.error_filter import ErrorFilter, FilterState
+from strapdown.estimation.error_model import RotationVectorModel
+from strapdown.estimation.robust import Igg3, RobustUpdate
+from strapdown.evaluation.heading_light import GROWS, SURE, doubted, seconds_of
+from strapdown.evaluation.trajectory_differences import trajectory_at
+from strapdown.frames import q_ne
+from strapdown.mechanization.ned import NorthEastDown
+from strapdown.mechanization.wander_azimuth import WanderAzimuth
 from strapdown.nav_state import NavState
+from strapdown.navigation.consistency import ObservationConsistency
 from strapdown.navigation.navigator import Navigator, NavigatorState
-from strapdown.navigation.piece import Mark, NavigationPiece
-from strapdown.navigation.record import NavigationRecord
+from strapdown.navigation.record import Mark, NavigationPiece, NavigationRecord
 from strapdown.rotation.euler_angles import euler_sd
-from strapdown.systems.sins.witness_source import Witnesses
+from strapdown.sensors.uncertainty import ImuUncertainty
+from strapdown.systems.sins.chain import Chain
+from strapdown.systems.sins.gyrocompass import Compass
+from strapdown.systems.sins.intake import NEAR as NEAR_FIXES
+from strapdown.systems.sins.intake import JoinedSteps, joined_steps
 from strapdown.tables import EULER, GEODETIC, VELOCITY
-from strapdown.tables.checks import index_of
+from strapdown.tables.checks import index_of, values_of
 
-__all__ = ["Evidence", "hear_witnesses"]
+__all__ = [
+    "LONGEST",
+    "UNSEEN",
+    "CarriedHeading",
+    "Evidence",
+    "Witnesses",
+    "carry_headings",
+    "hear_witnesses",
+    "witnesses_of",
+]
+
 
 Array = NDArray[np.float64]
 
@@ -285,3 +306,293 @@ def _begin(
 
 def _ellipsoid(navigator: Navigator) -> Ellipsoid:
     return find_ellipsoid(navigator.filter.mechanization.ellipsoid)
+
+
+# What witnesses of a heading are made of: their filter, joined increments, thinned fixes.
+
+
+#: Fixes are taken no denser, s.
+FIXES_APART = 1.0
+#: Nearer to a pole the local north is none.
+POLAR = 85.0
+
+
+@dataclass(frozen=True, eq=False)
+class Witnesses:
+    """What witnesses are made of: their filter, their receivers, and the record.
+
+    Attributes
+    ----------
+    navigator : Navigator
+    time : ndarray, (n,), s
+        Ends of the joined steps.
+    rows : ndarray, (n, 10)
+        Motion increments.
+    tables : mapping of str to DataFrame
+        Fixes, thinned.
+    begun : float, s
+        Begin of the first step.
+    """
+
+    navigator: Navigator
+    time: Array
+    rows: Array
+    tables: Mapping[str, pd.DataFrame]
+    begun: float
+
+
+def witnesses_of(
+    filter_: ErrorFilter,
+    chain: Chain,
+    imu: pd.DataFrame,
+    tables: Mapping[str, pd.DataFrame],
+    record: NavigationRecord,
+    consistency: Mapping[str, ObservationConsistency],
+) -> Witnesses | None:
+    """Return what witnesses of a run are made of.
+
+    Parameters
+    ----------
+    filter_ : ErrorFilter
+        Of the run, without the states of its aids.
+    chain : Chain
+        Of the run.
+    imu : DataFrame
+        Its samples.
+    tables : mapping of str to DataFrame
+        By name of the aid.
+    record : NavigationRecord
+        What came of it.
+    consistency : mapping of str to ObservationConsistency
+        Of its innovations.
+
+    Returns
+    -------
+    Witnesses or None
+        None where there is no satellite receiver: nothing else tells a direction of its own.
+    """
+    receivers = [aid for aid in chain.navigator.aids if type(aid) is Gnss and aid.name in tables]
+    if not receivers:
+        return None
+    span = record.trajectory.index
+    steps = joined_steps(chain.intake, imu, float(span[0]), float(span[-1]))
+    time, rows = steps.time, steps.rows
+    if len(time) < 2:
+        return None
+    robust = filter_.rule is not None or any(_robust(aid, consistency) for aid in receivers)
+    aids = tuple(_known(aid, record, robust) for aid in receivers)
+    ellipsoid = filter_.mechanization.ellipsoid
+    polar = record.trajectory["lat"].abs().max() > POLAR
+    model = filter_.model
+    small = ErrorFilter(
+        (WanderAzimuth if polar else NorthEastDown)(ellipsoid=ellipsoid),
+        RotationVectorModel(model.gyro_noise, model.accel_noise, model.sensors),
+        Joseph(),
+        None,
+        step=FIXES_APART,
+    )
+    thinned = {aid.name: _thinned(tables[aid.name]) for aid in receivers}
+    begun = float(time[0] - rows[0, 0])
+    return Witnesses(Navigator(small, aids, mark_interval=FIXES_APART), time, rows, thinned, begun)
+
+
+def _known(aid: Gnss, record: NavigationRecord, robust: bool) -> Gnss:
+    """A receiver with arm and time offset as the run found them in the end."""
+    found = record.sensors.iloc[-1]
+    arm = list(aid.lever_arm)
+    for k, axis in enumerate("xyz"):
+        arm[k] -= float(found.get(f"{aid.name}.lever_arm_{axis}", 0.0))
+    offset = next(
+        (float(v) for n, v in found.items() if str(n).startswith(f"{aid.name}.time_offset")), 0.0
+    )
+    return replace(
+        aid,
+        rule=(aid.rule or RobustUpdate(Igg3())) if robust else None,
+        lever_arm=(arm[0], arm[1], arm[2]),
+        lever_arm_sd=0.0,
+        time_offset=aid.time_offset - offset,
+        time_offset_sd=0.0,
+        time_offset_drift=0.0,
+    )
+
+
+def _robust(aid: Gnss, consistency: Mapping[str, ObservationConsistency]) -> bool:
+    """Whether fixes of a receiver are to be believed with care."""
+    return aid.rule is not None or any(
+        one.gross
+        for name, of in consistency.items()
+        if name.partition(".")[0] == aid.name
+        for one in of.components
+    )
+
+
+def _thinned(table: pd.DataFrame) -> pd.DataFrame:
+    """Rows that are as far apart as fixes are taken."""
+    time = index_of(table)
+    cell = np.floor(time / FIXES_APART + NEAR_FIXES)
+    kept = np.concatenate([[True], np.diff(cell) > 0.0]) if len(time) else np.empty(0, bool)
+    out = table[kept]
+    out.attrs = dict(table.attrs)
+    return out
+
+
+# A heading that was found at rest, carried on by the gyros alone.
+
+
+#: A gyro may have changed by so many standard deviations of its bias since, and nobody saw it.
+UNSEEN = 30.0
+#: Longer than this nobody has looked at the gyros, s.
+LONGEST = 7200.0
+#: A step that is so long, or so much time between two, is a gap, s.
+GAP = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class CarriedHeading:
+    """What one rest tells of the headings of a run after it; as `heading_light.Heard`.
+
+    Attributes
+    ----------
+    since : float, s
+        When the rest ended.
+    time : ndarray, (n,), s
+        Seconds of the run after it.
+    difference : ndarray, (n,), deg
+        Heading of the run less the carried one.
+    sd : ndarray, (n,), deg
+        What bounds 99 of 100 of the errors of the carried one, over `heading_light.SURE`.
+    plain : ndarray, (n,), deg
+        The same by what is stated of the gyros, without what the rest itself showed of them.
+    kind : str
+    """
+
+    since: float
+    time: Array
+    difference: Array
+    sd: Array
+    plain: Array
+    kind: str = "gyrocompass"
+
+
+def carry_headings(
+    compasses: Sequence[Compass],
+    doubts: Sequence[float],
+    steps: JoinedSteps,
+    record: NavigationRecord,
+    sensors: ImuUncertainty,
+    ellipsoid: Ellipsoid,
+) -> list[CarriedHeading]:
+    """Carry headings on, each until a later one agrees with it.
+
+    Parameters
+    ----------
+    compasses : sequence of Compass
+        In the order of time.
+    doubts : sequence of float, s
+        Instants at which gyros were found to have changed: nothing is carried beyond.
+    steps : JoinedSteps
+        From the first of them on.
+    record : NavigationRecord
+        Of the run, which tells the place: a kilometre turns north by less than 0.02 deg.
+    sensors : ImuUncertainty
+    ellipsoid : Ellipsoid
+
+    Returns
+    -------
+    list of CarriedHeading
+
+    Notes
+    -----
+    From one instant to another the gyros turn the body in inertial space, and the Earth and the way
+    over it turn north; nothing else is needed. The bound of such a heading is that of the rest, the
+    noise, the bias that the rest left and the scale factors since, and what a change of a gyro by
+    `UNSEEN` of its standard deviations adds, which nothing but another rest would show.
+    """
+    if not compasses or not len(steps.time):
+        return []
+    rows = record.trajectory
+    seconds = seconds_of(record)
+    at = np.clip(np.searchsorted(index_of(rows), seconds - 1e-6), 0, len(rows) - 1)
+    stamps, own = index_of(rows)[at], values_of(rows, EULER)[at, 2]
+    carried = [_Carried(one, steps, rows, ellipsoid, sensors) for one in compasses]
+    out = []
+    for k, one in enumerate(carried):
+        until = min(one.compass.time + LONGEST, one.unbroken)
+        until = min([until, *(at for at in doubts if at > one.compass.time)])
+        for later in carried[k + 1 :]:
+            if later.compass.time <= until and one.agrees(later.compass):
+                until = min(until, later.compass.time)
+                break
+        used = (seconds >= one.compass.time - 1e-6) & (seconds <= until + 1e-6)
+        told = stamps[used]
+        difference = np.asarray(rotation.within_half_turn(own[used] - one.heading(told)))
+        bound, plain = one.bounds(told)
+        out.append(
+            CarriedHeading(one.compass.time, seconds[used], difference, bound / SURE, plain / SURE)
+        )
+    return [one for one in out if len(one.time)]
+
+
+class _Carried:
+    """The attitude of one rest, at the end of each step after it."""
+
+    def __init__(
+        self,
+        compass: Compass,
+        steps: JoinedSteps,
+        rows: pd.DataFrame,
+        ellipsoid: Ellipsoid,
+        sensors: ImuUncertainty,
+    ) -> None:
+        self.compass, self.sensors = compass, sensors
+        # A rest that ends within a step: the body stands there.
+        after = int(np.searchsorted(steps.time, compass.time + 1e-6))
+        dt = np.ascontiguousarray(steps.rows[after:, 0])
+        turns = np.ascontiguousarray(steps.rows[after:, 1:4] - dt[:, None] * compass.gyro_bias)
+        turned = np.empty((len(dt), 4))
+        quaternion_advance(np.array([1.0, 0.0, 0.0, 0.0]), dt, turns, turns, turned, 0.0, 1.0)
+        self.time = np.concatenate([[compass.time], steps.time[after:]])
+        # Through a gap the gyros carry nothing.
+        gaps = np.flatnonzero((dt > GAP) | (np.diff(self.time) > dt + GAP))
+        self.unbroken = float(self.time[gaps[0]]) if len(gaps) else math.inf
+        turned = np.concatenate([[[1.0, 0.0, 0.0, 0.0]], turned])
+        known = index_of(rows)
+        lat, lon = np.interp(self.time, known, rows["lat"]), _longitude(self.time, rows)
+        lon = lon + math.degrees(ellipsoid.rotation_rate) * (self.time - compass.time)
+        q_ni = q_ne(lat, rotation.within_half_turn(lon))
+        first = rotation.compose(rotation.conjugate(q_ni[0]), compass.q_nb)
+        q_nb = rotation.compose(q_ni, rotation.compose(first, turned))
+        heading = rotation.euler_from_quaternion(q_nb)[:, 2]
+        self.unwrapped = np.degrees(np.unwrap(np.radians(heading)))
+        away = np.abs(self.unwrapped - self.unwrapped[0])
+        self.turned = np.radians(np.maximum.accumulate(away))
+
+    def heading(self, time: Array) -> Array:
+        """At some instants, deg."""
+        return np.asarray(np.interp(time, self.time, self.unwrapped))
+
+    def bounds(self, time: Array) -> tuple[Array, Array]:
+        """Of 99 of 100 headings at some instants, deg: by the rest, and by what is stated."""
+        gyro, drift = self.sensors.gyro, self.sensors.gyro_drift
+        since = np.maximum(time - self.compass.time, 0.0)
+        bias = float(np.max(np.hypot(gyro.axis("bias"), drift.triad)))
+        noise = float(np.max(gyro.axis("noise_density")))
+        scale = float(np.max(np.hypot(gyro.axis("scale"), gyro.axis("misalignment"))))
+        turned = np.interp(time, self.time, self.turned)
+        chance = np.sqrt(noise**2 * since + (bias * since) ** 2 + (scale * turned) ** 2)
+        unseen = UNSEEN * bias + GROWS * self.compass.unsteady
+        grown = np.degrees(SURE * chance + unseen * since)
+        return self.compass.bound + grown, SURE * self.compass.sd + grown
+
+    def agrees(self, later: Compass) -> bool:
+        """Whether a later rest found what was carried to it."""
+        at = np.array([later.time])
+        there = float(rotation.euler_from_quaternion(later.q_nb)[2])
+        apart = abs(float(rotation.within_half_turn(self.heading(at)[0] - there)))
+        return bool(apart <= math.hypot(float(self.bounds(at)[0][0]), later.bound))
+
+
+def _longitude(time: Array, rows: pd.DataFrame) -> Array:
+    """Longitude at some instants, deg, also over the date line."""
+    lon = np.degrees(np.unwrap(np.radians(rows["lon"].to_numpy(dtype=np.float64))))
+    return np.asarray(np.interp(time, index_of(rows), lon))

@@ -3,20 +3,489 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from typing import Any, Literal
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError
+from strapdown import rotation
+from strapdown._kernels.level import Q_LB
+from strapdown._kernels.motion_blocks import join_blocks
+from strapdown.dsp.samples import even_step
+from strapdown.errors import ConfigError, DataError
+from strapdown.estimation.error_filter import symmetric
 from strapdown.increments.stream import IncrementStream, IncrementStreamState
-from strapdown.navigation.growing_rows import GrowingRows
-from strapdown.prefilter.prefilter import CHANNELS, Prefilter
-from strapdown.systems.sins.filtering import Filtering, FilteringState
-from strapdown.systems.sins.gaps import GapPolicy, Hole, hole_between
-from strapdown.systems.sins.saturated import RangeEnds, RangeState
+from strapdown.navigation.navigator import Navigator, NavigatorState
+from strapdown.navigation.record import GrowingRows
+from strapdown.prefilter.prefilter import CHANNELS, Grid, Prefilter
+from strapdown.sensors.saturation import ROUNDING
+from strapdown.sensors.uncertainty import ImuUncertainty
+from strapdown.tables import ACCEL, GYRO
+from strapdown.tables.checks import index_of, is_number, values_of
 
-__all__ = ["Intake", "IntakeState", "Steps"]
+__all__ = [
+    "NEAR",
+    "Filtered",
+    "Filtering",
+    "FilteringState",
+    "GapPolicy",
+    "Hole",
+    "Intake",
+    "IntakeState",
+    "JoinedSteps",
+    "RangeEnds",
+    "RangeState",
+    "Steps",
+    "ends_of",
+    "hole_between",
+    "joined_steps",
+    "steps_of",
+    "widened",
+]
+
+
+# The steps of a record, as they are or joined to tenths of a second.
+
+
+#: Increments are joined to so much, s.
+JOINED = 0.1
+#: Of the record that is taken at a time, s.
+AT_ONCE = 60.0
+#: Stamps are the same within this, s.
+NEAR = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class JoinedSteps:
+    """Motion increments of some steps.
+
+    Attributes
+    ----------
+    time : ndarray, (n,), s
+        Ends of the steps.
+    rows : ndarray, (n, 10)
+        Motion increments.
+    """
+
+    time: Array
+    rows: Array
+
+
+def steps_of(intake: Intake, imu: pd.DataFrame, begin: float, end: float) -> Iterator[JoinedSteps]:
+    """Give motion increments within a span as they are, a minute at a time."""
+    time, values = index_of(imu), values_of(imu, [*GYRO, *ACCEL])
+    state = intake.begin(imu.attrs["sampling"], None)
+    cuts = np.searchsorted(
+        time, [*np.arange(time[0] + AT_ONCE, time[-1], AT_ONCE), np.inf]
+    ).tolist()
+    at = 0
+    for cut in cuts:
+        state, steps = intake.advance(state, time[at:cut], values[at:cut], cut == len(time))
+        at = cut
+        used = (steps.time > begin + NEAR) & (steps.time <= end + NEAR)
+        if used.any():
+            yield JoinedSteps(steps.time[used], np.ascontiguousarray(steps.rows[used]))
+
+
+def joined_steps(intake: Intake, imu: pd.DataFrame, begin: float, end: float) -> JoinedSteps:
+    """Return motion increments within a span, joined to a tenth of a second.
+
+    Parameters
+    ----------
+    intake : Intake
+    imu : DataFrame
+        Imu table.
+    begin, end : float, s
+
+    Returns
+    -------
+    JoinedSteps
+    """
+    ends, joined = [np.empty(0)], [np.empty((0, 10))]
+    for steps in steps_of(intake, imu, begin, end):
+        dt = np.ascontiguousarray(steps.rows[:, 0])
+        last, out = np.empty(len(dt), dtype=np.int64), np.empty_like(steps.rows)
+        samples = max(1, round(JOINED / float(np.median(dt))))
+        count = int(join_blocks(dt, samples, steps.rows, last, out))
+        ends.append(steps.time[last[:count]])
+        joined.append(out[:count].copy())
+    return JoinedSteps(np.concatenate(ends), np.concatenate(joined))
+
+
+# A pre-filter within a chain: real stamps on its even grid, lost samples along lines.
+
+
+@dataclass(frozen=True, eq=False)
+class FilteringState:
+    """Between pieces.
+
+    Attributes
+    ----------
+    grid : Grid
+        From zero: its numbers count steps since the first sample.
+    inner : object
+        State of the pre-filter.
+    numbers, stamps : ndarray, (k,)
+        Of samples around the next output: count of the grid, and stamp.
+    newest : ndarray, (0 or 1, 6)
+        The newest sample.
+    """
+
+    grid: Grid
+    inner: Any
+    numbers: Array = field(default_factory=lambda: np.empty(0))
+    stamps: Array = field(default_factory=lambda: np.empty(0))
+    newest: Array = field(default_factory=lambda: np.empty((0, 6)))
+
+
+@dataclass(frozen=True, eq=False)
+class Filtered:
+    """What came out.
+
+    Attributes
+    ----------
+    time : ndarray, (m,), s
+        On the clock of the samples: the delay of the filter is taken off.
+    values : ndarray, (m, 6)
+    rows : ndarray, (m, 10) or (0, 10)
+        Motion increments, of a pre-filter that makes them itself.
+    """
+
+    time: Array
+    values: Array
+    rows: Array
+
+
+@dataclass(frozen=True)
+class Filtering:
+    """A pre-filter of samples whose stamps may drift against an even grid.
+
+    Attributes
+    ----------
+    prefilter : Prefilter
+    """
+
+    prefilter: Prefilter
+
+    def begin(self, first: Array, means: bool, source: str | None) -> FilteringState:
+        """Return the state before the first sample.
+
+        Parameters
+        ----------
+        first : ndarray, s
+            Stamps that tell the step: the first ones of the record.
+        means : bool
+            Whether samples are means over the step before them.
+        source : str, optional
+            Name for messages.
+
+        Raises
+        ------
+        DataError
+            The stamps are not even.
+        """
+        try:
+            grid = Grid(0.0, even_step(first), means)
+        except DataError as error:
+            f = error.finding
+            raise DataError(
+                "navigation.prefilter-needs-even-stamps",
+                file=source,
+                row=f.row,
+                quantity=f.quantity,
+                reason=f,
+            ) from None
+        try:
+            return FilteringState(grid, self.prefilter.begin(grid, 6))
+        except ConfigError as error:
+            if error.finding.quantity != "rate":
+                raise
+            raise error.replaced(file=source, quantity="prefilter, rate_hz") from None
+
+    def advance(
+        self, state: FilteringState, time: Array, values: Array, last: bool, source: str | None
+    ) -> tuple[FilteringState, Filtered]:
+        """Take further samples; `last` says that none follows."""
+        numbers = self._numbered(state, time, source)
+        all_numbers = np.concatenate([state.numbers, numbers])
+        all_stamps = np.concatenate([state.stamps, time])
+        known = len(state.newest)
+        nodes = np.concatenate([state.newest, values])
+        at = all_numbers[len(all_numbers) - len(nodes) :]
+        if len(nodes) > 1 and np.diff(at).max() > 1.0:
+            every = np.arange(at[0], at[-1] + 1.0)
+            nodes = np.column_stack([np.interp(every, at, column) for column in nodes.T])
+        inner, portion = self.prefilter.advance(
+            state.inner, np.ascontiguousarray(nodes[known:]), last
+        )
+        # Of means some filters answer between two samples.
+        wanted = np.rint(2.0 * portion.time / state.grid.step) / 2.0
+        stamps = np.interp(wanted, all_numbers, all_stamps) if wanted.size else np.empty(0)
+        keep = min(len(all_numbers), 1) - 1
+        if wanted.size:
+            keep = int(np.searchsorted(all_numbers, wanted[-1], side="right")) - 1
+        keep = max(keep, 0)
+        after = FilteringState(
+            state.grid,
+            inner,
+            all_numbers[keep:].copy(),
+            all_stamps[keep:].copy(),
+            values[-1:].copy() if len(values) else state.newest,
+        )
+        return after, Filtered(stamps, portion.values, portion.rows)
+
+    def _numbered(self, state: FilteringState, time: Array, source: str | None) -> Array:
+        """Places of stamps on the grid."""
+        stamps = np.concatenate([state.stamps[-1:], time])
+        steps = np.rint(np.diff(stamps) / state.grid.step)
+        if steps.size and not steps.min() >= 1.0:
+            row = int(np.argmin(steps))
+            raise DataError(
+                "navigation.samples-uneven",
+                file=source,
+                quantity="time",
+                stamps=stamps[row],
+                stamps_2=stamps[row + 1],
+                step=state.grid.step,
+            )
+        if state.numbers.size:
+            return np.asarray(state.numbers[-1] + np.cumsum(steps))
+        return np.concatenate([np.zeros(min(1, len(time))), np.cumsum(steps)])
+
+
+# Holes in what the inertial sensors gave: what is done about them, and what is not known then.
+
+
+@dataclass(frozen=True)
+class GapPolicy:
+    """What is done where samples are missing.
+
+    A step of more than `usual` times the usual one is a gap. Over it rate and force run along the
+    line between its sides, and the covariance takes that the body did there what it did over the
+    second before: see `hole_between`.
+
+    Attributes
+    ----------
+    usual : float
+        Of the step that 95 % of the first 64 do not exceed.
+    coast : float, s
+        A longer gap is not bridged.
+    beyond : {'refuse', 'align', 'coast'}
+        What a longer gap does: it ends the run with an error; it begins the first mode anew; or it
+        is bridged like a short one.
+    """
+
+    usual: float = field(default=3.0, metadata={"unit": ""})
+    coast: float = field(default=1.0, metadata={"unit": "s"})
+    beyond: Literal["refuse", "align", "coast"] = "refuse"
+
+    def __post_init__(self) -> None:
+        if not is_number(self.usual) or not self.usual > 1.0:
+            raise ConfigError("navigation.gap-factor-too-small", quantity="usual", usual=self.usual)
+        if not is_number(self.coast) or not self.coast >= 0.0:
+            raise ConfigError("navigation.gap-length-negative", quantity="coast", coast=self.coast)
+        if self.beyond not in ("refuse", "align", "coast"):
+            raise ConfigError(
+                "navigation.nothing-do-about-gap", quantity="beyond", beyond=self.beyond
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Hole:
+    """A gap in the samples.
+
+    Attributes
+    ----------
+    begin, end : float, s
+        Stamps of its two sides.
+    rate_sd, force_sd : ndarray, (3,), rad/s and m/s²
+        By how much the mean over it may differ from that of the line between its sides.
+    """
+
+    begin: float
+    end: float
+    rate_sd: Array
+    force_sd: Array
+
+    @property
+    def length(self) -> float:
+        """Length in s."""
+        return self.end - self.begin
+
+
+def hole_between(before: Array, time: tuple[float, float], after: Array) -> Hole:
+    """Judge a gap by the samples beside it.
+
+    Parameters
+    ----------
+    before : ndarray, (k, 6)
+        Samples of about a second before it, the last one at its begin.
+    time : tuple of float, s
+        Stamps of its sides.
+    after : ndarray, (6,)
+        The sample that ends it.
+
+    Returns
+    -------
+    Hole
+        The mean over it may differ from the mean of its sides by half of their difference, which
+        is where all of the change was at one of its ends, and by as much as the samples of the
+        second before differ from each other.
+    """
+    half = 0.5 * (after - before[-1])
+    sd = np.sqrt(np.square(half) + before.var(axis=0))
+    return Hole(time[0], time[1], sd[:3], sd[3:])
+
+
+def widened(navigator: Navigator, state: NavigatorState, hole: Hole) -> NavigatorState:
+    """Return a state before a gap, with what is not known of the gap in its covariance.
+
+    Parameters
+    ----------
+    navigator : Navigator
+    state : NavigatorState
+        At the begin of the gap.
+    hole : Hole
+
+    Returns
+    -------
+    NavigatorState
+        A mean rate that is off by d turns the attitude by ``d length``, a mean force the velocity
+        by as much, and the place goes on with that velocity: twice what a constant one would do.
+    """
+    filter_, model = navigator.filter, navigator.filter.model
+    at = state.engine.filter
+    level = filter_.mechanization.levels(at.row[None, :])[0]
+    C = rotation.dcm_from_quaternion(level[Q_LB : Q_LB + 4])
+    P = np.zeros((model.physical_size,) * 2)
+    P[3:6, 3:6] = C * np.square(hole.force_sd * hole.length) @ C.T
+    P[6:9, 6:9] = C * np.square(hole.rate_sd * hole.length) @ C.T
+    E = model.from_physical(filter_.mechanization, at.time, at.row)
+    more = symmetric(E @ P @ E.T)
+    covariance = filter_.form.predict(at.covariance, np.eye(len(more)), more)
+    engine = replace(state.engine, filter=replace(at, covariance=covariance))
+    return replace(state, engine=engine)
+
+
+# Sensors at the end of their range: what they cut off is not known from there on.
+
+
+@dataclass(frozen=True, eq=False)
+class RangeState:
+    """Between pieces.
+
+    Attributes
+    ----------
+    time, values : ndarray, (m,) and (m, 6)
+        The last samples, two at most.
+    since : ndarray, (6,), s
+        Of each channel at its end, the last sample before it; NaN of the others.
+    slope : ndarray, (6,)
+        By which it came there.
+    """
+
+    time: Array = field(default_factory=lambda: np.empty(0))
+    values: Array = field(default_factory=lambda: np.empty((0, 6)))
+    since: Array = field(default_factory=lambda: np.full(6, np.nan))
+    slope: Array = field(default_factory=lambda: np.zeros(6))
+
+
+@dataclass(frozen=True, eq=False)
+class RangeEnds:
+    """Ends of the ranges of six channels.
+
+    What a channel would read beyond its end is taken for a parabola: it came there with a slope s,
+    the steepest of the two steps before, and were it to turn around midway and come back within a
+    time T, it would have been ``s T²/6`` above the end, as an integral. That is the standard
+    deviation of what is missing; as nobody knows T before the end, it grows over the samples: by
+    ``(s t²/6)²`` in variance after a time t, the steps on both sides of the end included. A turn of
+    which so large an angle is missing turns about the wrong axes, too: half its square is not known
+    about each.
+
+    Attributes
+    ----------
+    least, most : ndarray, (6,), rad/s and m/s²
+        A reading of that size is at the end; what is larger belongs to another sensor.
+    """
+
+    least: Array
+    most: Array
+
+    def advance(
+        self, state: RangeState, time: Array, values: Array
+    ) -> tuple[RangeState, tuple[Hole, ...]]:
+        """Look at further samples; pieces of any length give the same as the whole.
+
+        Parameters
+        ----------
+        state : RangeState
+        time : ndarray, (k,), s
+        values : ndarray, (k, 6)
+
+        Returns
+        -------
+        state : RangeState
+        holes : tuple of Hole
+            A step each, with what it adds to what is not known.
+        """
+        size = np.abs(values)
+        at = (size >= self.least) & (size <= self.most)
+        t, v = np.concatenate([state.time, time]), np.concatenate([state.values, values])
+        new, rows = len(state.time), np.atleast_1d(at.any(axis=1))
+        holes = []
+        if rows.any() or not np.isnan(state.since).all():
+            # A sample at an end, and the one after it.
+            after = ~np.isnan(state.since).all()
+            open_ = rows | np.concatenate([[after], rows[:-1]])
+            since, slope = state.since.copy(), state.slope.copy()
+            for k in np.flatnonzero(open_).tolist():
+                i = new + k
+                if i == 0:
+                    # A record that begins at an end: how long it stood there is not in it.
+                    since[at[0]] = t[0]
+                    continue
+                begun = at[k] & np.isnan(since)
+                if begun.any():
+                    since[begun] = t[i - 1]
+                    near = t[max(i - 2, 0) : i + 1]
+                    steps = np.abs(np.diff(v[max(i - 2, 0) : i + 1], axis=0))
+                    slope[begun] = (steps / np.diff(near)[:, None]).max(axis=0)[begun]
+                here, before = t[i] - since, np.maximum(t[i - 1] - since, 0.0)
+                missed = np.where(
+                    np.isnan(since), 0.0, slope / 6.0 * np.array([before**2, here**2])
+                )
+                missed[np.isnan(missed)] = 0.0
+                more = np.diff(np.square(missed), axis=0)[0]
+                more[:3] += np.diff(np.square(0.5 * np.square(missed[:, :3])).sum(axis=1))
+                sd = np.sqrt(more) / (t[i] - t[i - 1])
+                holes.append(Hole(float(t[i - 1]), float(t[i]), sd[:3], sd[3:]))
+                since[~at[k]] = np.nan
+            state = replace(state, since=since, slope=slope)
+        kept = max(len(t) - 2, 0)
+        state = replace(state, time=t[kept:].copy(), values=v[kept:].copy())
+        return state, tuple(holes)
+
+
+def ends_of(sensors: ImuUncertainty) -> RangeEnds | None:
+    """Return the ends of the ranges that are stated; None where none is.
+
+    Parameters
+    ----------
+    sensors : ImuUncertainty
+        A reading within a step of the converter of the stated end is at it.
+    """
+    triads = (sensors.gyro, sensors.accel)
+    full = np.concatenate([np.asarray(one.axis("full_scale"), dtype=float) for one in triads])
+    step = np.concatenate([np.asarray(one.axis("quantization"), dtype=float) for one in triads])
+    if np.isinf(full).all():
+        return None
+    with np.errstate(invalid="ignore"):
+        slack = np.where(np.isfinite(full), np.maximum(step, ROUNDING * full), 0.0)
+    return RangeEnds(full - slack, np.where(np.isfinite(full), full + slack, 0.0))
+
 
 Array = NDArray[np.float64]
 

@@ -6,12 +6,30 @@ import math
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from strapdown.alignment.coarse import CoarseAlignment
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.alignment.alignment import Alignment, CoarseAlignment
 from strapdown.alignment.fine import FineAlignment
+from strapdown.alignment.fine_result import FineResult
 from strapdown.errors import ConfigError
+from strapdown.nav_state import NavState
+from strapdown.navigation.record import Event, NavigationPiece, Span
+from strapdown.rotation import euler_from_quaternion
 from strapdown.tables.checks import is_number
 
-__all__ = ["CoarseMode", "Command", "FineMode", "Mode", "Navigation", "Until", "check_timeline"]
+__all__ = [
+    "Aligned",
+    "ChainPiece",
+    "CoarseMode",
+    "Command",
+    "FineMode",
+    "KnownStart",
+    "Mode",
+    "Navigation",
+    "Until",
+    "check_timeline",
+]
 
 
 @dataclass(frozen=True)
@@ -185,3 +203,118 @@ def check_timeline(modes: tuple[Mode, ...], known_start: bool) -> None:
             raise ConfigError(
                 "navigation.mode-without-coarse-alignment", quantity="modes", name=mode.name
             )
+
+
+# Navigation from a state that is known, without an alignment.
+
+
+Array = NDArray[np.float64]
+Three = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class KnownStart:
+    """The state at a start, with standard deviations.
+
+    Attributes
+    ----------
+    state : NavState
+        Navigation begins with the sample at its time; samples before are left out.
+    position_sd : tuple of float, (3,), m
+        North, east, down.
+    velocity_sd : tuple of float, (3,), m/s
+    attitude_sd_deg : tuple of float, (3,), deg
+        Roll, pitch, heading.
+    at_first_sample : bool
+        Whether the state is that of the first sample, whatever its time.
+
+    Raises
+    ------
+    ConfigError
+        A standard deviation is negative or no number.
+    """
+
+    state: NavState
+    position_sd: Three
+    velocity_sd: Three
+    attitude_sd_deg: Three
+    at_first_sample: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("position_sd", "velocity_sd", "attitude_sd_deg"):
+            value = getattr(self, name)
+            if len(value) != 3 or not all(is_number(x) and 0.0 <= x < math.inf for x in value):
+                raise ConfigError(
+                    "navigation.no-three-standard-deviations", quantity=name, value=value
+                )
+
+    @property
+    def covariance(self) -> Array:
+        """Of displacement, velocity and rotation in north-east-down, (9, 9).
+
+        Errors of roll, pitch and heading turn about the forward axis, about the level axis to its
+        right, and about down.
+        """
+        _, pitch, heading = np.radians(euler_from_quaternion(self.state.q_nb)).tolist()
+        sp, cp, sh, ch = math.sin(pitch), math.cos(pitch), math.sin(heading), math.cos(heading)
+        axes = np.array([[cp * ch, -sh, 0.0], [cp * sh, ch, 0.0], [-sp, 0.0, 1.0]])
+        P = np.zeros((9, 9))
+        P[0:3, 0:3] = np.diag(np.square(self.position_sd))
+        P[3:6, 3:6] = np.diag(np.square(self.velocity_sd))
+        P[6:9, 6:9] = axes * np.square(np.radians(self.attitude_sd_deg)) @ axes.T
+        return P
+
+
+# What a chain gives for a piece of its input.
+
+
+@dataclass(frozen=True, eq=False)
+class Aligned:
+    """What a mode of alignment ended with.
+
+    Attributes
+    ----------
+    mode : str
+    begin, end : float, s
+        Of the mode.
+    alignment : Alignment
+        At its end.
+    fine : FineResult or None
+    """
+
+    mode: str
+    begin: float
+    end: float
+    alignment: Alignment
+    fine: FineResult | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class ChainPiece:
+    """What came of a piece.
+
+    Attributes
+    ----------
+    mode : str
+        At its end.
+    time : float, s
+        To which the chain has come.
+    navigation : tuple of NavigationPiece
+        One after the other.
+    aligned : tuple of Aligned
+        Modes of alignment that ended in it.
+    events : tuple of Event
+        That became known in it; some are of a time before.
+    modes : tuple of Span
+        That ended in it.
+    outages : tuple of (str, Span)
+        Of aids, that ended in it.
+    """
+
+    mode: str
+    time: float
+    navigation: tuple[NavigationPiece, ...] = ()
+    aligned: tuple[Aligned, ...] = ()
+    events: tuple[Event, ...] = ()
+    modes: tuple[Span, ...] = ()
+    outages: tuple[tuple[str, Span], ...] = ()

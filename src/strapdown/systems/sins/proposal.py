@@ -11,8 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.aiding.gnss_clock import time_offset
-from strapdown.aiding.gnss_delay import velocity_delay
+from strapdown.aiding.gnss_clock import time_offset, velocity_delay
 from strapdown.config.alignment import AxesTable, LogTable
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, Finding
@@ -21,7 +20,7 @@ from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.gnss_fixes import GnssOptions
 from strapdown.formats.recording import Recording, StatedStart
 from strapdown.sensors.catalogue import SENSORS, load_sensor
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.alignment_source import body_record
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY_SD
 from strapdown.tables import VELOCITY as VELOCITY_COLUMNS

@@ -3,23 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 
+from strapdown import rotation
 from strapdown.aiding.aid import TableAid
 from strapdown.aiding.gnss import Gnss
 from strapdown.aiding.gnss_readiness import gnss_readiness
-from strapdown.config.navigation import NavigationSpec, aids_of
+from strapdown.config.navigation import NavigationSpec, StartTable, aids_of
 from strapdown.config.navigation_modules import make_aids
+from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError, Finding
-from strapdown.estimation.error_models import ERROR_MODELS
+from strapdown.estimation.error_model import ERROR_MODELS
 from strapdown.frames import ecef_from_geodetic
-from strapdown.tables import GEODETIC, POSITION_SD
+from strapdown.sensors.health_log import LEAST_SAMPLES, ChannelFault
+from strapdown.sensors.imu_health import check_imu_channels
+from strapdown.sensors.uncertainty import ImuUncertainty
+from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD
 from strapdown.tables.checks import index_of, source_of, values_of
 
-__all__ = ["look_through"]
+__all__ = ["channel_findings", "look_through", "saturated_findings"]
+
 
 #: A height that nothing aids multiplies its error by e over so long, s: sqrt(R / 2 g).
 VERTICAL = 570.0
@@ -151,4 +157,188 @@ def _height(spec: NavigationSpec, imu: pd.DataFrame) -> tuple[Finding, ...]:
             e_folding_s=VERTICAL,
             times=times,
         ),
+    )
+
+
+# Channels of a record that do not read what a body does: told, or refused, before it is used.
+
+
+#: Faults after which a channel tells nothing, and the share of a record that may be without it.
+SILENT, MOST = ("missing", "stuck", "saturated"), 0.5
+#: Turns that are cut off so often are lost: a linear filter does not know what it has missed.
+MOST_SATURATED = 0.15
+#: Of the largest reading of a saturated stretch, what is at the end of the range, too.
+AT_END = 0.999
+#: So many times as noisy as the data sheet are gyros in deg/s that are taken for rad/s, roughly.
+DEGREES = (57.3 / 2.0, 57.3 * 2.0)
+#: A usual reading so near to gravity in another unit is that.
+NEAR = 0.05
+#: The first second is held beside a start that is stated; it may be so far off, deg.
+FIRST, CHANNELS_FAR = 1.0, 60.0
+
+
+def channel_findings(
+    imu: pd.DataFrame, sensors: ImuUncertainty, start: StartTable | None
+) -> tuple[Finding, ...]:
+    """Look at the channels of a record.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        Imu table as it was recorded, body axes.
+    sensors : ImuUncertainty
+    start : StartTable or None
+        A state that is known at its first sample.
+
+    Returns
+    -------
+    tuple of Finding
+        Of each channel and kind of fault the longest stretch.
+
+    Raises
+    ------
+    DataError
+        A channel reads nothing over half of the record, or is at the end of its range over 15 %
+        of it, gyros are in degrees, accelerometers in another unit, or gravity is not where the
+        stated attitude has it.
+    """
+    _refuse_unit(imu)
+    _refuse_gravity(imu, start)
+    if len(imu) < LEAST_SAMPLES:
+        return ()
+    _refuse_degrees(imu, sensors)
+    return _told(imu, check_imu_channels(imu, sensors).faults)
+
+
+def _told(imu: pd.DataFrame, faults: Sequence[ChannelFault]) -> tuple[Finding, ...]:
+    """Of each channel and kind of fault the longest stretch."""
+    worst: dict[tuple[str, str], ChannelFault] = {}
+    lost: dict[tuple[str, str], int] = {}
+    for fault in faults:
+        key = (fault.channel, fault.kind)
+        lost[key] = lost.get(key, 0) + _without(imu, fault)
+        if key not in worst or fault.last - fault.first > worst[key].last - worst[key].first:
+            worst[key] = fault
+    for (channel, kind), count in lost.items():
+        most = MOST_SATURATED if kind == "saturated" else MOST
+        if kind in SILENT and count > most * len(imu):
+            said = worst[channel, kind].finding
+            raise DataError(
+                "navigation.channel-lost",
+                file=said.file,
+                row=said.row,
+                quantity=said.quantity,
+                reason=said,
+            )
+    return tuple(_counted(worst[key].finding, lost[key], len(imu)) for key in worst)
+
+
+def saturated_findings(imu: pd.DataFrame, sensors: ImuUncertainty) -> tuple[Finding, ...]:
+    """Return what is at the end of its range: of each channel the longest stretch.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        Imu table, body axes.
+    sensors : ImuUncertainty
+
+    Returns
+    -------
+    tuple of Finding
+
+    Raises
+    ------
+    DataError
+        A channel is there over 15 % of the record.
+    """
+    if len(imu) < LEAST_SAMPLES:
+        return ()
+    faults = check_imu_channels(imu, sensors).faults
+    return _told(imu, [one for one in faults if one.kind == "saturated"])
+
+
+def _without(imu: pd.DataFrame, fault: ChannelFault) -> int:
+    """Samples that tell nothing: of a stretch that is saturated now and then, those at the end."""
+    if fault.kind != "saturated":
+        return fault.last - fault.first + 1
+    values = imu[fault.channel].to_numpy(dtype=np.float64)[fault.first : fault.last + 1]
+    return int(np.count_nonzero(np.abs(values) >= AT_END * fault.size))
+
+
+def _counted(finding: Finding, lost: int, samples: int) -> Finding:
+    return Finding(
+        "navigation.channel-fault",
+        severity=finding.severity,
+        file=finding.file,
+        row=finding.row,
+        quantity=finding.quantity,
+        reason=finding,
+        percent=100.0 * lost / samples,
+    )
+
+
+def _refuse_degrees(imu: pd.DataFrame, sensors: ImuUncertainty) -> None:
+    """Gyros whose every axis is noisy by as much as deg/s are by rad/s."""
+    step = float(np.median(np.diff(index_of(imu))))
+    density = np.asarray(sensors.gyro.axis("noise_density"))
+    if not density.all():
+        return
+    second = np.diff(values_of(imu, GYRO), n=2, axis=0)
+    times = np.sqrt(np.median(np.square(second), axis=0) / MEDIAN / 6.0 * step) / density
+    # A rate that turns a body around within a second is none of a vehicle.
+    wild = float(np.quantile(np.abs(values_of(imu, GYRO)), 0.99)) > WILD
+    if wild and ((times > DEGREES[0]) & (times < DEGREES[1])).all():
+        raise DataError(
+            "navigation.gyros-seem-in-deg-per-s",
+            file=source_of(imu),
+            quantity="gyro",
+            times=times.min(),
+            times_2=times.max(),
+        )
+
+
+#: Median of the square of a standard normal number, and a rate in rad/s.
+MEDIAN, WILD = 0.4549364, 6.0
+
+
+def _refuse_unit(imu: pd.DataFrame) -> None:
+    """Accelerometers whose usual reading is gravity in another unit."""
+    time, force = index_of(imu), values_of(imu, ACCEL)
+    starts = np.unique(np.searchsorted(time, np.arange(time[0], time[-1], FIRST)))
+    count = np.diff(np.append(starts, len(time)))[:, None]
+    size = np.median(np.linalg.norm(np.add.reduceat(force, starts) / count, axis=1))
+    for unit, factor in (("g", 1.0 / STANDARD_GRAVITY), ("m/s2", STANDARD_GRAVITY)):
+        wanted = STANDARD_GRAVITY * factor
+        if abs(size / wanted - 1.0) < NEAR:
+            raise DataError(
+                "navigation.accelerometers-seem-in-other-unit",
+                file=source_of(imu),
+                quantity="accel",
+                size=size,
+                standard_gravity=STANDARD_GRAVITY,
+                unit=unit,
+            )
+
+
+def _refuse_gravity(imu: pd.DataFrame, start: StartTable | None) -> None:
+    """The specific force of the first second, beside what a stated attitude makes of gravity."""
+    if start is None:
+        return
+    time = index_of(imu)
+    force = values_of(imu, ACCEL)[time <= time[0] + FIRST].mean(axis=0)
+    q = rotation.quaternion_from_euler([start.roll_deg, start.pitch_deg, start.heading_deg])
+    wanted = rotation.rotate(rotation.conjugate(q), np.array([0.0, 0.0, -1.0]))
+    size = float(np.linalg.norm(force))
+    cosine = float(force @ wanted) / size if size > 0.0 else 0.0
+    apart = float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+    if apart < CHANNELS_FAR:
+        return
+    raise DataError(
+        "navigation.gravity-upside-down"
+        if apart > 180.0 - CHANNELS_FAR
+        else "navigation.gravity-contradicts-attitude",
+        file=source_of(imu),
+        quantity="accel",
+        force=force,
+        apart_deg=apart,
     )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from strapdown.aiding.standstill import StandstillAid
 from strapdown.navigation.record import NavigationRecord
 from strapdown.systems.sins.chain import Chain
-from strapdown.systems.sins.joined_steps import steps_of
+from strapdown.systems.sins.intake import steps_of
 from strapdown.tables import VELOCITY
 from strapdown.tables.checks import index_of, values_of
 

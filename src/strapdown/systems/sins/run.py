@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -10,29 +12,52 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.config.choice import make_choice
-from strapdown.config.navigation import NavigationSpec
-from strapdown.config.navigation_modules import given_of, sensors_of
-from strapdown.config.slots import SLOTS
-from strapdown.ellipsoids import find_ellipsoid
-from strapdown.evaluation.control_points import score_control_points
-from strapdown.evaluation.trajectory_differences import trajectory_differences
-from strapdown.evaluation.trajectory_summary import DifferenceSummary, summarise_differences
+from strapdown.alignment.alignment import Alignment, Site
+from strapdown.alignment.fine_result import FineResult
+from strapdown.config.choice import SLOTS, make_choice
+from strapdown.config.navigation import CoarseModeSpec, FineModeSpec, NavigationSpec, StartTable
+from strapdown.config.navigation_modules import given_of, make_aids, make_filter, sensors_of
+from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
+from strapdown.errors import Finding
+from strapdown.evaluation.control_points import ControlPointScore, score_control_points
+from strapdown.evaluation.trajectory_differences import (
+    DifferenceSummary,
+    summarise_differences,
+    trajectory_differences,
+)
+from strapdown.nav_state import NavState
+from strapdown.navigation.navigator import Navigator, with_states
+from strapdown.navigation.record import NavigationRecord
 from strapdown.navigation.recorder import Recorder
+from strapdown.results.inputs import InputFiles
+from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.attitude_source import input_files
 from strapdown.systems.one_thread import one_thread
 from strapdown.systems.progress import Progress, silent
-from strapdown.systems.sins.build import make_chain
-from strapdown.systems.sins.channels import channel_findings, saturated_findings
+from strapdown.systems.sins.chain import Chain
 from strapdown.systems.sins.drive import ChainRun, run_batch
-from strapdown.systems.sins.file_rows import in_file, said_of_file
-from strapdown.systems.sins.readiness import look_through
-from strapdown.systems.sins.result import NavigationResult
-from strapdown.systems.sins.source import NavigationSource, read_navigation_source
-from strapdown.systems.sins.trust import trust_of
-from strapdown.systems.sins.withholding import score_withholding
+from strapdown.systems.sins.intake import GapPolicy, Intake, ends_of
+from strapdown.systems.sins.modes import (
+    CoarseMode,
+    Command,
+    FineMode,
+    KnownStart,
+    Mode,
+    Navigation,
+    Until,
+)
+from strapdown.systems.sins.readiness import channel_findings, look_through, saturated_findings
+from strapdown.systems.sins.source import (
+    NavigationSource,
+    in_file,
+    read_navigation_source,
+    said_of_file,
+)
+from strapdown.systems.sins.trust import Trust, trust_of
+from strapdown.systems.sins.withholding import Withheld, score_withholding
 
-__all__ = ["Drive", "run_navigation"]
+__all__ = ["Drive", "NavigationResult", "make_chain", "run_navigation"]
+
 
 #: Runs a chain over samples and tables: with a recorder, and what is told of progress.
 Drive = Callable[..., ChainRun]
@@ -180,3 +205,173 @@ def _rows_compared(time: NDArray[np.float64]) -> NDArray[np.intp]:
     step = float(np.median(np.diff(time))) if len(time) > 1 else APART
     each = max(1, round(APART / step)) if step > 0.0 else 1
     return np.arange(len(time) - 1, -1, -each)[::-1]
+
+
+# Everything that came of a run of navigation.
+
+
+@dataclass(frozen=True, eq=False)
+class NavigationResult:
+    """Everything that came of a run of navigation.
+
+    Attributes
+    ----------
+    spec : NavigationSpec
+        Resolved: every option of every module.
+    source : NavigationSource
+    ellipsoid : Ellipsoid
+    sensors : ImuUncertainty
+    coarse : Alignment or None
+    fine : FineResult or None
+    record : NavigationRecord
+        Smoothed, where the run was to be.
+    forward : NavigationRecord or None
+        What the filter alone said, of a run that was smoothed.
+    differences : DataFrame or None
+        From the truth, where it is known (`trajectory_differences`), ten times a second at most.
+    errors : DifferenceSummary or None
+        Of these.
+    forward_differences : DataFrame or None
+        Of what the filter alone said, of a run that was smoothed.
+    points : ControlPointScore or None
+        The path at its control points.
+    withheld : tuple of Withheld
+        Stretches over which fixes were kept back, and how far it then was from them.
+    trust : Trust
+        How far it can be trusted.
+    inputs : tuple of InputFiles
+    findings : tuple of Finding
+    """
+
+    spec: NavigationSpec
+    source: NavigationSource
+    ellipsoid: Ellipsoid
+    sensors: ImuUncertainty
+    coarse: Alignment | None
+    fine: FineResult | None
+    record: NavigationRecord
+    forward: NavigationRecord | None
+    differences: pd.DataFrame | None
+    errors: DifferenceSummary | None
+    forward_differences: pd.DataFrame | None
+    points: ControlPointScore | None
+    withheld: tuple[Withheld, ...]
+    trust: Trust
+    inputs: tuple[InputFiles, ...]
+    findings: tuple[Finding, ...]
+
+    @property
+    def filtered(self) -> NavigationRecord:
+        """What the filter alone said: what was known at each instant then."""
+        return self.forward or self.record
+
+    @property
+    def filtered_differences(self) -> pd.DataFrame | None:
+        """From the truth, of what the filter alone said."""
+        return self.differences if self.forward is None else self.forward_differences
+
+
+# A chain made of its configuration.
+
+
+Three = tuple[float, float, float]
+
+
+def make_chain(spec: NavigationSpec, sensors: ImuUncertainty) -> Chain:
+    """Make the chain of a specification.
+
+    Parameters
+    ----------
+    spec : NavigationSpec
+        Samples and tables are given to the chain in body axes and on one clock.
+    sensors : ImuUncertainty
+
+    Returns
+    -------
+    Chain
+
+    Raises
+    ------
+    ConfigError
+        A module refuses an option, or its parts do not go together.
+    """
+    given = given_of(spec)
+    aids = make_aids(spec)
+    options = make_choice(spec.filter, SLOTS["filter"], given)
+    navigator = Navigator(
+        with_states(make_filter(spec, sensors), aids),
+        aids,
+        options.mark_interval,
+        make_choice(spec.damping, SLOTS["damping"], given),
+        make_choice(spec.smoother, SLOTS["smoother"], given),
+    )
+    prefilter = None
+    if spec.prefilter.kind != "none":
+        prefilter = make_choice(spec.prefilter, SLOTS["prefilter"], given)
+    gaps = spec.gaps
+    site, site_sd, velocity_sd = None, (1.0, 1.0, 1.0), (0.1, 0.1, 0.1)
+    if spec.site is not None:
+        site = Site(
+            spec.site.lat_deg, spec.site.lon_deg, spec.site.alt_m, find_ellipsoid(spec.ellipsoid)
+        )
+        site_sd = _three(spec.site.position_sd_m)
+        velocity_sd = _three(spec.site.velocity_sd_m_per_s)
+    return Chain(
+        navigator=navigator,
+        intake=Intake(
+            prefilter=prefilter,
+            gaps=GapPolicy(gaps.usual, gaps.coast_s, gaps.beyond),
+            ends=ends_of(sensors),
+        ),
+        modes=_modes(spec),
+        start=None if spec.start is None else _known(spec.start),
+        sensors=sensors,
+        site=site,
+        commands=tuple(Command(one.time_s, one.mode) for one in spec.commands),
+        site_sd=site_sd,
+        velocity_sd=velocity_sd,
+    )
+
+
+def _modes(spec: NavigationSpec) -> tuple[Mode, ...]:
+    given = given_of(spec)
+    modes: list[Mode] = []
+    coarse = make_choice(spec.coarse, SLOTS["coarse"], given)
+    if coarse is not None:
+        window = math.inf if spec.coarse.window_s is None else spec.coarse.window_s
+        modes.append(CoarseMode("coarse", _until(spec.coarse), way=coarse, window=window))
+    fine = make_choice(spec.fine, SLOTS["fine"], given)
+    if fine is not None:
+        modes.append(FineMode("fine", _until(spec.fine), fine))
+    return (*modes, Navigation())
+
+
+def _until(mode: CoarseModeSpec | FineModeSpec) -> Until:
+    return Until(
+        duration=math.inf if mode.duration_s is None else mode.duration_s,
+        heading_sd_deg=mode.until_heading_sd_deg,
+        tilt_sd_deg=mode.until_tilt_sd_deg,
+    )
+
+
+def _known(start: StartTable) -> KnownStart:
+    return KnownStart(
+        NavState.from_degrees(
+            start.lat_deg,
+            start.lon_deg,
+            start.alt_m,
+            v_n=start.v_ned_m_per_s,
+            roll_deg=start.roll_deg,
+            pitch_deg=start.pitch_deg,
+            heading_deg=start.heading_deg,
+        ),
+        position_sd=_three(start.position_sd_m),
+        velocity_sd=_three(start.velocity_sd_m_per_s),
+        attitude_sd_deg=(start.tilt_sd_deg, start.tilt_sd_deg, start.heading_sd_deg),
+        at_first_sample=True,
+    )
+
+
+def _three(value: float | Three) -> Three:
+    x, y, z = (float(v) for v in np.broadcast_to(value, 3))
+    return x, y, z

@@ -3,32 +3,74 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
-from strapdown.config.navigation import NavigationSpec, aids_of, receivers_of
-from strapdown.ellipsoids import find_ellipsoid
-from strapdown.errors import ConfigError, Finding
+from strapdown import rotation
+from strapdown.aiding.aid import TableAid
+from strapdown.alignment.alignment import Site
+from strapdown.config.choice import SLOTS
+from strapdown.config.navigation import (
+    AidSpec,
+    NavigationSpec,
+    ReceiverTable,
+    aids_of,
+    receivers_of,
+)
+from strapdown.constants import MAD_TO_SD
+from strapdown.dsp.running_integral import running_integral
+from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
+from strapdown.errors import ConfigError, DataError, DivergenceError, Finding
+from strapdown.formats.aid_table import read_aid_table
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.control_points import read_control_points
-from strapdown.formats.gnss_files import files_of_fixes
+from strapdown.formats.gnss_files import files_of_fixes, read_gnss
+from strapdown.formats.gnss_fixes import GnssOptions
 from strapdown.formats.recording import StatedStart
 from strapdown.formats.trajectory_readers import files_of_trajectory, read_trajectory
+from strapdown.frames import geodetic_from_ned, ned_from_geodetic
+from strapdown.nav_state import NavState
 from strapdown.results.inputs import InputFiles, Reading
 from strapdown.sensors.catalogue import load_sensor
-from strapdown.sensors.error_draws import child
+from strapdown.sensors.error_chain import child, normal
 from strapdown.simulation import simulate_imu
+from strapdown.simulation.earth_motion import EarthMotion
+from strapdown.simulation.gnss import GnssReceiver, moved_places, simulate_gnss
 from strapdown.systems.alignment_source import body_record
 from strapdown.systems.attitude_source import input_files, sensor_file
-from strapdown.systems.sins.aid_files import read_aid
-from strapdown.systems.sins.simulated_fixes import simulated_fixes
 from strapdown.systems.trajectory_source import make_motion, with_key
+from strapdown.tables import (
+    GEODETIC,
+    GNSS,
+    POSITION_SD,
+    VELOCITY,
+    VELOCITY_SD,
+    check_gnss,
+    gnss_table,
+)
+from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
+from strapdown.tables.checks import index_of, source_of, values_of
 
-__all__ = ["NavigationSource", "read_navigation_source"]
+__all__ = [
+    "COLUMN_UNITS",
+    "NavigationSource",
+    "Place",
+    "fixes_until",
+    "here_by_fix",
+    "in_file",
+    "read_aid",
+    "read_navigation_source",
+    "said_of_file",
+    "simulated_fixes",
+    "site_of_fixes",
+]
+
 
 #: Stream of the fixes below the seed of a simulation; those of the sensors are counted from zero.
 _FIXES = 1000
@@ -181,3 +223,349 @@ def _simulated(
         inputs=tuple(inputs),
         findings=tuple(findings),
     )
+
+
+# The file of an aid, as the table that it takes.
+
+
+#: Units of the columns of aids, as `read_aid_table` has them; of a column that is not here, and of
+#: which its aid says nothing, the number is taken as it stands.
+COLUMN_UNITS = {
+    "speed": "m/s",
+    "height": "m",
+    "heading": "deg",
+    "vx": "m/s",
+    "vy": "m/s",
+    "vz": "m/s",
+}
+
+
+def read_aid(given: AidSpec) -> pd.DataFrame:
+    """Read what an aid measured.
+
+    Parameters
+    ----------
+    given : AidSpec
+        With a path.
+
+    Returns
+    -------
+    DataFrame
+        By time as it stands in the file; ``attrs`` say its clock, ``source`` and ``findings``.
+
+    Raises
+    ------
+    DataError, ConfigError
+        It cannot be used; the message names file, row and remedy.
+    """
+    assert given.path is not None  # checked with the specification
+    entry = SLOTS["aiding"].entries[given.kind]
+    assert issubclass(entry, TableAid)
+    if set(entry.columns) == set(GNSS):
+        return read_gnss(
+            given.path,
+            GnssOptions(
+                columns=given.columns,
+                position_sd=given.position_sd_m,
+                velocity_sd=given.velocity_sd_m_per_s,
+                repair=given.repair,
+            ),
+        )
+    units = {c: COLUMN_UNITS.get(c.removesuffix("_sd"), "") for c in entry.columns}
+    units |= dict(getattr(entry, "units", {}))
+    return read_aid_table(given.path, units, names=given.columns, repair=given.repair)
+
+
+# Where a body is while it is aligned: the site that is stated, or the fixes of a receiver.
+
+
+Array = NDArray[np.float64]
+
+# A vehicle changes its velocity by so much, m/s², as one standard deviation.
+MANOEUVRE = 1.0
+# Fixes among which one stands out, of how long, s, and how few tell it.
+LOOKED_AT, LOOKED_BACK, LEAST_LOOKED_AT = 9, 10.0, 4
+# It stands out by so many standard deviations.
+CLEAR = 5.0
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Place and velocity of the sensors at an instant.
+
+    Attributes
+    ----------
+    state : NavState
+        Its attitude is the one that was given.
+    covariance : ndarray, (6, 6)
+        Displacement and velocity, north-east-down.
+    """
+
+    state: NavState
+    covariance: Array
+
+
+def fixes_until(
+    tables: Sequence[pd.DataFrame], time: float, offset: float = 0.0
+) -> pd.DataFrame | None:
+    """Return the fixes up to an instant as one table.
+
+    Parameters
+    ----------
+    tables : sequence of DataFrame
+        Gnss tables, one after the other.
+    time : float, s
+    offset : float, s
+        Stamps less the time of the inertial sensors.
+
+    Returns
+    -------
+    DataFrame or None
+        By the time of the inertial sensors; None where there is none.
+    """
+    if not tables:
+        return None
+    joined = tables[0] if len(tables) == 1 else pd.concat(tables)
+    out: pd.DataFrame = joined[joined.index - offset <= time]
+    if offset:
+        out = out.set_axis(out.index - offset)
+    out.attrs = dict(tables[0].attrs)
+    if out.empty:
+        return None
+    check_gnss(out)
+    return out
+
+
+def site_of_fixes(
+    fixes: pd.DataFrame | None, begin: float, time: float, ellipsoid: Ellipsoid
+) -> tuple[Site, Array]:
+    """Return where a body stands, by the median of its fixes.
+
+    Parameters
+    ----------
+    fixes : DataFrame or None
+        Until `time`.
+    begin, time : float, s
+        Of the rest. Without a fix in it the newest one before is taken.
+    ellipsoid : Ellipsoid
+
+    Returns
+    -------
+    site : Site
+    sd : ndarray, (3,), m
+        The least that a fix states: what stays the same from fix to fix is not averaged away.
+
+    Raises
+    ------
+    DataError
+        There is no fix with a place.
+    """
+    place, sd, stamps = _good(fixes, POSITION_SD, time)
+    first = min(int(np.searchsorted(stamps, begin)), len(stamps) - 1)
+    lat, lon, alt = np.median(place[first:], axis=0).tolist()
+    return Site(lat, lon, alt, ellipsoid), np.asarray(sd[first:].min(axis=0))
+
+
+def here_by_fix(
+    fixes: pd.DataFrame | None,
+    time: float,
+    q_nb: Array,
+    lever_arm: Array,
+    ellipsoid: Ellipsoid,
+    velocity: Array,
+    velocity_covariance: Array,
+) -> Place:
+    """Return where a vehicle is, by its newest fix that agrees with those before.
+
+    Parameters
+    ----------
+    fixes : DataFrame or None
+        Until `time`.
+    time : float, s
+    q_nb : ndarray, (4,)
+    lever_arm : ndarray, (3,), m
+        Of the antenna, body axes.
+    ellipsoid : Ellipsoid
+    velocity : ndarray, (3,), m/s
+        Of the sensors at `time`, north, east, down.
+    velocity_covariance : ndarray, (3, 3), (m/s)²
+
+    Returns
+    -------
+    Place
+        Carried from the fix by the velocity; an acceleration of 1 m/s² is taken as unknown. By
+        which a wrong instant of the fix moves it is left to `by_antenna.errors_by_antenna`.
+
+    Raises
+    ------
+    DataError
+        There is no fix with a place.
+    """
+    place, sd, stamps = _good(fixes, POSITION_SD, time)
+    assert fixes is not None
+    k = _newest_that_agrees(fixes, place, sd, stamps, ellipsoid)
+    after = time - float(stamps[k])
+    off = velocity * after - rotation.rotate(q_nb, lever_arm)
+    lat, lon, alt = geodetic_from_ned(off, place[k], ellipsoid=ellipsoid).tolist()
+    state = NavState(time, np.radians(lat), np.radians(lon), alt, velocity, q_nb)
+    P = np.zeros((6, 6))
+    unknown = np.square(sd[k]) + (0.5 * MANOEUVRE * after**2) ** 2
+    P[:3, :3] = np.diag(unknown) + velocity_covariance * after**2
+    P[:3, 3:] = P[3:, :3] = velocity_covariance * after
+    P[3:, 3:] = velocity_covariance
+    return Place(state, P)
+
+
+def _newest_that_agrees(
+    fixes: pd.DataFrame, place: Array, sd: Array, stamps: Array, ellipsoid: Ellipsoid
+) -> int:
+    """The newest place that is where the places before it, carried by velocities, say.
+
+    Places are carried by velocities of which each is the middle one of three; where they should
+    be is the middle of what the newest ones say.
+    """
+    rows = np.flatnonzero(stamps >= stamps[-1] - LOOKED_BACK)[-LOOKED_AT:]
+    told = np.isfinite(values_of(fixes, VELOCITY_SD)).all(axis=1)
+    told &= values_of(fixes, ["quality"])[:, 0] > 0.0
+    if len(rows) < LEAST_LOOKED_AT or told.sum() < LEAST_LOOKED_AT:
+        return len(stamps) - 1
+    v, v_time = values_of(fixes, VELOCITY)[told], index_of(fixes)[told]
+    near = np.clip(np.arange(len(v))[:, None] + np.arange(-1, 2), 0, len(v) - 1)
+    v = np.median(v[near], axis=1)
+    v = np.column_stack([np.interp(stamps[rows], v_time, one) for one in v.T])
+    way = running_integral(stamps[rows], v)
+    at = np.array([ned_from_geodetic(one, place[-1], ellipsoid=ellipsoid) for one in place[rows]])
+    off = at - way
+    off -= np.median(off, axis=0)
+    usual = np.maximum(sd[rows], MAD_TO_SD * np.median(np.abs(off), axis=0))
+    good = (np.abs(off) <= CLEAR * usual).all(axis=1)
+    return int(rows[np.flatnonzero(good)[-1]]) if good.any() else len(stamps) - 1
+
+
+def _good(
+    fixes: pd.DataFrame | None, columns: Sequence[str], time: float
+) -> tuple[Array, Array, Array]:
+    """Places, standard deviations and stamps of the fixes that have them."""
+    if fixes is not None:
+        sd = values_of(fixes, columns)
+        good = np.isfinite(sd).all(axis=1) & (values_of(fixes, ["quality"])[:, 0] > 0.0)
+        if good.any():
+            return values_of(fixes, GEODETIC)[good], sd[good], index_of(fixes)[good]
+    raise DataError(
+        "navigation.no-position-for-alignment",
+        file=None if fixes is None else source_of(fixes),
+        quantity="site",
+        time=time,
+    )
+
+
+# Fixes of a receiver that is simulated, with the outages and outliers that it is told to have.
+
+
+# Streams below the seed; those of the receiver itself are counted from zero.
+_STRUCK, _WAY = 100, 101
+
+
+def simulated_fixes(
+    motion: EarthMotion, asked: ReceiverTable, seed: np.random.SeedSequence, name: str
+) -> pd.DataFrame:
+    """Simulate a receiver over a motion.
+
+    Parameters
+    ----------
+    motion : EarthMotion
+    asked : ReceiverTable
+    seed : SeedSequence
+        Of everything that is random.
+    name : str
+        Of the aid, for messages.
+
+    Returns
+    -------
+    DataFrame
+        Gnss table: without the fixes of the outages; outliers claim the precision of the others.
+    """
+    receiver = GnssReceiver(
+        rate=asked.rate_hz,
+        position_noise=asked.position_noise_m,
+        position_drift=asked.position_drift_m,
+        correlation_time=asked.correlation_time_s,
+        velocity_noise=asked.velocity_noise_m_per_s,
+        antenna=asked.antenna_m,
+        time_offset=asked.time_offset_s,
+        on_excess="unaffected",
+    )
+    table = simulate_gnss(motion, receiver, seed=seed, source=name)
+    time = index_of(table)
+    place, velocity = values_of(table, GEODETIC), values_of(table, VELOCITY_COLUMNS)
+    place_sd, velocity_sd = values_of(table, POSITION_SD), values_of(table, VELOCITY_SD)
+    if asked.outlier_share > 0.0:
+        struck = _uniform(child(seed, _STRUCK), len(time)) < asked.outlier_share
+        way = normal(seed, _WAY, len(time), axes=6)
+        for part in (way[:, :3], way[:, 3:]):
+            part /= np.linalg.norm(part, axis=1, keepdims=True)
+        off = asked.outlier_size * struck[:, None] * way
+        place = moved_places(place, off[:, :3] * place_sd, motion.ellipsoid)
+        velocity = velocity + off[:, 3:] * velocity_sd
+    if not asked.velocity:
+        velocity_sd = np.full_like(velocity_sd, np.inf)
+    kept = np.ones(len(time), dtype=np.bool_)
+    for begin, end in asked.outages_s:
+        kept &= (time < begin) | (time > end)
+    return gnss_table(
+        time[kept], place[kept], velocity[kept], place_sd[kept], velocity_sd[kept], source=name
+    )
+
+
+def _uniform(seed: np.random.SeedSequence, count: int) -> Array:
+    return np.random.Generator(np.random.PCG64(seed)).random(count)
+
+
+# What is said of a row of a table, said of the row of the file that it was read from.
+
+
+def in_file(findings: Iterable[Finding], *tables: pd.DataFrame) -> tuple[Finding, ...]:
+    """Count rows as their file does.
+
+    Parameters
+    ----------
+    findings : iterable of Finding
+        Their rows count from 1 in a table.
+    *tables : DataFrame
+        Tables whose ``attrs`` may have a ``first_row``: the row of the file in which their first
+        one stands, or None where rows between were left out.
+
+    Returns
+    -------
+    tuple of Finding
+        Without a row where it is not known.
+    """
+    known = {t.attrs.get("source"): t.attrs["first_row"] for t in tables if "first_row" in t.attrs}
+    return tuple(
+        one.replace(row=_moved(one.row, known[one.file]))
+        if one.row is not None and one.file in known
+        else one
+        for one in findings
+    )
+
+
+def _moved(row: int, first: int | None) -> int | None:
+    return None if first is None else first + row - 1
+
+
+@contextmanager
+def said_of_file(*tables: pd.DataFrame) -> Iterator[None]:
+    """Errors that are raised within name rows of the file, and the first table's file at least."""
+    try:
+        yield
+    except DivergenceError as error:
+        said = error.finding
+        if said.file is not None or not tables:
+            raise
+        raise error.replaced(file=source_of(tables[0])) from None
+    except DataError as error:
+        said = error.finding
+        (moved,) = in_file((said,), *tables)
+        if moved == said:
+            raise
+        raise error.replaced(row=moved.row) from None

@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 
 from strapdown.config.navigation import NavigationSpec, WithholdTable, aids_of
 from strapdown.errors import ConfigError
-from strapdown.evaluation.withheld import (
+from strapdown.evaluation.gnss_outages import (
     WithheldScore,
     blinded,
+    end_of_what_tells,
     score_of,
+    score_of_smoothed,
     spans_to_withhold,
 )
-from strapdown.evaluation.withheld_smoothed import end_of_what_tells, score_of_smoothed
-from strapdown.navigation.piece import NavigationPiece
-from strapdown.navigation.record import NavigationRecord, Span
+from strapdown.navigation.record import NavigationPiece, NavigationRecord, Span
 from strapdown.systems.progress import Progress
 from strapdown.systems.sins.chain import Chain, ChainState
 from strapdown.systems.sins.source import NavigationSource

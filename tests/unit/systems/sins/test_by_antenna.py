@@ -7,17 +7,17 @@ import pytest
 from strapdown import rotation
 from strapdown.aiding.gnss import Gnss
 from strapdown.ellipsoids import WGS84
-from strapdown.estimation.covariances import COVARIANCES
+from strapdown.estimation.covariance import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter
-from strapdown.estimation.error_models import ERROR_MODELS
+from strapdown.estimation.error_model import ERROR_MODELS
 from strapdown.estimation.sensor_blocks import accel_bias, gyro_bias
 from strapdown.frames import geodetic_from_ned, ned_from_geodetic
 from strapdown.mechanization import NorthEastDown, WanderAzimuth
 from strapdown.nav_state import NavState
 from strapdown.navigation.navigator import with_states
+from strapdown.systems.sins.aligning import _added, _with_sensors, from_state
 from strapdown.systems.sins.by_antenna import errors_by_antenna
-from strapdown.systems.sins.fixes import here_by_fix
-from strapdown.systems.sins.handover import _added, _with_sensors, from_state
+from strapdown.systems.sins.source import here_by_fix
 from strapdown.tables import GNSS
 
 HERE = np.array([50.0, 10.0, 500.0])

@@ -5,7 +5,7 @@ import pytest
 
 from strapdown.errors import ConfigError
 from strapdown.estimation.covariance import Innovations
-from strapdown.navigation.piece import NavigationPiece, Seen
+from strapdown.navigation.record import NavigationPiece, Seen
 from strapdown.systems.sins.deliveries import Deliveries
 
 

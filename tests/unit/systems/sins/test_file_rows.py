@@ -16,7 +16,7 @@ from strapdown.config.alignment import AxesTable, LogTable
 from strapdown.errors import DataError, DivergenceError, Finding
 from strapdown.formats.gnss_files import read_gnss
 from strapdown.systems.alignment_source import body_record
-from strapdown.systems.sins.file_rows import in_file, said_of_file
+from strapdown.systems.sins.source import in_file, said_of_file
 
 
 def table(**attrs):

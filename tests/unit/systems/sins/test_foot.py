@@ -16,17 +16,23 @@ from strapdown.config.navigation_modules import sensors_of
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import WGS84
 from strapdown.errors import ConfigError, DataError
-from strapdown.estimation.stated_states import states_that_are_stated
+from strapdown.estimation.sensor_blocks import states_that_are_stated
 from strapdown.evaluation.truth_comparison import compare_with_truth
 from strapdown.formats import csv
 from strapdown.sensors.catalogue import load_sensor
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.simulation import GAITS, Origin, simulate_imu, walk
-from strapdown.systems.sins.build import make_chain
-from strapdown.systems.sins.draft import draft_navigation
+from strapdown.systems.sins.draft import (
+    BENT,
+    STANCE,
+    STANDING,
+    STEP,
+    draft_navigation,
+    first_stand,
+    second_order,
+)
 from strapdown.systems.sins.drive import run_batch, run_by_sample
-from strapdown.systems.sins.foot import BENT, STANCE, STANDING, STEP, first_stand, second_order
-from strapdown.systems.sins.run import run_navigation
+from strapdown.systems.sins.run import make_chain, run_navigation
 from strapdown.systems.trajectory_source import make_motion
 from strapdown.tables import GYRO
 

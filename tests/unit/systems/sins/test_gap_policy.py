@@ -4,18 +4,17 @@ import numpy as np
 import pytest
 
 from strapdown.errors import ConfigError, DataError
-from strapdown.estimation.covariances import COVARIANCES
+from strapdown.estimation.covariance import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter
-from strapdown.estimation.rotation_vector_model import RotationVectorModel
+from strapdown.estimation.error_model import RotationVectorModel
 from strapdown.estimation.sensor_blocks import accel_bias, gyro_bias
 from strapdown.mechanization import MECHANIZATIONS
 from strapdown.nav_state import NavState
 from strapdown.navigation.navigator import Navigator
 from strapdown.systems.sins.chain import Chain
 from strapdown.systems.sins.drive import run_batch
-from strapdown.systems.sins.gaps import GapPolicy, Hole, hole_between, widened
-from strapdown.systems.sins.intake import Intake
-from strapdown.systems.sins.known_start import KnownStart
+from strapdown.systems.sins.intake import GapPolicy, Hole, Intake, hole_between, widened
+from strapdown.systems.sins.modes import KnownStart
 from strapdown.tables import imu_table
 
 START = NavState.from_degrees(48.0, 11.0, 500.0, roll_deg=10.0, heading_deg=30.0)

@@ -14,10 +14,10 @@ from strapdown.config.navigation_file import navigation_spec
 from strapdown.ellipsoids import WGS84
 from strapdown.evaluation.heading_light import SURE
 from strapdown.sensors.catalogue import load_sensor
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
-from strapdown.systems.sins.carried_heading import UNSEEN, CarriedHeading
+from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.sins.gyrocompass import STUDENT, north_within
 from strapdown.systems.sins.heading_sources import agreeing_sources
+from strapdown.systems.sins.heading_witness import UNSEEN, CarriedHeading
 from strapdown.systems.sins.run import run_navigation
 
 LIMIT = 3.0

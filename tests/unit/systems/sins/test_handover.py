@@ -6,24 +6,21 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
-from strapdown.alignment.alignment import Alignment
+from strapdown.alignment.alignment import Alignment, Site
 from strapdown.alignment.coarse_alignments import COARSE_ALIGNMENTS
 from strapdown.alignment.fine import FineAlignment
-from strapdown.alignment.site import Site
-from strapdown.estimation.covariances import COVARIANCES
+from strapdown.estimation.covariance import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter
-from strapdown.estimation.error_model import PHYSICAL
-from strapdown.estimation.error_models import ERROR_MODELS
+from strapdown.estimation.error_model import ERROR_MODELS, PHYSICAL
 from strapdown.estimation.sensor_blocks import accel_bias, accel_scale, gyro_bias, gyro_drift
 from strapdown.mechanization import MECHANIZATIONS
 from strapdown.nav_state import NavState
-from strapdown.navigation.damping import Feedforward
+from strapdown.navigation.filter_options import Feedforward
 from strapdown.navigation.navigator import Navigator
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
 from strapdown.simulation import Origin, StationaryMotion, simulate_imu
-from strapdown.systems.sins.handover import _with_biases, from_alignment, from_fine
+from strapdown.systems.sins.aligning import _with_biases, from_alignment, from_fine
 from strapdown.tables import ACCEL, GYRO
 
 HERE = (50.0, 10.0, 100.0)

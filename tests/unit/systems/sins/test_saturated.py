@@ -5,9 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
-from strapdown.systems.sins.saturated import RangeState, ends_of
+from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
+from strapdown.systems.sins.intake import RangeState, ends_of
 
 END = 4.0
 SENSORS = ImuUncertainty(

@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
+from strapdown.alignment.alignment import Site
 from strapdown.alignment.coarse_alignments import COARSE_ALIGNMENTS
-from strapdown.alignment.site import Site
 from strapdown.errors import ConfigError, DataError
-from strapdown.estimation.covariances import COVARIANCES
+from strapdown.estimation.covariance import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter
-from strapdown.estimation.rotation_vector_model import RotationVectorModel
+from strapdown.estimation.error_model import RotationVectorModel
 from strapdown.estimation.sensor_blocks import accel_bias, gyro_bias
 from strapdown.mechanization import MECHANIZATIONS
 from strapdown.nav_state import NavState
@@ -20,17 +20,16 @@ from strapdown.rotation import (
     quaternion_from_dcm,
     rotation_vector_from_quaternion,
 )
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
 from strapdown.simulation import Origin, StationaryMotion, simulate_imu
 from strapdown.systems.sins.chain import Chain
 from strapdown.systems.sins.drive import Recording, pieces_by_sample, run_batch
-from strapdown.systems.sins.known_start import KnownStart
 from strapdown.systems.sins.modes import (
     CoarseMode,
     Command,
     FineMode,
+    KnownStart,
     Navigation,
     Until,
     check_timeline,

@@ -12,10 +12,8 @@ from strapdown.config.navigation_file import navigation_spec
 from strapdown.config.navigation_modules import make_filter, sensors_of
 from strapdown.evaluation.heading_light import SURE
 from strapdown.report.navigation import write_navigation
-from strapdown.systems.sins.build import make_chain
-from strapdown.systems.sins.heading_witness import hear_witnesses
-from strapdown.systems.sins.run import run_navigation
-from strapdown.systems.sins.witness_source import witnesses_of
+from strapdown.systems.sins.heading_witness import hear_witnesses, witnesses_of
+from strapdown.systems.sins.run import make_chain, run_navigation
 
 LIMIT = 3.0
 

@@ -1,0 +1,468 @@
+"""What errors of gyros and accelerometers do to the attitude and velocity of a drive, backward."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown import rotation
+from strapdown.alignment.inertial_sums import InertialSums, sum_inertially
+from strapdown.errors import DataError
+from strapdown.increments import motion_increments
+from strapdown.results.rests import RestStretch
+from strapdown.sensors.rest import find_rests_of_every_grade, rest_between
+from strapdown.sensors.uncertainty import ImuUncertainty
+from strapdown.tables import ACCEL, DV, GYRO, VELOCITY, VELOCITY_SD, check_gnss
+from strapdown.tables.checks import source_of
+
+__all__ = [
+    "ACCEL_MATRIX",
+    "ACCEL_NOISE",
+    "ASKED",
+    "AXLE",
+    "COUNT",
+    "COURSE_UNKNOWNS_ACCEL",
+    "COURSE_UNKNOWNS_GYRO",
+    "COURSE_UNKNOWNS_VELOCITY",
+    "GYRO_BY_FORCE",
+    "GYRO_MATRIX",
+    "GYRO_NOISE",
+    "HANDED",
+    "OFFSET",
+    "OF_ACCELS",
+    "OF_GYROS",
+    "OF_SENSORS",
+    "STRETCHES",
+    "TURN",
+    "YAW",
+    "Antenna",
+    "CourseFixes",
+    "DriveSums",
+    "RestRate",
+    "course_fixes",
+    "drive_sums",
+    "rest_rates",
+]
+
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+#: Over so much before and after it the rate at an instant is a mean, s.
+STEADY = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class DriveSums:
+    """A record summed from the instants of fixes to its end, k fixes, m nodes, s stretches.
+
+    Attributes
+    ----------
+    until_end : ndarray, (k,), s
+        From the fixes to the end of the record.
+    turned : ndarray, (k, 3, 3)
+        From the body's axes at a fix to those at the end, held still in inertial space.
+    gained : ndarray, (k, 3), m/s
+        Integral of the specific force from a fix to the end, in the axes at the end.
+    rate : ndarray, (k, 3), rad/s
+        Of the body at the fixes, without its shaking; body axes.
+    stretch : ndarray, (s,), s
+        Lengths of the stretches.
+    by_gyro : ndarray, (k, 3, 21 + 3 s)
+        What errors of the gyros add to that of the attitude at a fix, in the axes at the end, rad:
+        a bias of each axis, the nine elements (i, j) of an error of axis i in proportion to what
+        axis j has above its mean rate, nine in proportion to the specific force above its mean,
+        and a bias of each axis in each stretch alone. Signs: bias is reading less truth, what is
+        added is truth less computed.
+    by_turn : ndarray, (k, 3, 21 + 3 s)
+        What they add to the velocity at a fix, in the axes at the end, m/s.
+    by_accel : ndarray, (k, 3, 12 + 3 s)
+        What errors of the accelerometers add to the velocity: likewise, nine in proportion to the
+        specific force.
+    """
+
+    until_end: Array
+    turned: Array
+    gained: Array
+    rate: Array
+    stretch: Array
+    by_gyro: Array
+    by_accel: Array
+    by_turn: Array
+
+
+def drive_sums(imu: pd.DataFrame, time: Array, means: Array, errors: Array) -> DriveSums:
+    """Sum a record between fixes and its end.
+
+    Parameters
+    ----------
+    imu : DataFrame
+    time : ndarray, (k,), s
+        Of fixes, within the record.
+    means : ndarray, (6,)
+        Of rate and force, about which errors in proportion to the input are counted.
+    errors : ndarray
+        The columns `course_unknowns.OF_SENSORS`, which are taken off.
+
+    Returns
+    -------
+    DriveSums
+
+    Notes
+    -----
+    With theta the rotation by which the true attitude is off the computed one,
+    ``C_true = exp([theta x]) C``, and the true rate and force less by db and da than taken, it is
+    ``theta(t) = theta_e + int_t^e C db`` and
+    ``v(t) = v_e - int_t^e (C f + theta x C f - C da)``.
+    """
+    stamps = imu.index.to_numpy(dtype=np.float64)
+    table = imu.copy()
+    table.attrs = dict(imu.attrs)
+    table[[*GYRO, *ACCEL]] = _mended(imu[[*GYRO, *ACCEL]].to_numpy(), stamps, means, errors)
+    n = len(stamps) - 1
+    before = np.clip(np.searchsorted(stamps, time, side="right") - 1, 0, n - 1)
+    even = np.searchsorted(stamps, np.linspace(stamps[0], stamps[-1], 2 * STRETCHES + 1)[1:-1])
+    ends = np.unique(np.concatenate([before, np.clip(even, 1, n), [n]]))
+    ends = ends[ends > 0].astype(np.int64)
+    sums = sum_inertially(table, ends)
+    dv = np.ascontiguousarray(motion_increments(table)[DV].to_numpy(dtype=np.float64))
+    steps = rotation.rotate(sums.turned[:-1], dv)
+    gained = np.vstack([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+    end = rotation.dcm_from_quaternion(sums.turned[-1]).T
+    part = ((time - stamps[before]) / (stamps[before + 1] - stamps[before]))[:, None]
+    there = gained[before] + part * steps[before]
+    turn = rotation.rotation_vector_from_quaternion(
+        rotation.compose(rotation.conjugate(sums.turned[before]), sums.turned[before + 1])
+    )
+    turned = rotation.dcm_from_quaternion(sums.turned[before])
+    turned = turned @ rotation.dcm_from_rotation_vector(part * turn)
+    stretch, by_gyro, by_accel, by_turn = _partials(
+        sums, end, gained[np.r_[0, ends]], means - errors[:6]
+    )
+    edge = np.searchsorted(np.r_[0, ends], before)
+    return DriveSums(
+        stamps[-1] - time,
+        end @ turned,
+        (gained[-1] - there) @ end.T,
+        _rate(sums.turned, stamps, time),
+        stretch,
+        by_gyro[edge],
+        by_accel[edge],
+        by_turn[edge],
+    )
+
+
+def _stretch_of(since: Array, length: float) -> Indices:
+    """Stretch in which instants after the beginning lie."""
+    return np.clip((since / length * STRETCHES).astype(np.int64), 0, STRETCHES - 1)
+
+
+def _mended(values: Array, stamps: Array, means: Array, errors: Array) -> Array:
+    """Rates and forces without errors."""
+    x = np.concatenate([np.zeros(OF_SENSORS.start), errors])
+    matrix, by_force = x[GYRO_MATRIX].reshape(3, 3), x[GYRO_BY_FORCE].reshape(3, 3)
+    before = np.diff(stamps, prepend=stamps[0] - (stamps[1] - stamps[0]))
+    here = _stretch_of(stamps - 0.5 * before - stamps[0], stamps[-1] - stamps[0])
+    out = np.array(values, dtype=np.float64) - errors[:6]
+    above = out - (means - errors[:6])
+    rate, force = above[:, :3], above[:, 3:]
+    out[:, :3] -= rate @ matrix.T + force @ by_force.T + x[GYRO_NOISE].reshape(-1, 3)[here]
+    out[:, 3:] -= force @ x[ACCEL_MATRIX].reshape(3, 3).T + x[ACCEL_NOISE].reshape(-1, 3)[here]
+    return out
+
+
+def _partials(
+    sums: InertialSums, end: Array, gained: Array, means: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Lengths of the stretches, and what errors add at the beginning of each node."""
+    m = len(sums.node_length)
+    times = end @ sums.times
+    middle = sums.middles
+    of = _stretch_of(middle, sums.length)
+    mine = (of[:, None] == np.arange(STRETCHES)).astype(np.float64)
+    alone = np.einsum("mhi,ms->mhsi", times, mine).reshape(m, 3, 3 * STRETCHES)
+
+    def above(products: Array, mean: Array) -> Array:
+        out = np.einsum("gh,mhij->mgij", end, products) - times[:, :, :, None] * mean
+        return np.asarray(out.reshape(m, 3, 9))
+
+    by_rate, by_force = above(sums.turns, means[:3]), above(sums.pushes, means[3:])
+    by_gyro = np.concatenate([times, by_rate, by_force, alone], axis=2)
+    by_accel = np.concatenate([times, by_force, alone], axis=2)
+    at_edge = _from_end(by_gyro)
+    push = np.diff(gained, axis=0) @ end.T
+    by_turn = rotation.cross_matrix(push) @ (at_edge[1:] + 0.5 * by_gyro)
+    stretch = np.bincount(of, sums.node_length, STRETCHES).astype(np.float64)
+    return stretch, at_edge, _from_end(by_accel), _from_end(by_turn)
+
+
+def _from_end(nodes: Array) -> Array:
+    """Sums of nodes from the beginning of each to the end, and nothing at the end."""
+    nothing = np.zeros((1, *nodes.shape[1:]))
+    return np.concatenate([np.cumsum(nodes[::-1], axis=0)[::-1], nothing])
+
+
+def _rate(turned: Array, stamps: Array, time: Array) -> Array:
+    """Mean rates about instants; body axes."""
+    last = len(stamps) - 1
+    first = np.clip(np.searchsorted(stamps, time - STEADY), 0, last - 1)
+    past = np.clip(np.searchsorted(stamps, time + STEADY), first + 1, last)
+    turn = rotation.compose(rotation.conjugate(turned[first]), turned[past])
+    length = (stamps[past] - stamps[first])[:, None]
+    return np.asarray(rotation.rotation_vector_from_quaternion(turn) / length)
+
+
+# Velocities of the fixes of a drive, and which of them have a course.
+
+
+#: No receiver knows a velocity better, m/s.
+LEAST_SD = 1e-6
+
+
+@dataclass(frozen=True)
+class Antenna:
+    """Where a receiver measures, and when.
+
+    Attributes
+    ----------
+    lever_arm : triad, m
+        From the inertial sensors, body axes.
+    velocity_delay : float, s
+        By which a stated velocity is older than its stamp.
+    time_offset_sd : float, s
+        By which all stamps may be wrong.
+    """
+
+    lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    velocity_delay: float = 0.0
+    time_offset_sd: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class CourseFixes:
+    """Fixes with a velocity during an inertial record.
+
+    Attributes
+    ----------
+    time : ndarray, (k,), s
+        At which the velocities hold.
+    velocity, sd : ndarray, (k, 3), m/s
+        North, east, down. The standard deviation of the last may be infinite.
+    fast : ndarray of bool, (k,)
+        Whether they are fast enough to have a course.
+    row : ndarray of int, (k,)
+        Of the table, from 1.
+    source : str, optional
+        Of the fixes.
+    """
+
+    time: Array
+    velocity: Array
+    sd: Array
+    fast: NDArray[np.bool_]
+    row: NDArray[np.int64]
+    source: str | None
+
+    def only(self, rows: NDArray[np.bool_]) -> CourseFixes:
+        """Some of them."""
+        return CourseFixes(
+            self.time[rows],
+            self.velocity[rows],
+            self.sd[rows],
+            self.fast[rows],
+            self.row[rows],
+            self.source,
+        )
+
+
+def course_fixes(
+    imu: pd.DataFrame,
+    gnss: pd.DataFrame | None,
+    least_speed: float,
+    largest_sd: float,
+    velocity_delay: float = 0.0,
+) -> CourseFixes:
+    """Take the fixes with a velocity of a record that ends while it drives.
+
+    Parameters
+    ----------
+    imu : DataFrame
+    gnss : DataFrame, optional
+    least_speed : float, m/s
+    largest_sd : float, rad
+        Of a course by the noise of the receiver.
+    velocity_delay : float, s
+
+    Returns
+    -------
+    CourseFixes
+
+    Raises
+    ------
+    DataError
+        There is no Gnss table, fewer than two fixes with a velocity during the record, or the
+        last two of them are too slow.
+    """
+    if gnss is None:
+        raise DataError("alignment.no-fixes-for-course", file=source_of(imu), quantity="gnss")
+    check_gnss(gnss)
+    source = source_of(gnss)
+    first, last = float(imu.index[0]), float(imu.index[-1])
+    time = gnss.index.to_numpy(dtype=np.float64) - velocity_delay
+    velocity = gnss[VELOCITY].to_numpy(dtype=np.float64)
+    sd = gnss[VELOCITY_SD].to_numpy(dtype=np.float64)
+    good = (time >= first) & (time <= last) & (gnss["quality"].to_numpy() > 0.0)
+    timely = int(good.sum())
+    good &= np.isfinite(sd[:, :2]).all(axis=1)
+    if good.sum() < 2:
+        raise DataError(
+            "alignment.too-few-fix-velocities",
+            file=source,
+            quantity="VN, VE",
+            first=first,
+            last=last,
+            timely=timely,
+            good=int(good.sum()),
+        )
+    rows = np.flatnonzero(good)
+    time, velocity, sd = time[rows], velocity[rows], np.maximum(sd[rows], LEAST_SD)
+    speed = np.hypot(velocity[:, 0], velocity[:, 1])
+    course_sd = sd[:, :2].max(axis=1) / np.maximum(speed, 1e-9)
+    fast = (speed >= least_speed) & (course_sd <= largest_sd)
+    if not fast[-2:].all():
+        k = len(fast) - 2 + int(np.flatnonzero(~fast[-2:])[-1])
+        raise DataError(
+            "alignment.vehicle-too-slow-for-course",
+            file=source,
+            row=int(rows[k]) + 1,
+            quantity="VN, VE",
+            speed=speed[k],
+            time=time[k],
+            sd=sd[k, :2].max(),
+            course_sd_deg=np.degrees(min(course_sd[k], np.pi)),
+            least_speed=least_speed,
+            largest_sd_deg=np.degrees(largest_sd),
+        )
+    return CourseFixes(time, velocity, sd, fast, rows + 1, source)
+
+
+# What the gyros read while the fixes of a drive say that the vehicle stood.
+
+
+#: A velocity within so many standard deviations is none, nor one below what no one drives at.
+CLEAR, CREEP = 4.0, 0.1
+#: A shorter rest, s, tells less than the fixes of the drive do.
+LEAST = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class RestRate:
+    """Mean rate of a rest.
+
+    Attributes
+    ----------
+    time : float, s
+        Its middle.
+    rate, sd : ndarray, (3,), rad/s
+        The mean, and how well it tells the bias at the end of the record: what scatters within the
+        rest, and what the bias drifts since.
+    """
+
+    time: float
+    rate: Array
+    sd: Array
+
+
+def rest_rates(
+    imu: pd.DataFrame, fixes: CourseFixes, sensors: ImuUncertainty
+) -> tuple[RestRate, ...]:
+    """Find the rests of a record in which the receiver stood, too.
+
+    A gyro cannot tell a parked vehicle from one on a straight road; the fixes do.
+
+    Parameters
+    ----------
+    imu : DataFrame
+    fixes : CourseFixes
+    sensors : ImuUncertainty
+
+    Returns
+    -------
+    tuple of RestRate
+        Nothing where no fix lies in a rest.
+    """
+    speed = np.hypot(fixes.velocity[:, 0], fixes.velocity[:, 1])
+    slow = speed <= np.maximum(CLEAR * fixes.sd[:, :2].max(axis=1), CREEP)
+    if not slow.any():
+        return ()
+    # One fix that is wrong neither ends a rest nor makes one.
+    near = np.clip(np.arange(len(slow))[:, None] + np.arange(-1, 2), 0, len(slow) - 1)
+    slow = slow[near].sum(axis=1) >= 2
+    drift, out = sensors.gyro_drift, []
+    for found in find_rests_of_every_grade(imu):
+        rest = _while_slow(imu, found, fixes.time, slow)
+        if rest is None:
+            continue
+        assert rest.gyro_mean_sd is not None
+        since = float(imu.index[-1]) - 0.5 * (rest.start + rest.end)
+        moved = -2.0 * math.expm1(-since / drift.correlation_time) * np.square(drift.triad)
+        white = np.square(sensors.gyro.axis("noise_density")) / (rest.end - rest.start)
+        sd = np.sqrt(np.maximum(np.square(rest.gyro_mean_sd), white) + moved)
+        middle = 0.5 * (rest.start + rest.end)
+        out.append(RestRate(middle, np.array(rest.gyro_mean), sd))
+    return tuple(out)
+
+
+def _while_slow(
+    imu: pd.DataFrame, rest: RestStretch, time: Array, slow: NDArray[np.bool_]
+) -> RestStretch | None:
+    """The longest part of a rest between fixes that stand: gyros rest on a straight road, too."""
+    inside = np.flatnonzero((time >= rest.start) & (time <= rest.end))
+    runs = np.split(inside, np.flatnonzero(np.diff(slow[inside].astype(np.int64))) + 1)
+    runs = [run for run in runs if len(run) > 1 and slow[run[0]]]
+    if not runs:
+        return None
+    run = max(runs, key=lambda one: float(time[one[-1]] - time[one[0]]))
+    start = rest.start if run[0] == inside[0] else float(time[run[0]])
+    end = rest.end if run[-1] == inside[-1] else float(time[run[-1]])
+    return rest_between(imu, start, end) if end - start >= LEAST else None
+
+
+# What the least squares of a drive look for, in the order of their columns.
+
+
+#: Stretches of a record with a noise of their own: what white noise adds is known at their ends.
+STRETCHES: Final = 24
+
+# At the end of the record: velocity, rotation by which the true attitude is off the computed one,
+# biases of gyros and accelerometers.
+COURSE_UNKNOWNS_VELOCITY, TURN, COURSE_UNKNOWNS_GYRO, COURSE_UNKNOWNS_ACCEL = (
+    slice(0, 3),
+    slice(3, 6),
+    slice(6, 9),
+    slice(9, 12),
+)
+ASKED: Final = 12
+# Errors of gyros in proportion to rates and to forces, of accelerometers in proportion to forces,
+# elements (i, j) of axis i by input j; and of both in each stretch alone, (stretch, axis).
+GYRO_MATRIX, GYRO_BY_FORCE = slice(12, 21), slice(21, 30)
+GYRO_NOISE = slice(30, 30 + 3 * STRETCHES)
+ACCEL_MATRIX = slice(GYRO_NOISE.stop, GYRO_NOISE.stop + 9)
+ACCEL_NOISE = slice(ACCEL_MATRIX.stop, ACCEL_MATRIX.stop + 3 * STRETCHES)
+# Of the heading less the course; how far the unit is ahead of the axle; of the stamps of the fixes.
+YAW: Final = ACCEL_NOISE.stop
+AXLE: Final = YAW + 1
+OFFSET: Final = YAW + 2
+COUNT: Final = YAW + 3
+
+#: In the order of `DriveSums.by_gyro` and `DriveSums.by_accel`.
+OF_GYROS = np.r_[COURSE_UNKNOWNS_GYRO, GYRO_MATRIX, GYRO_BY_FORCE, GYRO_NOISE]
+OF_ACCELS = np.r_[COURSE_UNKNOWNS_ACCEL, ACCEL_MATRIX, ACCEL_NOISE]
+OF_SENSORS = slice(COURSE_UNKNOWNS_GYRO.start, ACCEL_NOISE.stop)
+#: What is known beyond the record: all but its own noise, and what is of the vehicle and the fixes.
+HANDED = np.r_[:ASKED, GYRO_MATRIX, GYRO_BY_FORCE, ACCEL_MATRIX]

@@ -1,0 +1,475 @@
+"""Fixes withheld from a navigator, and how far it then is from them.
+
+A reference is not needed where a receiver is good: some seconds of its fixes are kept back, and the
+navigator, which goes on without them, is scored against them. What it says of its own error is
+scored at the same fixes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.aiding.aid import TableAid
+from strapdown.errors import ConfigError
+from strapdown.estimation.covariance import Step
+from strapdown.evaluation.plane_bound import PLANE_95, plane_reach
+from strapdown.navigation.navigator import Navigator, NavigatorState
+from strapdown.navigation.record import NavigationPiece, Seen, Span
+from strapdown.tables.checks import index_of, source_of
+
+__all__ = [
+    "WithheldScore",
+    "Withholding",
+    "blinded",
+    "end_of_what_tells",
+    "score_of",
+    "score_of_smoothed",
+    "score_withheld",
+    "score_withheld_smoothed",
+    "scores_table",
+    "spans_to_withhold",
+    "without_spans",
+]
+
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Withholding:
+    """The rule of an aid whose observations are looked at and not used."""
+
+    def step(self, nu: float, s: float, r: float) -> Step:
+        """Return a step that changes nothing."""
+        return Step(0.0, 1.0, r, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class WithheldScore:
+    """A navigator over one span without fixes.
+
+    Attributes
+    ----------
+    span : Span
+    time : ndarray, (n,), s
+        Of the fixes that were withheld, on the clock of the inertial sensors.
+    error : ndarray, (n, 3), m
+        Computed place of the antenna less the fix, north, east, down.
+    variance : ndarray, (n, 3), m²
+        Expected of it, the noise of the fix with it.
+    covariance : ndarray, (n, 2, 2), m²
+        Of its horizontal part, the noise of the fix with it.
+    """
+
+    span: Span
+    time: Array
+    error: Array
+    variance: Array
+    covariance: Array
+
+    @property
+    def horizontal(self) -> Array:
+        """Length of the horizontal error, (n,), m."""
+        return np.asarray(np.hypot(self.error[:, 0], self.error[:, 1]))
+
+    @property
+    def largest(self) -> float:
+        """Largest horizontal error, m."""
+        return float(self.horizontal.max())
+
+    @property
+    def bound(self) -> Array:
+        """Distance that 95 of 100 errors are within, in the direction of the error, (n,), m.
+
+        Where the ray through the error leaves the ellipse of 95 %: `horizontal` is below it if and
+        only if the error is within the ellipse.
+        """
+        return plane_reach(self.horizontal, self.distance, self.covariance)
+
+    @property
+    def distance(self) -> Array:
+        """Mahalanobis distance of the horizontal error, (n,): 2.45 is the bound of 95 %."""
+        e = self.error[:, :2]
+        weighed = np.linalg.solve(self.covariance, e[:, :, None])[..., 0]
+        return np.asarray(np.sqrt((e * weighed).sum(axis=1)))
+
+    @property
+    def inside(self) -> bool:
+        """Whether the largest horizontal error is within the ellipse of 95 % of its instant."""
+        return bool(self.distance[int(np.argmax(self.horizontal))] <= PLANE_95)
+
+
+def spans_to_withhold(begin: float, end: float, length: float, places: int = 5) -> tuple[Span, ...]:
+    """Return spans of one length, spread evenly: the first at the begin, the last at the end.
+
+    Parameters
+    ----------
+    begin, end : float, s
+        Between which there are fixes and the filter has settled.
+    length : float, s
+    places : int
+
+    Returns
+    -------
+    tuple of Span
+        They overlap where there is not room for them side by side; each is tried by itself.
+
+    Raises
+    ------
+    ConfigError
+        There is no room for one.
+    """
+    room = end - begin - length
+    if room < 0.0 or places < 1 or not length > 0.0:
+        raise ConfigError(
+            "evaluation.spans-do-not-fit-within",
+            quantity="withhold",
+            places=places,
+            length=length,
+            end=end - begin,
+        )
+    starts = begin + room * (np.linspace(0.0, 1.0, places) if places > 1 else np.array([0.5]))
+    return tuple(Span(f"{length:g} s", float(at), float(at + length)) for at in starts)
+
+
+def without_spans(table: pd.DataFrame, spans: Sequence[Span]) -> pd.DataFrame:
+    """Return the rows of a table whose stamps are in no span.
+
+    Parameters
+    ----------
+    table : DataFrame
+        By time.
+    spans : sequence of Span
+        After the begin, up to the end.
+
+    Returns
+    -------
+    DataFrame
+
+    Raises
+    ------
+    ConfigError
+        Nothing is left, or a span has no row in it.
+    """
+    time = index_of(table)
+    kept = np.ones(len(time), dtype=np.bool_)
+    for span in spans:
+        within = (time > span.begin) & (time <= span.end)
+        if not within.any():
+            raise ConfigError(
+                "evaluation.nothing-withhold-table-goes",
+                file=source_of(table),
+                quantity="withhold",
+                begin=span.begin,
+                end=span.end,
+                time=time[0],
+                time_2=time[-1],
+            )
+        kept &= ~within
+    if not kept.any():
+        raise ConfigError(
+            "evaluation.every-row-would-withheld", file=source_of(table), quantity="withhold"
+        )
+    out = table[kept]
+    out.attrs = dict(table.attrs)
+    return out
+
+
+def score_withheld(
+    navigator: Navigator,
+    state: NavigatorState,
+    time: Array,
+    rows: Array,
+    name: str,
+    table: pd.DataFrame,
+    spans: Sequence[Span],
+) -> tuple[WithheldScore, ...]:
+    """Navigate with every fix up to each span, and through it with none.
+
+    The aid stays in the navigator and its observations are computed, but not used. Each span is by
+    itself: the run that goes on from its end has had the fixes.
+
+    Parameters
+    ----------
+    navigator : Navigator
+    state : NavigatorState
+        At the start; the tables of the other aids have been told.
+    time : ndarray, (n,), s
+    rows : ndarray, (n, 10)
+        As `Navigator.advance`, from the state on.
+    name : str
+        Of the aid; its observation ``NAME.position`` is scored.
+    table : DataFrame
+        Of the aid, not told yet.
+    spans : sequence of Span
+        On the clock of the inertial sensors.
+
+    Returns
+    -------
+    tuple of WithheldScore
+        In the order of the spans.
+
+    Raises
+    ------
+    ConfigError
+        There is no such aid, or a span has no fixes or is not within the record.
+    """
+    blind = blinded(navigator, name)
+    state = navigator.tell(state, name, table)
+    found: dict[int, WithheldScore] = {}
+    at = 0
+    for k in sorted(range(len(spans)), key=lambda k: spans[k].begin):
+        span = spans[k]
+        first, last = np.searchsorted(time, [span.begin, span.end], side="right").tolist()
+        if first < at or first == last or span.end > time[-1]:
+            raise ConfigError(
+                "evaluation.not-within-record",
+                quantity="withhold",
+                begin=span.begin,
+                end=span.end,
+                time=state.time,
+                time_2=time[-1],
+            )
+        state, _ = navigator.advance(state, time[at:first], rows[at:first])
+        at = first
+        found[k] = _score(blind, state, time[first:last], rows[first:last], name, span)
+    return tuple(found[k] for k in range(len(spans)))
+
+
+def scores_table(scores: Sequence[WithheldScore]) -> pd.DataFrame:
+    """Return scores as a table.
+
+    Parameters
+    ----------
+    scores : sequence of WithheldScore
+
+    Returns
+    -------
+    DataFrame
+        By begin of the span in s: its ``length`` s and ``fixes``; of the largest horizontal error
+        ``error`` m, ``bound`` m (95 %), ``distance`` (Mahalanobis, 2.45 at the bound); ``down``
+        m, the largest error of height; ``inside``, the share of the fixes within their bounds.
+    """
+    rows = []
+    for one in scores:
+        worst = int(np.argmax(one.horizontal))
+        rows.append(
+            {
+                "length": one.span.end - one.span.begin,
+                "fixes": len(one.time),
+                "error": one.largest,
+                "bound": float(one.bound[worst]),
+                "distance": float(one.distance[worst]),
+                "down": float(np.abs(one.error[:, 2]).max()),
+                "inside": float(np.mean(one.distance <= PLANE_95)),
+            }
+        )
+    begins = pd.Index([one.span.begin for one in scores], name="begin")
+    return pd.DataFrame(rows, index=begins)
+
+
+def blinded(navigator: Navigator, name: str) -> Navigator:
+    """Return a navigator that looks at what an aid observes, and does not use it.
+
+    Parameters
+    ----------
+    navigator : Navigator
+    name : str
+        Of the aid.
+
+    Raises
+    ------
+    ConfigError
+        There is no such aid with a table.
+    """
+    aid = navigator.by_name.get(name)
+    if not isinstance(aid, TableAid):
+        raise ConfigError(
+            "evaluation.no-aid-table",
+            quantity="withhold",
+            name=name,
+            word=name,
+            known=navigator.by_name,
+        )
+    aids = navigator.aids
+    blind = tuple(replace(one, rule=Withholding()) if one.name == name else one for one in aids)
+    return replace(navigator, aids=blind)
+
+
+def _score(
+    blind: Navigator, state: NavigatorState, time: Array, rows: Array, name: str, span: Span
+) -> WithheldScore:
+    _, piece = blind.advance(state, time, rows)
+    return score_of([piece], name, span)
+
+
+def score_of(pieces: Sequence[NavigationPiece], name: str, span: Span) -> WithheldScore:
+    """Score what a navigator gave over a span, in which an aid was looked at and not used.
+
+    Parameters
+    ----------
+    pieces : sequence of NavigationPiece
+    name : str
+        Of the aid; its observation ``NAME.position`` is scored.
+    span : Span
+
+    Returns
+    -------
+    WithheldScore
+
+    Raises
+    ------
+    ConfigError
+        The aid has no fixes there.
+    """
+    seen = seen_of(pieces, name, span)
+    time = np.array([one.time for one in seen])
+    nu = np.array([one.innovations.nu for one in seen])
+    s = np.array([one.innovations.s for one in seen])
+    marks = {mark.time: mark.covariance for piece in pieces for mark in piece.marks}
+    P = np.array([marks[at][:2, :2] for at in time.tolist()])
+    return WithheldScore(span, time, nu, s, P + _beyond_place(s, P))
+
+
+def seen_of(pieces: Sequence[NavigationPiece], name: str, span: Span) -> list[Seen]:
+    """Return what was seen of the fixes of a span.
+
+    Parameters
+    ----------
+    pieces : sequence of NavigationPiece
+    name : str
+        Of the aid.
+    span : Span
+        For messages.
+
+    Raises
+    ------
+    ConfigError
+        There is nothing.
+    """
+    seen = [one for piece in pieces for one in piece.seen if one.name == f"{name}.position"]
+    if not seen:
+        raise ConfigError(
+            "evaluation.no-fixes-score", quantity="withhold", begin=span.begin, end=span.end
+        )
+    return seen
+
+
+def _beyond_place(s: Array, P: Array) -> Array:
+    """Return the variance that is expected of a fix beyond that of the place, (n, 2, 2).
+
+    What is expected along north and east is P, what the arm adds, and the fix's own noise: the
+    part beyond P is independent from axis to axis but for the arm's share.
+    """
+    beyond = np.maximum(s[:, :2] - np.diagonal(P, axis1=1, axis2=2), 0.0)
+    return np.asarray(np.eye(2) * beyond[:, None, :])
+
+
+# Fixes withheld from a navigator, and how far its smoother then is from them.
+
+
+#: A smoother is given so many lengths of the stretch after it, and no less than so many seconds:
+#: what comes later tells nothing of the stretch that this does not.
+AFTER, LEAST_AFTER = 2.0, 60.0
+
+
+def end_of_what_tells(span: Span) -> float:
+    """Return the time up to which a smoother is given what follows a stretch, s."""
+    return span.end + max(AFTER * (span.end - span.begin), LEAST_AFTER)
+
+
+def score_withheld_smoothed(
+    navigator: Navigator,
+    state: NavigatorState,
+    time: Array,
+    rows: Array,
+    name: str,
+    spans: Sequence[Span],
+) -> tuple[WithheldScore, ...]:
+    """Score a navigator's smoother by each of some spans without fixes, by itself.
+
+    Parameters
+    ----------
+    navigator : Navigator
+        With a smoother.
+    state : NavigatorState
+        At the start, told of the fixes.
+    time : ndarray, (n,), s
+    rows : ndarray, (n, 10)
+        As `Navigator.advance`, from the state on.
+    name : str
+        Of the aid; its observation ``NAME.position`` is scored.
+    spans : sequence of Span
+        In the order of time, within the record.
+
+    Returns
+    -------
+    tuple of WithheldScore
+
+    Raises
+    ------
+    ConfigError
+        There is no such aid, or a span has no fixes.
+    """
+    blind = blinded(navigator, name)
+    found, at = [], 0
+    for span in spans:
+        ends = [span.begin, span.end, end_of_what_tells(span)]
+        first, last, after = np.searchsorted(time, ends, side="right").tolist()
+        state, _ = navigator.advance(state, time[at:first], rows[at:first])
+        at = first
+        through, piece = blind.advance(state, time[first:last], rows[first:last])
+        _, later = navigator.advance(through, time[last:after], rows[last:after])
+        found.append(score_of_smoothed(navigator, [piece], [later], name, span))
+    return tuple(found)
+
+
+def score_of_smoothed(
+    navigator: Navigator,
+    pieces: Sequence[NavigationPiece],
+    later: Sequence[NavigationPiece],
+    name: str,
+    span: Span,
+) -> WithheldScore:
+    """Score what a smoother makes of a span by what came before and after it.
+
+    The place of the antenna is that of the smoothed state with the smoothed arm and the smoothed
+    offset of its clock, where these are estimated, and so is its covariance.
+
+    Parameters
+    ----------
+    navigator : Navigator
+        With a smoother.
+    pieces : sequence of NavigationPiece
+        Of the span, in which the aid was looked at and not used.
+    later : sequence of NavigationPiece
+        That follow, with the aid.
+    name : str
+        Of the aid, which is a receiver.
+    span : Span
+
+    Returns
+    -------
+    WithheldScore
+
+    Raises
+    ------
+    ConfigError
+        The aid has no fixes there.
+    """
+    assert navigator.smoother is not None
+    seen = seen_of(pieces, name, span)
+    smoothing = navigator.smoother.begin(navigator)
+    for piece in (*pieces, *later):
+        smoothing.take(piece)
+    time = np.array([one.time for one in seen])
+    # Looked at by a rule of its own, it is no lone receiver of a compiled loop.
+    observations = [one.observation for one in seen if one.observation is not None]
+    error, covariance = smoothing.seen(time, observations)
+    variance = np.einsum("kii->ki", covariance)
+    return WithheldScore(span, time, error, variance, covariance[:, :2, :2])

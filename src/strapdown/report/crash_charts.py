@@ -1,0 +1,767 @@
+"""The change of velocity over each event, of every unit and of their mean."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
+from strapdown.crash.acceleration import Acceleration
+from strapdown.crash.compare_units import UnitComparison
+from strapdown.crash.delta_v import VelocityCourse, cumulative_delta_v
+from strapdown.crash.delta_v_bound import DeltaVBound, VelocityChange, body_delta_v_bound
+from strapdown.crash.events import CrashEvent
+from strapdown.crash.path import CrashPath
+from strapdown.crash.pdof_sensitivity import SHIFTS, WINDOWS, pdof_by_shift, pdof_by_window
+from strapdown.crash.severity_model import SPEEDS, InjuryRisk, SeverityModel, injury_risk
+from strapdown.crash.unit_reconstruction import UnitReconstruction
+from strapdown.crash.window_weights import window_weights
+from strapdown.dsp.channel_class import LEAST_RATE, cfc_filter
+from strapdown.errors import DataError, StrapdownError
+from strapdown.report.chart import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    PURPLE,
+    Band,
+    Bars,
+    Chart,
+    Fill,
+    Line,
+    Mark,
+    Panel,
+    curve,
+    look,
+)
+from strapdown.report.crash_moments import AROUND, crash_span, event_marks, unit_look
+from strapdown.report.values import MEAN, plain
+from strapdown.rotation import within_half_turn
+from strapdown.tables import NED
+
+__all__ = [
+    "StatedDeltaV",
+    "accelerations_chart",
+    "delta_v_budget",
+    "delta_v_budget_chart",
+    "delta_v_chart",
+    "delta_v_course",
+    "delta_v_half_widths",
+    "differences_chart",
+    "pdof_by_shift_chart",
+    "pdof_by_window_chart",
+    "place_budget_chart",
+    "risk_chart",
+]
+
+
+Array = NDArray[np.float64]
+
+AXES = ("forward", "right", "down", "resultant")
+KMH = 3.6
+# Instants at which the bound is found; between them it is smooth.
+_INSTANTS = 31
+_SYMBOLS = ("square", "diamond", "triangle-up", "star", "pentagon", "cross")
+
+
+@dataclass(frozen=True)
+class StatedDeltaV:
+    """A change of velocity that somebody else states.
+
+    Attributes
+    ----------
+    time : float, s
+        From the trigger; the change is that from time zero to then.
+    value, sd : float, m/s
+    name : str
+    axis : {'forward', 'right', 'down', 'resultant'}
+    """
+
+    time: float
+    value: float
+    sd: float
+    name: str
+    axis: str = "forward"
+
+
+def delta_v_course(acceleration: Acceleration, zero: float, low: float, high: float) -> Array:
+    """Change of velocity since an instant, before and after it.
+
+    Parameters
+    ----------
+    acceleration : Acceleration
+    zero, low, high : float, s
+        Zero where the change is; the others are cut to the record.
+
+    Returns
+    -------
+    ndarray, (n, 5)
+        Time in s, forward, right, down and resultant in m/s.
+    """
+    low, high = max(low, acceleration.begin), min(high, acceleration.end)
+    parts = []
+    if low < zero:
+        before = cumulative_delta_v(acceleration, low, zero)
+        values = before[["dv_x", "dv_y", "dv_z"]].to_numpy()
+        parts.append(np.column_stack([before.index.to_numpy() + low, values - values[-1]])[:-1])
+    after = cumulative_delta_v(acceleration, zero, high)
+    values = after[["dv_x", "dv_y", "dv_z"]].to_numpy()
+    parts.append(np.column_stack([after.index.to_numpy() + zero, values]))
+    whole = np.vstack(parts)
+    return np.column_stack([whole, np.sqrt((whole[:, 1:] ** 2).sum(axis=1))])
+
+
+def delta_v_half_widths(
+    unit: UnitReconstruction,
+    zero: float,
+    zero_sd: float,
+    instants: Array,
+    gravity: float = STANDARD_GRAVITY,
+) -> Array:
+    """Half widths of what holds 95 % of a change of velocity since time zero.
+
+    Parameters
+    ----------
+    unit : UnitReconstruction
+    zero, zero_sd : float, s
+    instants : ndarray, (n,), s
+        After `zero`. They are taken as exact, as those of a clock.
+    gravity : float, m/s²
+
+    Returns
+    -------
+    ndarray, (n, 4), m/s
+        Forward, right, down, resultant.
+    """
+    of, acceleration = unit.at_point, unit.acceleration
+    rest_sd = of.resting_force(gravity)[1]
+    course = VelocityCourse(acceleration)
+    moved = -course.rate(np.array([zero])) * zero_sd
+    rows = []
+    for at in instants.tolist():
+        weights = window_weights(acceleration.time, zero, at, acceleration.sampling)
+        bound = body_delta_v_bound(of.effects, weights, rest_sd=rest_sd, at_ends=moved)
+        rows.append([*bound.half_width, _along(bound, weights @ acceleration.values)])
+    return np.array(rows, dtype=np.float64).reshape(-1, 4)
+
+
+def _along(bound: DeltaVBound, vector: Array) -> float:
+    if not vector.any():
+        return TWO_SIDED_95 * float(np.sqrt(np.linalg.eigvalsh(bound.covariance)[-1]))
+    return TWO_SIDED_95 * bound.along(vector)
+
+
+def delta_v_chart(
+    units: Sequence[UnitReconstruction],
+    combined: UnitReconstruction | None,
+    event: int = 0,
+    *,
+    gravity: float = STANDARD_GRAVITY,
+    stated: Sequence[StatedDeltaV] = (),
+) -> Chart | None:
+    """Chart the change of velocity since time zero of an event.
+
+    Parameters
+    ----------
+    units : sequence of UnitReconstruction
+    combined : UnitReconstruction or None
+        The mean of the units, whose event and bound are drawn; those of the first unit if None.
+    event : int
+        Of the mean, from 0.
+    gravity : float, m/s²
+    stated : sequence of StatedDeltaV
+        Laid over with their 95 %.
+
+    Returns
+    -------
+    Chart or None
+        None where there is no such event.
+    """
+    main = units[0] if combined is None else combined
+    if not 0 <= event < len(main.events.events):
+        return None
+    found = main.events.events[event]
+    zero, end = found.time_zero, min(found.end, main.acceleration.end)
+    span = (zero - 0.4 * AROUND[0], end + AROUND[1])
+    lines: list[list[Line]] = [[] for _ in AXES]
+    for k, unit in enumerate(units):
+        if unit.acceleration.begin <= zero < unit.acceleration.end:
+            look = unit_look(k, len(units) == 1)
+            _add_course(lines, unit, (zero, *span), unit.name, look, 2.2 if unit is main else 1.3)
+    own = unit_look(None if combined is not None else 0)["colour"]
+    if combined is not None:
+        _add_course(lines, combined, (zero, *span), MEAN, unit_look(None), 2.2)
+    last = min(span[1], main.acceleration.end)
+    instants = np.unique(np.r_[np.linspace(zero, last, _INSTANTS)[1:], end])
+    half = KMH * delta_v_half_widths(main, zero, found.time_zero_sd, instants, gravity)
+    course = delta_v_course(main.acceleration, zero, *span)
+    whole = main.body[event].event
+    values = [*whole.delta_v.vector.tolist(), whole.resultant]
+    halves = [*whole.bound.half_width, whole.resultant_bound]
+    panels = []
+    of = "of the mean" if combined is not None else f"of {main.name}"
+    for k, axis in enumerate(AXES):
+        middle = KMH * np.interp(instants, course[:, 0], course[:, 1 + k])
+        low = middle - half[:, k]
+        fill = Fill(
+            f"95 % {of}",
+            1e3 * np.r_[zero, instants],
+            np.r_[0.0, np.maximum(low, 0.0) if axis == "resultant" else low],
+            np.r_[0.0, middle + half[:, k]],
+            own,
+            0.15,
+            legend=k == 0,
+        )
+        words = f"{axis}: {plain(KMH * values[k], 1)} ± {plain(KMH * halves[k], 1)} km/h "
+        words += f"({plain(values[k], 2)} ± {plain(halves[k], 2)} m/s)"
+        ends = KMH * np.array([values[k] - halves[k], values[k] + halves[k]])
+        at = np.array([1e3 * end])
+        marks = [
+            Line("bar", np.repeat(at, 2), ends, own, width=2.4, legend=False),
+            Line(
+                f"end of the event, 95 % {of}",
+                at,
+                np.array([KMH * values[k]]),
+                own,
+                points=True,
+                symbol="circle",
+                size=8.0,
+                legend=k == 0,
+            ),
+        ]
+        given = _stated_lines([s for s in stated if s.axis == axis])
+        panels.append(
+            Panel(
+                f"{axis}, km/h", (*lines[k], *marks, *given), title=words, fills=(fill,), height=0.8
+            )
+        )
+    many = len(main.events.events) > 1
+    title = f"Change of velocity, event {event + 1}" if many else "Change of velocity"
+    return Chart(
+        f"delta-v-{event + 1}" if many else "delta-v",
+        title,
+        _caption(bool(stated)),
+        "time from the trigger, ms",
+        tuple(panels),
+        marks=event_marks([found], *span),
+    )
+
+
+def _caption(stated: bool) -> str:
+    return (
+        "Change of the velocity of the reference point since time zero, integrated along the "
+        "turning axes of the vehicle, gravity as it was felt at rest taken off; forward, right, "
+        "down are positive, so that braking counts negative; 1 m/s = 3.6 km/h. Shaded: 95 % at "
+        "an exact time; the bar at the end of the event has the uncertainty of that end as well."
+        + (" Symbols with bars: what others state, with their 95 %." if stated else "")
+    )
+
+
+def _add_course(
+    lines: list[list[Line]],
+    unit: UnitReconstruction,
+    times: tuple[float, float, float],
+    name: str,
+    look: Mapping[str, str],
+    width: float,
+) -> None:
+    course = delta_v_course(unit.acceleration, *times)
+    for k in range(len(AXES)):
+        made = curve(
+            name, 1e3 * course[:, 0], KMH * course[:, 1 + k], look["colour"], look["dash"], width
+        )
+        lines[k].append(replace(made, legend=k == 0))
+
+
+def _stated_lines(stated: Sequence[StatedDeltaV]) -> list[Line]:
+    out = []
+    for k, one in enumerate(stated):
+        at = np.array([1e3 * one.time])
+        reach = TWO_SIDED_95 * one.sd
+        ends = KMH * np.array([one.value - reach, one.value + reach])
+        colour = PURPLE if k == 0 else GREY
+        out.append(Line("bar", np.repeat(at, 2), ends, colour, width=1.8, legend=False))
+        out.append(
+            Line(
+                one.name,
+                at,
+                np.array([KMH * one.value]),
+                colour,
+                points=True,
+                symbol=_SYMBOLS[k % len(_SYMBOLS)],
+                hollow=True,
+            )
+        )
+    return out
+
+
+# What each contributor adds to the uncertainty of the answers.
+
+
+_SUM = "all together"
+# Of the largest sum: what is less is no bar, and joined with the others.
+_LEAST = 0.01
+_REST = "others"
+
+
+def delta_v_budget(change: VelocityChange) -> pd.DataFrame:
+    """Standard deviations that each contributor adds to a change of velocity.
+
+    Returns
+    -------
+    DataFrame
+        Indexed by contributor; ``forward right down``, m/s.
+    """
+    found = change.bound.by_contributor[["xx", "yy", "zz"]]
+    values = np.sqrt(np.maximum(found.to_numpy(dtype=np.float64), 0.0))
+    return pd.DataFrame(values, index=found.index, columns=["forward", "right", "down"])
+
+
+def delta_v_budget_chart(change: VelocityChange) -> Chart:
+    """Chart the contributors to the uncertainty of a change of velocity, the largest first.
+
+    Parameters
+    ----------
+    change : VelocityChange
+        Along vehicle axes.
+    """
+    table = delta_v_budget(change)[["forward", "right"]]
+    return _chart(
+        "budget-delta-v",
+        "What makes the uncertainty of the change of velocity",
+        "Standard deviation that each contributor adds to the change of velocity of the main "
+        "event, forward and right; their squares add up to that of the bar at the top, and 1.96 "
+        "of it are the 95 % bound. Contributors below 1 % of the sum are joined.",
+        table,
+        "m/s",
+    )
+
+
+def place_budget_chart(path: CrashPath, names: tuple[str, str] = ("forward", "right")) -> Chart:
+    """Chart the contributors to the uncertainty of the end of the path, the largest first.
+
+    Parameters
+    ----------
+    path : CrashPath
+    names : (str, str)
+        Of the first two axes of the path.
+    """
+    found = path.variances()[NED[:2]]
+    table = pd.DataFrame(np.sqrt(found.to_numpy()), index=found.index, columns=list(names))
+    at = 1e3 * float(path.time[-1])
+    return _chart(
+        "budget-place",
+        "What makes the uncertainty of the end of the path",
+        f"Standard deviation that each contributor adds to the place of the reference point at "
+        f"{at:.0f} ms, {names[0]} and {names[1]}; their squares add up to that of the bar at the "
+        "top, and 1.96 of it are the 95 % bound. Contributors below 1 % of the sum are joined.",
+        table,
+        "m",
+    )
+
+
+def _chart(slug: str, title: str, caption: str, table: pd.DataFrame, unit: str) -> Chart:
+    total = np.sqrt((table**2).sum())
+    table = _joined(table, float(total.max()))
+    size = np.sqrt((table**2).sum(axis=1))
+    # Stable, so that equal ones keep the order of the budget; the rest always last.
+    order = sorted(table.index, key=lambda name: (name == _REST, -float(size[name])))
+    categories = (_SUM, *(str(name) for name in order))
+    # Three digits of the larger sum, and as many decimals of all that adds up to it.
+    most = float(total.max())
+    digits = max(0, 2 - math.floor(math.log10(most))) if most > 0.0 else 0
+    panels = []
+    for column, colour in zip(table.columns, (BLUE, GREEN), strict=True):
+        values = np.array([float(total[column]), *(float(table[column][n]) for n in order)])
+        panels.append(
+            Panel(
+                "",
+                (),
+                title=f"{column}, {unit}",
+                categories=categories,
+                bars=(
+                    _bars(_SUM, [0], values[:1], BLACK, digits),
+                    _bars(str(column), range(1, len(values)), values[1:], colour, digits),
+                ),
+            )
+        )
+    return Chart(slug, title, caption, f"standard deviation, {unit}", tuple(panels), beside=True)
+
+
+def _bars(name: str, at: Sequence[int] | range, values: object, colour: str, digits: int) -> Bars:
+    ends = np.asarray(values, dtype=np.float64)
+    labels = tuple(f"{v:.{digits}f}" for v in ends.tolist())
+    where = np.array(list(at), dtype=np.float64)
+    return Bars(name, where, ends, colour, labels=labels, legend=False)
+
+
+def _joined(table: pd.DataFrame, most: float) -> pd.DataFrame:
+    """The contributors with what is too little to be seen as one."""
+    small = (table < _LEAST * most).all(axis=1)
+    if int(small.sum()) < 2:
+        return table
+    kept = table[~small].copy()
+    kept.loc[_REST] = np.sqrt((table[small] ** 2).sum())
+    return kept
+
+
+# On what the direction of force hangs: the length of the window, and time zero.
+
+
+_LABEL = "direction of force, deg"
+_SIGN = (
+    "Where the force came from along the turning axes, 0 the front, positive clockwise from above "
+    "(from the right)"
+)
+_STEADY = 0.02
+
+
+def pdof_by_window_chart(
+    units: Sequence[UnitReconstruction], combined: UnitReconstruction | None, event: int = 0
+) -> Chart | None:
+    """Chart the direction of force against the length of the window from time zero.
+
+    Parameters
+    ----------
+    units : sequence of UnitReconstruction
+    combined : UnitReconstruction or None
+        The mean of the units, whose event it is; the first unit if None.
+    event : int
+        From 0.
+
+    Returns
+    -------
+    Chart or None
+        None where there is no such event.
+    """
+    main = units[0] if combined is None else combined
+    if not 0 <= event < len(main.body):
+        return None
+    found = main.events.events[event]
+    length = main.body[event].event.delta_v.end - found.time_zero
+    windows = sorted({*WINDOWS, length})
+
+    def table(unit: UnitReconstruction) -> pd.DataFrame:
+        return pdof_by_window(unit.acceleration, found.time_zero, windows)
+
+    lines = _lines(units, combined, event, table)
+    lines += _chosen(main, event, length, "the event's own window, 95 %")
+    return Chart(
+        "pdof-by-window",
+        "Direction of force against the length of the window",
+        f"{_SIGN}, from the change of velocity in windows that begin at time zero. The bar: the "
+        "answer, from the whole event, with its 95 % interval.",
+        "length of the window from time zero, ms",
+        (Panel(_LABEL, tuple(lines), steady=_STEADY),),
+        marks=(Mark(1e3 * length, "the whole event"),),
+    )
+
+
+def pdof_by_shift_chart(
+    units: Sequence[UnitReconstruction], combined: UnitReconstruction | None, event: int = 0
+) -> Chart | None:
+    """Chart the direction of force against an error of time zero.
+
+    Parameters
+    ----------
+    units, combined, event
+        As `pdof_by_window_chart`.
+
+    Returns
+    -------
+    Chart or None
+        None where there is no such event.
+    """
+    main = units[0] if combined is None else combined
+    if not 0 <= event < len(main.body):
+        return None
+    whole = main.body[event].event.delta_v
+
+    def table(unit: UnitReconstruction) -> pd.DataFrame:
+        return pdof_by_shift(unit.acceleration, whole.start, whole.end, SHIFTS)
+
+    lines = _lines(units, combined, event, table)
+    lines += _chosen(main, event, 0.0, "time zero as found, 95 %")
+    return Chart(
+        "pdof-by-time-zero",
+        "Direction of force against time zero",
+        f"{_SIGN}, from windows that begin earlier (negative) or later than the time zero that was "
+        "found, and end with the event. The bar: the answer with its 95 % interval.",
+        "shift of time zero, ms",
+        (Panel(_LABEL, tuple(lines), steady=_STEADY),),
+        marks=(Mark(0.0, "as found"),),
+    )
+
+
+def _near(angle_deg: Array, middle_deg: float) -> Array:
+    """Angles within half a turn of another: one at 180 deg is not split."""
+    return middle_deg + np.asarray(within_half_turn(angle_deg - middle_deg))
+
+
+def _lines(
+    units: Sequence[UnitReconstruction],
+    combined: UnitReconstruction | None,
+    event: int,
+    table: Callable[[UnitReconstruction], pd.DataFrame],
+) -> list[Line]:
+    main = units[0] if combined is None else combined
+    middle = main.types[event].direction.horizontal_deg
+    lines = []
+    named: list[tuple[UnitReconstruction, int | None]] = [(u, k) for k, u in enumerate(units)]
+    if combined is not None:
+        named.append((combined, None))
+    for unit, number in named:
+        try:
+            found = table(unit)
+        except DataError:
+            # Its record does not reach over any of the windows.
+            continue
+        look = unit_look(number, len(units) == 1)
+        line = Line(
+            MEAN if number is None else unit.name,
+            1e3 * found.index.to_numpy(dtype=np.float64),
+            _near(found["horizontal_deg"].to_numpy(dtype=np.float64), middle),
+            look["colour"],
+            look["dash"],
+            2.2 if unit is main else 1.3,
+            dots=True,
+            symbol=look["symbol"],
+            size=6.0,
+        )
+        lines.append(line)
+    return lines
+
+
+def _chosen(main: UnitReconstruction, event: int, at: float, name: str) -> list[Line]:
+    whole = main.body[event].event
+    middle = main.types[event].direction.horizontal_deg
+    interval = whole.interval.horizontal
+    x = np.array([1e3 * at])
+    point = Line(
+        name, x, np.array([middle]), BLACK, points=True, symbol="diamond", size=11.0, hollow=True
+    )
+    if interval.undetermined:
+        return [replace(point, name=f"{name}: undetermined")]
+    ends = np.array([interval.low_deg, interval.high_deg])
+    return [Line("bar", np.repeat(x, 2), ends, BLACK, width=2.4, legend=False), point]
+
+
+# The units against each other at the reference point.
+
+
+_AXES = ("forward", "right", "down")
+_CLASS = 60
+_X = "time from the trigger, ms"
+
+
+def differences_chart(comparison: UnitComparison, names: Sequence[str]) -> Chart | None:
+    """Chart how far the change of velocity of each unit is from that of all together.
+
+    Parameters
+    ----------
+    comparison : UnitComparison
+    names : sequence of str
+        Of all units in the order of the report, for their colours.
+
+    Returns
+    -------
+    Chart or None
+        Of the axes that two or more units measure; None where there are none.
+    """
+    edges = 1e3 * comparison.edges
+    panels = []
+    named: set[str] = set()
+    for k, axis in enumerate(_AXES):
+        lines: list[Line] = []
+        fills: list[Fill] = []
+        measured = [one for one in comparison.against if np.isfinite(one.difference[:, k]).any()]
+        for one in measured:
+            look = unit_look(list(names).index(one.name))
+            y, half = one.difference[:, k], TWO_SIDED_95 * one.sd[:, k]
+            made = curve(one.name, edges, y, look["colour"], look["dash"], 1.8)
+            lines.append(replace(made, legend=one.name not in named))
+            named.add(one.name)
+            for edge in (half, -half):
+                made = curve(one.name, edges, edge, look["colour"], "dot", 0.9)
+                lines.append(replace(made, legend=False))
+            fills.append(Fill(one.name, edges, -half, half, look["colour"], 0.05, legend=False))
+        if measured:
+            panels.append(Panel(f"{axis}, m/s", tuple(lines), fills=tuple(fills), height=0.9))
+    if not panels:
+        return None
+    said = "agree within" if comparison.agree else "do NOT agree within"
+    return Chart(
+        "units",
+        "Recorders against each other",
+        "Change of velocity at the reference point by each recorder less that of their best "
+        "weighted mean, vehicle axes, since the first instant shown. Dotted, in its colour: what "
+        "holds 95 % of such a difference, as stated of the recorders; what a recorder shares with "
+        "the mean is taken into account. "
+        f"Together they {said} their bounds (chi-square {comparison.chi_square:.4g} of "
+        f"{comparison.freedom} degrees of freedom, probability {comparison.probability:.2g}).",
+        _X,
+        tuple(panels),
+    )
+
+
+def accelerations_chart(
+    units: Sequence[UnitReconstruction],
+    combined: UnitReconstruction | None,
+    events: Sequence[CrashEvent] = (),
+) -> Chart:
+    """Chart the acceleration of the reference point by every unit, one over the other.
+
+    Parameters
+    ----------
+    units : sequence of UnitReconstruction
+    combined : UnitReconstruction or None
+    events : sequence of CrashEvent
+
+    Returns
+    -------
+    Chart
+        After a low-pass of class CFC 60 where the common rate carries it.
+    """
+    main = units[0] if combined is None else combined
+    span = crash_span(events, main.acceleration.begin, main.acceleration.end)
+    rows: list[list[Line]] = [[], [], []]
+    filtered = False
+    drawn: list[tuple[UnitReconstruction, int | None]] = [(u, k) for k, u in enumerate(units)]
+    if combined is not None:
+        drawn.append((combined, None))
+    for unit, number in drawn:
+        time, values = unit.acceleration.time, unit.acceleration.values / STANDARD_GRAVITY
+        step = float(np.median(np.diff(time)))
+        if step * LEAST_RATE * _CLASS <= 1.0 and not unit.acceleration.gaps(time[0], time[-1]):
+            values, filtered = cfc_filter(values, step, _CLASS), True
+        inside = (time >= span[0]) & (time <= span[1])
+        look = unit_look(number, len(units) == 1)
+        name = MEAN if number is None else unit.name
+        for k in range(3):
+            made = curve(
+                name,
+                1e3 * time[inside],
+                values[inside, k],
+                look["colour"],
+                look["dash"],
+                2.0 if number is None else 1.3,
+            )
+            rows[k].append(replace(made, legend=k == 0))
+    how = f"after a phaseless low-pass of class CFC {_CLASS}" if filtered else "as sampled"
+    return Chart(
+        "accelerations",
+        "Acceleration of the reference point by every recorder",
+        "Along the turning axes of the vehicle, forward, right, down, what was felt at rest taken "
+        f"off, {how}; 1 g = 9.80665 m/s². Shaded: the event.",
+        _X,
+        tuple(Panel(f"{axis}, g", tuple(rows[k]), height=0.9) for k, axis in enumerate(_AXES)),
+        marks=event_marks(events, *span),
+        bands=tuple(Band(1e3 * e.time_zero, 1e3 * e.end, "event") for e in events),
+    )
+
+
+# Risk of injury against the change of velocity, and where this crash is on the curve.
+
+
+_POINTS = 121
+# Where a model tells no range, up to this many times our value.
+_BEYOND = 2.5
+_KMH = 3.6
+
+
+def risk_chart(
+    risks: Sequence[InjuryRisk],
+    delta_v: float,
+    sd: float,
+    inputs: Mapping[str, float | str] | None = None,
+) -> Chart | None:
+    """Chart the models that gave an answer, each within its range.
+
+    Parameters
+    ----------
+    risks : sequence of InjuryRisk
+    delta_v, sd : float, m/s
+        What they were asked with.
+    inputs : mapping, optional
+        Their other inputs.
+
+    Returns
+    -------
+    Chart or None
+        None where no model uses a change of velocity or none gave an answer.
+    """
+    lines: list[Line] = []
+    reach = TWO_SIDED_95 * sd
+    for risk in risks:
+        model = risk.model
+        if "delta_v" not in model.inputs:
+            continue
+        x, y = _curve(model, delta_v, dict(inputs or {}))
+        if not x.size:
+            continue
+        style = look(len(lines) // 3)
+        lines.append(Line(_name(model), x, 100.0 * y, style["colour"], style["dash"], 1.8))
+        at = np.array([_KMH * delta_v])
+        bound = 100.0 * np.array([risk.low, risk.high])
+        upright = np.repeat(at, 2)
+        lines.append(Line("bar", upright, bound, style["colour"], width=2.4, legend=False))
+        lines.append(
+            Line(
+                f"this crash: {_percent(risk.probability)} "
+                f"({_percent(risk.low)} to {_percent(risk.high)})",
+                at,
+                np.array([100.0 * risk.probability]),
+                style["colour"],
+                points=True,
+                symbol=style["symbol"],
+                low=np.array([_KMH * max(delta_v - reach, 0.0)]),
+                high=np.array([_KMH * (delta_v + reach)]),
+                legend=False,
+            )
+        )
+    if not lines:
+        return None
+    return Chart(
+        "severity",
+        "Risk of injury against the change of velocity",
+        "Published logistic models, each drawn within the range that it is valid in; marked: this "
+        "crash with the 95 % bound of its change of velocity and what that makes of the risk. The "
+        "bound has nothing of the model's own uncertainty.",
+        "change of velocity (resultant of the main event), km/h",
+        (Panel("probability, %", tuple(lines)),),
+    )
+
+
+def _curve(
+    model: SeverityModel, delta_v: float, inputs: dict[str, float | str]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Change of velocity in km/h and probability, within the model's range."""
+    factor = SPEEDS.get(model.unit("delta_v"), 1.0)
+    low, high = model.validity.get("delta_v", (0.0, _BEYOND * delta_v / factor))
+    at = np.linspace(low * factor, high * factor, _POINTS)
+    # Rounding may put an end just outside.
+    at[[0, -1]] += np.array([1e-9, -1e-9]) * (at[-1] - at[0])
+    x, y = [], []
+    for value in at.tolist():
+        try:
+            risk = injury_risk(model, {**inputs, "delta_v": value})
+        except StrapdownError:
+            # A logarithm has no value at zero; an input is missing.
+            continue
+        x.append(_KMH * value)
+        y.append(risk.probability)
+    return np.array(x), np.array(y)
+
+
+def _name(model: SeverityModel) -> str:
+    return f"{model.outcome}: {model.author} {model.year}, {model.table}"
+
+
+def _percent(share: float) -> str:
+    value = 100.0 * share
+    return f"{value:.2g} %" if value < 9.95 else f"{value:.0f} %"

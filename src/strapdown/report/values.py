@@ -1,0 +1,400 @@
+"""Numbers of a crash report as a reader sees them: rounded by their bound, with their unit."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.alignment.alignment import Alignment
+from strapdown.constants import DEG_PER_HOUR, MICRO_G, STANDARD_GRAVITY, TWO_SIDED_95
+from strapdown.evaluation.plane_bound import plane_bound
+from strapdown.navigation.record import NavigationRecord, Span
+from strapdown.report.chart import break_jumps
+
+if TYPE_CHECKING:
+    from strapdown.crash.pdof import AngleInterval
+    from strapdown.crash.unit_reconstruction import UnitReconstruction
+    from strapdown.systems.crash_case import CaseResult
+
+__all__ = [
+    "ANY",
+    "GAP",
+    "KMH",
+    "MEAN",
+    "NOT_KNOWN",
+    "StateBlock",
+    "about",
+    "alignment_values_instant",
+    "angle_bound",
+    "angle_range",
+    "at_marks",
+    "axis_names",
+    "blocks_of",
+    "distance_over_ground",
+    "duration_words",
+    "force_words",
+    "half",
+    "heading_shown",
+    "instant",
+    "length_words",
+    "moment",
+    "over_ground",
+    "plain",
+    "rate_words",
+    "recorder",
+    "share_words",
+    "shown_unit",
+    "side_words",
+    "small",
+    "spaced",
+    "speed",
+    "speed_range",
+    "unwrapped",
+    "worst_within",
+]
+
+
+#: m/s in km/h.
+KMH = 3.6
+#: Name of what is combined of all recorders, in every table and chart.
+MEAN = "mean of the recorders"
+MINUS = "\u2212"
+# Between a number, its bound and their unit: they stay in one line.
+GAP = "\u00a0"
+# A bound is told to this many digits, and its value to the same place.
+DIGITS = 2
+
+
+def plain(value: float, places: int) -> str:
+    """Write a number to so many places, with a real minus, and zero without a sign.
+
+    Parameters
+    ----------
+    value : float
+    places : int
+
+    Returns
+    -------
+    str
+        A dash for what is no number.
+    """
+    if not math.isfinite(value):
+        return "–"
+    text = f"{value:.{places}f}"
+    if float(text) == 0.0:
+        text = text.removeprefix("-")
+    return text.replace("-", MINUS)
+
+
+def _places(half: float) -> int:
+    """Places at which a bound has its second digit, at most four."""
+    if not (math.isfinite(half) and half > 0.0):
+        return 2
+    return min(4, max(0, DIGITS - 1 - math.floor(math.log10(half))))
+
+
+def about(value: float, half: float, unit: str) -> str:
+    """Write a value with the half width of its bound.
+
+    Parameters
+    ----------
+    value, half : float
+        In the unit.
+    unit : str
+
+    Returns
+    -------
+    str
+        As ``7.34 ± 0.27 m/s``, with spaces at which no line breaks.
+    """
+    places = _places(half)
+    both = f"{plain(value, places)}{GAP}±{GAP}{plain(half, places)}"
+    return both + (unit if unit == "°" else GAP + unit if unit else "")
+
+
+def speed(value: float, half: float) -> str:
+    """Write a speed in m/s with its bound, in km/h."""
+    return about(KMH * value, KMH * half, "km/h")
+
+
+def speed_range(value: float, half: float) -> str:
+    """Write the bound of a speed in m/s as a range, in km/h and m/s."""
+    places = _places(KMH * half)
+    low, high = KMH * (value - half), KMH * (value + half)
+    ends = f"{plain(low, places)} to {plain(high, places)}{GAP}km/h with 95{GAP}%"
+    return f"{ends}; {about(value, half, 'm/s')}"
+
+
+def instant(time: float) -> str:
+    """Write an instant or a length of time in s, to a tenth of a millisecond."""
+    text = plain(time, 4).rstrip("0").rstrip(".")
+    return f"{'0' if text == MINUS + '0' else text}{GAP}s"
+
+
+def angle_range(interval: AngleInterval) -> str:
+    """Write the bound of a direction."""
+    if interval.undetermined:
+        return "not determined: no direction is excluded with 95 %"
+    return f"{plain(interval.low_deg, 1)}° to {plain(interval.high_deg, 1)}° with 95{GAP}%"
+
+
+def moment(time: float) -> str:
+    """Say when an instant is: ``0.7 ms before the trigger``."""
+    if abs(time) < 5e-5:
+        return "the trigger"
+    return f"{plain(1e3 * abs(time), 1)}{GAP}ms {'before' if time < 0.0 else 'after'} the trigger"
+
+
+def recorder(unit: UnitReconstruction, result: CaseResult) -> str:
+    """Name whose answer it is: a recorder's, or the mean's."""
+    return MEAN if unit is result.reconstruction.combined else unit.name
+
+
+def side_words(forward: float, right: float) -> str:
+    """Say in words which way a change of velocity is, or a displacement: ``backward``."""
+    ahead = "forward" if forward > 0.0 else "backward"
+    aside = "to the right" if right > 0.0 else "to the left"
+    if abs(forward) > 2.5 * abs(right):
+        return ahead
+    if abs(right) > 2.5 * abs(forward):
+        return aside
+    return f"{ahead} and {aside}"
+
+
+def over_ground(result: CaseResult) -> bool:
+    """Whether a heading is known, so that the path is told over ground."""
+    entry = result.spec.entry
+    return entry.kind == "gnss" or bool(entry.heading_deg)
+
+
+def axis_names(result: CaseResult) -> tuple[str, str, str]:
+    """Return the names of the axes of the path."""
+    return ("north", "east", "down") if over_ground(result) else ("forward", "right", "down")
+
+
+def spaced(text: str) -> str:
+    """Return a text with ordinary spaces, for what is searched and not set on a page."""
+    return text.replace(GAP, " ")
+
+
+# Numbers of a run of navigation: how far, how well known, in units that people use.
+
+
+Array = NDArray[np.float64]
+
+_MG = 1e-3 * MICRO_G
+#: A heading that turns by more is drawn within 0 to 360 deg.
+MOST_TURN = 900.0
+
+
+@dataclass(frozen=True)
+class StateBlock:
+    """States of one kind, with the unit that they are shown in.
+
+    Attributes
+    ----------
+    name : str
+        In words: ``gyro bias``, ``rtk: lever arm``.
+    slug : str
+    columns : tuple of str
+        Of the record.
+    labels : tuple of str
+        ``x``, ``y``, ``z``.
+    unit : str
+    factor : float
+        From SI.
+    """
+
+    name: str
+    slug: str
+    columns: tuple[str, ...]
+    labels: tuple[str, ...]
+    unit: str
+    factor: float
+
+
+def blocks_of(record: NavigationRecord) -> tuple[StateBlock, ...]:
+    """Return the blocks of states of sensors and aids, in their order."""
+    groups: dict[str, list[str]] = {}
+    for column in record.sensors.columns:
+        groups.setdefault(str(column).rpartition("_")[0] or str(column), []).append(str(column))
+    out = []
+    for name, columns in groups.items():
+        labels = [c.removeprefix(name).lstrip("_") for c in columns]
+        # What was unknown at first, and what is known now, are both to be read.
+        sizes = [record.sensors[columns].to_numpy(), record.sensors_sd[columns].to_numpy()]
+        size = max((float(np.nanmax(np.abs(v))) for v in sizes if v.size), default=0.0)
+        factor, unit = shown_unit(record.units.get(columns[0], ""), size)
+        aid, dot, own = name.rpartition(".")
+        words = own.replace("_", " ")
+        out.append(
+            StateBlock(
+                f"{aid}: {words}" if dot else words.replace("accel ", "accelerometer "),
+                name.replace("_", "-").replace(".", "-"),
+                tuple(columns),
+                tuple(labels),
+                unit,
+                factor,
+            )
+        )
+    return tuple(out)
+
+
+def shown_unit(unit: str, size: float) -> tuple[float, str]:
+    """Factor and unit in which states of such a size are told."""
+    if unit == "rad/s":
+        slow = size * DEG_PER_HOUR < 1000.0
+        return (DEG_PER_HOUR, "deg/h") if slow else (math.degrees(1.0), "deg/s")
+    if unit == "m/s²":
+        micro = size * MICRO_G < 1000.0
+        return (MICRO_G, "µg") if micro else (_MG, "mg")
+    if unit == "1":
+        return (1e6, "ppm") if size < 1e-2 else (100.0, "%")
+    if unit in ("rad", "rad/g"):
+        return math.degrees(1.0), unit.replace("rad", "deg")
+    if unit == "(rad/s)/(m/s²)":
+        return DEG_PER_HOUR * STANDARD_GRAVITY, "deg/h/g"
+    return 1.0, unit
+
+
+def unwrapped(heading: Array) -> Array:
+    """Headings in deg without jumps, the first of them within 0 to 360."""
+    if not heading.size:
+        return heading
+    whole = np.unwrap(heading, period=360.0)
+    return np.asarray(whole - 360.0 * np.floor(whole[0] / 360.0))
+
+
+def heading_shown(record: NavigationRecord) -> tuple[Array, Array, str]:
+    """Heading over the trajectory and at the marks, deg, as it is drawn, and what to say of it.
+
+    It goes on over north, unless it turns so often that nothing could be read; then NaN breaks it
+    there.
+    """
+    time = record.trajectory.index.to_numpy(dtype=np.float64)
+    values = unwrapped(record.trajectory["heading"].to_numpy(dtype=np.float64))
+    marks = np.interp(record.sd.index.to_numpy(dtype=np.float64), time, values)
+    if np.ptp(values) <= MOST_TURN:
+        return values, marks, "The heading goes on over north, so that no turn breaks it."
+    return (
+        break_jumps(values % 360.0),
+        break_jumps(marks % 360.0),
+        f"The heading turns by {plain(float(np.ptp(values)) / 360.0, 1)} full turns in all.",
+    )
+
+
+def at_marks(record: NavigationRecord, column: str) -> Array:
+    """A column of the trajectory, but for the heading, at the marks of the covariance."""
+    time = record.trajectory.index.to_numpy(dtype=np.float64)
+    values = record.trajectory[column].to_numpy(dtype=np.float64)
+    return np.asarray(np.interp(record.sd.index.to_numpy(dtype=np.float64), time, values))
+
+
+def worst_within(record: NavigationRecord, span: Span) -> tuple[float, float] | None:
+    """The largest horizontal bound in m of a span, and its time; None without a mark in it."""
+    time = record.sd.index.to_numpy(dtype=np.float64)
+    rows = np.flatnonzero((time >= span.begin) & (time <= span.end))
+    if not rows.size:
+        return None
+    bounds = plane_bound(record.covariance)[rows]
+    k = int(np.argmax(bounds))
+    return float(bounds[k]), float(time[rows[k]])
+
+
+def distance_over_ground(trajectory: pd.DataFrame) -> float:
+    """Way over the ground, m: the horizontal speed summed over time by the trapezoid rule."""
+    time = trajectory.index.to_numpy(dtype=np.float64)
+    speed = np.hypot(*(trajectory[c].to_numpy(dtype=np.float64) for c in ("VN", "VE")))
+    return float(np.trapezoid(speed, time))
+
+
+def length_words(metres: float) -> str:
+    """A length: ``0.021 m``, ``13.4 m``, ``388 m``, ``2.41 km``."""
+    size = abs(metres)
+    if not math.isfinite(size):
+        return "–"
+    if size >= 1e5:
+        return f"{plain(1e-3 * metres, 0)}{GAP}km"
+    if size >= 1000.0:
+        return f"{plain(1e-3 * metres, 2 if size < 1e4 else 1)}{GAP}km"
+    places = 0 if size >= 99.95 else 1 if size >= 10.0 else 2 if size >= 1.0 else 3
+    return f"{plain(metres, places)}{GAP}m"
+
+
+def duration_words(seconds: float) -> str:
+    """A length of time: ``221 s``, ``30 min 5 s``, ``1 h 12 min``."""
+    if seconds < 10.0:
+        return f"{plain(seconds, 2)}{GAP}s"
+    whole = round(seconds)
+    if whole < 600:
+        return f"{plain(seconds, 1)}{GAP}s" if whole < 100 else f"{whole}{GAP}s"
+    if whole < 7200:
+        rest = f" {whole % 60}{GAP}s" if whole % 60 else ""
+        return f"{whole // 60}{GAP}min{rest}"
+    rest = f" {whole % 3600 // 60}{GAP}min" if whole % 3600 // 60 else ""
+    return f"{whole // 3600}{GAP}h{rest}"
+
+
+def half(sd: float) -> float:
+    """Half width of the interval of 95 %."""
+    return TWO_SIDED_95 * float(sd)
+
+
+def share_words(share: float) -> str:
+    """A share: ``97.4 %``; never rounded to all or to nothing."""
+    if not math.isfinite(share):
+        return "–"
+    places = 0 if share in (0.0, 1.0) else 1
+    value = 100.0 * share if share in (0.0, 1.0) else min(99.9, max(0.1, 100.0 * share))
+    return f"{plain(value, places)}{GAP}%"
+
+
+# Numbers of an alignment as a reader sees them.
+
+
+#: Bounds of roll, pitch and heading, in deg, that leave no angle out.
+ANY = (180.0, 90.0, 180.0)
+NOT_KNOWN = "not known"
+
+
+def angle_bound(alignment: Alignment, which: int) -> str:
+    """An angle with its bound: ``90.60° ± 0.12°``; in words where it may be any."""
+    value = float(alignment.roll_pitch_heading[which])
+    half = TWO_SIDED_95 * float(alignment.sd_deg[which])
+    if not half < ANY[which]:
+        return NOT_KNOWN
+    if which == 2:
+        value %= 360.0
+    return about(value, half, "°")
+
+
+def alignment_values_instant(time: float) -> str:
+    """Say a stamp to a hundredth of a second: ``243298.01 s``."""
+    return f"{plain(time, 2).rstrip('0').rstrip('.')}{GAP}s"
+
+
+def rate_words(rate: float) -> str:
+    """A rate in rad/s in deg/h, or in deg/s where that is a large number."""
+    if rate * DEG_PER_HOUR < 3600.0:
+        return f"{small(rate * DEG_PER_HOUR)} deg/h"
+    return f"{small(math.degrees(rate))} deg/s"
+
+
+def force_words(force: float) -> str:
+    """A specific force in m/s² in µg, or in mg where that is a large number."""
+    micro = force * MICRO_G
+    return f"{micro:.3g} µg" if micro < 1e4 else f"{1e-3 * micro:.3g} mg"
+
+
+def small(value: float) -> str:
+    """Two digits of a small number."""
+    size = abs(value)
+    if not math.isfinite(size):
+        return "–"
+    places = 2 if size == 0 else min(5, max(1, 1 - math.floor(math.log10(size))))
+    return plain(value, places)

@@ -1,0 +1,458 @@
+"""Barometer tables: heights of a sensor by the pressure of the air."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown.errors import ConfigError, DataError
+from strapdown.tables.checks import (
+    as_array,
+    check_rows,
+    check_same_length,
+    check_time,
+    checked_values,
+    each_row,
+    is_number,
+    joined,
+    source_of,
+    values_of,
+)
+
+Array = NDArray[np.float64]
+
+BAROMETER = ["height", "height_sd"]
+
+# US Standard Atmosphere (1976), up to 11 km that of ISO 2533: at the height of the sea 288.15 K and
+# 1013.25 hPa, 6.5 K less a km of geopotential height; the gas constant of air, the gravity of that
+# height, the radius by which geopotential height is made of height.
+TEMPERATURE, PRESSURE, LAPSE = 288.15, 101325.0, 0.0065
+GAS, GRAVITY, RADIUS = 287.05287, 9.80665, 6_356_766.0
+EXPONENT = GAS * LAPSE / GRAVITY
+# Of that layer, m, and the pressure at its top, Pa.
+TOP, LEAST_PRESSURE = 11_000.0, 22_632.0
+# No pressure of open air is higher: 1085 hPa was measured; and mines and tanks beside.
+MOST_PRESSURE = 120_000.0
+# Heights of a barometer are within, m.
+LOWEST, HIGHEST = -2_000.0, 50_000.0
+
+
+def standard_height(pressure_pa: ArrayLike) -> Array:
+    """Return the height at which the standard atmosphere has a pressure.
+
+    Parameters
+    ----------
+    pressure_pa : array_like, (n,), Pa
+        22 632 (at 11 km of geopotential height) to 120 000.
+
+    Returns
+    -------
+    ndarray, (n,), m
+        Geometric, over the sea. ``H = T0 / L (1 - (p / p0)^(R L / g))``, ``h = r H / (r - H)``:
+        US Standard Atmosphere (1976), Eqs. (33a), (19).
+    """
+    ratio = np.asarray(pressure_pa, dtype=np.float64) / PRESSURE
+    geopotential = TEMPERATURE / LAPSE * (1.0 - ratio**EXPONENT)
+    return np.asarray(RADIUS * geopotential / (RADIUS - geopotential))
+
+
+def standard_slope(pressure_pa: ArrayLike) -> Array:
+    """Return how that height falls with pressure, (n,), m/Pa; negative."""
+    p = np.asarray(pressure_pa, dtype=np.float64)
+    geopotential = TEMPERATURE / LAPSE * (1.0 - (p / PRESSURE) ** EXPONENT)
+    slope = -(TEMPERATURE - LAPSE * geopotential) * GAS / (GRAVITY * p)
+    return np.asarray(slope * (RADIUS / (RADIUS - geopotential)) ** 2)
+
+
+def barometer_table(
+    time: ArrayLike, height: ArrayLike, height_sd: ArrayLike, source: str | None = None
+) -> pd.DataFrame:
+    """Make a Barometer table.
+
+    Parameters
+    ----------
+    time : array_like, (n,), s
+        On the clock of the inertial sensors.
+    height : array_like, (n,), m
+        Upward; over anything that stays the same, as the sea or the place of the start.
+    height_sd : array_like, (n,) or float, m
+        Of the noise of each; infinite where nothing was measured.
+    source : str, optional
+        Name for messages.
+
+    Returns
+    -------
+    DataFrame
+
+    Raises
+    ------
+    DataError
+        Shapes disagree, or as `check_barometer`.
+    """
+    blocks = {"height": (height, None), "height_sd": (each_row(height_sd, time), None)}
+    table = joined(time, BAROMETER, source, **blocks)
+    check_barometer(table)
+    return table
+
+
+def barometer_from_pressure(
+    time: ArrayLike, pressure_pa: ArrayLike, pressure_sd_pa: ArrayLike, source: str | None = None
+) -> pd.DataFrame:
+    """Make a Barometer table of pressures, by the standard atmosphere.
+
+    Parameters
+    ----------
+    time : array_like, (n,), s
+    pressure_pa : array_like, (n,), Pa
+        Static; 22 632 to 120 000.
+    pressure_sd_pa : array_like, (n,) or float, Pa
+    source : str, optional
+        Name for messages.
+
+    Returns
+    -------
+    DataFrame
+
+    Raises
+    ------
+    DataError
+        A pressure is not that of open air below 11 km; what is in hPa or kPa is told so.
+    """
+    p = as_array(pressure_pa, None, "pressure_pa", source)
+    check_rows(p[:, None], ["pressure_pa"], source)
+    wrong = np.flatnonzero((p < LEAST_PRESSURE) | (p > MOST_PRESSURE))
+    if wrong.size:
+        row = int(wrong[0])
+        middle = float(np.median(p))
+        code = "tables.pressure-of-no-air"
+        for other, factor in (("tables.pressure-in-hpa", 100.0), ("tables.pressure-in-kpa", 1e3)):
+            if LEAST_PRESSURE <= factor * middle <= MOST_PRESSURE:
+                code = other
+                break
+        raise DataError(
+            code,
+            file=source,
+            row=row + 1,
+            quantity="pressure_pa",
+            pressure=p[row],
+        )
+    spread = as_array(each_row(pressure_sd_pa, p), None, "pressure_sd_pa", source)
+    return barometer_table(time, standard_height(p), -standard_slope(p) * spread, source)
+
+
+def check_barometer(table: pd.DataFrame) -> None:
+    """Check a Barometer table.
+
+    Parameters
+    ----------
+    table : DataFrame
+
+    Raises
+    ------
+    DataError
+        A column is missing, a value is not finite, time does not advance, a standard deviation is
+        not above zero, or a height is none.
+    """
+    height = checked_values(table, ["height"], ["height_sd"])[:, 0]
+    beyond = np.flatnonzero((height < LOWEST) | (height > HIGHEST))
+    if beyond.size:
+        row = int(beyond[0])
+        raise DataError(
+            "tables.no-height-barometer"
+            if height[row] > HIGHEST
+            else "tables.no-height-barometer-2",
+            file=source_of(table),
+            row=row + 1,
+            quantity="height",
+            height=height[row],
+        )
+
+
+# BodyVelocity tables: a velocity measured along the axes of an instrument, as by Doppler.
+
+
+BODY_VELOCITY = ["vx", "vy", "vz", "vx_sd", "vy_sd", "vz_sd"]
+
+# What measures its velocity by Doppler or a camera is slower, m/s.
+FASTEST = 400.0
+
+
+def body_velocity_table(
+    time: ArrayLike, velocity: ArrayLike, velocity_sd: ArrayLike, source: str | None = None
+) -> pd.DataFrame:
+    """Make a BodyVelocity table.
+
+    Parameters
+    ----------
+    time : array_like, (n,), s
+        On the clock of the inertial sensors.
+    velocity : array_like, (n, 3), m/s
+        Relative to the Earth, along the instrument's forward, right, down.
+    velocity_sd : array_like, (n, 3) or (3,), m/s
+        Infinite where an axis was not measured.
+    source : str, optional
+        Name for messages.
+
+    Returns
+    -------
+    DataFrame
+
+    Raises
+    ------
+    DataError
+        Shapes disagree, or as `check_body_velocity`.
+    """
+    blocks = {"velocity": (velocity, 3), "velocity_sd": (each_row(velocity_sd, time, 3), 3)}
+    table = joined(time, BODY_VELOCITY, source, **blocks)
+    check_body_velocity(table)
+    return table
+
+
+def check_body_velocity(table: pd.DataFrame) -> None:
+    """Check a BodyVelocity table.
+
+    Parameters
+    ----------
+    table : DataFrame
+
+    Raises
+    ------
+    DataError
+        A column is missing, a value is not finite, time does not advance, a standard deviation is
+        not above zero, or a velocity is beyond 400 m/s.
+    """
+    velocity = checked_values(table, BODY_VELOCITY[:3], BODY_VELOCITY[3:])
+    beyond = np.argwhere(np.abs(velocity) > FASTEST)
+    if len(beyond):
+        row, column = (int(i) for i in beyond[0])
+        raise DataError(
+            "tables.faster-than-such-instrument-measures",
+            file=source_of(table),
+            row=row + 1,
+            quantity=BODY_VELOCITY[column],
+            velocity=velocity[row, column],
+        )
+
+
+# Heading tables: where a compass or the baseline of two antennas points.
+
+
+HEADING = ["heading", "heading_sd"]
+
+TURN = 2.0 * math.pi
+# Part of a full turn in rad that a record fills, and that two rows leap, where it is in rad.
+FILLED, LEAPT = 0.97, 0.9
+# A standard deviation of a heading is below, deg: an even distribution has 104.
+MOST_SD = 110.0
+
+
+def heading_table(
+    time: ArrayLike, heading: ArrayLike, heading_sd: ArrayLike, source: str | None = None
+) -> pd.DataFrame:
+    """Make a Heading table.
+
+    Parameters
+    ----------
+    time : array_like, (n,), s
+        On the clock of the inertial sensors.
+    heading : array_like, (n,), deg
+        Clockwise from north, -360 to 360.
+    heading_sd : array_like, (n,) or float, deg
+        Of the noise of each; infinite where nothing was measured.
+    source : str, optional
+        Name for messages.
+
+    Returns
+    -------
+    DataFrame
+
+    Raises
+    ------
+    DataError
+        Shapes disagree, or as `check_heading`.
+    """
+    blocks = {"heading": (heading, None), "heading_sd": (each_row(heading_sd, time), None)}
+    table = joined(time, HEADING, source, **blocks)
+    check_heading(table)
+    return table
+
+
+def check_heading(table: pd.DataFrame) -> None:
+    """Check a Heading table.
+
+    Parameters
+    ----------
+    table : DataFrame
+
+    Raises
+    ------
+    DataError
+        A column is missing, a value is not finite, time does not advance, a standard deviation is
+        not above zero or finite beyond 110 deg, a heading is beyond a turn, or all are within a
+        turn in rad, and leap by one.
+    """
+    heading = checked_values(table, ["heading"], ["heading_sd"])[:, 0]
+    sd = values_of(table, ["heading_sd"])[:, 0]
+    source = source_of(table)
+    beyond = np.flatnonzero(np.abs(heading) > 360.0)
+    if beyond.size:
+        row = int(beyond[0])
+        raise DataError(
+            "tables.heading-more-than-turn",
+            file=source,
+            row=row + 1,
+            quantity="heading",
+            heading=heading[row],
+        )
+    wide = np.flatnonzero(np.isfinite(sd) & (sd > MOST_SD))
+    if wide.size:
+        row = int(wide[0])
+        raise DataError(
+            "tables.standard-deviation-says-nothing-heading",
+            file=source,
+            row=row + 1,
+            quantity="heading_sd",
+            sd=sd[row],
+        )
+    leaps = np.abs(np.diff(heading))
+    in_radians = np.ptp(heading) <= 1.001 * TURN if len(heading) else False
+    if in_radians and np.ptp(heading) > FILLED * TURN and leaps.max() > LEAPT * TURN:
+        row = int(np.argmax(leaps)) + 1
+        raise DataError(
+            "tables.all-headings-within-leap-radians",
+            file=source,
+            row=row + 1,
+            quantity="heading",
+            heading=heading.min(),
+            heading_2=heading.max(),
+            heading_3=heading[row - 1],
+            heading_4=heading[row],
+        )
+
+
+# Odometer tables: how fast a wheel rolls.
+
+
+ODOMETER = ["speed", "speed_sd"]
+
+# No wheel of a road vehicle or train rolls faster, m/s: what does is in km/h.
+ODOMETER_FASTEST = 100.0
+
+
+def odometer_table(
+    time: ArrayLike, speed: ArrayLike, speed_sd: ArrayLike, source: str | None = None
+) -> pd.DataFrame:
+    """Make an Odometer table.
+
+    Parameters
+    ----------
+    time : array_like, (n,), s
+        On the clock of the inertial sensors.
+    speed : array_like, (n,), m/s
+        Along the wheel, forward positive.
+    speed_sd : array_like, (n,) or float, m/s
+        Of the noise of each, without the scale factor; infinite where nothing was measured.
+    source : str, optional
+        Name for messages.
+
+    Returns
+    -------
+    DataFrame
+
+    Raises
+    ------
+    DataError
+        Shapes disagree, or as `check_odometer`.
+    """
+    blocks = {"speed": (speed, None), "speed_sd": (each_row(speed_sd, time), None)}
+    table = joined(time, ODOMETER, source, **blocks)
+    check_odometer(table)
+    return table
+
+
+def odometer_from_distance(
+    time: ArrayLike, distance: ArrayLike, quantum: float, source: str | None = None
+) -> pd.DataFrame:
+    """Make an Odometer table of a counter.
+
+    Between two rows the wheel has rolled at a mean speed, which is that of the middle of the step
+    but for ``dt² / 24`` times the derivative of its acceleration. Two counts are each wrong by up
+    to half a `quantum`, evenly: the speed by ``quantum / (√6 dt)``; what one step has too much, the
+    next has not, so that to take them for independent is to believe them too little.
+
+    Parameters
+    ----------
+    time : array_like, (n,), s
+    distance : array_like, (n,), m
+        Since any instant; backwards it falls.
+    quantum : float, m
+        Of one count: circumference over pulses a turn.
+    source : str, optional
+        Name for messages.
+
+    Returns
+    -------
+    DataFrame
+        Of the n - 1 middles.
+
+    Raises
+    ------
+    ConfigError
+        The quantum is no length.
+    DataError
+        Shapes disagree; time does not advance; a counter was set back, or overflowed; or as
+        `check_odometer`.
+    """
+    if not is_number(quantum) or not 0.0 < quantum < math.inf:
+        raise ConfigError("tables.no-length-count", quantity="quantum", quantum=quantum)
+    stamps, way = as_array(time, None, "time", source), as_array(distance, None, "distance", source)
+    check_same_length(source, time=stamps, distance=way)
+    check_time(stamps, source)
+    check_rows(way[:, None], ["distance"], source)
+    dt = np.diff(stamps)
+    speed = np.diff(way) / dt
+    wild = np.flatnonzero(np.abs(speed) > ODOMETER_FASTEST)
+    if wild.size == 1 and len(speed) > 1:
+        row = int(wild[0]) + 1
+        raise DataError(
+            "tables.counter-set-back-or-overflowed",
+            file=source,
+            row=row + 1,
+            quantity="distance",
+            way=way[row - 1],
+            way_2=way[row],
+            dt=dt[row - 1],
+        )
+    sd = quantum / (math.sqrt(6.0) * dt)
+    return odometer_table(0.5 * (stamps[1:] + stamps[:-1]), speed, sd, source)
+
+
+def check_odometer(table: pd.DataFrame) -> None:
+    """Check an Odometer table.
+
+    Parameters
+    ----------
+    table : DataFrame
+
+    Raises
+    ------
+    DataError
+        A column is missing, a value is not finite, time does not advance, a standard deviation is
+        not above zero, or a speed is beyond 100 m/s.
+    """
+    speed = checked_values(table, ["speed"], ["speed_sd"])[:, 0]
+    beyond = np.flatnonzero(np.abs(speed) > ODOMETER_FASTEST)
+    if beyond.size:
+        row = int(beyond[0])
+        raise DataError(
+            "tables.faster-than-wheel-rolls"
+            if np.abs(speed).max() < 3.6 * ODOMETER_FASTEST
+            else "tables.faster-than-wheel-rolls-2",
+            file=source_of(table),
+            row=row + 1,
+            quantity="speed",
+            speed=speed[row],
+        )
