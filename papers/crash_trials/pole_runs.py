@@ -29,8 +29,7 @@ from strapdown.errors import DataError
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown, run_mechanization
 from strapdown.nav_state import NavState
-from strapdown.sensors import TriadUncertainty, child, draw_errors
-from strapdown.sensors import uncertainty as crash_priors
+from strapdown.sensors import TriadUncertainty, child, crash_priors, draw_errors
 from strapdown.simulation import (
     CRASHES,
     CrashScenario,

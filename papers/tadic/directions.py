@@ -31,9 +31,7 @@ from strapdown.crash import (
     pdof,
     resolved_delta_v_bound,
     trailing_delta_v,
-)
-from strapdown.crash import (
-    delta_v_bound as velocity_change,
+    velocity_change,
 )
 
 Array = NDArray[np.float64]

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from strapdown import __version__
-from strapdown.report import crash_tables as checks
-from strapdown.report import crash_tables as sources
-from strapdown.report import crash_tables as tables
+from strapdown.report import crash_tables
 from strapdown.report.chart import Chart
 from strapdown.report.crash_figures import CrashFigures
 from strapdown.report.crash_limits import (
@@ -71,14 +69,14 @@ def crash_document(result: CaseResult, figures: CrashFigures, name: str) -> Docu
         Section(
             "delta-v",
             "Delta-V",
-            _blocks(_if_any(tables.answers_table(result)), *_charts(*figures.delta_v))
+            _blocks(_if_any(crash_tables.answers_table(result)), *_charts(*figures.delta_v))
             or (Paragraph(headline(result)),),
         ),
         Section(
             "direction",
             "Direction of force",
             _blocks(
-                _if_any(tables.direction_table(result)),
+                _if_any(crash_tables.direction_table(result)),
                 *_charts(figures.pdof_by_window, figures.pdof_by_time_zero),
             )
             or (Paragraph("Without an event there is no direction of force to tell."),),
@@ -87,7 +85,7 @@ def crash_document(result: CaseResult, figures: CrashFigures, name: str) -> Docu
             "path",
             "Path",
             _blocks(
-                tables.path_table(result),
+                crash_tables.path_table(result),
                 figures.path,
                 figures.motion,
                 *_charts(figures.place, figures.velocity, figures.attitude),
@@ -103,7 +101,7 @@ def crash_document(result: CaseResult, figures: CrashFigures, name: str) -> Docu
                     "computation, and those of one kind are added up here."
                 ),
                 *_charts(figures.delta_v_budget, figures.place_budget),
-                tables.budget_table(result),
+                crash_tables.budget_table(result),
             ),
         ),
         Section("severity", "Severity", _severity(result, figures)),
@@ -120,7 +118,7 @@ def crash_document(result: CaseResult, figures: CrashFigures, name: str) -> Docu
         Section(
             "sensors",
             "Sensors",
-            _blocks(sources.units_table(result), sources.sensors_table(result)),
+            _blocks(crash_tables.units_table(result), crash_tables.sensors_table(result)),
         ),
         Section("conventions", "Conventions", _blocks(figures.conventions, Facts(CONVENTIONS))),
         Section("limitations", "Limitations", _limitations(result)),
@@ -187,11 +185,11 @@ def _case(result: CaseResult) -> tuple[Block, ...]:
         rows = record_facts(record)
         if rows:
             facts += [Paragraph(f"What {record.path.name} says of itself:"), Facts(rows)]
-    return _blocks(*described, sources.records_table(result), *facts)
+    return _blocks(*described, crash_tables.records_table(result), *facts)
 
 
 def _agreement(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:
-    table = checks.comparison_table(result)
+    table = crash_tables.comparison_table(result)
     if table is None:
         return (Paragraph("There is one recorder, and nothing to hold it against."),)
     comparison = result.reconstruction.comparison
@@ -207,7 +205,7 @@ def _agreement(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:
 
 
 def _severity(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:
-    table = checks.severity_table(result)
+    table = crash_tables.severity_table(result)
     if table is None:
         return (Paragraph("Without an event there is no severity to tell."),)
     notes = dict.fromkeys(a.model.note for a in result.severity if a.model.note)
@@ -215,7 +213,7 @@ def _severity(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:
 
 
 def _references(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:
-    tables = checks.reference_tables(result)
+    tables = crash_tables.reference_tables(result)
     if not tables:
         return (Paragraph("No reference was given."),)
     sources = tuple((r.name, r.source) for r in result.spec.references if r.source)
@@ -250,5 +248,5 @@ def _verify(result: CaseResult, name: str) -> tuple[Block, ...]:
     return (
         Items(how_to_verify()),
         Paragraph(f"strapdown verify {name}", "mono"),
-        sources.inputs_table(result),
+        crash_tables.inputs_table(result),
     )

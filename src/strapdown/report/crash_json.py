@@ -25,7 +25,6 @@ from strapdown.errors import Finding
 from strapdown.formats import csv
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.report import crash_limits, crash_words
-from strapdown.report import crash_limits as crash_assumptions
 from strapdown.report.values import spaced
 from strapdown.systems.crash_case import CaseResult, ReferenceAnswer, SeverityAnswer, main_event
 from strapdown.tables import ACCEL, EULER, GYRO, NED, VELOCITY
@@ -54,14 +53,14 @@ def crash_json(result: CaseResult) -> dict[str, Any]:
         "strapdown": __version__,
         "title": result.spec.title,
         "number": result.spec.number,
-        "conventions": dict(crash_assumptions.CONVENTIONS),
+        "conventions": dict(crash_limits.CONVENTIONS),
         "headline": spaced(crash_words.headline(result)),
         "main": made.main.name,
         "answers": [_unit(unit) for unit in made.answers],
         "comparison": None if made.comparison is None else _comparison(made.comparison),
         "severity": [_severity(s) for s in result.severity],
         "references": [_reference(r) for r in result.references],
-        "assumptions": _pairs(crash_assumptions.assumptions(result)),
+        "assumptions": _pairs(crash_limits.assumptions(result)),
         "limitations": _pairs(crash_limits.limitations(result)),
         "findings": [_finding(f) for f in result.findings],
         "case": _named(result.spec.model_dump(mode="json", exclude_none=True)),
