@@ -16,7 +16,7 @@ from strapdown.config.navigation_file import navigation_spec
 from strapdown.config.navigation_modules import given_of, sensors_of
 from strapdown.navigation.navigator import with_states
 from strapdown.systems.progress import silent
-from strapdown.systems.sins.chain import Chain
+from strapdown.systems.sins.chain import NavigationPipeline
 from strapdown.systems.sins.drive import run_batch
 from strapdown.systems.sins.run import make_chain
 from strapdown.systems.sins.source import NavigationSource, read_navigation_source
@@ -38,14 +38,14 @@ class Case:
     heading_error: float
     imu: Callable[[pd.DataFrame], pd.DataFrame] = lambda imu: imu
     tables: Callable[[dict[str, pd.DataFrame]], dict[str, pd.DataFrame]] = lambda t: t
-    chain: Callable[[Chain], Chain] = lambda c: c
+    chain: Callable[[NavigationPipeline], NavigationPipeline] = lambda c: c
     truth_turned: float = 0.0
     extra: Callable[[pd.DataFrame], dict[str, pd.DataFrame]] = lambda truth: {}
     aligns: bool = False
 
 
-def with_aid(aid: Heading) -> Callable[[Chain], Chain]:
-    def added(chain: Chain) -> Chain:
+def with_aid(aid: Heading) -> Callable[[NavigationPipeline], NavigationPipeline]:
+    def added(chain: NavigationPipeline) -> NavigationPipeline:
         navigator = chain.navigator
         aids = (*navigator.aids, aid)
         return replace(

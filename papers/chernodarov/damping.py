@@ -49,7 +49,7 @@ from strapdown.estimation import (
     gyro_scale,
 )
 from strapdown.increments import motion_increments
-from strapdown.navigation import Feedforward, Navigator
+from strapdown.navigation import Navigator, OpenLoop
 from strapdown.simulation import Origin, PathMotion, Track, simulate_imu
 
 Array = NDArray[np.float64]
@@ -267,7 +267,7 @@ def units(count: int = COUNT) -> Units:
 def fed_forward(fine: FineResult, increments: pd.DataFrame) -> Array:
     """Return the velocity north and east with estimates taken off what is shown, (n, 2), m/s."""
     used = autonomous_filter(fine)
-    navigator = Navigator(used, damping=Feedforward())
+    navigator = Navigator(used, damping=OpenLoop())
     ends, rows = after(increments, fine.state.time)
     _, piece = navigator.advance(navigator.begin_from(fine.state), ends, rows)
     path = used.mechanization.trajectory(piece.time, piece.history)

@@ -25,7 +25,13 @@ from strapdown.estimation import (
     UpdateRule,
 )
 from strapdown.increments import motion_increments
-from strapdown.navigation import Damping, Feedback, LostCovarianceError, NavigationPiece, Navigator
+from strapdown.navigation import (
+    ClosedLoop,
+    Correction,
+    LostCovarianceError,
+    NavigationChunk,
+    Navigator,
+)
 from strapdown.simulation import (
     Accelerate,
     GnssReceiver,
@@ -203,7 +209,7 @@ class Drive:
         fixes: pd.DataFrame | None,
         model: type[ErrorModel] = QuaternionModel,
         damped: bool = True,
-        damping: Damping | None = None,
+        damping: Correction | None = None,
     ) -> Driven:
         """Drive.
 
@@ -227,12 +233,12 @@ class Drive:
         begun = fine.state
         if not damped:
             begun = replace(begun, sensors=np.zeros_like(begun.sensors))
-        navigator = Navigator(filter_, (Gnss(name="gnss"),), damping=damping or Feedback())
+        navigator = Navigator(filter_, (Gnss(name="gnss"),), damping=damping or ClosedLoop())
         state = navigator.begin_from(begun)
         if fixes is not None:
             state = navigator.tell(state, "gnss", fixes)
         ends, rows = after(self.increments, begun.time)
-        pieces: list[NavigationPiece] = []
+        pieces: list[NavigationChunk] = []
         lost, least = "", np.inf
         for k in range(0, len(ends), PIECE):
             try:

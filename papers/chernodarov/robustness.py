@@ -32,7 +32,7 @@ from papers.reproduction import (
     amount,
 )
 from strapdown.estimation import RotationVectorModel
-from strapdown.navigation import Feedforward
+from strapdown.navigation import OpenLoop
 
 #: Runs: receiver, what it tells, and how it is taken.
 COARSE = "3 m"
@@ -93,7 +93,7 @@ def runs(drive: Drive) -> Runs:
     receiver, fixes, rule = ALSO
     told = drive.fixes(fixes, receivers[receiver])
     other = drive.navigate(RULES[rule], told, RotationVectorModel)
-    forward = drive.navigate(RULES[rule], told, damping=Feedforward())
+    forward = drive.navigate(RULES[rule], told, damping=OpenLoop())
     return Runs(drive, found, other, forward)
 
 

@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from aid_views import SITUATIONS, Moment, difference_columns, moment_of, view_of
 from aided_drives import drive, gnss_of, increments_of, navigator_of, run
 from strapdown import rotation
-from strapdown.aiding.aid import Aid, TableAid, WatchingAid
+from strapdown.aiding.aid import ImuDerivedMeasurement, Measurement, TabulatedMeasurement
 from strapdown.aiding.aids import AIDS
 from strapdown.aiding.barometer import Barometer
 from strapdown.aiding.gnss import Gnss
@@ -60,8 +60,8 @@ class Case:
         Where all that it assumes is true.
     """
 
-    aid: Aid
-    values: Callable[[Aid, Moment], np.ndarray]
+    aid: Measurement
+    values: Callable[[Measurement, Moment], np.ndarray]
     situations: tuple[str, ...] = tuple(SITUATIONS)
 
 
@@ -163,7 +163,7 @@ def test_it_says_what_it_is(kind):
     assert type(aid) is AIDS[kind]
     assert aid.kind == kind
     assert aid.summary and aid.source
-    assert isinstance(aid, TableAid | WatchingAid)
+    assert isinstance(aid, TabulatedMeasurement | ImuDerivedMeasurement)
     assert all(s.block.name.startswith(f"{aid.name}.") for s in aid.states())
 
 
@@ -203,7 +203,7 @@ def test_every_column_is_how_an_error_changes_the_difference(kind, mechanization
 
 # --- watching in pieces ------------------------------------------------------------------
 
-WATCHING = [kind for kind in CASE_NAMES if isinstance(CASES[kind].aid, WatchingAid)]
+WATCHING = [kind for kind in CASE_NAMES if isinstance(CASES[kind].aid, ImuDerivedMeasurement)]
 
 
 @pytest.mark.parametrize("kind", WATCHING)

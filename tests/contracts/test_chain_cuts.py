@@ -22,7 +22,7 @@ from tests.town_drive import (
     motion,
 )
 
-from strapdown.aiding.aid import WatchingAid
+from strapdown.aiding.aid import ImuDerivedMeasurement
 from strapdown.aiding.aids import AIDS
 from strapdown.aiding.gnss import Gnss
 from strapdown.alignment.alignment import Site
@@ -43,9 +43,9 @@ from strapdown.prefilter import PREFILTERS
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
 from strapdown.simulation import Origin, StationaryMotion, simulate_imu
-from strapdown.systems.sins.chain import Chain
+from strapdown.systems.sins.chain import NavigationPipeline
 from strapdown.systems.sins.drive import Recording, run_batch, run_by_sample
-from strapdown.systems.sins.intake import GapPolicy, Intake
+from strapdown.systems.sins.intake import GapPolicy, ImuPreprocessor
 from strapdown.systems.sins.modes import (
     CoarseMode,
     Command,
@@ -125,7 +125,7 @@ def driving(navigator, **more):
         heading_deg=truth["heading"],
     )
     known = KnownStart(start, (1.0,) * 3, (0.1,) * 3, (0.3, 0.3, 1.5))
-    return Chain(navigator, start=known, **more)
+    return NavigationPipeline(navigator, start=known, **more)
 
 
 def in_random_pieces(chain, imu, told, recorder, seed):
@@ -210,13 +210,13 @@ def test_dampings(damping):
 @pytest.mark.parametrize("kind", AIDS)
 def test_aids(kind):
     aid = AIDS[kind](name="it")
-    if isinstance(aid, WatchingAid):
+    if isinstance(aid, ImuDerivedMeasurement):
         if kind == "no_slip":
             assert_cuts(driving(navigation(aids=(aid,))), drive(), {})
         else:
             still = NavState.from_degrees(*HERE, roll_deg=2.0, heading_deg=30.0)
             known = KnownStart(still, (1.0,) * 3, (0.01,) * 3, (0.1, 0.1, 1.0))
-            assert_cuts(Chain(navigation(aids=(aid,)), start=known), rest(), {})
+            assert_cuts(NavigationPipeline(navigation(aids=(aid,)), start=known), rest(), {})
     else:
         assert_cuts(driving(navigation(aids=(aid,))), drive(), {"it": tables()[kind]})
 
@@ -260,9 +260,9 @@ def standing(modes, prefilter=None, **more):
     model = ERROR_MODELS["rotation_vector"]((1e-6,) * 3, (1e-4,) * 3, sensors)
     filter_ = ErrorFilter(MECHANIZATIONS["wander_azimuth"](), model, COVARIANCES["ud"]())
     aids = (Gnss(name="gnss"),)
-    return Chain(
+    return NavigationPipeline(
         Navigator(with_states(filter_, aids), aids),
-        Intake(prefilter=prefilter),
+        ImuPreprocessor(prefilter=prefilter),
         modes,
         sensors=SENSORS,
         **more,
@@ -331,7 +331,9 @@ def test_a_long_gap_aligns_anew():
     modes = (CoarseMode(way=COARSE_ALIGNMENTS["two_vector"](), until=Until(12.0)), Navigation())
     chain = standing(modes)
     smoothed = replace(chain.navigator, smoother=SMOOTHERS["rts"]())
-    chain = replace(chain, navigator=smoothed, intake=Intake(gaps=GapPolicy(beyond="align")))
+    chain = replace(
+        chain, navigator=smoothed, intake=ImuPreprocessor(gaps=GapPolicy(beyond="align"))
+    )
     whole = assert_cuts(chain, kept, standing_fixes())
     assert [mode.name for mode in whole.record.modes] == [
         "coarse",

@@ -13,9 +13,9 @@ from strapdown.mechanization import MECHANIZATIONS
 from strapdown.navigation.navigator import Navigator, with_states
 from strapdown.navigation.recorder import IntervalRecorder
 from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
-from strapdown.systems.sins.chain import Chain
+from strapdown.systems.sins.chain import NavigationPipeline
 from strapdown.systems.sins.drive import run_batch
-from strapdown.systems.sins.intake import GapPolicy, Intake
+from strapdown.systems.sins.intake import GapPolicy, ImuPreprocessor
 from strapdown.systems.sins.modes import CoarseMode, Navigation, Until
 from strapdown.tables import gnss_table, imu_table
 
@@ -40,9 +40,9 @@ def chain(**gaps):
     aids = (Gnss(name="rtk", lever_arm=(0.0, -0.05, 0.0), time_offset=-0.13, velocity_delay=0.125),)
     course = COARSE_ALIGNMENTS["gnss_course"](mounting_yaw_deg=5.35)
     until = Until(120.0, heading_sd_deg=3.0, least=5.0)
-    return Chain(
+    return NavigationPipeline(
         Navigator(with_states(filter_, aids), aids),
-        Intake(gaps=GapPolicy(**gaps)),
+        ImuPreprocessor(gaps=GapPolicy(**gaps)),
         (CoarseMode(way=course, until=until, window=20.0), Navigation()),
         sensors=ImuUncertainty(
             TriadUncertainty(bias=0.3 * DEG, noise_density=0.02 * DEG),

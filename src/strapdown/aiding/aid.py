@@ -26,11 +26,11 @@ from strapdown.nav_state import NavState
 from strapdown.tables.checks import is_number
 
 __all__ = [
-    "Aid",
     "Epochs",
-    "TableAid",
+    "ImuDerivedMeasurement",
+    "Measurement",
+    "TabulatedMeasurement",
     "View",
-    "WatchingAid",
     "check_block",
     "check_number",
     "check_numbers",
@@ -60,7 +60,7 @@ class Epochs:
 
 
 @dataclass(frozen=True)
-class Aid(ABC):
+class Measurement(ABC):
     """A source of observations; it holds no state of its own.
 
     Attributes
@@ -107,7 +107,7 @@ class Aid(ABC):
 
 
 @dataclass(frozen=True)
-class TableAid(Aid):
+class TabulatedMeasurement(Measurement):
     """An aid with a table of what it measured."""
 
     #: Columns that its table must have.
@@ -130,7 +130,7 @@ class TableAid(Aid):
 
 
 @dataclass(frozen=True)
-class WatchingAid(Aid):
+class ImuDerivedMeasurement(Measurement):
     """An aid that watches the inertial sensors, and observes where they tell it to."""
 
     @abstractmethod
@@ -157,7 +157,7 @@ class WatchingAid(Aid):
         """
 
 
-def lasting(aids: Iterable[Aid]) -> tuple[str, ...]:
+def lasting(aids: Iterable[Measurement]) -> tuple[str, ...]:
     """Return the names of the aids that state that their errors last."""
     return tuple(one.name for one in aids if one.lasts)
 
@@ -166,7 +166,12 @@ def lasting(aids: Iterable[Aid]) -> tuple[str, ...]:
 
 
 def check_number(
-    aid: Aid, name: str, *, low: float = -math.inf, high: float = math.inf, above: bool = False
+    aid: Measurement,
+    name: str,
+    *,
+    low: float = -math.inf,
+    high: float = math.inf,
+    above: bool = False,
 ) -> None:
     """Refuse an option that is no number within limits.
 
@@ -198,7 +203,7 @@ def check_number(
         )
 
 
-def check_numbers(aid: Aid, name: str, count: int, *, low: float = -math.inf) -> None:
+def check_numbers(aid: Measurement, name: str, count: int, *, low: float = -math.inf) -> None:
     """Refuse an option that is not so many finite numbers; keep them as a tuple of float.
 
     Parameters
@@ -248,7 +253,7 @@ def check_block(view: View, name: str) -> None:
     view.model.layout[name]
 
 
-def check_other_name(aid: Aid, name: str) -> None:
+def check_other_name(aid: Measurement, name: str) -> None:
     """Refuse an option that is no name of another aid; nothing is one.
 
     Parameters

@@ -13,7 +13,7 @@ from strapdown.aiding.aid import (
     DISPLACEMENT,
     ROTATION,
     Epochs,
-    TableAid,
+    TabulatedMeasurement,
     View,
     check_number,
     check_numbers,
@@ -33,7 +33,7 @@ HOUR = 3600.0
 
 
 @dataclass(frozen=True)
-class Barometer(TableAid):
+class Barometer(TabulatedMeasurement):
     """Height of a barometer: that over the ellipsoid, a bias, and noise.
 
     The bias is what the sea is over the ellipsoid and the weather is from the standard, or
@@ -78,7 +78,7 @@ class Barometer(TableAid):
         return (random_walk(bias, self.walk / HOUR**0.5),)
 
     def epochs(self, table: pd.DataFrame) -> Epochs:
-        """Return an epoch for each height that was measured; see `TableAid.epochs`."""
+        """Return an epoch for each height that was measured; see `TabulatedMeasurement.epochs`."""
         check_barometer(table)
         values = values_of(table, BAROMETER)
         told = np.isfinite(values[:, 1])

@@ -11,7 +11,14 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown._kernels.level import AXIS
-from strapdown.aiding.aid import DISPLACEMENT, ROTATION, VELOCITY, Epochs, TableAid, View
+from strapdown.aiding.aid import (
+    DISPLACEMENT,
+    ROTATION,
+    VELOCITY,
+    Epochs,
+    TabulatedMeasurement,
+    View,
+)
 from strapdown.aiding.vehicle import turn_of_body
 from strapdown.earth import gravity
 from strapdown.errors import ConfigError, DataError
@@ -46,7 +53,7 @@ def _in(unit: str, default: float = 0.0) -> float:
 
 
 @dataclass(frozen=True)
-class Gnss(TableAid):
+class Gnss(TabulatedMeasurement):
     """A satellite receiver: places of its antenna, velocities, or both.
 
     A time offset that is a state is met by the antenna's place, velocity and acceleration at the
@@ -171,7 +178,7 @@ class Gnss(TableAid):
         return self.time_offset_sd > 0.0
 
     def epochs(self, table: pd.DataFrame) -> Epochs:
-        """Return an epoch for each place and for each velocity; see `TableAid.epochs`.
+        """Return an epoch for each place and for each velocity; see `TabulatedMeasurement.epochs`.
 
         A velocity without a vertical component is one of two components.
         """

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.aiding.aid import ROTATION, Epochs, TableAid, View, check_number
+from strapdown.aiding.aid import ROTATION, Epochs, TabulatedMeasurement, View, check_number
 from strapdown.estimation.covariance import Observation
 from strapdown.estimation.sensor_blocks import unseen
 from strapdown.estimation.sensor_states import SensorStates
@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Heading(TableAid):
+class Heading(TabulatedMeasurement):
     """Azimuth of an axis of the body, clockwise from north: that, a misalignment, and noise.
 
     Of a compass the misalignment is what declination and iron leave; of two antennas, what is
@@ -68,7 +68,7 @@ class Heading(TableAid):
         return (unseen(f"{self.name}.misalignment", ("misalignment",), "rad", sd),)
 
     def epochs(self, table: pd.DataFrame) -> Epochs:
-        """Return an epoch for each heading that was measured; see `TableAid.epochs`."""
+        """Return an epoch for each heading that was measured; see `TabulatedMeasurement.epochs`."""
         check_heading(table)
         values = np.radians(values_of(table, HEADING))
         told = np.isfinite(values[:, 1])

@@ -16,8 +16,8 @@ from strapdown.aiding.aid import (
     ROTATION,
     VELOCITY,
     Epochs,
+    ImuDerivedMeasurement,
     View,
-    WatchingAid,
     check_number,
     longer_by,
 )
@@ -74,7 +74,7 @@ class Window(NamedTuple):
 
 
 @dataclass(frozen=True)
-class StandstillAid(WatchingAid):
+class StandstillAid(ImuDerivedMeasurement):
     """An aid that observes while a detector says that the body rests.
 
     The detector sees the samples of the `window` that ends at an epoch, and no later ones.

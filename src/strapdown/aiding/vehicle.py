@@ -17,9 +17,9 @@ from strapdown.aiding.aid import (
     ROTATION,
     VELOCITY,
     Epochs,
-    TableAid,
+    ImuDerivedMeasurement,
+    TabulatedMeasurement,
     View,
-    WatchingAid,
     check_block,
     check_number,
     check_numbers,
@@ -53,7 +53,7 @@ HEADING = 8
 
 
 @dataclass(frozen=True)
-class NoSlip(WatchingAid):
+class NoSlip(ImuDerivedMeasurement):
     """A vehicle on wheels: a point of an axle that is not steered moves along the vehicle.
 
     Lateral and vertical velocity of the point, in axes of the vehicle, are zero but for
@@ -211,7 +211,7 @@ LABELS = ("lateral, m/s", "vertical, m/s")
 
 
 @dataclass(frozen=True)
-class Odometer(TableAid):
+class Odometer(TabulatedMeasurement):
     """Speed of a wheel that is not steered: ``reading = (1 + scale) v_forward + noise``.
 
     Attributes
@@ -259,7 +259,7 @@ class Odometer(TableAid):
         return (unseen(f"{self.name}.scale", ("scale",), "1", self.scale_sd),)
 
     def epochs(self, table: pd.DataFrame) -> Epochs:
-        """Return an epoch for each speed that was measured; see `TableAid.epochs`."""
+        """Return an epoch for each speed that was measured; see `TabulatedMeasurement.epochs`."""
         check_odometer(table)
         values = values_of(table, ODOMETER)
         told = np.isfinite(values[:, 1]) & (np.abs(values[:, 0]) >= self.least_speed)
@@ -287,7 +287,7 @@ class Odometer(TableAid):
 
 
 @dataclass(frozen=True)
-class BodyVelocity(TableAid):
+class BodyVelocity(TabulatedMeasurement):
     """Velocity relative to the Earth by an instrument: ``(1 + scale) C_ib v_b + noise``.
 
     Attributes
@@ -338,7 +338,7 @@ class BodyVelocity(TableAid):
         return mounting + (scale if self.scale_sd > 0.0 else ())
 
     def epochs(self, table: pd.DataFrame) -> Epochs:
-        """Return an epoch for each row of which an axis was measured; see `TableAid.epochs`."""
+        """Return an epoch for each row with a measured axis; see `TabulatedMeasurement.epochs`."""
         check_body_velocity(table)
         values = values_of(table, BODY_VELOCITY)
         told = np.isfinite(values[:, 3:]).any(axis=1)

@@ -33,7 +33,7 @@ from strapdown.report.navigation import write_navigation
 from strapdown.systems.progress import Progress, silent
 from strapdown.systems.sins.proposal import CODE_RECEIVER, propose
 from strapdown.systems.sins.run import NavigationResult, run_navigation
-from strapdown.systems.sins.trust import Trust
+from strapdown.systems.sins.trust import IntegrityReport
 from strapdown.tables import EULER, GEODETIC, VELOCITY
 
 if TYPE_CHECKING:
@@ -212,7 +212,7 @@ class NavigationRun(NavigationResult):
         return self.record.sensors
 
     @property
-    def integrity(self) -> Trust:
+    def integrity(self) -> IntegrityReport:
         """Whether heading and bounds can be trusted, and the first inconsistency."""
         return self.trust
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from strapdown.aiding.aid import Aid
+from strapdown.aiding.aid import Measurement
 from strapdown.aiding.standstill import STANDSTILL_DETECTORS, STANDSTILL_THRESHOLDS
 from strapdown.attitude import ALGORITHMS, AttitudeAlgorithm
 from strapdown.config.choice import SLOTS, Slot, options_of
@@ -73,7 +73,7 @@ def cell_text(value: Any) -> str:
 #: Of each list, the kind of the plug-ins that can stand in it, and what they must be.
 _PLUGINS: dict[str, tuple[str, type]] = {
     "attitude_algorithms": ("attitude", AttitudeAlgorithm),
-    "aiding": ("measurement", Aid),
+    "aiding": ("measurement", Measurement),
     "log_formats": ("reader", Reader),
 }
 

@@ -9,7 +9,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 
 from pydantic import StrictBool, StrictInt, StrictStr, create_model
 
-from strapdown.aiding.aid import Aid
+from strapdown.aiding.aid import Measurement
 from strapdown.aiding.aids import AIDS
 from strapdown.alignment.alignment import CoarseAlignment
 from strapdown.alignment.coarse_alignments import COARSE_ALIGNMENTS
@@ -22,7 +22,7 @@ from strapdown.estimation.covariance import COVARIANCES, CovarianceForm, UpdateR
 from strapdown.estimation.error_model import ERROR_MODELS, ErrorModel
 from strapdown.estimation.robust import INFLUENCES, UPDATE_RULES, Influence
 from strapdown.mechanization import MECHANIZATIONS, Mechanization
-from strapdown.navigation.filter_options import DAMPINGS, Damping, FilterOptions
+from strapdown.navigation.filter_options import DAMPINGS, Correction, FilterOptions
 from strapdown.navigation.recorder import RECORDERS, Recorder
 from strapdown.navigation.smoother import SMOOTHERS, Smoother
 from strapdown.plugins import WithPlugins
@@ -282,8 +282,8 @@ SLOTS: dict[str, Slot] = {
     "covariance": Slot("covariance", "Covariance forms", CovarianceForm, COVARIANCES),
     "update_rule": Slot("update_rule", "Update rules", UpdateRule, UPDATE_RULES),
     "influence": Slot("influence", "Influence functions", Influence, INFLUENCES),
-    "aiding": Slot("aiding", "Aids", Aid, WithPlugins(AIDS, "measurement", Aid)),
-    "damping": Slot("damping", "Dampings", Damping, DAMPINGS),
+    "aiding": Slot("aiding", "Aids", Measurement, WithPlugins(AIDS, "measurement", Measurement)),
+    "damping": Slot("damping", "Dampings", Correction, DAMPINGS),
     "smoother": Slot("smoother", "Smoothers", Smoother, SMOOTHERS),
     "recorder": Slot("recorder", "Recorders", Recorder, RECORDERS),
 }

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, create_model
 
-from strapdown.aiding.aid import TableAid
+from strapdown.aiding.aid import TabulatedMeasurement
 from strapdown.config.alignment import PrefilterSpec
 from strapdown.config.alignment_file import MOST_SAMPLES, NEEDS_GNSS, NOT_BEFORE_FINE, SourceChecks
 from strapdown.config.choice import (
@@ -400,7 +400,7 @@ class _Checks(SourceChecks):
         given = aids_of(spec)[name]
         entry = SLOTS["aiding"].entries[given.kind]
         self.told(("aiding", name), partial(make_aid, spec, name))
-        takes = issubclass(entry, TableAid)
+        takes = issubclass(entry, TabulatedMeasurement)
         if not takes and given.path is not None:
             raise self.refuse(
                 ("aiding", name, "path"),

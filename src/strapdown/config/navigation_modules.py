@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import create_model
 
-from strapdown.aiding.aid import Aid
+from strapdown.aiding.aid import Measurement
 from strapdown.config.alignment import AlignmentSpec
 from strapdown.config.choice import SLOTS, make_choice
 from strapdown.config.crash_case import OneOrThree, Positive
@@ -86,13 +86,15 @@ def make_filter(spec: NavigationSpec, sensors: ImuUncertainty) -> ErrorFilter:
     )
 
 
-def make_aid(spec: NavigationSpec, name: str) -> Aid:
+def make_aid(spec: NavigationSpec, name: str) -> Measurement:
     """Make the aid of a name; as `make_aids`."""
-    made: Aid = make_choice(aids_of(spec)[name], SLOTS["aiding"], {**given_of(spec), "name": name})
+    made: Measurement = make_choice(
+        aids_of(spec)[name], SLOTS["aiding"], {**given_of(spec), "name": name}
+    )
     return made
 
 
-def make_aids(spec: NavigationSpec) -> tuple[Aid, ...]:
+def make_aids(spec: NavigationSpec) -> tuple[Measurement, ...]:
     """Make the aids of a specification.
 
     Raises

@@ -25,7 +25,7 @@ NO_GYRO = "no gyro"
 
 
 @dataclass(frozen=True, eq=False)
-class AtPoint:
+class PointKinematics:
     """What a unit, or the mean of several, says at a point.
 
     Attributes
@@ -116,7 +116,7 @@ def at_point(
     *,
     time_sd: float | None = None,
     window: float | None = None,
-) -> AtPoint:
+) -> PointKinematics:
     """Move a prepared unit to a point and list what is not known of it.
 
     Parameters
@@ -132,14 +132,14 @@ def at_point(
 
     Returns
     -------
-    AtPoint
+    PointKinematics
     """
     moved = move_unit(prepared, point, window=window)
     axes, turns = unmeasured_axes(prepared.unit), unmeasured_turns(prepared.unit)
     if axes.any():
         moved = _but_along(axes, moved, prepared)
     sd = prepared.unit.trigger_sd if time_sd is None else time_sd
-    return AtPoint(
+    return PointKinematics(
         prepared.unit.name,
         moved.imu,
         unit_effects(prepared, moved, time_sd=sd),

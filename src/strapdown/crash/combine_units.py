@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.alignment.levelling import level
-from strapdown.crash.at_point import AtPoint
+from strapdown.crash.at_point import PointKinematics
 from strapdown.crash.compare_units import clipped_axes
 from strapdown.crash.unit_differences import TINY, floored
 from strapdown.crash.unit_effects import SampleEffects, level_turned_by
@@ -36,12 +36,12 @@ Array = NDArray[np.float64]
 COMBINATIONS = ("weighted", "median")
 
 
-def combine_units(units: Sequence[AtPoint], method: str = "weighted") -> AtPoint:
+def combine_units(units: Sequence[PointKinematics], method: str = "weighted") -> PointKinematics:
     """Combine units that were moved to one point.
 
     Parameters
     ----------
-    units : sequence of AtPoint
+    units : sequence of PointKinematics
         Of one vehicle, at one point; the stamps of the first are kept, where all have samples,
         and the others are interpolated linearly.
     method : {'weighted', 'median'}
@@ -52,7 +52,7 @@ def combine_units(units: Sequence[AtPoint], method: str = "weighted") -> AtPoint
 
     Returns
     -------
-    AtPoint
+    PointKinematics
         With the unknowns of all its parts, each with the weight of its unit: one that two units
         share, as the bias of a borrowed gyro, is one. Rates are weighed by how well they tell the
         turn from 0.1 s before to 0.75 s after the trigger. It is
@@ -130,7 +130,7 @@ def combine_units(units: Sequence[AtPoint], method: str = "weighted") -> AtPoint
         mean = replace(mean, roll_deg=roll, pitch_deg=pitch)
         tilt = level_turned_by(effects.rest_force, _level(mean))
         effects = replace(effects, tilt=effects.tilt + tilt)
-    return AtPoint(
+    return PointKinematics(
         name,
         imu,
         effects,
@@ -145,13 +145,13 @@ def combine_units(units: Sequence[AtPoint], method: str = "weighted") -> AtPoint
     )
 
 
-def _turning_measured(units: Sequence[AtPoint]) -> NDArray[np.bool_]:
+def _turning_measured(units: Sequence[PointKinematics]) -> NDArray[np.bool_]:
     """Which units measure the turning about the most axes: what others assume does not count."""
     assumed = [0.0 if u.unmeasured_turns is None else np.trace(u.unmeasured_turns) for u in units]
     return np.asarray(np.round(assumed) == np.round(min(assumed)))
 
 
-def _common_stamps(units: Sequence[AtPoint]) -> Array:
+def _common_stamps(units: Sequence[PointKinematics]) -> Array:
     first = max(float(u.time[0]) for u in units)
     last = min(float(u.time[-1]) for u in units)
     time = units[0].time
@@ -161,7 +161,7 @@ def _common_stamps(units: Sequence[AtPoint]) -> Array:
     return time
 
 
-def _at(unit: AtPoint, time: Array) -> AtPoint:
+def _at(unit: PointKinematics, time: Array) -> PointKinematics:
     """A unit at other stamps, on straight lines between its own."""
     own = unit.time
     if own.size == time.size and np.array_equal(own, time):
@@ -194,7 +194,7 @@ def _at(unit: AtPoint, time: Array) -> AtPoint:
     )
 
 
-def _common_rest(units: Sequence[AtPoint], time: Array) -> tuple[float, float] | None:
+def _common_rest(units: Sequence[PointKinematics], time: Array) -> tuple[float, float] | None:
     rests: list[RestStretch] = [u.rest for u in units if u.rest is not None]
     if len(rests) < len(units):
         return None
@@ -203,7 +203,7 @@ def _common_rest(units: Sequence[AtPoint], time: Array) -> tuple[float, float] |
     return (start, end) if within.sum() >= LEAST_SAMPLES else None
 
 
-def _mean_levelling(units: Sequence[AtPoint], share: Array) -> Levelling:
+def _mean_levelling(units: Sequence[PointKinematics], share: Array) -> Levelling:
     levels = [u.levelling for u in units]
     return Levelling(
         float(share @ [v.roll_deg for v in levels]),
@@ -218,7 +218,7 @@ def _level(levelling: Levelling) -> Array:
     return rotation.dcm_from_euler([levelling.roll_deg, levelling.pitch_deg, 0.0])
 
 
-def _without_own_tilt(unit: AtPoint) -> SampleEffects:
+def _without_own_tilt(unit: PointKinematics) -> SampleEffects:
     """Effects without the tilt that follows from the force at rest: it is that of the mean."""
     effects = unit.effects
     tilt = level_turned_by(effects.rest_force, _level(unit.levelling))
@@ -237,7 +237,7 @@ def _median_weights(force: Array) -> Array:
     return weights
 
 
-def _rate_weights(units: Sequence[AtPoint], counted: NDArray[np.bool_]) -> Array:
+def _rate_weights(units: Sequence[PointKinematics], counted: NDArray[np.bool_]) -> Array:
     """One number a unit; a gyro that several have counts once."""
     steps = crash_steps(units[0].time)
     known, weights = set(), []
@@ -339,12 +339,12 @@ CRASH_WINDOW = (-0.1, 0.75)  # s
 ROUNDING = 1e-9
 
 
-def force_weights(units: Sequence[AtPoint]) -> Array:
+def force_weights(units: Sequence[PointKinematics]) -> Array:
     """Weights of the specific forces of units in their mean.
 
     Parameters
     ----------
-    units : sequence of AtPoint
+    units : sequence of PointKinematics
         k units at one point and at the same stamps.
 
     Returns
@@ -404,12 +404,12 @@ def crash_steps(time: Array) -> Array:
     return np.where(within, steps, 0.0) if within.any() else steps
 
 
-def velocity_covariance(units: Sequence[AtPoint]) -> Array:
+def velocity_covariance(units: Sequence[PointKinematics]) -> Array:
     """Joint covariance of the changes of velocity of units over the crash, axis by axis.
 
     Parameters
     ----------
-    units : sequence of AtPoint
+    units : sequence of PointKinematics
         k units, at the same stamps.
 
     Returns

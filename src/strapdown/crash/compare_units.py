@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.crash.at_point import AtPoint
+from strapdown.crash.at_point import PointKinematics
 from strapdown.crash.mounting_checks import (
     AxisMatch,
     LeverArmCheck,
@@ -56,7 +56,7 @@ NO_WEIGHT = 1e8
 
 
 def compare_units(
-    units: Sequence[AtPoint],
+    units: Sequence[PointKinematics],
     *,
     window: tuple[float, float] | None = None,
     pieces: int = 20,
@@ -66,7 +66,7 @@ def compare_units(
 
     Parameters
     ----------
-    units : sequence of AtPoint
+    units : sequence of PointKinematics
         Two or more, of one rigid vehicle, at one point.
     window : (start, end), s, optional
         What is compared; -0.1 to 0.75 s, as far as all have samples, if not given.
@@ -132,8 +132,8 @@ def compare_units(
 
 
 def _pair(
-    first: AtPoint,
-    second: AtPoint,
+    first: PointKinematics,
+    second: PointKinematics,
     a: VelocityIncrements,
     b: VelocityIncrements,
     kept: Flags,
@@ -210,7 +210,7 @@ class _Together:
 
 
 def _against_all(
-    units: Sequence[AtPoint], increments: Sequence[VelocityIncrements], kept: Flags
+    units: Sequence[PointKinematics], increments: Sequence[VelocityIncrements], kept: Flags
 ) -> _Together:
     """`increments` are those of the pieces that are kept."""
     size = increments[0].values.size
@@ -264,7 +264,7 @@ def _square(difference: Array, covariance: Array) -> float:
     return float(difference @ np.linalg.solve(floored(covariance), difference))
 
 
-def _nothing_together(units: Sequence[AtPoint], kept: Flags) -> _Together:
+def _nothing_together(units: Sequence[PointKinematics], kept: Flags) -> _Together:
     """All pieces were left out."""
     none = np.full((kept.size + 1, 3), np.nan)
     return _Together(
@@ -292,8 +292,8 @@ def _curve_sd(covariance: Array, kept: Flags) -> Array:
 
 
 def _disagreement(
-    first: AtPoint,
-    second: AtPoint,
+    first: PointKinematics,
+    second: PointKinematics,
     edges: Array,
     curve: Array,
     sd: Array,
@@ -319,7 +319,7 @@ def _disagreement(
     )
 
 
-def _left_out(unit: AtPoint, edges: Array, cut: Flags) -> Finding:
+def _left_out(unit: PointKinematics, edges: Array, cut: Flags) -> Finding:
     pieces = np.flatnonzero(cut)
     return Finding(
         "crash.end-range-between-pieces-record",
@@ -332,7 +332,7 @@ def _left_out(unit: AtPoint, edges: Array, cut: Flags) -> Finding:
     )
 
 
-def _nothing_whole(first: AtPoint, second: AtPoint) -> Finding:
+def _nothing_whole(first: PointKinematics, second: PointKinematics) -> Finding:
     return Finding(
         "crash.no-piece-record-neither-end",
         file=first.name,
@@ -341,13 +341,13 @@ def _nothing_whole(first: AtPoint, second: AtPoint) -> Finding:
     )
 
 
-def _nothing_in_common(first: AtPoint, second: AtPoint) -> Finding:
+def _nothing_in_common(first: PointKinematics, second: PointKinematics) -> Finding:
     return Finding(
         "crash.measure-no-axis-common-not", file=first.name, quantity="delta-V", name=second.name
     )
 
 
-def _odd_one(units: Sequence[AtPoint], pairs: Sequence[UnitPair]) -> list[Finding]:
+def _odd_one(units: Sequence[PointKinematics], pairs: Sequence[UnitPair]) -> list[Finding]:
     """Of three or more, the one without which the others agree."""
     if len(units) < 3 or all(p.agree for p in pairs):
         return []
@@ -469,7 +469,7 @@ ROUNDING = 1e-9
 MOST = 0.9
 
 
-def measured_by_all(units: Sequence[AtPoint]) -> Array:
+def measured_by_all(units: Sequence[PointKinematics]) -> Array:
     """Orthonormal columns of the directions along which each of the units measures, (3, r)."""
     total = sum((_unmeasured(u) for u in units), np.zeros((3, 3)))
     if not total.any():
@@ -478,7 +478,7 @@ def measured_by_all(units: Sequence[AtPoint]) -> Array:
     return np.asarray(vectors[:, values < ROUNDING])
 
 
-def measured_by_any(units: Sequence[AtPoint]) -> Array:
+def measured_by_any(units: Sequence[PointKinematics]) -> Array:
     """Orthonormal columns of the directions along which at least one of them measures, (3, r)."""
     measured = np.mean([np.eye(3) - _unmeasured(u) for u in units], axis=0)
     values, vectors = np.linalg.eigh(measured)
@@ -509,7 +509,7 @@ def chi_square_along(basis: Array, difference: Array, covariance: Array) -> tupl
     return float(difference @ np.linalg.solve(floored(covariance), difference)), difference.size
 
 
-def _unmeasured(unit: AtPoint) -> Array:
+def _unmeasured(unit: PointKinematics) -> Array:
     return np.zeros((3, 3)) if unit.unmeasured is None else unit.unmeasured
 
 
@@ -520,12 +520,12 @@ def _unmeasured(unit: AtPoint) -> Array:
 LEAST_SHARE = 0.01
 
 
-def clipped_axes(unit: AtPoint, window: tuple[float, float]) -> Flags:
+def clipped_axes(unit: PointKinematics, window: tuple[float, float]) -> Flags:
     """Along which of the vehicle's axes a unit was clipped in a window.
 
     Parameters
     ----------
-    unit : AtPoint
+    unit : PointKinematics
     window : (float, float), s
 
     Returns
@@ -543,12 +543,12 @@ def clipped_axes(unit: AtPoint, window: tuple[float, float]) -> Flags:
     return np.asarray((share & cut).any(axis=1))
 
 
-def clipped_pieces(unit: AtPoint, edges: Array) -> Flags:
+def clipped_pieces(unit: PointKinematics, edges: Array) -> Flags:
     """In which pieces of time a unit's readings are not what it felt.
 
     Parameters
     ----------
-    unit : AtPoint
+    unit : PointKinematics
     edges : ndarray, (m + 1,), s
 
     Returns

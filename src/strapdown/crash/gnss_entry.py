@@ -13,7 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.crash.at_point import AtPoint
+from strapdown.crash.at_point import PointKinematics
 from strapdown.crash.entry import (
     ACCEL_BIAS,
     ATTITUDE,
@@ -285,20 +285,20 @@ class GnssEntry:
 
 
 def start_from_gnss(
-    at: AtPoint, given: GnssEntry, point: Sequence[float]
-) -> tuple[AtPoint, Entry, EntryState]:
+    at: PointKinematics, given: GnssEntry, point: Sequence[float]
+) -> tuple[PointKinematics, Entry, EntryState]:
     """Find the entry of a unit and take off the biases that were found with it.
 
     Parameters
     ----------
-    at : AtPoint
+    at : PointKinematics
     given : GnssEntry
     point : sequence of float, (3,), m
         Where the unit was moved to, vehicle axes from the vehicle's origin.
 
     Returns
     -------
-    at : AtPoint
+    at : PointKinematics
         Without the biases. Of its unknowns, those of the biases are gone, and each other one
         counts only as far as it adds something else than it did on average over the window:
         that much the biases have taken in. How the unit is turned in roll and pitch is taken in
@@ -369,7 +369,7 @@ def _entry(state: EntryState) -> Entry:
     )
 
 
-def _without_biases(at: AtPoint, state: EntryState, begin: float) -> AtPoint:
+def _without_biases(at: PointKinematics, state: EntryState, begin: float) -> PointKinematics:
     effects = at.effects
     time = at.imu.index.to_numpy(dtype=np.float64)
     window = (time >= begin) & (time <= state.state.time)

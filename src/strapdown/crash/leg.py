@@ -27,7 +27,7 @@ ATTITUDE, VELOCITY, PLACE = slice(0, 3), slice(3, 6), slice(6, 9)
 
 
 @dataclass(frozen=True, eq=False)
-class Leg:
+class IntegrationSegment:
     """Increments of a stretch, what the unknowns add to them, and the states that follow.
 
     A backward leg is a motion of its own, with the opposite velocity on an Earth that turns the
@@ -114,7 +114,7 @@ def make_leg(
     rows: slice,
     *,
     backward: bool,
-) -> Leg:
+) -> IntegrationSegment:
     """Cut a leg out of a record and navigate it.
 
     Parameters
@@ -170,7 +170,7 @@ def make_leg(
             quantity="path",
             time=time[made],
         )
-    return Leg(
+    return IntegrationSegment(
         backward,
         time,
         state,

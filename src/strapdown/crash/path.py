@@ -15,7 +15,7 @@ from strapdown import frames, rotation
 from strapdown._kernels.ned import ALT, LAT, LON, Q, V
 from strapdown.constants import STANDARD_GRAVITY as GRAVITY
 from strapdown.crash.entry import Entry, angles_sd
-from strapdown.crash.leg import ATTITUDE, PLACE, VELOCITY, Leg, make_leg
+from strapdown.crash.leg import ATTITUDE, PLACE, VELOCITY, IntegrationSegment, make_leg
 from strapdown.crash.reconstruction_summary import path_line
 from strapdown.crash.unit_effects import SampleEffects
 from strapdown.crash.window_weights import NOISE, by_contributor, window_weights
@@ -74,7 +74,7 @@ class CrashPath:
     errors: Array = field(repr=False)
     noise_covariance: Array = field(repr=False)
     start: Array = field(repr=False)
-    legs: tuple[Leg, Leg] = field(repr=False)
+    legs: tuple[IntegrationSegment, IntegrationSegment] = field(repr=False)
 
     def __repr__(self) -> str:
         return f"<CrashPath, {path_line(self)}>"
@@ -351,7 +351,7 @@ def _padded(
 
 
 def _joined(
-    legs: tuple[Leg, Leg],
+    legs: tuple[IntegrationSegment, IntegrationSegment],
     entry: Entry,
     names: tuple[str, ...],
     contributors: tuple[str, ...],
@@ -381,7 +381,7 @@ def _joined(
     )
 
 
-def _states(leg: Leg) -> Array:
+def _states(leg: IntegrationSegment) -> Array:
     states = leg.nominal.copy()
     if leg.backward:
         states[:, V : V + 3] *= -1.0

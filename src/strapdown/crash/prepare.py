@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown.alignment.levelling import level
 from strapdown.crash.acceleration import force_at_rest
-from strapdown.crash.at_point import AtPoint, at_point
+from strapdown.crash.at_point import PointKinematics, at_point
 from strapdown.crash.entry import Entry
 from strapdown.crash.path import reconstruct_path
 from strapdown.crash.prepare_findings import (
@@ -398,7 +398,7 @@ def prepare_together(
     point: Sequence[float],
     gravity: float,
     options: Mapping[str, Any],
-) -> list[AtPoint]:
+) -> list[PointKinematics]:
     """Prepare units and move them to a point.
 
     Parameters
@@ -413,7 +413,7 @@ def prepare_together(
 
     Returns
     -------
-    list of AtPoint
+    list of PointKinematics
         In the order of the units. A unit that borrows its gyro and is not levelled by an option,
         and whose record begins after the lender's rest, is levelled by the lender: its roll and
         pitch carried on by the gyro to where the borrower's record begins, with their standard
@@ -427,7 +427,7 @@ def prepare_together(
     names = {u.unit.name for u in together.units}
     common = {k: v for k, v in options.items() if k not in names}
     turning = [u.unit.name for u in together.units if u.lender is None and _turns(u)]
-    done: dict[str, AtPoint] = {}
+    done: dict[str, PointKinematics] = {}
     for unit in sorted(together.units, key=lambda u: u.lender is not None):
         own = {"gravity": gravity, **common, **options.get(unit.unit.name, {})}
         if unit.lender is not None and own.get("levelling") is None:
@@ -474,7 +474,7 @@ def _gyro_to_borrow(unit: SynchronisedUnit, turning: Sequence[str]) -> Finding |
 
 
 def _attitude_at_start(
-    unit: SynchronisedUnit, lender: AtPoint
+    unit: SynchronisedUnit, lender: PointKinematics
 ) -> tuple[float, float, float] | None:
     """Roll, pitch and their sd in deg where a record begins, or None where it has its own rest."""
     begin = float(unit.accelerometers[0].triad.table.index[0])

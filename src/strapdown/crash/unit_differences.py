@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.crash.at_point import AtPoint
+from strapdown.crash.at_point import PointKinematics
 from strapdown.crash.window_weights import window_weights
 from strapdown.errors import ConfigError, DataError
 
@@ -191,7 +191,7 @@ def floored(covariance: Array) -> Array:
 
 
 def common_edges(
-    units: Sequence[AtPoint], window: tuple[float, float] | None, pieces: int
+    units: Sequence[PointKinematics], window: tuple[float, float] | None, pieces: int
 ) -> Array:
     """Edges of equal pieces over a window that all units cover.
 
@@ -234,12 +234,12 @@ def common_edges(
     return np.linspace(start, end, min(pieces, most) + 1)
 
 
-def velocity_increments(unit: AtPoint, edges: Array) -> VelocityIncrements:
+def velocity_increments(unit: PointKinematics, edges: Array) -> VelocityIncrements:
     """Integrate a unit's specific force and rates between edges.
 
     Parameters
     ----------
-    unit : AtPoint
+    unit : PointKinematics
     edges : ndarray, (m + 1,), s
 
     Returns
@@ -310,12 +310,12 @@ class NoiseOfSums:
         )
 
 
-def noise_of_sums(at_point: AtPoint, weights: Array) -> NoiseOfSums:
+def noise_of_sums(at_point: PointKinematics, weights: Array) -> NoiseOfSums:
     """Find what the noise of the samples does to weighted sums of them.
 
     Parameters
     ----------
-    at_point : AtPoint
+    at_point : PointKinematics
         Of a unit, or of a combination, whose samples are taken as independent.
     weights : ndarray, (m, n), s
 
@@ -345,7 +345,7 @@ def noise_of_sums(at_point: AtPoint, weights: Array) -> NoiseOfSums:
     return NoiseOfSums(blocks.reshape(3 * m, 3 * m), arm, turned, at_point.gyro)
 
 
-def _touched(at_point: AtPoint, weights: Array) -> slice:
+def _touched(at_point: PointKinematics, weights: Array) -> slice:
     """The samples that count in a sum, with those from which an angular acceleration is made."""
     used = np.flatnonzero(weights.any(axis=0))
     if not used.size:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.acceleration import Acceleration, body_acceleration, resolved_acceleration
-from strapdown.crash.at_point import AtPoint
+from strapdown.crash.at_point import PointKinematics
 from strapdown.crash.crash_type import CrashType, classify_crashes
 from strapdown.crash.delta_v import DeltaV, delta_v, trailing_delta_v
 from strapdown.crash.delta_v_bound import (
@@ -48,7 +48,7 @@ class UnitReconstruction:
     Attributes
     ----------
     name : str
-    at_point : AtPoint
+    at_point : PointKinematics
     acceleration : Acceleration
         Along the turning axes of the vehicle, the resting value taken off.
     resolved : Acceleration
@@ -64,7 +64,7 @@ class UnitReconstruction:
     """
 
     name: str
-    at_point: AtPoint = field(repr=False)
+    at_point: PointKinematics = field(repr=False)
     acceleration: Acceleration = field(repr=False)
     resolved: Acceleration = field(repr=False)
     events: CrashEvents
@@ -89,7 +89,7 @@ class UnitReconstruction:
 
 
 def reconstruct_unit(
-    at_point: AtPoint,
+    at_point: PointKinematics,
     entry: Entry | None,
     *,
     window: Sequence[float] | None = None,
@@ -102,7 +102,7 @@ def reconstruct_unit(
 
     Parameters
     ----------
-    at_point : AtPoint
+    at_point : PointKinematics
     entry : Entry or None
         As `reconstruct_path`.
     window : (float, float), s, optional
@@ -217,7 +217,7 @@ def reconstruct_unit(
     )
 
 
-def _unseen(at_point: AtPoint, events: CrashEvents) -> list[Finding]:
+def _unseen(at_point: PointKinematics, events: CrashEvents) -> list[Finding]:
     """An impact along an axis that is assumed is none of the events."""
     blind = [axis for axis in at_point.assumed_axes if axis in ("forward", "right")]
     if events.events or not blind:
@@ -257,7 +257,7 @@ SIGMAS = 4.0
 SLOPE_DEG = 4.0
 
 
-def check_standing(at_point: AtPoint, entry: Entry | None) -> None:
+def check_standing(at_point: PointKinematics, entry: Entry | None) -> None:
     """Refuse to begin at zero speed where the vehicle may have been driving.
 
     Raises
@@ -277,7 +277,7 @@ def check_standing(at_point: AtPoint, entry: Entry | None) -> None:
 
 
 def entry_findings(
-    at_point: AtPoint,
+    at_point: PointKinematics,
     entry: Entry | None,
     path: CrashPath,
     events: CrashEvents,
@@ -287,7 +287,7 @@ def entry_findings(
 
     Parameters
     ----------
-    at_point : AtPoint
+    at_point : PointKinematics
     entry : Entry or None
     path : CrashPath
         That is tied to it.
@@ -345,7 +345,7 @@ def entry_findings(
     return found
 
 
-def _slope(at_point: AtPoint, entry: Entry, path: CrashPath) -> list[Finding]:
+def _slope(at_point: PointKinematics, entry: Entry, path: CrashPath) -> list[Finding]:
     """A level velocity of a vehicle that stands on a slope."""
     now, sd = path.table.iloc[path.anchor], path.sd.iloc[path.anchor]
     pitch, along = float(now["pitch"]), entry.velocity

@@ -14,12 +14,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.aiding.aid import TableAid
+from strapdown.aiding.aid import TabulatedMeasurement
 from strapdown.errors import ConfigError
 from strapdown.estimation.covariance import Step
 from strapdown.evaluation.plane_bound import PLANE_95, plane_reach
 from strapdown.navigation.navigator import Navigator, NavigatorState
-from strapdown.navigation.record import NavigationPiece, Seen, Span
+from strapdown.navigation.record import InnovationRecord, NavigationChunk, Span
 from strapdown.tables.checks import index_of, source_of
 
 __all__ = [
@@ -288,7 +288,7 @@ def blinded(navigator: Navigator, name: str) -> Navigator:
         There is no such aid with a table.
     """
     aid = navigator.by_name.get(name)
-    if not isinstance(aid, TableAid):
+    if not isinstance(aid, TabulatedMeasurement):
         raise ConfigError(
             "evaluation.no-aid-table",
             quantity="withhold",
@@ -308,12 +308,12 @@ def _score(
     return score_of([piece], name, span)
 
 
-def score_of(pieces: Sequence[NavigationPiece], name: str, span: Span) -> WithheldScore:
+def score_of(pieces: Sequence[NavigationChunk], name: str, span: Span) -> WithheldScore:
     """Score what a navigator gave over a span, in which an aid was looked at and not used.
 
     Parameters
     ----------
-    pieces : sequence of NavigationPiece
+    pieces : sequence of NavigationChunk
     name : str
         Of the aid; its observation ``NAME.position`` is scored.
     span : Span
@@ -336,12 +336,12 @@ def score_of(pieces: Sequence[NavigationPiece], name: str, span: Span) -> Withhe
     return WithheldScore(span, time, nu, s, P + _beyond_place(s, P))
 
 
-def seen_of(pieces: Sequence[NavigationPiece], name: str, span: Span) -> list[Seen]:
+def seen_of(pieces: Sequence[NavigationChunk], name: str, span: Span) -> list[InnovationRecord]:
     """Return what was seen of the fixes of a span.
 
     Parameters
     ----------
-    pieces : sequence of NavigationPiece
+    pieces : sequence of NavigationChunk
     name : str
         Of the aid.
     span : Span
@@ -431,8 +431,8 @@ def score_withheld_smoothed(
 
 def score_of_smoothed(
     navigator: Navigator,
-    pieces: Sequence[NavigationPiece],
-    later: Sequence[NavigationPiece],
+    pieces: Sequence[NavigationChunk],
+    later: Sequence[NavigationChunk],
     name: str,
     span: Span,
 ) -> WithheldScore:
@@ -445,9 +445,9 @@ def score_of_smoothed(
     ----------
     navigator : Navigator
         With a smoother.
-    pieces : sequence of NavigationPiece
+    pieces : sequence of NavigationChunk
         Of the span, in which the aid was looked at and not used.
-    later : sequence of NavigationPiece
+    later : sequence of NavigationChunk
         That follow, with the aid.
     name : str
         Of the aid, which is a receiver.

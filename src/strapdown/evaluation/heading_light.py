@@ -28,7 +28,7 @@ __all__ = [
     "REASONS",
     "SURE",
     "WITNESSES",
-    "HeadingLight",
+    "HeadingIntegrity",
     "LightSpan",
     "doubted",
     "heading_light",
@@ -110,7 +110,7 @@ class LightSpan:
 
 
 @dataclass(frozen=True, eq=False)
-class HeadingLight:
+class HeadingIntegrity:
     """A light for each second.
 
     Attributes
@@ -157,7 +157,7 @@ def heading_light(
     *,
     green: float = 3.0,
     red: float = 10.0,
-) -> HeadingLight:
+) -> HeadingIntegrity:
     """Return the light of each second of a run.
 
     Parameters
@@ -172,7 +172,7 @@ def heading_light(
 
     Returns
     -------
-    HeadingLight
+    HeadingIntegrity
 
     Raises
     ------
@@ -235,7 +235,7 @@ def heading_light(
         },
         index=pd.Index(seconds, name="time"),
     )
-    return HeadingLight(table, green, red)
+    return HeadingIntegrity(table, green, red)
 
 
 def seconds_of(record: NavigationRecord) -> Array:

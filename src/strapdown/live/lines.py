@@ -23,15 +23,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.aiding.aid import TableAid
+from strapdown.aiding.aid import TabulatedMeasurement
 from strapdown.config.navigation import AidSpec
 from strapdown.errors import ConfigError, Finding
 from strapdown.formats import csv
 from strapdown.formats.sensorstream import blocks_of
 from strapdown.navigation.navigator import Navigator
-from strapdown.navigation.record import Mark
+from strapdown.navigation.record import CovarianceSnapshot
 from strapdown.rotation.euler_angles import euler_sd
-from strapdown.systems.sins.modes import ChainPiece
+from strapdown.systems.sins.modes import PipelineChunk
 from strapdown.systems.sins.source import COLUMN_UNITS
 from strapdown.tables import EULER, GEODETIC, GNSS, TRAJECTORY, VELOCITY
 from strapdown.tables.checks import POSITION_SD, VELOCITY_SD
@@ -207,12 +207,12 @@ class AidRows:
 
     Parameters
     ----------
-    aid : TableAid
+    aid : TabulatedMeasurement
     given : AidSpec
         What the configuration says in place of what is sent: standard deviations of fixes.
     """
 
-    def __init__(self, aid: TableAid, given: AidSpec) -> None:
+    def __init__(self, aid: TabulatedMeasurement, given: AidSpec) -> None:
         self.aid = aid
         self.of_fixes = set(aid.columns) == set(GNSS)
         self._columns = GNSS if self.of_fixes else list(aid.columns)
@@ -343,10 +343,10 @@ class StateLines:
             raise ConfigError("live.bad-interval", quantity="--every", every=every)
         self._used, self._write, self._form, self._every = navigator, write, form, every
         self._next = -math.inf
-        self._mark: Mark | None = None
+        self._mark: CovarianceSnapshot | None = None
         self._begun = False
 
-    def take(self, piece: ChainPiece) -> None:
+    def take(self, piece: PipelineChunk) -> None:
         """Take what came of a sample."""
         for navigation in piece.navigation:
             if navigation.marks:
@@ -364,7 +364,7 @@ class StateLines:
             self._begun = True
         self._write(",".join("" if v is None else str(v) for v in told.values()) + "\n")
 
-    def _state(self, piece: ChainPiece) -> dict[str, float | None]:
+    def _state(self, piece: PipelineChunk) -> dict[str, float | None]:
         rows = [one.history[-1:] for one in piece.navigation if len(one.history)]
         if not rows:
             return dict.fromkeys([*STATE, *SD])

@@ -8,15 +8,15 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from strapdown.aiding.aid import Aid
+from strapdown.aiding.aid import Measurement
 from strapdown.errors import ConfigError
 from strapdown.live.clock import Clock, MachineClock
 from strapdown.live.latency import LatencyTape
 from strapdown.live.warm_up import warm_up
 from strapdown.navigation.recorder import Recorder
 from strapdown.systems.progress import Progress, silent
-from strapdown.systems.sins.chain import Chain
-from strapdown.systems.sins.drive import ChainRun, Recording, pieces_by_sample
+from strapdown.systems.sins.chain import NavigationPipeline
+from strapdown.systems.sins.drive import PipelineRun, Recording, pieces_by_sample
 from strapdown.tables.checks import source_of
 
 __all__ = ["Replay", "before_stamp", "parse_pace"]
@@ -76,12 +76,12 @@ class Replay:
 
     def __call__(
         self,
-        chain: Chain,
+        chain: NavigationPipeline,
         imu: pd.DataFrame,
         tables: Mapping[str, pd.DataFrame] | None = None,
         recorder: Recorder | None = None,
         progress: Progress = silent,
-    ) -> ChainRun:
+    ) -> PipelineRun:
         """Run a chain, as `systems.sins.drive.run_batch`."""
         warm_up(chain, imu.attrs["sampling"])
         recording, clock = Recording(chain, recorder), self._clock
@@ -104,12 +104,12 @@ class Replay:
         return recording.run(source_of(imu))
 
 
-def _ahead(chain: Chain, tables: Mapping[str, pd.DataFrame]) -> float:
+def _ahead(chain: NavigationPipeline, tables: Mapping[str, pd.DataFrame]) -> float:
     """By how much rows must be told before their stamps: what they tell may be of before."""
     return max((before_stamp(chain.navigator.by_name[name]) for name in tables), default=0.0)
 
 
-def before_stamp(aid: Aid) -> float:
+def before_stamp(aid: Measurement) -> float:
     """By how much what a row tells is of before its stamp, s: known offsets and delays.
 
     Parameters

@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.aiding.aid import TableAid
+from strapdown.aiding.aid import TabulatedMeasurement
 from strapdown.config.choice import SLOTS, make_choice
 from strapdown.config.navigation import CommandTable, LiveTable, NavigationSpec, aids_of
 from strapdown.config.navigation_file import navigation_spec
@@ -44,9 +44,9 @@ from strapdown.navigation.recorder import Recorder
 from strapdown.systems.alignment_source import axes_matrices
 from strapdown.systems.one_thread import one_thread
 from strapdown.systems.progress import Progress, silent
-from strapdown.systems.sins.chain import Chain
-from strapdown.systems.sins.drive import ChainRun, Recording, run_batch
-from strapdown.systems.sins.modes import ChainPiece
+from strapdown.systems.sins.chain import NavigationPipeline
+from strapdown.systems.sins.drive import PipelineRun, Recording, run_batch
+from strapdown.systems.sins.modes import PipelineChunk
 from strapdown.systems.sins.run import NavigationResult, make_chain, run_navigation
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import values_of
@@ -62,7 +62,7 @@ class LiveRun:
     ----------
     spec : NavigationSpec
     got : Reception
-    run : ChainRun or None
+    run : PipelineRun or None
         None where navigation never began.
     error : StrapdownError or None
         What ended it before its time.
@@ -70,7 +70,7 @@ class LiveRun:
 
     spec: NavigationSpec
     got: Reception
-    run: ChainRun | None
+    run: PipelineRun | None
     error: StrapdownError | None
 
     @property
@@ -177,12 +177,12 @@ def result_of(
     spec = write_received(live.spec, live.got, folder)
 
     def same(
-        chain: Chain,
+        chain: NavigationPipeline,
         imu: pd.DataFrame,
         tables: Mapping[str, pd.DataFrame],
         recorder: Recorder,
         told: Progress,
-    ) -> ChainRun:
+    ) -> PipelineRun:
         read = np.column_stack([imu.index.to_numpy(), values_of(imu, [*GYRO, *ACCEL])])
         if live.run is not None and np.array_equal(read, live.got.samples):
             return live.run
@@ -351,11 +351,11 @@ class Reception:
 
     def __init__(
         self,
-        chain: Chain,
+        chain: NavigationPipeline,
         spec: NavigationSpec,
         recording: Recording,
         clock: Clock,
-        show: Callable[[ChainPiece], None],
+        show: Callable[[PipelineChunk], None],
         warn: Callable[[Finding], None],
     ) -> None:
         self._live = spec.live or LiveTable()
@@ -367,7 +367,7 @@ class Reception:
         self.rows = {
             aid.name: AidRows(aid, given[aid.name])
             for aid in chain.navigator.aids
-            if isinstance(aid, TableAid)
+            if isinstance(aid, TabulatedMeasurement)
         }
         self._origin = self._first = math.nan
         self._waiting: deque[_Waiting] = deque()

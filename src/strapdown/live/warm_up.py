@@ -12,7 +12,7 @@ from strapdown.aiding.gnss import Gnss
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import StrapdownError
 from strapdown.nav_state import NavState
-from strapdown.systems.sins.chain import Chain
+from strapdown.systems.sins.chain import NavigationPipeline
 from strapdown.systems.sins.drive import run_by_sample
 from strapdown.systems.sins.intake import GapPolicy
 from strapdown.systems.sins.modes import KnownStart, Navigation
@@ -24,7 +24,7 @@ __all__ = ["warm_up"]
 ROWS, STEP = 80, 0.01
 
 
-def warm_up(chain: Chain, sampling: str = "mean") -> None:
+def warm_up(chain: NavigationPipeline, sampling: str = "mean") -> None:
     """Navigate a rest of less than a second by a copy of a chain; nothing of it is kept.
 
     Parameters
@@ -51,7 +51,7 @@ def warm_up(chain: Chain, sampling: str = "mean") -> None:
         run_by_sample(own, imu, _fixes(chain))
 
 
-def _fixes(chain: Chain) -> dict[str, pd.DataFrame]:
+def _fixes(chain: NavigationPipeline) -> dict[str, pd.DataFrame]:
     """Two fixes of each receiver that tells the first of them in time."""
     at = 0.5 * ROWS * STEP
     return {

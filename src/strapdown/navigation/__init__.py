@@ -8,25 +8,25 @@ from strapdown.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
     from strapdown.navigation.engine import LostCovarianceError
-    from strapdown.navigation.filter_options import Damping, Feedback, Feedforward
+    from strapdown.navigation.filter_options import ClosedLoop, Correction, OpenLoop
     from strapdown.navigation.navigator import Navigator
-    from strapdown.navigation.record import NavigationPiece
+    from strapdown.navigation.record import NavigationChunk
 
 __all__ = [
-    "Damping",
-    "Feedback",
-    "Feedforward",
+    "ClosedLoop",
+    "Correction",
     "LostCovarianceError",
-    "NavigationPiece",
+    "NavigationChunk",
     "Navigator",
+    "OpenLoop",
 ]
 
 load_on_first_use(
     __name__,
     {
         "engine": "LostCovarianceError",
-        "filter_options": "Damping Feedback Feedforward",
+        "filter_options": "Correction ClosedLoop OpenLoop",
         "navigator": "Navigator",
-        "record": "NavigationPiece",
+        "record": "NavigationChunk",
     },
 )

@@ -10,7 +10,7 @@ from strapdown.estimation.covariance import COVARIANCES, CovarianceForm, UpdateR
 from strapdown.estimation.error_model import ErrorModel, RotationVectorModel
 from strapdown.tables.checks import is_number
 
-__all__ = ["DAMPINGS", "Damping", "Feedback", "Feedforward", "FilterOptions"]
+__all__ = ["DAMPINGS", "ClosedLoop", "Correction", "FilterOptions", "OpenLoop"]
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class FilterOptions:
 
 
 @dataclass(frozen=True)
-class Damping:
+class Correction:
     """Where estimates go."""
 
     kind: ClassVar[str]
@@ -69,7 +69,7 @@ class Damping:
 
 
 @dataclass(frozen=True)
-class Feedback(Damping):
+class ClosedLoop(Correction):
     """State and sensors are corrected at every epoch, so that errors stay small: damped."""
 
     kind: ClassVar[str] = "feedback"
@@ -79,7 +79,7 @@ class Feedback(Damping):
 
 
 @dataclass(frozen=True)
-class Feedforward(Damping):
+class OpenLoop(Correction):
     """The mechanization runs free, and estimates are taken off what is shown of it.
 
     Errors grow as those of an unaided system, and the model of the filter is linear in them: what
@@ -95,4 +95,4 @@ class Feedforward(Damping):
     feeds_back: ClassVar[bool] = False
 
 
-DAMPINGS: dict[str, type[Damping]] = {"feedback": Feedback, "feedforward": Feedforward}
+DAMPINGS: dict[str, type[Correction]] = {"feedback": ClosedLoop, "feedforward": OpenLoop}

@@ -13,7 +13,13 @@ from numpy.typing import NDArray
 
 from strapdown._kernels.split_increment import split_increment
 from strapdown._kernels.steady_motion import STEADY, steady_motion
-from strapdown.aiding.aid import Aid, Epochs, TableAid, View, WatchingAid
+from strapdown.aiding.aid import (
+    Epochs,
+    ImuDerivedMeasurement,
+    Measurement,
+    TabulatedMeasurement,
+    View,
+)
 from strapdown.aiding.gnss import HORIZONTAL_CODE, Gnss
 from strapdown.errors import ConfigError
 from strapdown.estimation.covariance import Innovations, Observation, UpdateRule
@@ -36,13 +42,13 @@ from strapdown.navigation.engine import (
     NodeRows,
     begun,
 )
-from strapdown.navigation.filter_options import Damping, Feedback
-from strapdown.navigation.record import Mark, NavigationPiece, Seen
+from strapdown.navigation.filter_options import ClosedLoop, Correction
+from strapdown.navigation.record import CovarianceSnapshot, InnovationRecord, NavigationChunk
 
 if TYPE_CHECKING:
     from strapdown.navigation.smoother import Smoother
 
-__all__ = ["Going", "Navigator", "NavigatorState", "with_states"]
+__all__ = ["EpochLoop", "Navigator", "NavigatorState", "with_states"]
 
 
 Array = NDArray[np.float64]
@@ -78,9 +84,9 @@ class Navigator:
     """
 
     filter: ErrorFilter
-    aids: tuple[Aid, ...] = ()
+    aids: tuple[Measurement, ...] = ()
     mark_interval: float = 1.0
-    damping: Damping = field(default_factory=Feedback)
+    damping: Correction = field(default_factory=ClosedLoop)
     smoother: Smoother | None = None
 
     def __post_init__(self) -> None:
@@ -103,7 +109,7 @@ class Navigator:
         return aid if plain else None
 
     @cached_property
-    def by_name(self) -> dict[str, Aid]:
+    def by_name(self) -> dict[str, Measurement]:
         """Aids by their names."""
         return {aid.name: aid for aid in self.aids}
 
@@ -128,7 +134,9 @@ class Navigator:
         return NavigatorState(
             engine=begun(self.filter, state, self.damping.feeds_back),
             queues={aid.name: nothing for aid in self.aids},
-            memories={aid.name: aid.begin() for aid in self.aids if isinstance(aid, WatchingAid)},
+            memories={
+                aid.name: aid.begin() for aid in self.aids if isinstance(aid, ImuDerivedMeasurement)
+            },
             marked=-np.inf,
             observed=state.time,
             tilted=is_large(self.filter.physical_covariance(state)),
@@ -149,13 +157,13 @@ class Navigator:
         NavigatorState
         """
         aid = self.by_name.get(name)
-        if not isinstance(aid, TableAid):
+        if not isinstance(aid, TabulatedMeasurement):
             raise ConfigError(
                 "navigation.no-aid-table",
                 quantity="aiding",
                 name=name,
                 word=name,
-                known=[a.name for a in self.aids if isinstance(a, TableAid)],
+                known=[a.name for a in self.aids if isinstance(a, TabulatedMeasurement)],
             )
         more = aid.epochs(table)
         queue = state.queues[name]
@@ -168,7 +176,7 @@ class Navigator:
 
     def advance(
         self, state: NavigatorState, time: Array, rows: Array
-    ) -> tuple[NavigatorState, NavigationPiece]:
+    ) -> tuple[NavigatorState, NavigationChunk]:
         """Go on over motion increments.
 
         Parameters
@@ -182,20 +190,20 @@ class Navigator:
         Returns
         -------
         state : NavigatorState
-        piece : NavigationPiece
+        piece : NavigationChunk
 
         Raises
         ------
         DivergenceError
             The state has left what the mechanization can do; the sample is named.
         """
-        going = Going(self, state)
+        going = EpochLoop(self, state)
         # What is writeable is one type for compiled code, and what is not another.
         stamps = np.require(time, np.float64, ["C", "W"])
         going.over(stamps, np.require(rows, np.float64, ["C", "W"]))
         return going.state(), going.piece()
 
-    def finish(self, state: NavigatorState) -> NavigationPiece:
+    def finish(self, state: NavigatorState) -> NavigationChunk:
         """Return the mark of the newest sample, which no epoch follows; the state stays.
 
         Parameters
@@ -204,10 +212,10 @@ class Navigator:
 
         Returns
         -------
-        NavigationPiece
+        NavigationChunk
             Without samples; without a mark where there is one already.
         """
-        going = Going(self, state)
+        going = EpochLoop(self, state)
         if state.time > state.marked + SAME_INSTANT:
             going.end()
         return going.piece()
@@ -219,7 +227,7 @@ class Navigator:
         return GeneralEngine(self.filter, state, self.damping.feeds_back)
 
 
-def with_states(filter_: ErrorFilter, aids: tuple[Aid, ...]) -> ErrorFilter:
+def with_states(filter_: ErrorFilter, aids: tuple[Measurement, ...]) -> ErrorFilter:
     """Return a filter whose model has the states of the aids, too.
 
     Parameters
@@ -293,7 +301,7 @@ ROUNDING = 1e-12
 PHYSICAL_LABELS = ("place", "velocity", "attitude")
 
 
-class Going:
+class EpochLoop:
     """A navigator on its way over one piece."""
 
     def __init__(self, navigator: Navigator, state: NavigatorState) -> None:
@@ -308,8 +316,8 @@ class Going:
         self.steady = state.steady.copy()
         self.begun_steady = state.steady
         self.steadies: Array | None = None
-        self.seen: list[Seen] = []
-        self.marks: list[Mark] = []
+        self.seen: list[InnovationRecord] = []
+        self.marks: list[CovarianceSnapshot] = []
         self.late: list[tuple[str, float]] = []
         self.engine.nodes = NodeRows(navigator.filter, navigator.smoother is not None)
         if state.marked == -np.inf:
@@ -320,7 +328,7 @@ class Going:
     def over(self, time: Array, rows: Array) -> None:
         """Go over steps."""
         for aid in self.navigator.aids:
-            if isinstance(aid, WatchingAid):
+            if isinstance(aid, ImuDerivedMeasurement):
                 self.memories[aid.name], self.queues[aid.name] = aid.watch(
                     self.memories[aid.name], time, rows
                 )
@@ -418,9 +426,12 @@ class Going:
         names = {code: aid.names(code) for code in set(codes)}
         told = map(Innovations, fixed.told[:, 0], fixed.told[:, 1], fixed.told[:, 2])
         self.seen += [
-            Seen(at, *names[code], nu) for at, code, nu in zip(times, codes, told, strict=True)
+            InnovationRecord(at, *names[code], nu)
+            for at, code, nu in zip(times, codes, told, strict=True)
         ]
-        for mark in map(Mark, times, fixed.covariance, fixed.sensors, fixed.sensors_sd):
+        for mark in map(
+            CovarianceSnapshot, times, fixed.covariance, fixed.sensors, fixed.sensors_sd
+        ):
             self._add_mark(mark)
         if count:
             self.observed = times[-1]
@@ -438,9 +449,9 @@ class Going:
             self.tilted,
         )
 
-    def piece(self) -> NavigationPiece:
+    def piece(self) -> NavigationChunk:
         """What came of it."""
-        return NavigationPiece(
+        return NavigationChunk(
             self.time,
             self.history,
             tuple(self.seen),
@@ -500,7 +511,7 @@ class Going:
             steady=self._steady(at),
             unobserved=at - self.observed,
         )
-        told: list[tuple[Aid, Observation]] = []
+        told: list[tuple[Measurement, Observation]] = []
         for aid in self.navigator.aids:
             queue = self.queues[aid.name]
             count = int(queue.time.searchsorted(at + SAME_INSTANT, side="right"))
@@ -515,7 +526,7 @@ class Going:
             known = [self.engine.known(one) for one in observations]
             innovations = self._told([aid.rule or filter_.rule for aid, _ in told], observations)
             self.seen += [
-                Seen(at, one.name, one.labels, nu, one)
+                InnovationRecord(at, one.name, one.labels, nu, one)
                 for one, nu in zip(known, innovations, strict=True)
             ]
         self._mark()
@@ -556,7 +567,7 @@ class Going:
         filter_, state = self.navigator.filter, self.engine.filter
         P = filter_.physical_covariance(state)
         turn = np.kron(np.eye(3), filter_.mechanization.level_from_ned(state.row))
-        mark = Mark(
+        mark = CovarianceSnapshot(
             state.time - before,
             turn.T @ P[:9, :9] @ turn,
             self.engine.estimates(filter_),
@@ -584,7 +595,7 @@ class Going:
             )
         return np.sqrt(np.maximum(variances[9:], 0.0))
 
-    def _add_mark(self, mark: Mark) -> None:
+    def _add_mark(self, mark: CovarianceSnapshot) -> None:
         if self.marks and self.marks[-1].time >= mark.time - SAME_INSTANT:
             self.marks.pop()
         self.marks.append(mark)

@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 
 from strapdown.estimation.covariance import Innovations, Observation
 
-__all__ = ["Event", "GrowingRows", "Mark", "NavigationPiece", "NavigationRecord", "Seen", "Span"]
+__all__ = [
+    "CovarianceSnapshot",
+    "Event",
+    "GrowingRows",
+    "InnovationRecord",
+    "NavigationChunk",
+    "NavigationRecord",
+    "Span",
+]
 
 
 Array = NDArray[np.float64]
@@ -95,7 +103,7 @@ class NavigationRecord:
 # What a navigator gives for a piece of a log.
 
 
-class Seen(NamedTuple):
+class InnovationRecord(NamedTuple):
     """One observation at an epoch.
 
     Attributes
@@ -119,7 +127,7 @@ class Seen(NamedTuple):
     observation: Observation | None = None
 
 
-class Mark(NamedTuple):
+class CovarianceSnapshot(NamedTuple):
     """Covariance and estimates at an instant, after what was observed then.
 
     Where nothing was observed for a while there is one before the observation, too, with a stamp
@@ -143,7 +151,7 @@ class Mark(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class NavigationPiece:
+class NavigationChunk:
     """What came of a piece of a log.
 
     Attributes
@@ -165,8 +173,8 @@ class NavigationPiece:
 
     time: Array
     history: Array
-    seen: tuple[Seen, ...]
-    marks: tuple[Mark, ...]
+    seen: tuple[InnovationRecord, ...]
+    marks: tuple[CovarianceSnapshot, ...]
     late: tuple[tuple[str, float], ...] = ()
     nodes: tuple[Array, ...] = ()
 

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from strapdown.errors import ConfigError, DataError
 from strapdown.navigation.navigator import Navigator
 from strapdown.navigation.record import (
+    CovarianceSnapshot,
     Event,
     GrowingRows,
-    Mark,
-    NavigationPiece,
+    InnovationRecord,
+    NavigationChunk,
     NavigationRecord,
-    Seen,
     Span,
 )
 from strapdown.navigation.smoother import Smoothing
@@ -140,7 +140,7 @@ class Tape:
         self._states = GrowingRows.of(1 + self.navigator.filter.mechanization.row)
         self._marks = GrowingRows.of(1 + 81 + 2 * count)
 
-    def take(self, piece: NavigationPiece) -> None:
+    def take(self, piece: NavigationChunk) -> None:
         """Take what came of a further piece."""
         cells = self._cells(piece.time)
         if len(cells) and cells[-1] > self._state_cell:
@@ -231,7 +231,7 @@ class Tape:
             return time
         return np.floor(time * self.rate + NEAR)
 
-    def _mark(self, mark: Mark) -> None:
+    def _mark(self, mark: CovarianceSnapshot) -> None:
         row = np.concatenate([[mark.time], mark.covariance.ravel(), mark.sensors, mark.sensors_sd])[
             None, :
         ]
@@ -245,7 +245,7 @@ class Tape:
         else:
             self._newest_mark = row
 
-    def _observed(self, one: Seen) -> None:
+    def _observed(self, one: InnovationRecord) -> None:
         known = self._seen.get(one.name)
         if known is None:
             known = _Observed(one.labels, GrowingRows.of(1 + 3 * len(one.labels)))
@@ -256,14 +256,14 @@ class Tape:
 
 
 def record_of(
-    navigator: Navigator, pieces: Sequence[NavigationPiece], source: str | None = None
+    navigator: Navigator, pieces: Sequence[NavigationChunk], source: str | None = None
 ) -> NavigationRecord:
     """Put the pieces of a run together, every sample of them.
 
     Parameters
     ----------
     navigator : Navigator
-    pieces : sequence of NavigationPiece
+    pieces : sequence of NavigationChunk
         At least one sample and one mark.
     source : str, optional
         Name for messages.

@@ -20,7 +20,7 @@ from strapdown.estimation.covariance import Observation
 from strapdown.mechanization.mechanization import Mechanization
 from strapdown.navigation.engine import SAME_INSTANT
 from strapdown.navigation.navigator import Navigator
-from strapdown.navigation.record import NavigationPiece
+from strapdown.navigation.record import NavigationChunk
 from strapdown.tables.checks import is_number
 
 __all__ = ["SMOOTHERS", "RauchTungStriebel", "Smoothed", "Smoother", "Smoothing", "SmoothingTape"]
@@ -104,7 +104,7 @@ class Smoothing:
         self._tape = SmoothingTape(navigator.filter.model.physical_size, memory)
         self._navigator = navigator
 
-    def take(self, piece: NavigationPiece) -> None:
+    def take(self, piece: NavigationChunk) -> None:
         """Take what came of a further piece."""
         for rows in piece.nodes:
             self._tape.take(rows)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from strapdown import __version__
 from strapdown.constants import TWO_SIDED_95
-from strapdown.evaluation.heading_light import REASONS, HeadingLight
+from strapdown.evaluation.heading_light import REASONS, HeadingIntegrity
 from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.report.chart import BLUE, GREY, VERMILLION, thin
 from strapdown.report.document import (
@@ -488,7 +488,7 @@ def repeated_picture(result: NavigationResult) -> Picture | None:
     )
 
 
-def _strip(picture: Drawing, light: HeadingLight, begin: float, end: float, top: float) -> None:
+def _strip(picture: Drawing, light: HeadingIntegrity, begin: float, end: float, top: float) -> None:
     picture.text((LEFT - 10.0, top + 0.5 * STRIP), "light", SMALL, anchor="end")
     scale = (WIDTH - LEFT - RIGHT) / (end - begin)
     seconds = _merged(light)
@@ -505,7 +505,7 @@ def _strip(picture: Drawing, light: HeadingLight, begin: float, end: float, top:
             )
 
 
-def _merged(light: HeadingLight) -> list[tuple[float, float, str]]:
+def _merged(light: HeadingIntegrity) -> list[tuple[float, float, str]]:
     """Stretches of one colour, whatever the reason."""
     out: list[tuple[float, float, str]] = []
     for span in light.spans:

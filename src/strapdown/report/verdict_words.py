@@ -12,7 +12,7 @@ from strapdown.navigation.consistency import Inconsistency
 from strapdown.report.values import GAP, duration_words, half, length_words, plain, share_words
 from strapdown.report.values import alignment_values_instant as instant
 from strapdown.systems.sins.run import NavigationResult
-from strapdown.systems.sins.trust import NO_NORTH, Advice, Repeated, Trust
+from strapdown.systems.sins.trust import NO_NORTH, Advice, IntegrityReport, Repeated
 
 __all__ = [
     "advice_words",
@@ -67,7 +67,7 @@ def place_words(result: NavigationResult) -> str:
     )
 
 
-def heading_words(trust: Trust) -> str:
+def heading_words(trust: IntegrityReport) -> str:
     """How much of the time the heading can be trusted, and whether at the end."""
     light = trust.light
     if not len(light.table):
@@ -86,7 +86,7 @@ def heading_words(trust: Trust) -> str:
     return f"Heading: {said} of the time; {now}"
 
 
-def unwitnessed_words(trust: Trust) -> str:
+def unwitnessed_words(trust: IntegrityReport) -> str:
     """Why nothing could confirm the heading, in words."""
     return "; ".join(one.sentence() for one in trust.unwitnessed)
 
@@ -95,7 +95,7 @@ def _failed(repeated: Repeated) -> str:
     return "" if repeated.failed is None else repeated.failed.text()
 
 
-def promise(trust: Trust) -> tuple[tuple[str, str], ...]:
+def promise(trust: IntegrityReport) -> tuple[tuple[str, str], ...]:
     """What each colour means, in plain words and numbers."""
     green, red = plain(trust.light.green, 1), plain(trust.light.red, 1)
     return (
@@ -132,7 +132,7 @@ def span_words(span: LightSpan) -> str:
     )
 
 
-def advice_words(advice: Advice, trust: Trust) -> str:
+def advice_words(advice: Advice, trust: IntegrityReport) -> str:
     """What would have helped then."""
     if not advice.options:
         return _without_fixes(trust)
@@ -145,7 +145,7 @@ def advice_words(advice: Advice, trust: Trust) -> str:
     return text + (f"; {', '.join(others)}" if others else "")
 
 
-def _without_fixes(trust: Trust) -> str:
+def _without_fixes(trust: IntegrityReport) -> str:
     """What would bear a heading out where there are no fixes."""
     north = f"these gyros find north to ±{GAP}{degrees_words(trust.north_sd)} (one sd)"
     if trust.north_sd >= NO_NORTH:
@@ -163,7 +163,7 @@ def _without_fixes(trust: Trust) -> str:
     )
 
 
-def witness_words(trust: Trust) -> str:
+def witness_words(trust: IntegrityReport) -> str:
     """Who bore the heading out while it was green, the longest first; empty if nobody."""
     table = trust.light.table
     green = table[(table["light"] == 0) & (table["witness"] != "")]
@@ -176,7 +176,7 @@ def kind_words(one: Inconsistency) -> str:
     return _KINDS[one.kind]
 
 
-def first_words(trust: Trust) -> str:
+def first_words(trust: IntegrityReport) -> str:
     """The first measurement that is not as expected, as a sentence."""
     one = trust.first
     if not trust.consistency:
@@ -252,7 +252,7 @@ def terminal_lines(result: NavigationResult) -> list[tuple[str, str]]:
     return lines
 
 
-def _style(trust: Trust) -> str:
+def _style(trust: IntegrityReport) -> str:
     spans = trust.light.spans
     last = spans[-1].colour if spans else "red"
     return {"green": "green", "amber": "yellow", "red": "red"}[last]

@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.crash.at_point import AtPoint
+from strapdown.crash.at_point import PointKinematics
 from strapdown.crash.combine_units import combine_units
 from strapdown.crash.compare_units import UnitComparison, compare_units
 from strapdown.crash.entry import Entry
@@ -182,7 +182,7 @@ def reconstruct_crash(
             there[k], tied[k], state = start_from_gnss(of, entry, point)
             findings += state.findings
 
-    def answers(of: AtPoint, start: Entry | None) -> UnitReconstruction:
+    def answers(of: PointKinematics, start: Entry | None) -> UnitReconstruction:
         return reconstruct_unit(
             of,
             start,
@@ -209,7 +209,7 @@ def reconstruct_crash(
     )
 
 
-def _no_mean(units: Sequence[AtPoint]) -> Finding:
+def _no_mean(units: Sequence[PointKinematics]) -> Finding:
     return Finding(
         "crash.units-disagree-no-mean-told",
         file=", ".join(u.name for u in units),

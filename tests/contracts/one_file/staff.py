@@ -9,13 +9,13 @@ from typing import ClassVar
 import numpy as np
 import pandas as pd
 
-from strapdown.aiding.aid import DISPLACEMENT, Epochs, TableAid, View
+from strapdown.aiding.aid import DISPLACEMENT, Epochs, TabulatedMeasurement, View
 from strapdown.estimation.covariance import Observation
 from strapdown.tables.checks import check_columns, index_of, source_of, values_of
 
 
 @dataclass(frozen=True)
-class Staff(TableAid):
+class Staff(TabulatedMeasurement):
     """Heights over the ellipsoid, with noise and nothing else.
 
     Attributes
@@ -33,7 +33,7 @@ class Staff(TableAid):
     units: ClassVar[Mapping[str, str]] = {"mark": "m", "mark_sd": "m"}
 
     def epochs(self, table: pd.DataFrame) -> Epochs:
-        """Return an epoch for each height; see `TableAid.epochs`."""
+        """Return an epoch for each height; see `TabulatedMeasurement.epochs`."""
         check_columns(table, self.columns, source_of(table))
         return Epochs(index_of(table), values_of(table, self.columns))
 

@@ -11,7 +11,7 @@ from tests.unit.crash.crash_case import RATE, prepared
 
 from strapdown import rotation
 from strapdown.crash.acceleration import body_acceleration
-from strapdown.crash.at_point import AtPoint, at_point
+from strapdown.crash.at_point import PointKinematics, at_point
 from strapdown.crash.delta_v import delta_v
 from strapdown.crash.delta_v_bound import body_delta_v_bound, resolved_delta_v_bound
 from strapdown.crash.entry import Entry, angle_rates
@@ -130,7 +130,7 @@ def test_without_a_crash_there_is_a_path_and_a_word(at):
     still = at.imu.copy()
     still.attrs = dict(at.imu.attrs)
     still[ACCEL] = [0.0, 0.0, -9.80665]
-    quiet = AtPoint("imu1", still, at.effects, at.levelling, at.rest)
+    quiet = PointKinematics("imu1", still, at.effects, at.levelling, at.rest)
     found = reconstruct_unit(quiet, Entry.from_speed(7.1, 0.05))
     assert found.events.events == () and found.body == () and found.types == ()
     assert found.findings and len(found.path.time) > 100

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from strapdown.aiding.aid import TableAid
+from strapdown.aiding.aid import TabulatedMeasurement
 from strapdown.aiding.aids import AIDS
 from strapdown.errors import DataError
 from strapdown.formats.aid_tables import AID_READERS
@@ -21,7 +21,9 @@ def written(tmp_path, header, rows=ROWS):
 
 
 def test_every_kind_with_a_table_has_a_reader():
-    assert set(AID_READERS) == {name for name, aid in AIDS.items() if issubclass(aid, TableAid)}
+    assert set(AID_READERS) == {
+        name for name, aid in AIDS.items() if issubclass(aid, TabulatedMeasurement)
+    }
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ from strapdown.mechanization.state_error import state_error
 from strapdown.nav_state import NavState
 from strapdown.navigation import navigator as navigator_module
 from strapdown.navigation.compiled_engine import compiled
-from strapdown.navigation.filter_options import Feedforward
+from strapdown.navigation.filter_options import OpenLoop
 from strapdown.navigation.navigator import Navigator, with_states
 from strapdown.sensors.triad_errors import ImuErrors
 from strapdown.simulation import Origin, SineVelocityMotion, simulate_imu
@@ -165,7 +165,7 @@ def test_both_engines_give_the_same_but_for_rounding(log, monkeypatch, mechaniza
 
 
 @pytest.mark.parametrize("model", ["rotation_vector", "quaternions"])
-@pytest.mark.parametrize("damping", [None, Feedforward()], ids=["feedback", "feedforward"])
+@pytest.mark.parametrize("damping", [None, OpenLoop()], ids=["feedback", "feedforward"])
 def test_errors_are_found_and_as_large_as_is_said(log, model, damping):
     options = {} if damping is None else {"damping": damping}
     navigator, state = started("wander", "ud", LONE, model, **options)
@@ -187,7 +187,7 @@ def test_errors_are_found_and_as_large_as_is_said(log, model, damping):
 
 
 def test_feedforward_goes_by_pieces_too(log):
-    navigator, state = started("wander", "ud", LONE, damping=Feedforward())
+    navigator, state = started("wander", "ud", LONE, damping=OpenLoop())
     cuts = [3, 77, 78, 1000]
     same(run(log, navigator, state), run(log, navigator, state, cuts))
 

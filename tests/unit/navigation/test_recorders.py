@@ -13,7 +13,13 @@ from strapdown.estimation.sensor_blocks import accel_bias, gyro_bias
 from strapdown.mechanization import MECHANIZATIONS
 from strapdown.nav_state import NavState
 from strapdown.navigation.navigator import Navigator
-from strapdown.navigation.record import Event, Mark, NavigationPiece, Seen, Span
+from strapdown.navigation.record import (
+    CovarianceSnapshot,
+    Event,
+    InnovationRecord,
+    NavigationChunk,
+    Span,
+)
 from strapdown.navigation.recorder import FullRecorder, IntervalRecorder
 
 MODEL = RotationVectorModel((1e-6,) * 3, (1e-4,) * 3, (gyro_bias(1e-7), accel_bias(2e-4)))
@@ -28,12 +34,15 @@ def run(rate=100.0, length=3.0, begin=7.003):
     history = np.tile(row, (len(time), 1))
     history[:, 2] += np.arange(len(time))
     at = time[::20]
-    marks = tuple(Mark(t, np.eye(9) * t, np.full(6, t), np.ones(6)) for t in at.tolist())
+    marks = tuple(
+        CovarianceSnapshot(t, np.eye(9) * t, np.full(6, t), np.ones(6)) for t in at.tolist()
+    )
     one = np.ones(1)
     seen = tuple(
-        Seen(t, "baro.height", ("up, m",), Innovations(t * one, 2.0 * one, one)) for t in at
+        InnovationRecord(t, "baro.height", ("up, m",), Innovations(t * one, 2.0 * one, one))
+        for t in at
     )
-    return NavigationPiece(time, history, seen, marks)
+    return NavigationChunk(time, history, seen, marks)
 
 
 def kept(recorder, pieces, **more):
@@ -49,7 +58,7 @@ def cut(piece, edges):
     for a, b in pairwise(bounds):
         at = (piece.time >= a) & (piece.time < b)
         out.append(
-            NavigationPiece(
+            NavigationChunk(
                 piece.time[at],
                 piece.history[at],
                 tuple(s for s in piece.seen if a <= s.time < b),
@@ -104,12 +113,12 @@ def test_events_and_spans_are_handed_on():
 
 
 def test_a_mark_that_is_told_again_is_the_later_one():
-    mark = Mark(7.1, np.eye(9), np.zeros(6), np.ones(6))
-    again = Mark(7.1, 2.0 * np.eye(9), np.ones(6), np.ones(6))
+    mark = CovarianceSnapshot(7.1, np.eye(9), np.zeros(6), np.ones(6))
+    again = CovarianceSnapshot(7.1, 2.0 * np.eye(9), np.ones(6), np.ones(6))
     piece = run(length=0.2)
     pieces = [
-        NavigationPiece(piece.time[:10], piece.history[:10], (), (mark,)),
-        NavigationPiece(piece.time[10:], piece.history[10:], (), (again,)),
+        NavigationChunk(piece.time[:10], piece.history[:10], (), (mark,)),
+        NavigationChunk(piece.time[10:], piece.history[10:], (), (again,)),
     ]
     for recorder in (FullRecorder(), IntervalRecorder(1.0)):
         record = kept(recorder, pieces)

@@ -9,13 +9,13 @@ from typing import ClassVar
 import numpy as np
 import pandas as pd
 
-from strapdown.aiding.aid import DISPLACEMENT, Epochs, TableAid, View
+from strapdown.aiding.aid import DISPLACEMENT, Epochs, TabulatedMeasurement, View
 from strapdown.estimation.covariance import Observation
 from strapdown.tables.checks import check_columns, index_of, source_of, values_of
 
 
 @dataclass(frozen=True)
-class SurveyedHeight(TableAid):
+class SurveyedHeight(TabulatedMeasurement):
     """Heights over the ellipsoid from a survey: ``surveyed`` and ``surveyed_sd`` in m.
 
     Attributes

@@ -15,7 +15,7 @@ from strapdown.estimation.error_model import ErrorModel
 from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.navigation.engine import SAME_INSTANT
 from strapdown.navigation.navigator import Navigator, NavigatorState
-from strapdown.navigation.record import NavigationPiece
+from strapdown.navigation.record import NavigationChunk
 from strapdown.navigation.recorder import record_of
 from strapdown.systems.progress import Progress, silent
 
@@ -36,7 +36,7 @@ __all__ = [
 Array = NDArray[np.float64]
 
 #: Goes over the samples of an outage with a navigator from a state.
-Go = Callable[[Navigator, NavigatorState], Sequence[NavigationPiece]]
+Go = Callable[[Navigator, NavigatorState], Sequence[NavigationChunk]]
 
 #: What is foretold, with its unit.
 QUANTITIES = {

@@ -14,12 +14,12 @@ from strapdown.errors import ConfigError
 from strapdown.evaluation.gnss_outages import WithheldScore, blinded, score_of, spans_to_withhold
 from strapdown.evaluation.plane_bound import PLANE_95, plane_bound
 from strapdown.navigation.navigator import Navigator, NavigatorState
-from strapdown.navigation.record import NavigationPiece, Span
+from strapdown.navigation.record import NavigationChunk, Span
 from strapdown.navigation.recorder import record_of
 from strapdown.systems.coasting.forecast import QUANTITIES, Forecast, courses, forecast, variances
 from strapdown.systems.part_of_log import check_part
 from strapdown.systems.progress import Progress, silent
-from strapdown.systems.sins.chain import Chain, ChainState
+from strapdown.systems.sins.chain import NavigationPipeline, PipelineState
 from strapdown.systems.sins.run import make_chain
 from strapdown.systems.sins.source import NavigationSource
 from strapdown.systems.sins.withholding import SETTLED, WithheldRun, withheld_runs
@@ -267,8 +267,8 @@ def _aligns_anew(begin: float, end: float) -> ConfigError:
 
 
 def _foretold(
-    chain: Chain,
-    state: ChainState,
+    chain: NavigationPipeline,
+    state: PipelineState,
     samples: tuple[Array, Array],
     receivers: list[str],
     outage: float,
@@ -286,7 +286,7 @@ def _foretold(
         for name, queue in begin.queues.items()
     }
 
-    def go(navigator: Navigator, start: NavigatorState) -> tuple[NavigationPiece, ...]:
+    def go(navigator: Navigator, start: NavigatorState) -> tuple[NavigationChunk, ...]:
         one = replace(chain, navigator=navigator)
         end, piece = one.advance(replace(state, navigator=start), *samples)
         if end.navigator is None:

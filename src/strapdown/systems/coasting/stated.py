@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.aiding.aid import Aid
+from strapdown.aiding.aid import Measurement
 from strapdown.aiding.gnss import Gnss
 from strapdown.config.choice import SLOTS, make_choice
 from strapdown.config.coast import CoastSpec, CoastStartTable
@@ -23,7 +23,7 @@ from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown
 from strapdown.nav_state import NavState
 from strapdown.navigation.navigator import Navigator, NavigatorState, with_states
-from strapdown.navigation.record import NavigationPiece
+from strapdown.navigation.record import NavigationChunk
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.triad_errors import ImuErrors
 from strapdown.sensors.uncertainty import ImuUncertainty, stated_imu
@@ -108,7 +108,7 @@ def coast_navigator(spec: CoastSpec, sensors: ImuUncertainty, fixes: bool) -> Na
     Navigator
     """
     names = type(spec.aiding).model_fields
-    aids: tuple[Aid, ...] = tuple(
+    aids: tuple[Measurement, ...] = tuple(
         make_choice(
             getattr(spec.aiding, kind), SLOTS["aiding"], {"name": kind, "ellipsoid": "wgs84"}
         )
@@ -169,7 +169,7 @@ def forecast_of_sensor(
     queues = {k: v for k, v in state.queues.items() if k != RECEIVER}
     state = _stated(replace(state, queues=queues), navigator, spec.start)
 
-    def go(one: Navigator, start: NavigatorState) -> tuple[NavigationPiece, ...]:
+    def go(one: Navigator, start: NavigatorState) -> tuple[NavigationChunk, ...]:
         end, piece = one.advance(start, time[first:], rows[first:])
         return piece, one.finish(end)
 

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
-from strapdown.aiding.aid import Aid
+from strapdown.aiding.aid import Measurement
 from strapdown.alignment.alignment import Alignment, Site
 from strapdown.alignment.course_sums import Antenna
 from strapdown.alignment.fine_result import FineResult
@@ -29,7 +29,7 @@ from strapdown.systems.sins.source import fixes_until, here_by_fix, site_of_fixe
 from strapdown.tables import MOTION
 
 if TYPE_CHECKING:
-    from strapdown.systems.sins.chain import Chain, ChainState
+    from strapdown.systems.sins.chain import NavigationPipeline, PipelineState
 
 __all__ = ["align", "from_alignment", "from_fine", "from_state", "handed_over", "unused_fixes"]
 
@@ -42,13 +42,13 @@ INSTANT = 1e-7
 STEADY = 0.1
 
 
-def align(chain: Chain, state: ChainState) -> Aligned:
+def align(chain: NavigationPipeline, state: PipelineState) -> Aligned:
     """Align by what was kept of the mode that a chain is in.
 
     Parameters
     ----------
     chain : Chain
-    state : ChainState
+    state : PipelineState
         In a mode of alignment.
 
     Returns
@@ -83,13 +83,13 @@ def align(chain: Chain, state: ChainState) -> Aligned:
     return Aligned(mode.name, state.begun, state.time, found)
 
 
-def handed_over(chain: Chain, state: ChainState, found: Aligned) -> FilterState:
+def handed_over(chain: NavigationPipeline, state: PipelineState, found: Aligned) -> FilterState:
     """Return the state of the filter with which navigation begins.
 
     Parameters
     ----------
     chain : Chain
-    state : ChainState
+    state : PipelineState
         At the end of a mode of alignment.
     found : Aligned
 
@@ -141,14 +141,14 @@ def handed_over(chain: Chain, state: ChainState, found: Aligned) -> FilterState:
 
 
 def unused_fixes(
-    chain: Chain, state: ChainState, begun: float
+    chain: NavigationPipeline, state: PipelineState, begun: float
 ) -> dict[str, tuple[pd.DataFrame, ...]]:
     """What is left of the tables of a receiver by whose fixes navigation has begun.
 
     Parameters
     ----------
     chain : Chain
-    state : ChainState
+    state : PipelineState
         At the end of a mode of alignment.
     begun : float, s
         When navigation begins.
@@ -167,7 +167,9 @@ def unused_fixes(
     return {name: tuple(table for table in out if len(table))}
 
 
-def _by_antenna(chain: Chain, q_nb: Array, velocity: Array, turn: Array) -> Array | None:
+def _by_antenna(
+    chain: NavigationPipeline, q_nb: Array, velocity: Array, turn: Array
+) -> Array | None:
     """What other errors add to a place and velocity by the fixes of the alignment."""
     if chain.fixes_from is None:
         return None
@@ -183,7 +185,7 @@ def _turn(kept: Array, at: float) -> Array:
     return np.asarray(kept[near, 1:4].mean(axis=0))
 
 
-def _window(chain: Chain, state: ChainState) -> Array:
+def _window(chain: NavigationPipeline, state: PipelineState) -> Array:
     """Steps that are aligned."""
     kept, mode = state.kept.rows, chain.modes[state.mode]
     if not isinstance(mode, CoarseMode):
@@ -191,13 +193,13 @@ def _window(chain: Chain, state: ChainState) -> Array:
     return kept[np.searchsorted(kept[:, 0], state.time - mode.window - INSTANT) :]
 
 
-def _table(values: Array, time: Array, columns: list[str], state: ChainState) -> pd.DataFrame:
+def _table(values: Array, time: Array, columns: list[str], state: PipelineState) -> pd.DataFrame:
     table = pd.DataFrame(values.copy(), index=pd.Index(time, name="time"), columns=columns)
     table.attrs["source"] = state.intake.source
     return table
 
 
-def _fixes(chain: Chain, state: ChainState) -> pd.DataFrame | None:
+def _fixes(chain: NavigationPipeline, state: PipelineState) -> pd.DataFrame | None:
     name = chain.fixes_from
     if name is None:
         return None
@@ -205,7 +207,9 @@ def _fixes(chain: Chain, state: ChainState) -> pd.DataFrame | None:
     return fixes_until(state.told[name], state.time + INSTANT, offset)
 
 
-def _site(chain: Chain, state: ChainState, q_nb: Array | None) -> tuple[Site, Array]:
+def _site(
+    chain: NavigationPipeline, state: PipelineState, q_nb: Array | None
+) -> tuple[Site, Array]:
     """Where the sensors are, and how well that is known."""
     if chain.site is not None:
         return chain.site, np.asarray(chain.site_sd, dtype=np.float64)
@@ -220,12 +224,12 @@ def _site(chain: Chain, state: ChainState, q_nb: Array | None) -> tuple[Site, Ar
     return Site(lat_deg, lon_deg, alt, ellipsoid), sd
 
 
-def _receiver(chain: Chain) -> Aid | None:
+def _receiver(chain: NavigationPipeline) -> Measurement | None:
     """That which has the fixes."""
     return chain.navigator.by_name.get(chain.fixes_from or "")
 
 
-def _antenna(chain: Chain) -> Antenna:
+def _antenna(chain: NavigationPipeline) -> Antenna:
     """Where and when the receiver measures."""
     aid = _receiver(chain)
     x, y, z = _lever_arm(chain).tolist()
@@ -236,7 +240,7 @@ def _antenna(chain: Chain) -> Antenna:
     )
 
 
-def _lever_arm(chain: Chain) -> Array:
+def _lever_arm(chain: NavigationPipeline) -> Array:
     """Of its antenna."""
     arm = getattr(_receiver(chain), "lever_arm", (0.0, 0.0, 0.0))
     return np.asarray(arm, dtype=np.float64)

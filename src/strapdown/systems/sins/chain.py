@@ -10,31 +10,37 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.aiding.aid import TableAid
+from strapdown.aiding.aid import TabulatedMeasurement
 from strapdown.alignment.alignment import Site
 from strapdown.errors import ConfigError, DataError, DivergenceError
 from strapdown.estimation.error_filter import FilterState
 from strapdown.navigation.navigator import Navigator, NavigatorState
-from strapdown.navigation.record import Event, GrowingRows, NavigationPiece, Span
+from strapdown.navigation.record import Event, GrowingRows, NavigationChunk, Span
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.sins.aligning import align, from_state, handed_over, unused_fixes
-from strapdown.systems.sins.deliveries import Deliveries, DeliveriesState
-from strapdown.systems.sins.intake import Hole, Intake, IntakeState, Steps, widened
+from strapdown.systems.sins.deliveries import MeasurementMonitor, MeasurementMonitorState
+from strapdown.systems.sins.intake import (
+    Hole,
+    ImuIncrements,
+    ImuPreprocessor,
+    ImuPreprocessorState,
+    widened,
+)
 from strapdown.systems.sins.modes import (
     Aligned,
-    ChainPiece,
     CoarseMode,
     Command,
     KnownStart,
     Mode,
     Navigation,
+    PipelineChunk,
     check_timeline,
 )
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Chain", "ChainState", "Going"]
+__all__ = ["ModeSequencer", "NavigationPipeline", "PipelineState"]
 
 
 Array = NDArray[np.float64]
@@ -47,12 +53,12 @@ REMEMBERED = 60.0
 
 
 @dataclass(frozen=True, eq=False)
-class ChainState:
+class PipelineState:
     """Everything that a chain remembers: from here it goes on.
 
     Attributes
     ----------
-    intake : IntakeState
+    intake : ImuPreprocessorState
     mode : int
         Place of the mode in the chain's `modes`.
     begun : float, s
@@ -70,13 +76,13 @@ class ChainState:
     holes : tuple of Hole
         That the steps have not come to yet.
     navigator : NavigatorState or None
-    deliveries : DeliveriesState
+    deliveries : MeasurementMonitorState
         What each aid delivered.
     time : float, s
         Of the newest step.
     """
 
-    intake: IntakeState
+    intake: ImuPreprocessorState
     mode: int
     begun: float
     next_try: float
@@ -86,12 +92,12 @@ class ChainState:
     commands: tuple[Command, ...]
     holes: tuple[Hole, ...]
     navigator: NavigatorState | None
-    deliveries: DeliveriesState
+    deliveries: MeasurementMonitorState
     time: float
 
 
 @dataclass(frozen=True, eq=False)
-class Chain:
+class NavigationPipeline:
     """Samples to steps, coarse and fine alignment, navigation: a timeline of modes.
 
     It does not know where its samples come from. They may come in pieces of any length, and the
@@ -133,7 +139,7 @@ class Chain:
     """
 
     navigator: Navigator
-    intake: Intake = field(default_factory=Intake)
+    intake: ImuPreprocessor = field(default_factory=ImuPreprocessor)
     modes: tuple[Mode, ...] = (Navigation(),)
     start: KnownStart | None = None
     sensors: ImuUncertainty | None = None
@@ -142,7 +148,7 @@ class Chain:
     velocity_sd: Three = (0.1, 0.1, 0.1)
     fixes: str | None = None
     commands: tuple[Command, ...] = ()
-    deliveries: Deliveries = field(default_factory=Deliveries)
+    deliveries: MeasurementMonitor = field(default_factory=MeasurementMonitor)
 
     def __post_init__(self) -> None:
         check_timeline(self.modes, self.start is not None)
@@ -168,7 +174,7 @@ class Chain:
             return self.fixes
         return next((aid.name for aid in self.navigator.aids if aid.kind == "gnss"), None)
 
-    def begin(self, sampling: str = "instantaneous", source: str | None = None) -> ChainState:
+    def begin(self, sampling: str = "instantaneous", source: str | None = None) -> PipelineState:
         """Return the state before the first sample.
 
         Parameters
@@ -178,7 +184,7 @@ class Chain:
         source : str, optional
             Name of the samples, for messages.
         """
-        return ChainState(
+        return PipelineState(
             intake=self.intake.begin(sampling, source),
             mode=0,
             begun=np.nan,
@@ -193,19 +199,19 @@ class Chain:
             time=-np.inf,
         )
 
-    def tell(self, state: ChainState, name: str, table: pd.DataFrame) -> ChainState:
+    def tell(self, state: PipelineState, name: str, table: pd.DataFrame) -> PipelineState:
         """Take rows of the table of an aid, later than those before.
 
         Parameters
         ----------
-        state : ChainState
+        state : PipelineState
         name : str
             Of the aid.
         table : DataFrame
 
         Returns
         -------
-        ChainState
+        PipelineState
 
         Raises
         ------
@@ -219,7 +225,7 @@ class Chain:
             state = replace(state, navigator=told)
             return self._remembering(state, name, table) if self._aligns_anew else state
         aid = self.navigator.by_name.get(name)
-        if not isinstance(aid, TableAid):
+        if not isinstance(aid, TabulatedMeasurement):
             raise ConfigError(
                 "navigation.no-aid-table",
                 quantity="aiding",
@@ -231,12 +237,12 @@ class Chain:
         aid.epochs(table)
         return self._remembering(state, name, table)
 
-    def command(self, state: ChainState, word: str, time: float = -np.inf) -> ChainState:
+    def command(self, state: PipelineState, word: str, time: float = -np.inf) -> PipelineState:
         """Take a command.
 
         Parameters
         ----------
-        state : ChainState
+        state : PipelineState
         word : str
             As `Command.word`.
         time : float, s
@@ -247,13 +253,13 @@ class Chain:
         return replace(state, commands=tuple(commands))
 
     def advance(
-        self, state: ChainState, time: Array, values: Array, last: bool = False
-    ) -> tuple[ChainState, ChainPiece]:
+        self, state: PipelineState, time: Array, values: Array, last: bool = False
+    ) -> tuple[PipelineState, PipelineChunk]:
         """Go on over samples.
 
         Parameters
         ----------
-        state : ChainState
+        state : PipelineState
         time : ndarray, (k,), s
             Stamps.
         values : ndarray, (k, 6)
@@ -263,8 +269,8 @@ class Chain:
 
         Returns
         -------
-        state : ChainState
-        piece : ChainPiece
+        state : PipelineState
+        piece : PipelineChunk
 
         Raises
         ------
@@ -275,11 +281,11 @@ class Chain:
             As `Navigator.advance`.
         """
         intake, steps = self.intake.advance(state.intake, time, values, last)
-        going = Going(self, replace(state, intake=intake))
+        going = ModeSequencer(self, replace(state, intake=intake))
         going.over(steps)
         return going.state(), going.piece(last)
 
-    def finish(self, state: ChainState) -> tuple[ChainState, ChainPiece]:
+    def finish(self, state: PipelineState) -> tuple[PipelineState, PipelineChunk]:
         """Say that no sample follows; as the last piece does with `last`."""
         return self.advance(state, np.empty(0), np.empty((0, 6)), last=True)
 
@@ -287,7 +293,7 @@ class Chain:
     def _aligns_anew(self) -> bool:
         return self.intake.gaps.beyond == "align"
 
-    def _remembering(self, state: ChainState, name: str, table: pd.DataFrame) -> ChainState:
+    def _remembering(self, state: PipelineState, name: str, table: pd.DataFrame) -> PipelineState:
         """Keep a table for what is to begin; in navigation, without what is long past."""
         known = state.told[name]
         if state.navigator is not None:
@@ -295,7 +301,9 @@ class Chain:
         return replace(state, told={**state.told, name: (*known, table)})
 
     def _tables(self) -> tuple[str, ...]:
-        return tuple(aid.name for aid in self.navigator.aids if isinstance(aid, TableAid))
+        return tuple(
+            aid.name for aid in self.navigator.aids if isinstance(aid, TabulatedMeasurement)
+        )
 
     def _check_word(self, word: str) -> None:
         words = ("next", *(mode.name for mode in self.modes[1:]))
@@ -316,25 +324,25 @@ AHEAD = 3.0
 TIME, VALUES, ROWS = 0, slice(1, 7), slice(7, 17)
 
 
-class Going:
+class ModeSequencer:
     """A chain on its way.
 
     Parameters
     ----------
     chain : Chain
-    state : ChainState
+    state : PipelineState
     """
 
-    def __init__(self, chain: Chain, state: ChainState) -> None:
+    def __init__(self, chain: NavigationPipeline, state: PipelineState) -> None:
         self._chain = chain
         self._state = state
-        self._navigation: list[NavigationPiece] = []
+        self._navigation: list[NavigationChunk] = []
         self._aligned: list[Aligned] = []
         self._events: list[Event] = []
         self._modes: list[Span] = []
         self._outages: list[tuple[str, Span]] = []
 
-    def over(self, steps: Steps) -> None:
+    def over(self, steps: ImuIncrements) -> None:
         """Go over what the samples of a piece made."""
         for hole in steps.holes:
             self._found(hole)
@@ -352,17 +360,17 @@ class Going:
         while len(kept):
             kept = self._some(kept)
 
-    def state(self) -> ChainState:
+    def state(self) -> PipelineState:
         """Where it is now."""
         return self._state
 
-    def piece(self, last: bool) -> ChainPiece:
+    def piece(self, last: bool) -> PipelineChunk:
         """What came of it."""
         state = self._state
         mode = self._chain.modes[state.mode]
         if last:
             self._end(mode.name)
-        return ChainPiece(
+        return PipelineChunk(
             mode=mode.name,
             time=state.time,
             navigation=tuple(self._navigation),

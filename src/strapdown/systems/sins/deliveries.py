@@ -10,10 +10,10 @@ from statistics import median
 import numpy as np
 
 from strapdown.errors import ConfigError
-from strapdown.navigation.record import Event, NavigationPiece, Seen, Span
+from strapdown.navigation.record import Event, InnovationRecord, NavigationChunk, Span
 from strapdown.tables.checks import is_number
 
-__all__ = ["Deliveries", "DeliveriesState"]
+__all__ = ["MeasurementMonitor", "MeasurementMonitorState"]
 
 # Intervals whose median is an aid's own.
 INTERVALS = 5
@@ -38,7 +38,7 @@ class Rejected:
 
 
 @dataclass(frozen=True)
-class Delivery:
+class MeasurementStatus:
     """What is known of one aid.
 
     Attributes
@@ -60,7 +60,7 @@ class Delivery:
 
 
 @dataclass(frozen=True, eq=False)
-class DeliveriesState:
+class MeasurementMonitorState:
     """Between pieces.
 
     Attributes
@@ -74,14 +74,14 @@ class DeliveriesState:
         When navigation began: what is of a time before is not late.
     """
 
-    aids: Mapping[str, Delivery]
+    aids: Mapping[str, MeasurementStatus]
     rejected: Mapping[str, Rejected] = field(default_factory=dict)
     late: Mapping[str, Rejected] = field(default_factory=dict)
     begun: float = math.nan
 
 
 @dataclass(frozen=True)
-class Deliveries:
+class MeasurementMonitor:
     """Tells events of aids; it holds no state.
 
     Attributes
@@ -105,30 +105,30 @@ class Deliveries:
                 "navigation.outage-intervals-not-above-one", quantity="outage", outage=self.outage
             )
 
-    def begin(self, tables: Sequence[str]) -> DeliveriesState:
+    def begin(self, tables: Sequence[str]) -> MeasurementMonitorState:
         """Return the state before navigation, of aids with tables."""
-        return DeliveriesState({name: Delivery(math.nan) for name in tables})
+        return MeasurementMonitorState({name: MeasurementStatus(math.nan) for name in tables})
 
-    def started(self, state: DeliveriesState, time: float) -> DeliveriesState:
+    def started(self, state: MeasurementMonitorState, time: float) -> MeasurementMonitorState:
         """Return the state where navigation begins."""
         aids = {name: replace(one, newest=time) for name, one in state.aids.items()}
         return replace(state, aids=aids, begun=time)
 
     def over(
-        self, state: DeliveriesState, piece: NavigationPiece, time: float
-    ) -> tuple[DeliveriesState, list[Event], list[tuple[str, Span]]]:
+        self, state: MeasurementMonitorState, piece: NavigationChunk, time: float
+    ) -> tuple[MeasurementMonitorState, list[Event], list[tuple[str, Span]]]:
         """Look at what came of a piece.
 
         Parameters
         ----------
-        state : DeliveriesState
-        piece : NavigationPiece
+        state : MeasurementMonitorState
+        piece : NavigationChunk
         time : float, s
             To which navigation has come.
 
         Returns
         -------
-        state : DeliveriesState
+        state : MeasurementMonitorState
         events : list of Event
         outages : list of (str, Span)
             That ended.
@@ -154,10 +154,10 @@ class Deliveries:
             if not aid.out and time - aid.newest > longest:
                 events.append(_out(name, aid.newest + longest, aid.newest))
                 aids[name] = replace(aid, out=True)
-        return DeliveriesState(aids, rejected, late, state.begun), events, outages
+        return MeasurementMonitorState(aids, rejected, late, state.begun), events, outages
 
     def finish(
-        self, state: DeliveriesState, time: float
+        self, state: MeasurementMonitorState, time: float
     ) -> tuple[list[Event], list[tuple[str, Span]]]:
         """Tell what is still open at the end."""
         events = [_rejected(name, one) for name, one in state.rejected.items()]
@@ -172,7 +172,7 @@ class Deliveries:
                     )
         return events, outages
 
-    def _longest(self, aid: Delivery) -> float:
+    def _longest(self, aid: MeasurementStatus) -> float:
         if not aid.intervals:
             return math.inf
         return self.outage * median(aid.intervals)
@@ -180,11 +180,11 @@ class Deliveries:
     def _delivered(
         self,
         name: str,
-        aid: Delivery,
-        one: Seen,
+        aid: MeasurementStatus,
+        one: InnovationRecord,
         events: list[Event],
         outages: list[tuple[str, Span]],
-    ) -> Delivery:
+    ) -> MeasurementStatus:
         """Take an observation of an aid."""
         if one.time <= aid.newest and aid.seen:
             return aid
@@ -209,7 +209,7 @@ class Deliveries:
         return replace(aid, newest=one.time, intervals=intervals)
 
 
-def _in_sd(one: Seen) -> float:
+def _in_sd(one: InnovationRecord) -> float:
     """The largest component of an innovation in standard deviations of what was expected."""
     return float(np.abs(one.innovations.nu / np.sqrt(one.innovations.s)).max())
 

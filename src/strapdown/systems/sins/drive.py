@@ -15,12 +15,19 @@ from strapdown.navigation.engine import SAME_INSTANT
 from strapdown.navigation.record import Event, NavigationRecord, Span
 from strapdown.navigation.recorder import FullRecorder, Recorder
 from strapdown.systems.progress import Progress, silent
-from strapdown.systems.sins.chain import Chain, ChainState
-from strapdown.systems.sins.modes import Aligned, ChainPiece
+from strapdown.systems.sins.chain import NavigationPipeline, PipelineState
+from strapdown.systems.sins.modes import Aligned, PipelineChunk
 from strapdown.tables import ACCEL, GYRO, check_imu
 from strapdown.tables.checks import check_columns, source_of, values_of
 
-__all__ = ["ChainRun", "Recording", "pieces_by_sample", "pieces_of", "run_batch", "run_by_sample"]
+__all__ = [
+    "PipelineRun",
+    "Recording",
+    "pieces_by_sample",
+    "pieces_of",
+    "run_batch",
+    "run_by_sample",
+]
 
 Array = NDArray[np.float64]
 
@@ -30,7 +37,7 @@ CHANNELS = [*GYRO, *ACCEL]
 
 
 @dataclass(frozen=True, eq=False)
-class ChainRun:
+class PipelineRun:
     """What came of a run.
 
     Attributes
@@ -57,7 +64,7 @@ class Recording:
         All samples, if not given.
     """
 
-    def __init__(self, chain: Chain, recorder: Recorder | None = None) -> None:
+    def __init__(self, chain: NavigationPipeline, recorder: Recorder | None = None) -> None:
         smoother = chain.navigator.smoother
         self._smoothing = None if smoother is None else smoother.begin(chain.navigator)
         self._tape = (recorder or FullRecorder()).begin(chain.navigator)
@@ -66,7 +73,7 @@ class Recording:
         self._modes: list[Span] = []
         self._outages: list[tuple[str, Span]] = []
 
-    def take(self, piece: ChainPiece) -> None:
+    def take(self, piece: PipelineChunk) -> None:
         """Take a piece."""
         for navigation in piece.navigation:
             self._tape.take(navigation)
@@ -77,7 +84,7 @@ class Recording:
         self._modes += piece.modes
         self._outages += piece.outages
 
-    def run(self, source: str | None = None) -> ChainRun:
+    def run(self, source: str | None = None) -> PipelineRun:
         """Return everything that was taken.
 
         Parameters
@@ -96,17 +103,17 @@ class Recording:
             },
         )
         smoothed = None if self._smoothing is None else record(smoothing=self._smoothing)
-        return ChainRun(record(), tuple(self._aligned), smoothed)
+        return PipelineRun(record(), tuple(self._aligned), smoothed)
 
 
 def run_batch(
-    chain: Chain,
+    chain: NavigationPipeline,
     imu: pd.DataFrame,
     tables: Mapping[str, pd.DataFrame] | None = None,
     recorder: Recorder | None = None,
     progress: Progress = silent,
     chunk: float = CHUNK,
-) -> ChainRun:
+) -> PipelineRun:
     """Run a chain over a record.
 
     Parameters
@@ -125,7 +132,7 @@ def run_batch(
 
     Returns
     -------
-    ChainRun
+    PipelineRun
 
     Raises
     ------
@@ -142,12 +149,12 @@ def run_batch(
 
 
 def run_by_sample(
-    chain: Chain,
+    chain: NavigationPipeline,
     imu: pd.DataFrame,
     tables: Mapping[str, pd.DataFrame] | None = None,
     recorder: Recorder | None = None,
     ahead: float = 0.0,
-) -> ChainRun:
+) -> PipelineRun:
     """Run a chain over a record as it would have come: sample by sample, each fix when it is due.
 
     Parameters
@@ -160,7 +167,7 @@ def run_by_sample(
 
     Returns
     -------
-    ChainRun
+    PipelineRun
     """
     recording = Recording(chain, recorder)
     for piece in pieces_by_sample(chain, imu, tables, ahead):
@@ -169,11 +176,11 @@ def run_by_sample(
 
 
 def pieces_of(
-    chain: Chain,
+    chain: NavigationPipeline,
     imu: pd.DataFrame,
     tables: Mapping[str, pd.DataFrame] | None = None,
     chunk: float = CHUNK,
-) -> Iterator[ChainPiece]:
+) -> Iterator[PipelineChunk]:
     """Run a chain over a record in chunks, and give the pieces as they come; see `run_batch`."""
     if not chunk > 0.0:
         raise ConfigError("navigation.chunk-not-positive", quantity="chunk", chunk=chunk)
@@ -192,12 +199,12 @@ def pieces_of(
 
 
 def pieces_by_sample(
-    chain: Chain,
+    chain: NavigationPipeline,
     imu: pd.DataFrame,
     tables: Mapping[str, pd.DataFrame] | None = None,
     ahead: float = 0.0,
-    each: Callable[[ChainState, float], ChainState] | None = None,
-) -> Iterator[ChainPiece]:
+    each: Callable[[PipelineState, float], PipelineState] | None = None,
+) -> Iterator[PipelineChunk]:
     """Run a chain sample by sample; see `run_by_sample`.
 
     Parameters
@@ -230,6 +237,6 @@ def pieces_by_sample(
         yield piece
 
 
-def _begun(chain: Chain, imu: pd.DataFrame) -> ChainState:
+def _begun(chain: NavigationPipeline, imu: pd.DataFrame) -> PipelineState:
     check_imu(imu)
     return chain.begin(imu.attrs["sampling"], source_of(imu))

@@ -28,7 +28,7 @@ from strapdown.nav_state import NavState
 from strapdown.navigation.record import NavigationRecord
 from strapdown.rotation.euler_angles import euler_sd
 from strapdown.sensors.uncertainty import ImuUncertainty
-from strapdown.systems.sins.chain import Chain
+from strapdown.systems.sins.chain import NavigationPipeline
 from strapdown.systems.sins.modes import Aligned
 from strapdown.systems.sins.rests import SHORTEST, seen_rests
 from strapdown.tables import GEODETIC, GYRO
@@ -88,7 +88,7 @@ def north_within(sensors: ImuUncertainty, lat_deg: float, ellipsoid: Ellipsoid) 
 
 
 def compasses_of(
-    chain: Chain,
+    chain: NavigationPipeline,
     sensors: ImuUncertainty,
     imu: pd.DataFrame,
     record: NavigationRecord,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from strapdown.aiding.heading import Heading
 from strapdown.evaluation.heading_light import RECENT, SURE, seconds_of
 from strapdown.navigation.record import NavigationRecord
-from strapdown.systems.sins.chain import Chain
+from strapdown.systems.sins.chain import NavigationPipeline
 from strapdown.systems.sins.heading_witness import CarriedHeading
 from strapdown.tables.checks import index_of
 
@@ -45,7 +45,7 @@ class AgreeingSources:
 
 
 def agreeing_sources(
-    chain: Chain, record: NavigationRecord, carried: Sequence[CarriedHeading]
+    chain: NavigationPipeline, record: NavigationRecord, carried: Sequence[CarriedHeading]
 ) -> list[AgreeingSources]:
     """Return what heading aids, and the gyros that found north, say together.
 

@@ -34,10 +34,10 @@ from strapdown.mechanization.wander_azimuth import WanderAzimuth
 from strapdown.nav_state import NavState
 from strapdown.navigation.consistency import ObservationConsistency
 from strapdown.navigation.navigator import Navigator, NavigatorState
-from strapdown.navigation.record import Mark, NavigationPiece, NavigationRecord
+from strapdown.navigation.record import CovarianceSnapshot, NavigationChunk, NavigationRecord
 from strapdown.rotation.euler_angles import euler_sd
 from strapdown.sensors.uncertainty import ImuUncertainty
-from strapdown.systems.sins.chain import Chain
+from strapdown.systems.sins.chain import NavigationPipeline
 from strapdown.systems.sins.gyrocompass import Compass
 from strapdown.systems.sins.intake import NEAR as NEAR_FIXES
 from strapdown.systems.sins.intake import JoinedSteps, joined_steps
@@ -177,7 +177,7 @@ class _Witness:
         doubt: bool,
     ) -> None:
         self.navigator, self.run, self.since = made.navigator, run, since
-        self.marks: list[Mark] = []
+        self.marks: list[CovarianceSnapshot] = []
         self.times: list[Array] = []
         self.history: list[Array] = []
         self.seen: list[tuple[float, Array]] = []
@@ -208,7 +208,7 @@ class _Witness:
             return
         self._take(piece)
 
-    def _take(self, piece: NavigationPiece) -> None:
+    def _take(self, piece: NavigationChunk) -> None:
         self.marks += piece.marks
         self.times.append(piece.time)
         self.history.append(piece.history)
@@ -343,7 +343,7 @@ class Witnesses:
 
 def witnesses_of(
     filter_: ErrorFilter,
-    chain: Chain,
+    chain: NavigationPipeline,
     imu: pd.DataFrame,
     tables: Mapping[str, pd.DataFrame],
     record: NavigationRecord,

@@ -33,12 +33,12 @@ __all__ = [
     "FilteringState",
     "GapPolicy",
     "Hole",
-    "Intake",
-    "IntakeState",
+    "ImuIncrements",
+    "ImuPreprocessor",
+    "ImuPreprocessorState",
     "JoinedSteps",
     "RangeEnds",
     "RangeState",
-    "Steps",
     "ends_of",
     "hole_between",
     "joined_steps",
@@ -74,7 +74,9 @@ class JoinedSteps:
     rows: Array
 
 
-def steps_of(intake: Intake, imu: pd.DataFrame, begin: float, end: float) -> Iterator[JoinedSteps]:
+def steps_of(
+    intake: ImuPreprocessor, imu: pd.DataFrame, begin: float, end: float
+) -> Iterator[JoinedSteps]:
     """Give motion increments within a span as they are, a minute at a time."""
     time, values = index_of(imu), values_of(imu, [*GYRO, *ACCEL])
     state = intake.begin(imu.attrs["sampling"], None)
@@ -90,7 +92,9 @@ def steps_of(intake: Intake, imu: pd.DataFrame, begin: float, end: float) -> Ite
             yield JoinedSteps(steps.time[used], np.ascontiguousarray(steps.rows[used]))
 
 
-def joined_steps(intake: Intake, imu: pd.DataFrame, begin: float, end: float) -> JoinedSteps:
+def joined_steps(
+    intake: ImuPreprocessor, imu: pd.DataFrame, begin: float, end: float
+) -> JoinedSteps:
     """Return motion increments within a span, joined to a tenth of a second.
 
     Parameters
@@ -498,7 +502,7 @@ ROUNDED = 1.01
 
 
 @dataclass(frozen=True, eq=False)
-class Steps:
+class ImuIncrements:
     """What the samples of a piece make.
 
     Attributes
@@ -534,7 +538,7 @@ def _no_values() -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class IntakeState:
+class ImuPreprocessorState:
     """Between pieces.
 
     Attributes
@@ -580,7 +584,7 @@ class IntakeState:
 
 
 @dataclass(frozen=True, eq=False)
-class Intake:
+class ImuPreprocessor:
     """Makes steps of samples; it holds no state.
 
     Attributes
@@ -610,13 +614,15 @@ class Intake:
             return self.stream
         return IncrementStream("linear" if self.prefilter is None else "cubic")
 
-    def sampling(self, state: IntakeState) -> str:
+    def sampling(self, state: ImuPreprocessorState) -> str:
         """What the values of its steps are: 'instantaneous' or 'mean'."""
         if self.prefilter is None or state.filtering is None:
             return state.sampling
         return self.prefilter.sampling(state.filtering.grid)
 
-    def begin(self, sampling: str = "instantaneous", source: str | None = None) -> IntakeState:
+    def begin(
+        self, sampling: str = "instantaneous", source: str | None = None
+    ) -> ImuPreprocessorState:
         """Return the state before the first sample.
 
         Parameters
@@ -625,16 +631,16 @@ class Intake:
         source : str, optional
             Name for messages.
         """
-        return IntakeState(sampling, source)
+        return ImuPreprocessorState(sampling, source)
 
     def advance(
-        self, state: IntakeState, time: Array, values: Array, last: bool = False
-    ) -> tuple[IntakeState, Steps]:
+        self, state: ImuPreprocessorState, time: Array, values: Array, last: bool = False
+    ) -> tuple[ImuPreprocessorState, ImuIncrements]:
         """Take further samples.
 
         Parameters
         ----------
-        state : IntakeState
+        state : ImuPreprocessorState
         time : ndarray, (k,), s
         values : ndarray, (k, 6)
             rad/s and m/s².
@@ -643,7 +649,7 @@ class Intake:
 
         Returns
         -------
-        state : IntakeState
+        state : ImuPreprocessorState
         steps : Steps
 
         Raises
@@ -685,7 +691,7 @@ class Intake:
                 out[:, at : at + 3] = x * matrix[:, 0] + y * matrix[:, 1] + z * matrix[:, 2]
         return out
 
-    def _judged(self, state: IntakeState, time: Array) -> IntakeState:
+    def _judged(self, state: ImuPreprocessorState, time: Array) -> ImuPreprocessorState:
         """Learn the usual step from the first samples, and begin what needs it."""
         if len(time) < 2:
             raise DataError(
@@ -703,7 +709,9 @@ class Intake:
         means = state.sampling == "mean"
         return replace(state, filtering=Filtering(self.prefilter).begin(time, means, state.source))
 
-    def _holes(self, state: IntakeState, known: int) -> tuple[IntakeState, tuple[Hole, ...]]:
+    def _holes(
+        self, state: ImuPreprocessorState, known: int
+    ) -> tuple[ImuPreprocessorState, tuple[Hole, ...]]:
         """Find gaps after the `known` rows of the tail, and drop what is long past."""
         rows = state.tail.rows
         time, begin = rows[:, 0], max(known - 1, 0)
@@ -722,12 +730,12 @@ class Intake:
 
     def _stepped(
         self,
-        state: IntakeState,
+        state: ImuPreprocessorState,
         time: Array,
         values: Array,
-        found: Steps,
+        found: ImuIncrements,
         last: bool,
-    ) -> tuple[IntakeState, Steps]:
+    ) -> tuple[ImuPreprocessorState, ImuIncrements]:
         """Make the increments; to them comes what was found of the samples."""
         if self.prefilter is not None:
             before = state.filtering
@@ -745,7 +753,9 @@ class Intake:
                 # Rows that a pre-filter makes begin with the first sample.
                 opening = state.first
                 state = replace(state, own=True, first=None)
-                return state, Steps(time, values, out.rows, opening, found.holes, found.cut_off)
+                return state, ImuIncrements(
+                    time, values, out.rows, opening, found.holes, found.cut_off
+                )
             if state.stream is None:
                 begun = self.increments.begin(self.sampling(state))
                 state = replace(state, stream=begun, first=None)
@@ -762,13 +772,13 @@ class Intake:
         state = replace(
             state, stream=stream, waiting_time=time[n:].copy(), waiting=values[n:].copy()
         )
-        return state, Steps(ends, values[:n], rows, opening, found.holes, found.cut_off)
+        return state, ImuIncrements(ends, values[:n], rows, opening, found.holes, found.cut_off)
 
 
-_NOTHING = Steps(_no_time(), _no_values(), np.empty((0, 10)), None, ())
+_NOTHING = ImuIncrements(_no_time(), _no_values(), np.empty((0, 10)), None, ())
 
 
-def _check(state: IntakeState, time: Array, values: Array) -> None:
+def _check(state: ImuPreprocessorState, time: Array, values: Array) -> None:
     """Refuse samples that cannot be used; rows count from 1 over the whole record."""
     # The sum of an infinity and its opposite is none, either.
     alone = len(time) == 1 and math.isfinite(sum(values[0].tolist()))

@@ -14,19 +14,19 @@ from strapdown.alignment.fine import FineAlignment
 from strapdown.alignment.fine_result import FineResult
 from strapdown.errors import ConfigError
 from strapdown.nav_state import NavState
-from strapdown.navigation.record import Event, NavigationPiece, Span
+from strapdown.navigation.record import Event, NavigationChunk, Span
 from strapdown.rotation import euler_from_quaternion
 from strapdown.tables.checks import is_number
 
 __all__ = [
     "Aligned",
-    "ChainPiece",
     "CoarseMode",
     "Command",
     "FineMode",
     "KnownStart",
     "Mode",
     "Navigation",
+    "PipelineChunk",
     "Until",
     "check_timeline",
 ]
@@ -290,7 +290,7 @@ class Aligned:
 
 
 @dataclass(frozen=True, eq=False)
-class ChainPiece:
+class PipelineChunk:
     """What came of a piece.
 
     Attributes
@@ -299,7 +299,7 @@ class ChainPiece:
         At its end.
     time : float, s
         To which the chain has come.
-    navigation : tuple of NavigationPiece
+    navigation : tuple of NavigationChunk
         One after the other.
     aligned : tuple of Aligned
         Modes of alignment that ended in it.
@@ -313,7 +313,7 @@ class ChainPiece:
 
     mode: str
     time: float
-    navigation: tuple[NavigationPiece, ...] = ()
+    navigation: tuple[NavigationChunk, ...] = ()
     aligned: tuple[Aligned, ...] = ()
     events: tuple[Event, ...] = ()
     modes: tuple[Span, ...] = ()

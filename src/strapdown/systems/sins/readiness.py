@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown import rotation
-from strapdown.aiding.aid import TableAid
+from strapdown.aiding.aid import TabulatedMeasurement
 from strapdown.aiding.gnss import Gnss
 from strapdown.aiding.gnss_readiness import gnss_readiness
 from strapdown.config.navigation import NavigationSpec, StartTable, aids_of
@@ -68,7 +68,7 @@ def look_through(
         if isinstance(aid, Gnss):
             found += gnss_readiness(table, imu, aid)
             _refuse_far(spec, table, imu, aid)
-        elif isinstance(aid, TableAid):
+        elif isinstance(aid, TabulatedMeasurement):
             _refuse_apart(table, imu)
     return (*found, *_height(spec, imu))
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from strapdown.aiding.standstill import StandstillAid
 from strapdown.navigation.record import NavigationRecord
-from strapdown.systems.sins.chain import Chain
+from strapdown.systems.sins.chain import NavigationPipeline
 from strapdown.systems.sins.intake import steps_of
 from strapdown.tables import VELOCITY
 from strapdown.tables.checks import index_of, values_of
@@ -32,7 +32,7 @@ GLIDES = 5.0
 
 
 def seen_rests(
-    chain: Chain, imu: pd.DataFrame, record: NavigationRecord
+    chain: NavigationPipeline, imu: pd.DataFrame, record: NavigationRecord
 ) -> list[tuple[float, float]]:
     """Return begins and ends of the rests of a run, in parts that are not too long, s.
 

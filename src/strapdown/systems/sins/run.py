@@ -34,9 +34,9 @@ from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.attitude_source import input_files
 from strapdown.systems.one_thread import one_thread
 from strapdown.systems.progress import Progress, silent
-from strapdown.systems.sins.chain import Chain
-from strapdown.systems.sins.drive import ChainRun, run_batch
-from strapdown.systems.sins.intake import GapPolicy, Intake, ends_of
+from strapdown.systems.sins.chain import NavigationPipeline
+from strapdown.systems.sins.drive import PipelineRun, run_batch
+from strapdown.systems.sins.intake import GapPolicy, ImuPreprocessor, ends_of
 from strapdown.systems.sins.modes import (
     CoarseMode,
     Command,
@@ -53,14 +53,14 @@ from strapdown.systems.sins.source import (
     read_navigation_source,
     said_of_file,
 )
-from strapdown.systems.sins.trust import Trust, trust_of
+from strapdown.systems.sins.trust import IntegrityReport, trust_of
 from strapdown.systems.sins.withholding import Withheld, score_withholding
 
 __all__ = ["Drive", "NavigationResult", "make_chain", "run_navigation"]
 
 
 #: Runs a chain over samples and tables: with a recorder, and what is told of progress.
-Drive = Callable[..., ChainRun]
+Drive = Callable[..., PipelineRun]
 
 #: Shares of a whole run at which its chain begins and ends.
 BEGUN, ENDED = 0.15, 0.8
@@ -256,7 +256,7 @@ class NavigationResult:
     forward_differences: pd.DataFrame | None
     points: ControlPointScore | None
     withheld: tuple[Withheld, ...]
-    trust: Trust
+    trust: IntegrityReport
     inputs: tuple[InputFiles, ...]
     findings: tuple[Finding, ...]
 
@@ -277,7 +277,7 @@ class NavigationResult:
 Three = tuple[float, float, float]
 
 
-def make_chain(spec: NavigationSpec, sensors: ImuUncertainty) -> Chain:
+def make_chain(spec: NavigationSpec, sensors: ImuUncertainty) -> NavigationPipeline:
     """Make the chain of a specification.
 
     Parameters
@@ -316,9 +316,9 @@ def make_chain(spec: NavigationSpec, sensors: ImuUncertainty) -> Chain:
         )
         site_sd = _three(spec.site.position_sd_m)
         velocity_sd = _three(spec.site.velocity_sd_m_per_s)
-    return Chain(
+    return NavigationPipeline(
         navigator=navigator,
-        intake=Intake(
+        intake=ImuPreprocessor(
             prefilter=prefilter,
             gaps=GapPolicy(gaps.usual, gaps.coast_s, gaps.beyond),
             ends=ends_of(sensors),

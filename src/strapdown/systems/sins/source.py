@@ -13,7 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.aiding.aid import TableAid
+from strapdown.aiding.aid import TabulatedMeasurement
 from strapdown.alignment.alignment import Site
 from strapdown.config.choice import SLOTS
 from strapdown.config.navigation import (
@@ -260,7 +260,7 @@ def read_aid(given: AidSpec) -> pd.DataFrame:
     """
     assert given.path is not None  # checked with the specification
     entry = SLOTS["aiding"].entries[given.kind]
-    assert issubclass(entry, TableAid)
+    assert issubclass(entry, TabulatedMeasurement)
     if set(entry.columns) == set(GNSS):
         return read_gnss(
             given.path,

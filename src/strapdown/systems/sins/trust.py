@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.aiding.aid import Aid, TableAid, lasting
+from strapdown.aiding.aid import Measurement, TabulatedMeasurement, lasting
 from strapdown.aiding.gnss import Gnss
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.navigation_modules import make_filter
@@ -18,7 +18,7 @@ from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
 from strapdown.errors import Finding, StrapdownError
 from strapdown.evaluation.heading_light import (
     SURE,
-    HeadingLight,
+    HeadingIntegrity,
     Heard,
     LightSpan,
     heading_light,
@@ -36,7 +36,7 @@ from strapdown.navigation.record import NavigationRecord
 from strapdown.navigation.recorder import IntervalRecorder
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.progress import Progress
-from strapdown.systems.sins.chain import Chain
+from strapdown.systems.sins.chain import NavigationPipeline
 from strapdown.systems.sins.drive import run_batch
 from strapdown.systems.sins.gyrocompass import (
     Manoeuvre,
@@ -59,7 +59,7 @@ from strapdown.systems.sins.modes import Aligned
 from strapdown.tables import EULER, GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
 from strapdown.tables.checks import index_of, values_of
 
-__all__ = ["Advice", "Repeated", "Trust", "repeat_without", "trust_of"]
+__all__ = ["Advice", "IntegrityReport", "Repeated", "repeat_without", "trust_of"]
 
 
 Array = NDArray[np.float64]
@@ -96,12 +96,12 @@ class Advice:
 
 
 @dataclass(frozen=True, eq=False)
-class Trust:
+class IntegrityReport:
     """How far a run can be trusted.
 
     Attributes
     ----------
-    light : HeadingLight
+    light : HeadingIntegrity
     unwitnessed : tuple of Finding
         Why nothing could tell a heading by itself; empty where something could.
     north_sd : float, deg
@@ -116,7 +116,7 @@ class Trust:
         The run without the first of them.
     """
 
-    light: HeadingLight
+    light: HeadingIntegrity
     unwitnessed: tuple[Finding, ...]
     north_sd: float
     advice: tuple[Advice, ...]
@@ -137,14 +137,14 @@ class Trust:
 
 def trust_of(
     spec: NavigationSpec,
-    chain: Chain,
+    chain: NavigationPipeline,
     sensors: ImuUncertainty,
     imu: pd.DataFrame,
     tables: Mapping[str, pd.DataFrame],
     record: NavigationRecord,
     aligned: Sequence[Aligned],
     progress: Progress,
-) -> Trust:
+) -> IntegrityReport:
     """Judge a run.
 
     Parameters
@@ -206,7 +206,7 @@ def trust_of(
             find_ellipsoid(spec.ellipsoid),
             lambda _, share: progress(stage, 0.3 + 0.7 * share),
         )
-    return Trust(
+    return IntegrityReport(
         light=light,
         unwitnessed=() if heard or why is None else (why, *no_north),
         north_sd=_north_sd(spec, sensors, record),
@@ -219,7 +219,7 @@ def trust_of(
 
 def _carried(
     spec: NavigationSpec,
-    chain: Chain,
+    chain: NavigationPipeline,
     sensors: ImuUncertainty,
     imu: pd.DataFrame,
     record: NavigationRecord,
@@ -250,7 +250,7 @@ def _north_sd(spec: NavigationSpec, sensors: ImuUncertainty, record: NavigationR
     return north_within(sensors, lat_deg, find_ellipsoid(spec.ellipsoid))
 
 
-def _unable(chain: Chain, record: NavigationRecord) -> Finding | None:
+def _unable(chain: NavigationPipeline, record: NavigationRecord) -> Finding | None:
     """Why witnesses by fixes cannot be begun from a record."""
     if not any(type(aid) is Gnss for aid in chain.navigator.aids):
         return Finding(NO_FIXES, severity="note")
@@ -261,7 +261,7 @@ def _unable(chain: Chain, record: NavigationRecord) -> Finding | None:
 
 
 def _advice(
-    light: HeadingLight,
+    light: HeadingIntegrity,
     evidence: list[Evidence],
     made: Witnesses | None,
     record: NavigationRecord,
@@ -372,7 +372,7 @@ class Repeated:
 
 
 def repeat_without(
-    chain: Chain,
+    chain: NavigationPipeline,
     imu: pd.DataFrame,
     tables: Mapping[str, pd.DataFrame],
     record: NavigationRecord,
@@ -420,8 +420,10 @@ def repeat_without(
 
 
 def _changed(
-    aids: tuple[Aid, ...], tables: Mapping[str, pd.DataFrame], found: Sequence[Inconsistency]
-) -> tuple[tuple[Aid, ...], dict[str, pd.DataFrame], str]:
+    aids: tuple[Measurement, ...],
+    tables: Mapping[str, pd.DataFrame],
+    found: Sequence[Inconsistency],
+) -> tuple[tuple[Measurement, ...], dict[str, pd.DataFrame], str]:
     """Aids and tables without something, and it in words."""
     one = found[0]
     aid = next(a for a in aids if a.name == one.aid)
@@ -463,12 +465,14 @@ def _changed(
                 f"with {one.aid}, of which nothing can be spared, believed {factor:.2g} times less"
             )
             return _swapped(aids, aid, less), told, words
-    if isinstance(aid, TableAid):
+    if isinstance(aid, TabulatedMeasurement):
         told.pop(one.aid, None)
     return tuple(a for a in aids if a is not aid), told, f"without {one.aid}"
 
 
-def _swapped(aids: tuple[Aid, ...], old: Aid, new: Aid) -> tuple[Aid, ...]:
+def _swapped(
+    aids: tuple[Measurement, ...], old: Measurement, new: Measurement
+) -> tuple[Measurement, ...]:
     return tuple(new if a is old else a for a in aids)
 
 
@@ -480,7 +484,7 @@ def _has_both(table: pd.DataFrame | None) -> bool:
     )
 
 
-def _kept(table: pd.DataFrame, one: Inconsistency, aid: Aid) -> NDArray[np.bool_]:
+def _kept(table: pd.DataFrame, one: Inconsistency, aid: Measurement) -> NDArray[np.bool_]:
     """Rows of a table that are none of the epochs."""
     time = index_of(table) - float(getattr(aid, "time_offset", 0.0))
     if one.name.endswith(".velocity"):

@@ -18,9 +18,9 @@ from strapdown.evaluation.gnss_outages import (
     score_of_smoothed,
     spans_to_withhold,
 )
-from strapdown.navigation.record import NavigationPiece, NavigationRecord, Span
+from strapdown.navigation.record import NavigationChunk, NavigationRecord, Span
 from strapdown.systems.progress import Progress
-from strapdown.systems.sins.chain import Chain, ChainState
+from strapdown.systems.sins.chain import NavigationPipeline, PipelineState
 from strapdown.systems.sins.source import NavigationSource
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import index_of, values_of
@@ -70,7 +70,7 @@ def withheld_aid(spec: NavigationSpec) -> str:
 
 def score_withholding(
     spec: NavigationSpec,
-    chain: Chain,
+    chain: NavigationPipeline,
     source: NavigationSource,
     record: NavigationRecord,
     progress: Progress,
@@ -144,26 +144,26 @@ class WithheldRun:
     ----------
     number : int
         Of the stretch.
-    state : ChainState
+    state : PipelineState
         Where it begins: with all that was observed before.
-    through : ChainState
+    through : PipelineState
         Where it ends.
     rows : slice
         Of its samples.
-    pieces : tuple of NavigationPiece
+    pieces : tuple of NavigationChunk
     """
 
     number: int
-    state: ChainState
-    through: ChainState
+    state: PipelineState
+    through: PipelineState
     rows: slice
-    pieces: tuple[NavigationPiece, ...]
+    pieces: tuple[NavigationChunk, ...]
 
 
 def withheld_runs(
-    chain: Chain,
-    blind: Chain,
-    state: ChainState,
+    chain: NavigationPipeline,
+    blind: NavigationPipeline,
+    state: PipelineState,
     time: Array,
     values: Array,
     spans: Sequence[Span],
@@ -175,7 +175,7 @@ def withheld_runs(
     chain : Chain
     blind : Chain
         The same, but that it does not use what is withheld (`blinded`).
-    state : ChainState
+    state : PipelineState
         Before the first of the samples.
     time : ndarray, (n,), s
     values : ndarray, (n, 6)

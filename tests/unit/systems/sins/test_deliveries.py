@@ -5,24 +5,26 @@ import pytest
 
 from strapdown.errors import ConfigError
 from strapdown.estimation.covariance import Innovations
-from strapdown.navigation.record import NavigationPiece, Seen
-from strapdown.systems.sins.deliveries import Deliveries
+from strapdown.navigation.record import InnovationRecord, NavigationChunk
+from strapdown.systems.sins.deliveries import MeasurementMonitor
 
 
 def seen(time, nu=0.5, weight=1.0, name="rtk.position"):
     ones = np.ones(3)
-    return Seen(time, name, ("n", "e", "d"), Innovations(nu * ones, 4.0 * ones, weight * ones))
+    return InnovationRecord(
+        time, name, ("n", "e", "d"), Innovations(nu * ones, 4.0 * ones, weight * ones)
+    )
 
 
 def told(observations, end, cuts=(), late=()):
     """Events and outages of a run from 0 s that was cut at some times."""
-    deliveries = Deliveries()
+    deliveries = MeasurementMonitor()
     state = deliveries.started(deliveries.begin(["rtk"]), 0.0)
     events, outages, first = [], [], -1.0
     for cut in (*cuts, end):
         part = tuple(one for one in observations if first < one.time <= cut)
         missed = tuple(("rtk", at) for at in late if first < at <= cut)
-        piece = NavigationPiece(np.empty(0), np.empty((0, 10)), part, (), missed)
+        piece = NavigationChunk(np.empty(0), np.empty((0, 10)), part, (), missed)
         state, more, ended = deliveries.over(state, piece, cut)
         events, outages, first = [*events, *more], [*outages, *ended], cut
     more, ended = deliveries.finish(state, end)
@@ -71,17 +73,17 @@ def test_cut_anywhere_it_is_the_same(seed):
 
 
 def test_two_aids_do_not_mix():
-    deliveries = Deliveries()
+    deliveries = MeasurementMonitor()
     state = deliveries.started(deliveries.begin(["rtk", "wheel"]), 0.0)
     both = tuple(
         one for t in range(1, 9) for one in (seen(float(t)), seen(t + 0.5, name="wheel.speed"))
     )
     fewer = tuple(one for one in both if one.name != "rtk.position" or one.time < 3.0)
-    piece = NavigationPiece(np.empty(0), np.empty((0, 10)), fewer, ())
+    piece = NavigationChunk(np.empty(0), np.empty((0, 10)), fewer, ())
     _, events, _ = deliveries.over(state, piece, 9.0)
     assert [(e.time, e.what[:3]) for e in events] == [(5.0, "rtk")]
 
 
 def test_what_means_nothing_is_refused():
     with pytest.raises(ConfigError, match="outage"):
-        Deliveries(outage=1.0)
+        MeasurementMonitor(outage=1.0)

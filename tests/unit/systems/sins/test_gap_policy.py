@@ -11,9 +11,9 @@ from strapdown.estimation.sensor_blocks import accel_bias, gyro_bias
 from strapdown.mechanization import MECHANIZATIONS
 from strapdown.nav_state import NavState
 from strapdown.navigation.navigator import Navigator
-from strapdown.systems.sins.chain import Chain
+from strapdown.systems.sins.chain import NavigationPipeline
 from strapdown.systems.sins.drive import run_batch
-from strapdown.systems.sins.intake import GapPolicy, Hole, Intake, hole_between, widened
+from strapdown.systems.sins.intake import GapPolicy, Hole, ImuPreprocessor, hole_between, widened
 from strapdown.systems.sins.modes import KnownStart
 from strapdown.tables import imu_table
 
@@ -27,7 +27,7 @@ def navigator(name="ned", form="ud"):
 
 def chain(**policy):
     known = KnownStart(START, (1.0,) * 3, (0.01,) * 3, (0.01,) * 3)
-    return Chain(navigator(), Intake(gaps=GapPolicy(**policy)), start=known)
+    return NavigationPipeline(navigator(), ImuPreprocessor(gaps=GapPolicy(**policy)), start=known)
 
 
 def log(first=2.0, length=0.3, rate=100.0):

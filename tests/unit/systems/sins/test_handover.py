@@ -15,7 +15,7 @@ from strapdown.estimation.error_model import ERROR_MODELS, PHYSICAL
 from strapdown.estimation.sensor_blocks import accel_bias, accel_scale, gyro_bias, gyro_drift
 from strapdown.mechanization import MECHANIZATIONS
 from strapdown.nav_state import NavState
-from strapdown.navigation.filter_options import Feedforward
+from strapdown.navigation.filter_options import OpenLoop
 from strapdown.navigation.navigator import Navigator
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
@@ -165,7 +165,7 @@ def test_a_navigator_that_feeds_nothing_back_keeps_what_was_found(aligned):
     filter_ = made()
     begun = from_fine(filter_, fine, rest)
     fed = Navigator(filter_)
-    free = Navigator(filter_, damping=Feedforward())
+    free = Navigator(filter_, damping=OpenLoop())
     state = free.begin_from(begun)
     assert not state.engine.filter.sensors.any()
     engine = free.engine(state.engine)

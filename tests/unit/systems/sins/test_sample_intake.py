@@ -7,7 +7,7 @@ from strapdown.errors import DataError
 from strapdown.increments import motion_increments
 from strapdown.prefilter import PREFILTERS, RobustFir, Summed
 from strapdown.rotation import dcm_from_euler
-from strapdown.systems.sins.intake import Intake
+from strapdown.systems.sins.intake import ImuPreprocessor
 from strapdown.tables import imu_table
 
 RNG = np.random.default_rng(8)
@@ -28,7 +28,7 @@ def steps_of(intake, time, values, sampling="instantaneous"):
 
 def test_without_a_prefilter_steps_are_the_motion_increments():
     time, values = samples()
-    steps, _ = steps_of(Intake(), time, values)
+    steps, _ = steps_of(ImuPreprocessor(), time, values)
     table = motion_increments(imu_table(time, values[:, :3], values[:, 3:]))
     np.testing.assert_array_equal(steps.rows, table.to_numpy())
     np.testing.assert_array_equal(steps.time, time[1:])
@@ -39,7 +39,7 @@ def test_without_a_prefilter_steps_are_the_motion_increments():
 def test_axes_turn_both_triads():
     time, values = samples()
     gyro, accel = dcm_from_euler([0.0, 0.0, 90.0]), dcm_from_euler([180.0, 0.0, 0.0])
-    steps, _ = steps_of(Intake(gyro, accel), time, values)
+    steps, _ = steps_of(ImuPreprocessor(gyro, accel), time, values)
     np.testing.assert_allclose(steps.values[:, :3], values[1:, :3] @ gyro.T, atol=1e-15)
     np.testing.assert_allclose(steps.values[:, 3:], values[1:, 3:] @ accel.T, atol=1e-14)
 
@@ -49,7 +49,7 @@ def test_axes_turn_both_triads():
 def test_a_prefilter_within_a_chain_is_the_prefilter(name, sampling):
     time, values = samples()
     module = PREFILTERS[name]() if name == "none" else PREFILTERS[name](rate=100.0)
-    steps, _ = steps_of(Intake(prefilter=module), time, values, sampling)
+    steps, _ = steps_of(ImuPreprocessor(prefilter=module), time, values, sampling)
     whole = module.apply(imu_table(time, values[:, :3], values[:, 3:], sampling=sampling))
     # Stamps here are those of the samples, there those of an even grid: to rounding the same, and
     # so are the steps.
@@ -67,7 +67,7 @@ def test_stamps_that_drift_against_their_grid_are_kept():
     time = 50.0 + np.cumsum(0.002 * (1.0 + 1e-3 * np.arange(n) / n))
     values = samples(n)[1]
     for module in (RobustFir(rate=100.0), Summed(rate=100.0)):
-        steps, _ = steps_of(Intake(prefilter=module), time, values)
+        steps, _ = steps_of(ImuPreprocessor(prefilter=module), time, values)
         assert np.isin(steps.time, time).all()
         gone = steps.time[-1] - steps.time[0]
         assert gone == pytest.approx(5.0 * 0.002 * (len(steps.time) - 1), rel=2e-3)
@@ -81,8 +81,10 @@ def test_lost_samples_before_a_prefilter_lie_on_a_line():
     for k in range(6):
         filled[lost, k] = np.interp(time[lost], there, np.r_[values[:400, k], values[404:, k]])
     module = RobustFir(rate=100.0)
-    steps, _ = steps_of(Intake(prefilter=module), there, np.vstack([values[:400], values[404:]]))
-    expected, _ = steps_of(Intake(prefilter=module), time, filled)
+    steps, _ = steps_of(
+        ImuPreprocessor(prefilter=module), there, np.vstack([values[:400], values[404:]])
+    )
+    expected, _ = steps_of(ImuPreprocessor(prefilter=module), time, filled)
     np.testing.assert_allclose(steps.values, expected.values, rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(steps.time, expected.time, atol=1e-12)
     (hole,) = steps.holes
@@ -92,7 +94,7 @@ def test_lost_samples_before_a_prefilter_lie_on_a_line():
 @pytest.mark.parametrize("cut", [None, 500])
 def test_what_cannot_be_is_named_with_its_row(cut):
     def fed(time, values):
-        intake, first = Intake(), cut or len(time)
+        intake, first = ImuPreprocessor(), cut or len(time)
         state, _ = intake.advance(intake.begin(source="log.csv"), time[:first], values[:first])
         intake.advance(state, time[first:], values[first:])
 
@@ -117,11 +119,11 @@ def test_what_cannot_be_is_named_with_its_row(cut):
 def test_one_sample_and_uneven_stamps_are_refused():
     time, values = samples()
     with pytest.raises(DataError, match="1 sample"):
-        steps_of(Intake(), time[:1], values[:1])
+        steps_of(ImuPreprocessor(), time[:1], values[:1])
     rng = np.random.default_rng(1)
     uneven = np.cumsum(rng.uniform(0.001, 0.003, len(time)))
     with pytest.raises(DataError, match=r"log.csv.*not evenly spaced.*\n.*pre-filter needs even"):
-        steps_of(Intake(prefilter=RobustFir()), uneven, values)
+        steps_of(ImuPreprocessor(prefilter=RobustFir()), uneven, values)
     time[700:] -= 0.0015
     with pytest.raises(DataError, match=r"51.398 s is followed by 51.3985 s"):
-        steps_of(Intake(prefilter=RobustFir(rate=100.0)), time, values)
+        steps_of(ImuPreprocessor(prefilter=RobustFir(rate=100.0)), time, values)

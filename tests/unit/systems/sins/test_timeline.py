@@ -23,7 +23,7 @@ from strapdown.rotation import (
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
 from strapdown.simulation import Origin, StationaryMotion, simulate_imu
-from strapdown.systems.sins.chain import Chain
+from strapdown.systems.sins.chain import NavigationPipeline
 from strapdown.systems.sins.drive import Recording, pieces_by_sample, run_batch
 from strapdown.systems.sins.modes import (
     CoarseMode,
@@ -48,7 +48,7 @@ def navigator():
 
 
 def standing(modes, **more):
-    return Chain(navigator(), modes=modes, sensors=SENSORS, site=Site(*HERE), **more)
+    return NavigationPipeline(navigator(), modes=modes, sensors=SENSORS, site=Site(*HERE), **more)
 
 
 def rest(length=20.0, rate=20.0):
@@ -98,7 +98,7 @@ def test_what_means_nothing_is_refused():
     with pytest.raises(ConfigError, match="no mode that can be commanded"):
         standing((LEVEL, Navigation()), commands=(Command(1.0, "fly"),))
     with pytest.raises(ConfigError, match="sensors may err"):
-        Chain(navigator(), modes=(LEVEL, Navigation()))
+        NavigationPipeline(navigator(), modes=(LEVEL, Navigation()))
     with pytest.raises(ConfigError, match="no aid 'rtk'"):
         standing((LEVEL, Navigation()), fixes="rtk")
 
@@ -172,13 +172,13 @@ def test_a_known_state_begins_with_its_sample():
     imu = rest()
     here = NavState.from_degrees(*HERE, heading_deg=30.0, time=5.0)
     sd = ((1.0,) * 3, (0.1,) * 3, (0.1, 0.1, 1.0))
-    run = run_batch(Chain(navigator(), start=KnownStart(here, *sd)), imu)
+    run = run_batch(NavigationPipeline(navigator(), start=KnownStart(here, *sd)), imu)
     assert run.record.trajectory.index[0] == pytest.approx(5.05)
     assert run.record.modes[0].begin == pytest.approx(5.0)
     late = NavState.from_degrees(*HERE, time=-3.0)
     with pytest.raises(DataError, match="known at -3 s, and the samples begin at 0 s"):
-        run_batch(Chain(navigator(), start=KnownStart(late, *sd)), imu)
-    first = Chain(navigator(), start=KnownStart(late, *sd, at_first_sample=True))
+        run_batch(NavigationPipeline(navigator(), start=KnownStart(late, *sd)), imu)
+    first = NavigationPipeline(navigator(), start=KnownStart(late, *sd, at_first_sample=True))
     assert run_batch(first, imu).record.trajectory.index[0] == pytest.approx(0.05)
 
 
