@@ -43,7 +43,7 @@ test: $(VENV)/.test
 	@$(FRESH) $(PYTEST) -n 2
 
 test-slow: $(VENV)/.test
-	@$(FRESH) $(PYTEST) -m slow
+	@$(FRESH) $(PYTEST) -m slow tests papers
 
 examples: $(VENV)/.test
 	@$(FRESH) $(PYTEST) -n 2 -m slow tests/cli/test_manual.py
@@ -74,7 +74,7 @@ codes: $(VENV)/.test
 	@$(FRESH) STRAPDOWN_WRITE_CODES=1 $(PYTEST) -m '' tests/cli/test_bad_input.py
 
 papers: $(VENV)/.test
-	@$(FRESH) $(PYTEST) -n 2 -m '' papers
+	@$(FRESH) $(PYTEST) -n 2 papers
 	@$(FRESH) for paper in alexiev tadic chernodarov; do \
 		NUMBA_CACHE_DIR="$$cache" $(BIN)/python -m papers.$$paper --out papers-reproduced/$$paper --quiet \
 		|| exit 1; done
