@@ -190,7 +190,7 @@ def attitude_json(bench: AttitudeBench) -> dict[str, Any]:
             for r in bench.rests
         ],
         "readings": [vars(r) for r in bench.readings],
-        "findings": [vars(f) for f in bench.findings],
+        "findings": [{**f.plain(), "what": f.what, "remedy": f.remedy} for f in bench.findings],
     }
 
 
