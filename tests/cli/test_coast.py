@@ -145,7 +145,7 @@ def test_outages_lie_within_the_part_that_flags_name(drive, run_cli, tmp_path, e
     ("flags", "what"),
     [
         (("--from", "45", "--to", "50"), "longer than the 5 s between 45 and 50 s"),
-        (("--from", "45", "--at", "50"), "--from: --at says where the one outage is"),
+        (("--from", "45", "--at", "50"), "--from: --at states where the one outage is"),
     ],
 )
 def test_a_part_without_room_for_an_outage_is_refused(drive, run_cli, tmp_path, flags, what):

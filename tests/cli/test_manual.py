@@ -68,8 +68,6 @@ def test_every_example_of_a_page_prints_what_the_page_shows(page, capsys, monkey
 
 @pytest.mark.parametrize("page", DOCUMENTS, ids=lambda page: page.stem)
 def test_every_example_is_run_or_says_why_it_is_not(page):
-    if page.stem == "messages":
-        pytest.skip("written and held by test_messages.py")
     if page.stem == "CONTRIBUTING":
         assert not [block["code"] for block in RUNNER.examples(page) if block["reason"] is None]
         return
@@ -105,7 +103,8 @@ def test_every_page_is_listed_and_no_link_leads_nowhere():
     # Anchors are the builder's affair, which takes a wrong one for an error.
     for page in DOCUMENTS:
         for target in re.findall(r"\]\(([^)#:\s]+\.\w+)[)#]", page.read_text(encoding="utf-8")):
-            assert (page.parent / target).exists(), (page.name, target)
+            # The page of messages is made of the catalogue when the manual is built.
+            assert target == "messages.md" or (page.parent / target).exists(), (page.name, target)
 
 
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.md"))
