@@ -1,6 +1,6 @@
 /* Attitude by quaternion, Alexiev (2021), (20)-(22).
  *
- * quaternion, written by strapdown 0.1.0 from the kernels that it runs itself.
+ * quaternion, written by strapdown 0.2.0.dev0 from the kernels that it runs itself.
  *
  * A sample is the rate at its instant, and the rate is linear between samples (trapezoid).
  *

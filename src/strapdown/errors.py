@@ -328,7 +328,8 @@ def _plain(value: Any) -> Any:
     if isinstance(value, PathLike):
         return fspath(value)
     if isinstance(value, Mapping):
-        return {str(k): _plain(v) for k, v in value.items()}
+        # Of a table the names are data; arrays behind them would fill a message and a bundle.
+        return tuple(str(k) for k in value)
     if isinstance(value, set | frozenset):
         return tuple(sorted(_plain(v) for v in value))
     if isinstance(value, Iterable):

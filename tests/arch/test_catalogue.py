@@ -67,6 +67,27 @@ def test_every_code_that_is_raised_has_its_entry():
     assert missing == []
 
 
+def test_no_sentence_stands_where_a_code_belongs():
+    texts = []
+    for path, tree in TREES.items():
+        for node in ast.walk(tree):
+            if not isinstance(node, ast.Call) or not node.args:
+                continue
+            if getattr(node.func, "id", getattr(node.func, "attr", "")) not in RAISED:
+                continue
+            first = node.args[0]
+            said = "".join(
+                str(n.value)
+                for n in ast.walk(first)
+                if isinstance(first, ast.Constant | ast.JoinedStr | ast.BinOp)
+                and isinstance(n, ast.Constant)
+            )
+            names = {k.arg for k in node.keywords}
+            if " " in said or "remedy" in names:
+                texts.append(f"{path.name}:{node.lineno}")
+    assert texts == []
+
+
 def test_no_entry_is_left_behind():
     """An entry is named in full, or by the constant parts of a text that is put together."""
     whole: set[str] = set()

@@ -314,7 +314,7 @@ def _known(terms: Sequence[str]) -> tuple[str, ...]:
             "estimation.no-terms-misalignment" if wrong else "estimation.no-terms-misalignment-2",
             quantity="terms",
             terms=terms,
-            word=wrong[0],
+            word=wrong[0] if wrong else None,
             known=CROSS_TERMS,
         )
     return tuple(terms)

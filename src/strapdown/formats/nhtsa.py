@@ -113,8 +113,8 @@ class CrashTest:
             file=self.path.name,
             quantity="channel",
             number=number,
-            numbers=min(numbers),
-            numbers_2=max(numbers),
+            numbers=min(numbers, default=None),
+            numbers_2=max(numbers, default=None),
         )
 
 

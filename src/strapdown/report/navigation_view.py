@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from strapdown.errors import ConfigError, nearest
+from strapdown.errors import ConfigError
 from strapdown.report import navigation_charts as charts
 from strapdown.report.chart import Chart
 from strapdown.report.navigation_charts import innovation_chart
@@ -53,15 +53,9 @@ def plot(result: NavigationResult, kind: str) -> Figure:
         return notebook_figure(innovation_chart(result.filtered, found[kind]))
     if kind not in KINDS:
         raise ConfigError(
-            f"there is no chart '{kind}' of this run",
-            quantity="kind",
-            remedy=nearest(kind, [*KINDS, *observed]),
+            "report.unknown-chart", quantity="kind", word=kind, known=[*KINDS, *observed]
         )
     chart = KINDS[kind](told_of(result))
     if chart is None:
-        raise ConfigError(
-            "the body does not move, and there is no path to draw",
-            quantity=f"kind '{kind}'",
-            remedy="plot attitude or bound",
-        )
+        raise ConfigError("report.no-path-to-draw", quantity=f"kind '{kind}'")
     return notebook_figure(chart)

@@ -143,11 +143,7 @@ def verify(bundle: str | Path) -> Verification:
     if changes:
         return Verification("changed", math.inf, digest, tuple(changes))
     if manifest["command"] == "reproduce":
-        raise DataError(
-            "it is a reproduced paper, and such bundles are not verified any more",
-            file=MANIFEST,
-            remedy="run python -m papers.NAME in the source of strapdown, which writes it again",
-        )
+        raise DataError("report.reproduced-paper", file=MANIFEST)
     if manifest["command"] not in RERUNS:
         raise DataError("report.command-not-known", file=MANIFEST, manifest=manifest["command"])
     with tempfile.TemporaryDirectory(prefix="strapdown-verify-") as folder:

@@ -156,7 +156,7 @@ def line_of(text, key):
         (
             GOOD + "[axes]\nmatrix = [[1,0,0],[0,1,0],[0,0.1,1]]\n",
             "matrix",
-            "stand at|long",
+            "are at|long",
             "cosines",
         ),
         (GOOD + '[axes]\ndesign = "chernodarov"\n', "design", "no such design", "chernodarov-2009"),

@@ -129,7 +129,7 @@ def test_random_walk_has_its_drive():
 @pytest.mark.parametrize(
     ("make", "said"),
     [
-        (lambda: gyro_bias(-1.0), "gyro_bias: -1.0 is no standard deviation"),
+        (lambda: gyro_bias(-1.0), "gyro_bias: -1.0 is not a standard deviation"),
         (lambda: accel_bias((1.0, 2.0)), r"accel_bias: \(1.0, 2.0\)"),
         (lambda: accel_scale(math.nan), "accel_scale: nan"),
         (lambda: time_offset((1.0, 1.0, 1.0)), "time_offset"),
