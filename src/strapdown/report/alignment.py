@@ -240,7 +240,7 @@ def _prefilter(result: AlignmentResult) -> dict[str, Any] | None:
 
 
 def _thinned(table: pd.DataFrame) -> pd.DataFrame:
-    """Decimate a history to at most 32 epochs; fine.csv holds all of them."""
+    """Decimate a history to at most 32 epochs; fine.csv holds the whole."""
     if len(table) <= 32:
         return table
     rows = np.unique(np.linspace(0, len(table) - 1, 32).round().astype(int))

@@ -311,7 +311,7 @@ def chosen_for_c(bench: AttitudeBench) -> str:
     Raises
     ------
     ConfigError
-        There is no recommendation and more than one algorithm.
+        No algorithm is recommended among several.
     """
     labels = [run.algorithm for run in bench.runs]
     chosen = labels[0] if len(labels) == 1 else bench.answer.algorithm

@@ -59,7 +59,7 @@ class Line:
     labels : tuple of str
         One per point, or none.
     places : tuple of (int, int)
-        Position of each label (`label_places.PLACES`); by default above its point.
+        Position of each label (`path_marks.PLACES`); by default above its point.
     low, high : ndarray, (n,), or None
         Ends of a horizontal bar through each point.
     legend : bool

@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
 #: A slider on a page cannot resolve more frames.
 MOST_FRAMES = 120
 _FRAME = 60  # ms
-_DIGITS = 4  # a tenth of a millimetre
+_DIGITS = 4  # a tenth of a millimeter
 _TICKS = 5
 _PAPER = {"showbackground": False, "gridcolor": "#e6e9ed", "zeroline": False}
 

@@ -211,7 +211,7 @@ _LIMITS: dict[type, dict[str, int]] = {
     Animation: {"caption": _WORDS, "live_caption": _TITLE, "title": _TITLE},
 }
 _MARKED = len("[U+10FFFF]")
-# Markup that plotly may interpret; it would turn some of it into links.
+# Markup that plotly may interpret, for example as links.
 _MARKUP = re.compile(r"<(?!/?(?:b|i|br|sub|sup)\s*/?>)", re.IGNORECASE)
 _SLUG = re.compile(r"[^A-Za-z0-9_-]+")
 

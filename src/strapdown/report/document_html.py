@@ -24,7 +24,7 @@ def document_page(document: Document, *, stills: Sequence[str] | None = None) ->
     Parameters
     ----------
     document : Document
-        Texts are made plain by `document_text.plain_document`, then escaped.
+        Texts are made plain by `document.plain_document`, then escaped.
     stills : sequence of str, optional
         Drawn charts from `document_data.draw_stills`, if already made.
 

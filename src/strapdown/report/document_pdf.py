@@ -27,7 +27,7 @@ def write_pdf(document: Document, path: Path, *, stills: Sequence[str] | None = 
     Parameters
     ----------
     document : Document
-        Texts are made plain by `document_text.plain_document`, and reach typst as values only.
+        Texts are made plain by `document.plain_document`, and reach typst as values only.
     path : Path
     stills : sequence of str, optional
         Drawn charts from `document_data.draw_stills`, if already made.

@@ -73,7 +73,7 @@ def envelope(places: Array, covariances: Array, pieces: int = 60) -> list[Array]
     Returns
     -------
     list of ndarray, (k, 2)
-        Convex hulls of consecutive pairs of ellipses, so that there are no gaps.
+        Convex hulls of consecutive pairs of ellipses, without gaps between them.
     """
     rows = np.unique(np.linspace(0, len(places) - 1, min(pieces + 1, len(places))).astype(int))
     rings = [ellipse(places[k], covariances[k]) for k in rows]

@@ -67,7 +67,7 @@ class NavigationFound:
         Against the truth.
     smoother : SmootherConsistency or None
     forward_errors : NavigationErrors or None
-        For a smoothed run: errors of the filter against the truth, beside those of its smoother.
+        For a smoothed run: agreement of filter and smoother, and the filter's errors.
     """
 
     told: NavigationTold

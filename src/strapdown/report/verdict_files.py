@@ -66,7 +66,7 @@ def write_verdict(result: NavigationResult, name: str, folder: Path) -> None:
 
 
 def verdict_json(result: NavigationResult) -> dict[str, Any]:
-    """Return a verdict for programs; angles in degrees, lengths in metres, times in s."""
+    """Return a verdict for programs; angles in degrees, lengths in meters, times in s."""
     trust, light = result.trust, result.trust.light
     bounds = plane_bound(result.record.covariance)
     spans = light.spans
