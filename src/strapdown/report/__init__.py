@@ -1,1 +1,1 @@
-"""Pages, figures and files that a person reads, and the bundles that hold them."""
+"""Report pages, figures and data files, and the bundles that hold them."""

@@ -1,4 +1,4 @@
-"""An alignment as files: page, JSON, tables and figures, sealed in a bundle."""
+"""Write an alignment as a sealed bundle: page, JSON, tables and figures."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ __all__ = ["alignment_json", "rerun_alignment", "write_alignment"]
 
 
 def rerun_alignment(configuration: dict[str, Any], out: Path, *, report: bool = True) -> Seal:
-    """Run a sealed alignment again from its configuration, with or without its page."""
+    """Re-run a sealed alignment from its configuration, with or without its page."""
     spec = alignment_spec(configuration["alignment"])
     path = configuration.get("file_path")
     name = str(configuration["name"])
@@ -54,13 +54,13 @@ def write_alignment(
     ----------
     result : AlignmentResult
     out : str or Path
-        Folder to make.
+        Folder to create.
     name : str, optional
-        Of the folder, as the report names it; that of `out`, if not given.
+        Folder name shown in the report; by default that of `out`.
     report : bool
-        Whether the page and the figures are written, too.
+        Whether to write the page and the figures.
     force : bool
-        Replace a bundle that is there.
+        Overwrite an existing bundle.
     progress : callable, optional
 
     Returns
@@ -93,7 +93,7 @@ def write_alignment(
 
 
 def _attitude(result: AlignmentResult) -> pd.DataFrame:
-    """Attitude at the rate that is asked for, each column with its unit."""
+    """Attitude at the requested rate; column names carry units."""
     table = result.attitude
     rate = result.spec.output.rate_hz
     if rate is not None:
@@ -108,7 +108,7 @@ def _attitude(result: AlignmentResult) -> pd.DataFrame:
 
 
 def _history(history: pd.DataFrame) -> pd.DataFrame:
-    """Estimates and standard deviations of the fine alignment, each column with its unit."""
+    """Estimates and standard deviations of the fine alignment; column names carry units."""
     units = dict.fromkeys(EULER, "deg")
     units |= {f"gyro_bias_{a}": "rad_per_s" for a in "xyz"}
     units |= {f"accel_bias_{a}": "m_per_s2" for a in "xyz"}
@@ -119,11 +119,11 @@ def _history(history: pd.DataFrame) -> pd.DataFrame:
     return out.reset_index(drop=True)
 
 
-# An alignment as JSON: the answer, its bounds, what was found and how.
+# JSON of an alignment: attitude, bounds, findings and method.
 
 
 def alignment_json(result: AlignmentResult) -> dict[str, Any]:
-    """Return everything that a program would ask of an alignment.
+    """Return an alignment as plain data for programs.
 
     Parameters
     ----------
@@ -240,7 +240,7 @@ def _prefilter(result: AlignmentResult) -> dict[str, Any] | None:
 
 
 def _thinned(table: pd.DataFrame) -> pd.DataFrame:
-    """A history at some thirty of its epochs; all of it stands in fine.csv."""
+    """Decimate a history to at most 32 epochs; fine.csv holds the whole."""
     if len(table) <= 32:
         return table
     rows = np.unique(np.linspace(0, len(table) - 1, 32).round().astype(int))

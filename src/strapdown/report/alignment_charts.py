@@ -1,4 +1,4 @@
-"""The charts of an alignment: readiness, signals, attitude, drifts and biases."""
+"""Charts of an alignment: readiness, signals, attitude, gyro and accelerometer biases."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 
 _TIME = "time, s"
 _NAMES = ("x, forward", "y, right", "z, down")
-#: Differences below this part of the smallest bound are drawn as that.
+#: Smallest difference drawn, as a share of the smallest bound.
 LEAST = 0.02
 BEGUN = (
     " The fine one begins at the coarse attitude and is near it in its first seconds; its bound "
@@ -54,7 +54,7 @@ _OFF_WORDS = {
 
 
 def readiness_chart(result: AlignmentResult) -> Chart:
-    """Alignment time against accuracy, coarse and fine."""
+    """Accuracy against alignment time, coarse and fine."""
     found = result.readiness
     length = result.spec.coarse.duration_s
     off = _OFF[found.against]
@@ -76,7 +76,7 @@ def readiness_chart(result: AlignmentResult) -> Chart:
             size = np.abs(table[[f"{a}_off" for a in angles]].to_numpy()).max(axis=1)
             size = np.maximum(size, least)
             if found.against == "answer" and name == "fine":
-                # It ends in the answer itself.
+                # The last estimate is the reference itself.
                 size[time > 0.9 * time[-1]] = np.nan
             lines.append(
                 Line(f"{name}: 95 % bound", time[kept], TWO_SIDED_95 * sd[kept], colour, dash, 2.4)
@@ -110,7 +110,7 @@ def readiness_chart(result: AlignmentResult) -> Chart:
 
 
 def signal_chart(result: AlignmentResult) -> Chart:
-    """Rates and specific force: as recorded, as aligned, and their means over a second."""
+    """Angular rate and specific force: as recorded, as aligned, and 1 s means."""
     panels = []
     for columns, factor, label in (
         (GYRO, DEG_PER_HOUR, "rate, deg/h"),
@@ -153,7 +153,7 @@ def _means(imu: pd.DataFrame, column: str, factor: float) -> Line:
 
 
 def attitude_chart(result: AlignmentResult) -> Chart:
-    """Attitude over the record: the answer, carried by the gyros."""
+    """Attitude over the record: the aligned attitude propagated by the gyros."""
     table = result.attitude
     time = table.index.to_numpy(dtype=np.float64)
     panels = []
@@ -189,7 +189,7 @@ def attitude_chart(result: AlignmentResult) -> Chart:
 
 
 def bias_charts(result: AlignmentResult) -> tuple[Chart, ...]:
-    """Drifts of the gyros and biases of the accelerometers over the fine alignment."""
+    """Gyro and accelerometer biases over the fine alignment."""
     if result.fine is None:
         return ()
     history = result.fine.history
@@ -227,7 +227,7 @@ def bias_charts(result: AlignmentResult) -> tuple[Chart, ...]:
 
 
 def innovation_chart(result: AlignmentResult) -> Chart | None:
-    """What each epoch observed less what was expected, in its own standard deviations."""
+    """Innovation of each epoch in its own standard deviations."""
     if result.fine is None:
         return None
     panels = []

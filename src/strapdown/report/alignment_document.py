@@ -1,4 +1,4 @@
-"""The report of an alignment: the answer first, then what it rests on."""
+"""Report of an alignment: the answer first, then its basis."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def alignment_document(result: AlignmentResult, name: str) -> Document:
     ----------
     result : AlignmentResult
     name : str
-        Of the folder, for the command that verifies it.
+        Folder name, for the verification command.
 
     Returns
     -------
@@ -136,7 +136,7 @@ def _answer(result: AlignmentResult, reasons: tuple[Finding, ...]) -> tuple[Bloc
 
 
 def _more(result: AlignmentResult) -> tuple[Section, ...]:
-    """What a turn of the body would tell that this rest does not."""
+    """Section on the accuracy that a turn of the body would add."""
     table = turn_table(result)
     if table is None:
         return ()
@@ -201,7 +201,7 @@ def _method(result: AlignmentResult, name: str) -> tuple[Block, ...]:
     )
 
 
-# What an alignment found, in sentences; terminal and page say the same.
+# Results of an alignment in sentences, shared by terminal and page.
 
 
 Array = NDArray[np.float64]
@@ -218,7 +218,7 @@ def headline(result: AlignmentResult) -> str:
 
 
 def key_figures(result: AlignmentResult) -> tuple[KeyFigure, ...]:
-    """Return the numbers of the top of the page."""
+    """Return the key figures at the top of the page."""
     out = []
     for k in ORDER:
         said = angle_bound(result.end, k)
@@ -245,7 +245,7 @@ def _places(half: float) -> int:
 
 
 def limits(result: AlignmentResult) -> tuple[tuple[str, str], ...]:
-    """Return what limits the answer, and what would help."""
+    """Return the limiting error sources and their remedies."""
     site = result.site
     gyro, accel = prior_sd(result)
     c_nb = _mean_attitude(result)
@@ -265,7 +265,7 @@ def limits(result: AlignmentResult) -> tuple[tuple[str, str], ...]:
 
 
 def _heading_limit(result: AlignmentResult, east: float) -> tuple[str, str]:
-    """What limits the heading, for an east drift of one standard deviation, rad/s."""
+    """Limit of the heading for a 1-sigma east gyro drift in rad/s."""
     coarse, heading = result.coarse, float(result.end.sd_deg[2])
     across = float(np.linalg.norm(result.site.earth_rate[:2]))
     hidden = (
@@ -303,7 +303,7 @@ def _heading_limit(result: AlignmentResult, east: float) -> tuple[str, str]:
 
 
 def prior_sd(result: AlignmentResult) -> tuple[Array, Array]:
-    """What gyros and accelerometers may read too much here, before anything is estimated."""
+    """Standard deviations of the gyro and accelerometer errors before any estimation."""
     rate, force = (values_of(result.imu, columns).mean(axis=0) for columns in (GYRO, ACCEL))
     return resting_sd(result.sensors, rate, force)
 
@@ -313,15 +313,15 @@ def _mean_attitude(result: AlignmentResult) -> Array:
     return rotation.dcm_from_quaternion(middle)
 
 
-# Tables of an alignment: the answer, the sensors' errors, and what was run.
+# Tables of an alignment: attitude, sensor errors, and method.
 
 
-#: Times since the start that the table of readiness shows, s.
+#: Times since the start in the readiness table, s.
 SHOWN = (30.0, 60.0, 100.0, 300.0, 600.0)
 
 
 def answer_table(result: AlignmentResult) -> TableBlock:
-    """The attitude at start and end, by both alignments."""
+    """Attitude at start and end from both alignments."""
     known = answer_error(result)
     columns = ["", "start", "end", "coarse alone"]
     if known is not None:
@@ -347,7 +347,7 @@ def answer_table(result: AlignmentResult) -> TableBlock:
 
 
 def bias_table(result: AlignmentResult) -> TableBlock | None:
-    """Estimated drifts and biases, and how much of what was unknown before is known now."""
+    """Estimated gyro and accelerometer biases, and the reduction of their uncertainty."""
     if result.fine is None:
         return None
     end = result.fine.alignment
@@ -377,7 +377,7 @@ def bias_table(result: AlignmentResult) -> TableBlock | None:
 
 
 def _half(half: float, unit: str) -> str:
-    """A bound alone: ``± 0.02 deg/h``."""
+    """Format a half width alone: ``± 0.02 deg/h``."""
     text = about(0.0, half, unit)
     return text[text.index("±") :]
 
@@ -389,7 +389,7 @@ def _found(share: float) -> str:
 
 
 def readiness_table(result: AlignmentResult) -> TableBlock:
-    """How well heading and level are known after some times."""
+    """Heading and level accuracy after given alignment times."""
     found = result.readiness
     whole = float(result.imu.index[-1] - result.imu.index[0])
     times = [t for t in SHOWN if t < 0.97 * whole] + [whole]
@@ -403,7 +403,7 @@ def readiness_table(result: AlignmentResult) -> TableBlock:
                 at = table.index.to_numpy(dtype=np.float64)
                 sizes = table[list(names)].to_numpy().max(axis=1)
                 inside = at[0] <= time * 1.001
-                # Lengths that were tried are evenly apart in their logarithm.
+                # The tested lengths are evenly spaced in their logarithm.
                 where = np.log(np.maximum(at, 1e-9))
                 value = np.exp(np.interp(np.log(time), where, np.log(sizes))) if inside else np.nan
                 cells.append(_bound(TWO_SIDED_95 * value, names[0]))
@@ -422,7 +422,7 @@ def _bound(half: float, name: str) -> str:
 
 
 def turn_table(result: AlignmentResult) -> TableBlock | None:
-    """What a turn and a further rest would make known, the best heading first."""
+    """Predicted accuracy after a turn and a further stationary stretch, best heading first."""
     if not result.manoeuvres:
         return None
     rows = []
@@ -445,7 +445,7 @@ def turn_table(result: AlignmentResult) -> TableBlock | None:
 
 
 def method_rows(result: AlignmentResult) -> tuple[tuple[str, str], ...]:
-    """What was run: the slots of the chain with their modules."""
+    """Slots of the chain with their modules."""
     spec = result.spec
     rows = [("Record", f"{result.source.name}: {result.source.what}")]
     if result.prefilter is not None:

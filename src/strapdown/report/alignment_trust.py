@@ -1,4 +1,4 @@
-"""Whether an alignment can be trusted: what its own record says for it and against it."""
+"""Judge whether an alignment can be trusted, from the evidence in its own record."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ __all__ = ["ORDER", "Trust", "answer_error", "bounds_hold", "reason", "trust"]
 
 Array = NDArray[np.float64]
 
-ORDER = (2, 1, 0)  # heading first: it is the one that is hard
-MOST_SAID = 2  # of what speaks against an answer, in one sentence
+ORDER = (2, 1, 0)  # heading first: it is the hardest to determine
+MOST_SAID = 2  # reasons against an answer in one sentence
 WORDS = {
     "trusted": "It can be trusted",
     "reserve": "It can be used with reserve",
@@ -32,15 +32,15 @@ WORDS = {
 
 @dataclass(frozen=True)
 class Trust:
-    """Whether the answer can be trusted, and why.
+    """Verdict on an answer, with its reasons.
 
     Attributes
     ----------
     verdict : {'trusted', 'reserve', 'distrusted'}
     reasons : tuple of Finding
-        A note speaks for it, a warning against it.
+        A note supports the answer, a warning contradicts it.
     short : tuple of Finding
-        What speaks for it, in a few words.
+        Supporting reasons in short form.
     """
 
     verdict: str
@@ -49,17 +49,17 @@ class Trust:
 
     @property
     def supporting(self) -> tuple[Finding, ...]:
-        """Reasons that speak for it."""
+        """Reasons that support the answer."""
         return tuple(one for one in self.reasons if one.severity == "note")
 
     @property
     def against(self) -> tuple[Finding, ...]:
-        """Reasons that speak against it."""
+        """Reasons against the answer."""
         return tuple(one for one in self.reasons if one.severity != "note")
 
     @property
     def sentence(self) -> str:
-        """The verdict in words, with what speaks against it."""
+        """The verdict in words, with the reasons against the answer."""
         against = [one.sentence() for one in self.against]
         said = WORDS[self.verdict]
         if against:
@@ -73,12 +73,12 @@ class Trust:
 
 
 def reason(good: bool, code: str, **data: Any) -> Finding:
-    """Return what speaks for an answer, or against it."""
+    """Return a reason for an answer or against it."""
     return Finding(code, severity="note" if good else "warning", data=data)
 
 
 def answer_error(result: AlignmentResult) -> tuple[str, Array, float] | None:
-    """What the answer is off from the truth or from a reference, deg, with the reference's sd.
+    """Return the error against the truth or a reference, deg, with the reference's sd.
 
     Returns
     -------
@@ -98,7 +98,7 @@ def answer_error(result: AlignmentResult) -> tuple[str, Array, float] | None:
 
 
 def trust(result: AlignmentResult) -> Trust:
-    """Judge the answer by what its own record says against it."""
+    """Judge the answer by the evidence in its own record."""
     reasons: list[Finding] = []
     known = answer_error(result)
     sd = result.end.sd_deg
@@ -121,7 +121,7 @@ def trust(result: AlignmentResult) -> Trust:
                         bound_deg=bound[k],
                     )
                 )
-    # Causes before what they bring about.
+    # Causes come before their effects.
     told = [*result.unread, *result.coarse.findings]
     told += () if result.fine is None else result.fine.findings
     reasons += [f for f in told if f.severity == "warning" and not _allowed(f, result)]
@@ -129,7 +129,7 @@ def trust(result: AlignmentResult) -> Trust:
     reasons += _surprises(result)
     against = [one for one in reasons if one.severity == "warning"]
     verdict = "trusted" if not against else "reserve"
-    # What a bound accounts for does not speak against the bound.
+    # A finding that the bound already includes does not contradict the bound.
     counted = sum(bool(one.data.get("in_bound")) for one in against)
     wrong = known is not None and bool(against) and reasons[0].severity == "warning"
     if len(against) - counted > 1 or wrong:
@@ -138,12 +138,12 @@ def trust(result: AlignmentResult) -> Trust:
 
 
 def bounds_hold(result: AlignmentResult) -> bool:
-    """Whether nothing that the record itself shows contradicts the bounds."""
+    """Whether the record is consistent with the bounds."""
     return all(one.severity == "note" for one in (*_agreement(result), *_surprises(result)))
 
 
 def _allowed(finding: Finding, result: AlignmentResult) -> bool:
-    """Whether the coarse alignment was made for what a finding tells."""
+    """Whether the coarse alignment method is designed for the condition of a finding."""
     return finding.code == ROCKS and result.coarse.method == "inertial_frame"
 
 
@@ -157,7 +157,7 @@ def _short(result: AlignmentResult, known: bool) -> tuple[Finding, ...]:
 
 
 def _agreement(result: AlignmentResult) -> list[Finding]:
-    """Coarse and fine alignment beside each other, at the end of the coarse one."""
+    """Compare coarse and fine alignment at the end of the coarse alignment."""
     if result.fine is None:
         return []
     time = result.attitude.index.to_numpy()
@@ -181,7 +181,7 @@ def _agreement(result: AlignmentResult) -> list[Finding]:
 
 
 def _surprises(result: AlignmentResult) -> list[Finding]:
-    """Whether the innovations of the fine alignment are as large as they were expected."""
+    """Check the size of the fine-alignment innovations against their expected covariance."""
     if result.fine is None:
         return []
     out = []

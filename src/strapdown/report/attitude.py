@@ -1,4 +1,4 @@
-"""The attitude bench as files: page, figures, JSON, CSV, sealed in a bundle."""
+"""Write the attitude bench as a sealed bundle: page, figures, JSON, CSV."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ def write_attitude(
     ----------
     bench : AttitudeBench
     out : str or Path
-        Folder to make.
+        Folder to create.
     report : bool
-        Whether the page and the figures are written, too.
+        Whether to write the page and the figures.
     force : bool
-        Replace a bundle that is there.
+        Overwrite an existing bundle.
     png : bool
-        Write each figure as PNG, too.
+        Also write each figure as PNG.
 
     Returns
     -------
@@ -87,12 +87,12 @@ def write_attitude(
 
 
 def _write_csv(bench: AttitudeBench, path: Path) -> None:
-    """Write every algorithm's attitude side by side, to 1e-9 and to 1e-6 deg."""
+    """Write the attitude of every algorithm side by side, to 1e-9 and to 1e-6 deg."""
     columns: dict[str, NDArray[Any]] = {
         "time_s": bench.runs[0].attitude.index.to_numpy(dtype=np.float64)
     }
     for run in bench.runs:
-        # Neither a comma nor a semicolon, which a reader may take for what parts the columns.
+        # Neither a comma nor a semicolon, which a reader may take for a column separator.
         name = run.algorithm.replace(",", " ")
         columns |= {f"{name} {q}": np.round(run.attitude[q].to_numpy(), 9) for q in QUATERNION}
         columns |= {f"{name} {e}_deg": np.round(run.attitude[e].to_numpy(), 6) for e in EULER}
@@ -102,12 +102,12 @@ def _write_csv(bench: AttitudeBench, path: Path) -> None:
 
 
 def _write_sweep(bench: AttitudeBench, path: Path) -> None:
-    """Write the errors at every rate; a field is empty where nothing is known."""
+    """Write the errors at every rate; unknown values are empty fields."""
     columns: dict[str, NDArray[Any]] = {}
     for name in bench.sweep.columns:
         values = bench.sweep[name].to_numpy()
         if values.dtype.kind == "f":
-            # What is missing is left empty, and not called NaN.
+            # Missing values are written as empty fields, not as NaN.
             values = np.array([None if np.isnan(v) else v for v in values.tolist()], dtype=object)
         columns[str(name)] = values
     csv.write(
@@ -123,7 +123,7 @@ def _write_sweep(bench: AttitudeBench, path: Path) -> None:
     )
 
 
-# The attitude bench as plain data.
+# Plain data of the attitude bench.
 
 
 def attitude_json(bench: AttitudeBench) -> dict[str, Any]:
@@ -236,7 +236,7 @@ def _score(score: Score) -> dict[str, Any]:
 
 
 def _cost(cost: Cost) -> dict[str, float]:
-    """Operations and cycles are a sample's; memory is in numbers."""
+    """Operations and cycles are per sample; memory is in numbers."""
     return {
         "add_per_sample": cost.add,
         "multiply_per_sample": cost.multiply,
@@ -270,7 +270,7 @@ def _trials(bench: AttitudeBench) -> dict[str, Any] | None:
 
 
 def _plain(row: dict[Any, Any]) -> dict[str, Any]:
-    """Without NaN, which JSON has not: what does not apply is null."""
+    """Replace NaN by null, because JSON has no NaN; null means not applicable."""
     plain: dict[str, Any] = {}
     for key, value in row.items():
         item = value.item() if hasattr(value, "item") else value
@@ -278,25 +278,26 @@ def _plain(row: dict[Any, Any]) -> dict[str, Any]:
     return plain
 
 
-# The algorithm that a bench chose, as a C file.
+# C export of the chosen algorithm.
 
 
-# What an embedded test needs: a second or so of motion, in a file that can still be read.
+# Samples of the test vector: about a second of motion, in a file of readable length.
 VECTOR = 64
 
 
 def check_c(path: Path | None, force: bool) -> None:
-    """Refuse a path that cannot be written, before anything is run.
+    """Reject a path that cannot be written, before the run starts.
 
     Raises
     ------
     ConfigError
-        It is no name of a C file, it exists and may not be replaced, or its folder does not.
+        The file name does not end in .c or .h, the file exists without `force`, or its folder does
+        not exist.
     """
     if path is None:
         return
     if path.suffix.lower() not in (".c", ".h"):
-        # What --force replaces might else be the log itself.
+        # Otherwise --force could overwrite the log itself.
         raise ConfigError("report.no-name-c-file", file=str(path), quantity="--export-c")
     if path.is_dir() or (path.exists() and not force):
         raise ConfigError("report.already", file=str(path), quantity="--export-c")
@@ -305,12 +306,12 @@ def check_c(path: Path | None, force: bool) -> None:
 
 
 def chosen_for_c(bench: AttitudeBench) -> str:
-    """Return the algorithm to export: the one that the answer names, or else the only one.
+    """Return the algorithm to export: the recommended one, or else the only one.
 
     Raises
     ------
     ConfigError
-        The answer names none and there are several.
+        No algorithm is recommended among several.
     """
     labels = [run.algorithm for run in bench.runs]
     chosen = labels[0] if len(labels) == 1 else bench.answer.algorithm
@@ -320,7 +321,7 @@ def chosen_for_c(bench: AttitudeBench) -> str:
 
 
 def write_c(bench: AttitudeBench, path: Path, *, force: bool = False) -> str:
-    """Write one algorithm of a bench as C99, with a test vector of its log.
+    """Write one algorithm of a bench as C99, with a test vector from its log.
 
     Parameters
     ----------
@@ -328,17 +329,17 @@ def write_c(bench: AttitudeBench, path: Path, *, force: bool = False) -> str:
     path : Path
         File to write.
     force : bool
-        Replace a file that is there.
+        Overwrite an existing file.
 
     Returns
     -------
     str
-        The algorithm: the one that the answer names, or else the only one.
+        The exported algorithm: the recommended one, or else the only one.
 
     Raises
     ------
     ConfigError
-        The answer names none and there are several, or the file may not be written.
+        No algorithm is recommended among several, or the file may not be written.
     """
     check_c(path, force)
     chosen = chosen_for_c(bench)
@@ -357,7 +358,7 @@ def write_c(bench: AttitudeBench, path: Path, *, force: bool = False) -> str:
 
 
 def _liveliest(bench: AttitudeBench) -> int:
-    """Where the stretch of the test vector turns most: one at rest would test nothing."""
+    """Start of the test vector: the stretch with the most rotation, which exercises the code."""
     rate = bench.imu[GYRO].to_numpy()
     energy = (rate * rate).sum(axis=1).cumsum()
     if len(energy) <= VECTOR:

@@ -1,4 +1,4 @@
-"""The charts of the attitude bench."""
+"""Charts of the attitude bench."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _TIME = "time, s"
 
 
 def charts(bench: AttitudeBench) -> list[Chart]:
-    """Return the charts that this bench has something to show in, in the order of the page.
+    """Return the charts for which this bench has data, in page order.
 
     Parameters
     ----------
@@ -57,12 +57,12 @@ def charts(bench: AttitudeBench) -> list[Chart]:
 
 
 def log_charts(bench: AttitudeBench) -> list[Chart]:
-    """Return the signals and the attitudes over time."""
+    """Return the charts of signals and attitudes over time."""
     return [_gyro(bench), _attitude(bench)]
 
 
 def error_charts(bench: AttitudeBench) -> list[Chart]:
-    """Return the errors and the differences over time."""
+    """Return the charts of errors and differences over time."""
     found = []
     if bench.truth is not None:
         found.append(_error(bench))
@@ -74,7 +74,7 @@ def error_charts(bench: AttitudeBench) -> list[Chart]:
 
 
 def _buckets(bench: AttitudeBench) -> int:
-    """Fewer points a curve where there are many, so that a page stays a page."""
+    """Points per curve, reduced for many curves to limit the page size."""
     return min(BUCKETS, 4500 // max(1, len(bench.runs)))
 
 
@@ -232,16 +232,16 @@ def _difference(bench: AttitudeBench) -> Chart:
     )
 
 
-# The charts that the answer rests on: cost, rate, whose error it is, luck, other libraries.
+# Charts behind the answer: cost, sample rate, error shares, trials, other libraries.
 
 
-# A logarithmic axis has no zero; what is less is drawn here.
+# A logarithmic axis has no zero; smaller values are drawn here.
 LEAST_ERROR, LEAST_WORDS = 1e-6, "10⁻⁶°"
 _FAINT = "#c3c9d0"
 
 
 def answer_charts(bench: AttitudeBench) -> list[Chart]:
-    """Return the charts for the top of the page: cost against error, and the rates.
+    """Return the charts for the top of the page: error against cost, and against rate.
 
     Parameters
     ----------
@@ -256,7 +256,7 @@ def answer_charts(bench: AttitudeBench) -> list[Chart]:
 
 
 def judgement_charts(bench: AttitudeBench) -> list[Chart]:
-    """Return the charts for the end of the page: shares, trials and peers.
+    """Return the charts for the end of the page: error shares, trials and other libraries.
 
     Parameters
     ----------
@@ -275,7 +275,7 @@ def judgement_charts(bench: AttitudeBench) -> list[Chart]:
 
 
 def _shown(values: object) -> Array:
-    """Numbers for a logarithmic axis; NaN stays NaN."""
+    """Clip values for a logarithmic axis; NaN stays NaN."""
     array = np.atleast_1d(np.asarray(values, dtype=np.float64))
     return np.where(np.isnan(array), np.nan, np.maximum(array, LEAST_ERROR))
 
@@ -363,7 +363,7 @@ def _cost(bench: AttitudeBench) -> Chart:
 
 
 def _pareto(cost: Array, error: Array) -> list[int]:
-    """Which points nothing beats in both, from the cheapest on."""
+    """Pareto-optimal points in cost and error, cheapest first."""
     front: list[int] = []
     for k in sorted(np.flatnonzero(~np.isnan(error)).tolist(), key=lambda j: (cost[j], error[j])):
         if not front or error[k] < error[front[-1]]:
@@ -404,7 +404,7 @@ def _sweep(bench: AttitudeBench) -> Chart:
                     _shown(rows["error_deg"]),
                     style["colour"],
                     style["dash"],
-                    # Curves that coincide lie within each other, and all are seen.
+                    # Decreasing widths keep coinciding curves visible.
                     width=max(1.4, 4.4 - 0.4 * k),
                     symbol=style["symbol"],
                     dots=True,
@@ -476,7 +476,7 @@ def _share(bench: AttitudeBench) -> Chart:
 
 
 def share_basis(bench: AttitudeBench) -> str:
-    """Say whether the shares are exact or estimates."""
+    """Return whether the shares are exact or estimates."""
     if bench.specification["source"]["kind"] == "scenario":
         return (
             "Exact: simulated, so that each algorithm also ran on samples without the sensor's "

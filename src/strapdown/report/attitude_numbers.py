@@ -1,4 +1,4 @@
-"""Numbers of a bench that several tables and charts show."""
+"""Numbers of a bench that several tables and charts share."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = [
     "sweep_grid",
 ]
 
-#: Ways to come to a lower rate, and what they are for people.
+#: Methods of lowering the sample rate, with their labels.
 MEANINGS = {
     "drop": "samples left out",
     "sum": "increments summed",
@@ -26,13 +26,13 @@ MEANINGS = {
 
 
 def largest_known(scores: Sequence[Score]) -> float | None:
-    """Largest error against anything that is known, in deg; None where nothing is."""
+    """Largest finite error against a known attitude, deg; None if there is none."""
     found = [s.error_deg if s.max_deg is None else s.max_deg for s in scores]
     return max((e for e in found if math.isfinite(e)), default=None)
 
 
 def full_rate_errors(bench: AttitudeBench) -> dict[str, float]:
-    """Return the error of each algorithm by which the answer judges, at the log's own rate.
+    """Return the error by which each algorithm is judged, at the log's own rate.
 
     Parameters
     ----------
@@ -41,8 +41,8 @@ def full_rate_errors(bench: AttitudeBench) -> dict[str, float]:
     Returns
     -------
     dict of str to float
-        In deg, in the order of the runs: the largest of what is known, else the largest of the
-        algorithm's own.
+        In deg, in the order of the runs: the largest error against known attitudes, else the
+        algorithm error.
     """
     own = {share.algorithm: share.own_deg[2] for share in bench.shares}
     swept: dict[str, float] = {}
@@ -58,7 +58,7 @@ def full_rate_errors(bench: AttitudeBench) -> dict[str, float]:
 
 
 def chosen_run(bench: AttitudeBench) -> AttitudeRun:
-    """Return the run of the algorithm that the answer names, else the least wrong one."""
+    """Return the run of the recommended algorithm, else that with the smallest error."""
     for run in bench.runs:
         if run.algorithm == bench.answer.algorithm:
             return run
@@ -70,7 +70,7 @@ def chosen_run(bench: AttitudeBench) -> AttitudeRun:
 
 
 def sweep_grid(bench: AttitudeBench, meaning: str) -> pd.DataFrame:
-    """Return the judged errors of one way to lower the rate.
+    """Return the errors of one method of lowering the rate.
 
     Parameters
     ----------
@@ -94,6 +94,6 @@ def sweep_grid(bench: AttitudeBench, meaning: str) -> pd.DataFrame:
 
 
 def like_with_like(bench: AttitudeBench) -> tuple[list[PeerRun], list[PeerRun]]:
-    """Part the peers into those with gyros alone, as the bench's own are, and aided ones."""
+    """Split the other libraries into gyro-only ones, as the bench's own are, and aided ones."""
     alone = [p for p in bench.peers if p.aiding == "gyro"]
     return alone, [p for p in bench.peers if p.aiding != "gyro"]

@@ -25,7 +25,7 @@ from strapdown.results.attitude_bench import AttitudeBench
 __all__ = ["MOST_FRAMES", "attitude_page", "body_caption", "body_figure"]
 
 
-# Where on the page a chart stands.
+# Section of the page for each chart.
 _PLACES = {
     "answer": ("cost", "sweep"),
     "log": ("gyro", "attitude"),
@@ -43,7 +43,7 @@ def attitude_page(bench: AttitudeBench, drawn: Sequence[Chart] | None = None) ->
     ----------
     bench : AttitudeBench
     drawn : sequence of Chart, optional
-        Its charts, where they have been made already.
+        Its charts, if already made.
 
     Returns
     -------
@@ -113,19 +113,19 @@ def _findings(findings: Iterable[Finding]) -> list[dict[str, str | None]]:
     ]
 
 
-# The body turning in space: a box with its axes among north, east and down, over time.
+# Animation of the body: a box with its axes in the north-east-down frame, over time.
 
 
 Array = NDArray[np.float64]
 
-#: More than these a slider of a page cannot tell apart.
+#: A slider on a page cannot resolve more frames.
 MOST_FRAMES = 300
 _AS_IT_WAS = 30_000.0  # ms: a longer log is played faster
-_SHORTEST = 33.0  # ms a frame: what a browser draws in space without falling behind
-# Half a phone, in lengths of the drawing: forward along its long side.
+_SHORTEST = 33.0  # ms a frame: the shortest that a browser can draw in 3D
+# Half dimensions of a phone, in drawing units; forward along its long side.
 _HALF = np.array([0.72, 0.38, 0.07])
 _CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * _HALF
-# Two triangles a face, corners numbered as above: down, up, left, right, aft, fore.
+# Two triangles per face, corners numbered as above: down, up, left, right, aft, fore.
 _TRIANGLES = np.array(
     [
         *([1, 3, 5], [3, 7, 5]),
@@ -136,7 +136,7 @@ _TRIANGLES = np.array(
         *([4, 5, 6], [5, 7, 6]),
     ]
 )
-# The upper face, where a screen is, and the front, so that one sees which way it points.
+# The upper face with the screen, and the front, have their own colors to show the orientation.
 _FACES = ("#9fb3c8", "#9fb3c8", "#3d5166", "#3d5166", *(("#c5d2de",) * 6), "#D55E00", "#D55E00")
 _EDGES = [(0, 1), (0, 2), (0, 4), (1, 3), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 6)]
 _EDGES += [(5, 7), (6, 7)]
@@ -144,7 +144,7 @@ _AXIS_NAMES = ("x forward", "y right", "z down")
 
 
 def body_figure(bench: AttitudeBench) -> dict[str, Any]:
-    """Return the turning body for ``Plotly.newPlot``, with its frames.
+    """Return the animated body for ``Plotly.newPlot``, with its frames.
 
     Parameters
     ----------
@@ -153,9 +153,9 @@ def body_figure(bench: AttitudeBench) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``data``, ``layout`` and ``frames``. The first pose stands without being played. The
-        box is what the chosen algorithm says (`attitude_numbers.chosen_run`), the wireframe
-        the truth, where it is known.
+        ``data``, ``layout`` and ``frames``. The first pose is visible before playback. The box
+        follows the chosen algorithm (`attitude_numbers.chosen_run`), the wireframe the truth, where
+        it is known.
     """
     attitude = chosen_run(bench).attitude
     time = _instants(attitude)
@@ -176,7 +176,7 @@ def body_figure(bench: AttitudeBench) -> dict[str, Any]:
 
 
 def body_caption(bench: AttitudeBench) -> str:
-    """Say what is shown, and how fast it is played."""
+    """Caption of the animation, with its playback speed."""
     run = chosen_run(bench)
     time = _instants(run.attitude)
     text = (
@@ -196,19 +196,19 @@ def body_caption(bench: AttitudeBench) -> str:
 
 
 def _instants(attitude: pd.DataFrame) -> Array:
-    """Equally spaced instants, no more than there are samples."""
+    """Equally spaced instants, at most as many as there are samples."""
     start, end = float(attitude.index[0]), float(attitude.index[-1])
     return np.linspace(start, end, min(MOST_FRAMES, max(2, len(attitude))))
 
 
 def _frame_length(time: Array) -> float:
-    """Milliseconds a frame: as it was where a log is short, else as fast as can be drawn."""
+    """Frame length in ms: real time for a short log, else the fastest drawable."""
     real = 1000.0 * float(time[-1] - time[0]) / (len(time) - 1)
     return max(real, _SHORTEST) if real * (len(time) - 1) <= _AS_IT_WAS else _SHORTEST
 
 
 def _ghost(bench: AttitudeBench, time: Array) -> Array | None:
-    """True attitude at the frames, NaN where it is not known."""
+    """True attitude at the frames; NaN where it is not known."""
     if bench.truth is None or not len(bench.truth):
         return None
     stamps = bench.truth.index.to_numpy(dtype=np.float64)
@@ -218,7 +218,7 @@ def _ghost(bench: AttitudeBench, time: Array) -> Array | None:
 
 
 def _turned(q_nb: Array, points_b: Array) -> Array:
-    """Points of the body in the drawing: east to the right, north away, up upwards."""
+    """Points of the body in the drawing frame: x east, y north, z up."""
     if np.isnan(q_nb).any():
         return np.full(points_b.shape, np.nan)
     north, east, down = rotation.rotate(q_nb, points_b).T
@@ -233,7 +233,7 @@ def _coordinates(points: Array) -> dict[str, list[float | None]]:
 
 
 def _moving(q: Array, ghost: Array | None) -> list[dict[str, Any]]:
-    """Traces that turn: the box, its axes, and the ghost."""
+    """Traces that rotate: the box, its axes, and the wireframe of the truth."""
     parts: list[dict[str, Any]] = [
         {
             "type": "mesh3d",
@@ -316,7 +316,7 @@ def _layout(time: Array) -> dict[str, Any]:
         "scene": {
             **{f"{axis}axis": empty for axis in "xyz"},
             "aspectmode": "cube",
-            # From the south-east and above: north leads away, east to the right.
+            # View from the south-east and above: north points away, east to the right.
             "camera": {"eye": {"x": 0.42, "y": -0.84, "z": 0.5}},
             "dragmode": "orbit",
         },

@@ -1,4 +1,4 @@
-"""The tables of the attitude bench; terminal and page show the same cells."""
+"""Tables of the attitude bench, shared by terminal and page."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ __all__ = [
 ]
 
 
-# More comparisons than these leave no room in a terminal for the parts of an error.
+# With more comparisons the error contributions no longer fit in a terminal.
 _MOST_BESIDE = 4
-# Reference points with a column of their own; of more the worst is shown.
+# Reference points with their own columns; with more, only the worst is shown.
 _MOST_POINTS = 7
 _NONE = "–"
 
@@ -48,13 +48,13 @@ class TextTable:
     columns : tuple of str
     rows : tuple of tuple of str
     text : tuple of int
-        Columns that hold text, to the left; the others hold numbers, to the right.
+        Left-aligned text columns; the others hold right-aligned numbers.
     note : str
-        What a reader must know of it.
+        Remark for the reader.
     passed : frozenset of (int, int)
-        Row and column of cells that are accurate enough; a tick stands in them, too.
+        Row and column of cells within the tolerance; these also get a tick.
     strong : frozenset of int
-        Rows that the answer names.
+        Rows of the recommended algorithms.
     """
 
     title: str
@@ -73,12 +73,12 @@ def _named(bench: AttitudeBench) -> frozenset[int]:
 
 
 def number(value: float) -> str:
-    """A count to three digits, without a needless point."""
+    """Format a count to three digits, without a needless decimal point."""
     return f"{value:.3g}" if value < 100 else f"{value:.0f}"
 
 
 def result_tables(bench: AttitudeBench) -> list[TextTable]:
-    """Return the errors of each algorithm, and what they are made of; two tables if wide.
+    """Return the errors of each algorithm with their contributions; two tables if wide.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def _compared(scores: list[Score], count: int) -> list[str]:
 
 
 def _parts(bench: AttitudeBench) -> tuple[list[str], dict[str, dict[str, str]]]:
-    """Columns for what an error is made of and costs, and their cells by algorithm."""
+    """Columns of the error contributions and costs, and their cells by algorithm."""
     cells: dict[str, dict[str, str]] = {}
     if bench.shares:
         cells["own"] = {s.algorithm: degrees(s.own_deg[2]) for s in bench.shares}
@@ -155,7 +155,7 @@ def _parts(bench: AttitudeBench) -> tuple[list[str], dict[str, dict[str, str]]]:
 
 
 def _lowest_rate(bench: AttitudeBench, algorithm: str) -> str:
-    """Lowest rate, samples left out, down to which its own error is within the tolerance."""
+    """Lowest decimated rate down to which the algorithm error is within the tolerance."""
     cells = bench.sweep[
         (bench.sweep["algorithm"] == algorithm) & (bench.sweep["meaning"] == "drop")
     ].sort_values("factor")
@@ -178,21 +178,21 @@ def _part_note(bench: AttitudeBench) -> str:
 
 
 def source_of(run: AttitudeRun) -> str:
-    """Where an algorithm stands, as ``Alexiev (2021) Eq. (2)``."""
+    """Source of an algorithm, as ``Alexiev (2021) Eq. (2)``."""
     cls = ALGORITHMS.get(run.algorithm.partition(":")[0])
     source = "" if cls is None else cls.source
     return f"{source} Eq. {run.equations}".strip() if run.equations else source
 
 
 def condition_table(bench: AttitudeBench) -> TextTable:
-    """Return where each algorithm comes from, and what it says of its own condition."""
+    """Return the source and the diagnostics of each algorithm."""
     rows = tuple((r.algorithm, source_of(r), condition(r.diagnostics)) for r in bench.runs)
     columns = ("algorithm", "source", "own condition")
     return TextTable("The algorithms", columns, rows, text=(0, 1, 2), strong=_named(bench))
 
 
 def cost_table(bench: AttitudeBench) -> TextTable | None:
-    """Return the operations of one sample of each algorithm; None where none were counted."""
+    """Return the operations per sample of each algorithm; None if none were counted."""
     if not bench.costs:
         return None
     rows = tuple(
@@ -215,7 +215,7 @@ def cost_table(bench: AttitudeBench) -> TextTable | None:
 
 
 def sweep_tables(bench: AttitudeBench) -> list[TextTable]:
-    """Return the judged error at every rate, one table a way to come to it."""
+    """Return the errors at every rate, one table per method of lowering it."""
     tables = []
     answer = bench.answer
     for meaning, words in MEANINGS.items():
@@ -256,7 +256,7 @@ def sweep_tables(bench: AttitudeBench) -> list[TextTable]:
 
 
 def difference_table(bench: AttitudeBench) -> TextTable | None:
-    """Return the largest difference of each pair of algorithms; None of one alone."""
+    """Return the largest difference of each pair of algorithms; None for a single one."""
     names = [run.algorithm for run in bench.runs]
     if len(names) < 2:
         return None
@@ -270,7 +270,7 @@ def difference_table(bench: AttitudeBench) -> TextTable | None:
 
 
 def luck_words(luck: float) -> str:
-    """Say whether a rank above the next one is luck."""
+    """Return whether a rank difference to the next algorithm is due to chance."""
     if not math.isfinite(luck):
         return _NONE
     if luck < 0.05:
@@ -279,7 +279,7 @@ def luck_words(luck: float) -> str:
 
 
 def trial_table(bench: AttitudeBench) -> TextTable | None:
-    """Return the ranking over several trials; None where there was one alone."""
+    """Return the ranking over several trials; None for a single trial."""
     if bench.trials is None:
         return None
     rows = tuple(
@@ -310,7 +310,7 @@ def _interval(low: float, high: float) -> str:
 
 
 def peer_table(bench: AttitudeBench) -> TextTable | None:
-    """Return other libraries beside these algorithms, gyro alone apart from aided ones.
+    """Return the errors of other libraries, gyro-only ones separate from aided ones.
 
     Parameters
     ----------
@@ -319,7 +319,7 @@ def peer_table(bench: AttitudeBench) -> TextTable | None:
     Returns
     -------
     TextTable or None
-        None where no other library ran.
+        None if no other library ran.
     """
     if not bench.peers:
         return None
@@ -348,11 +348,11 @@ def _peer_error(peer: PeerRun) -> str:
     return _NONE if error is None else degrees(error)
 
 
-# Places and a second log, in words and numbers.
+# Dead-reckoned positions and the second log.
 
 
 def place_table(bench: AttitudeBench) -> TextTable | None:
-    """Return how far dead-reckoned places are from what is known of them.
+    """Return the errors of dead-reckoned positions against known positions.
 
     Parameters
     ----------
@@ -361,7 +361,7 @@ def place_table(bench: AttitudeBench) -> TextTable | None:
     Returns
     -------
     TextTable or None
-        None where no place was named.
+        None if no position was given.
     """
     if not bench.places:
         return None
@@ -393,7 +393,7 @@ def place_table(bench: AttitudeBench) -> TextTable | None:
 
 
 def offer_lines(bench: AttitudeBench) -> list[str]:
-    """Rests that look alike, as reference points that could be given."""
+    """Stationary stretches of similar attitude, proposed as reference points."""
     return [
         f"--reference '{offer.words}' ({offer.apart_deg:.2g}° apart by gravity, 1σ "
         f"{offer.sd_deg:.2g}°; {offer.caveat})"
@@ -402,7 +402,7 @@ def offer_lines(bench: AttitudeBench) -> list[str]:
 
 
 def places_json(bench: AttitudeBench) -> dict[str, Any]:
-    """Places, offers and the second log as plain data."""
+    """Positions, proposed reference points and the second log as plain data."""
     return {
         "places": [asdict(place) for place in bench.places],
         "offered_references": [asdict(offer) for offer in bench.offers],
@@ -410,7 +410,7 @@ def places_json(bench: AttitudeBench) -> dict[str, Any]:
     }
 
 
-# The unit of each figure stands in its key.
+# Each key carries the unit of its value.
 _UNITS = {
     **dict.fromkeys(("start", "end", "middle", "offset", "offset_sd", "smoothing"), "_s"),
     **dict.fromkeys(("bias", "bias_sd", "residual"), "_rad_per_s"),

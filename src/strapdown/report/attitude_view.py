@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["KINDS", "plot", "short_html"]
 
-#: What can be plotted, and what a bench must have for it.
+#: Chart kinds, and the data that a bench needs for each.
 KINDS = {
     "cost": "costs",
     "sweep": "a sweep of rates",
@@ -44,12 +44,12 @@ def plot(bench: AttitudeBench, kind: str = "cost") -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        Of no window and no global state; it shows itself in a notebook.
+        Belongs to no window or global state; displays itself in a notebook.
 
     Raises
     ------
     ConfigError
-        There is no such chart, or the bench has nothing to show in it.
+        The chart does not exist, or the bench lacks its data.
     """
     if kind not in KINDS:
         raise ConfigError(

@@ -1,4 +1,4 @@
-"""What the attitude bench found, in words and rows; terminal and page say the same."""
+"""Results of the attitude bench in words and rows, shared by terminal and page."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ HOW_TO_REFERENCE = (
 )
 
 
-# Two exact algorithms that differ by less than this have the same answer.
+# Two exact algorithms that differ by less are taken as equal.
 AGREE = 1e-6  # deg
 
 
 def degrees(value: float | None) -> str:
-    """An angle to three significant digits, rounding errors as what they are."""
+    """Format an angle to three significant digits; rounding errors are named as such."""
     if value is None:
         return "–"
     if abs(value) < 1e-9:
@@ -45,17 +45,17 @@ def degrees(value: float | None) -> str:
 
 
 def seconds(value: float) -> str:
-    """An instant to a millisecond."""
+    """Format an instant to a millisecond."""
     return f"{value:.3f}".rstrip("0").rstrip(".") + " s"
 
 
 def headline(bench: AttitudeBench) -> str:
-    """The answer first, then how the algorithms stand."""
+    """Return the answer first, then the final errors of the algorithms."""
     return f"{bench.answer.sentence} {standing(bench)}"
 
 
 def standing(bench: AttitudeBench) -> str:
-    """How the algorithms stand at the end, in a sentence or two."""
+    """Return the final errors of the algorithms in one or two sentences."""
     scores = [s for s in bench.scores if s.against == "truth"]
     if scores:
         answer = f"At {seconds(scores[0].time)}, {_ranked(bench, scores, 'from the truth')}."
@@ -78,10 +78,10 @@ def standing(bench: AttitudeBench) -> str:
 def _ranked(bench: AttitudeBench, scores: list[Score], off: str) -> str:
     ranked = sorted(scores, key=lambda s: s.error_deg)
     worst = ranked[-1]
-    # What passed the pole may be near the truth by chance; it is not named as the best.
+    # A run through the pole may be near the truth by chance; it is not named as the best.
     lost = {r.algorithm for r in bench.runs if passed_pole(r)}
     best = next((s for s in ranked if s.algorithm not in lost), ranked[0])
-    # Equal to what a reader can see: algorithms that agree are named together.
+    # Algorithms with equal displayed errors are named together.
     level = [
         s.algorithm
         for s in scores
@@ -99,12 +99,12 @@ def _listed(names: list[str]) -> str:
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
-# An algorithm's own error of this share of the whole is not where the whole comes from.
+# Share of the total error below which the algorithm error does not explain it.
 SMALL_SHARE = 0.1
 
 
 def _whose_error(bench: AttitudeBench, scores: list[Score]) -> str:
-    """Say where what is left cannot come from, when two exact algorithms agree."""
+    """Exclude the algorithms as the error source when two exact ones agree."""
     names = [run.algorithm for run in bench.runs]
     exact = [s for s in scores if s.algorithm == "quaternion"]
     if not {"dcm", "quaternion"} <= set(names) or not exact or exact[0].error_deg < AGREE:
@@ -114,7 +114,7 @@ def _whose_error(bench: AttitudeBench, scores: list[Score]) -> str:
         return ""
     own = next((s.own_deg[2] for s in bench.shares if s.algorithm == "quaternion"), 0.0)
     if own > SMALL_SHARE * exact[0].error_deg:
-        # They agree, and share the error of an axis that turns within the step.
+        # They agree but share the error of an axis that turns within the step.
         return ""
     return (
         " Direction cosines and quaternion agree with each other to rounding: what is left comes "
@@ -123,7 +123,7 @@ def _whose_error(bench: AttitudeBench, scores: list[Score]) -> str:
 
 
 def condition(diagnostics: dict[str, float]) -> str:
-    """What an algorithm says of itself, in words."""
+    """Diagnostics of an algorithm in words."""
     parts = []
     if "closest_to_pole_deg" in diagnostics:
         near = diagnostics["closest_to_pole_deg"]
@@ -137,7 +137,7 @@ def condition(diagnostics: dict[str, float]) -> str:
 
 
 def first_value(reading: Reading) -> str:
-    """The first value of a column, as a reader shows it."""
+    """The first value of a column, in display form."""
     return reading.first if isinstance(reading.first, str) else f"{reading.first:.6g}"
 
 
@@ -160,7 +160,7 @@ def reference_lines(bench: AttitudeBench) -> list[str]:
 
 
 def facts(bench: AttitudeBench) -> list[tuple[str, str]]:
-    """What the run stood on."""
+    """Inputs and assumptions of the run."""
     i, b = bench.initial, bench.gyro_bias
     found = [
         ("Log", bench.description),
@@ -228,7 +228,7 @@ def _rest_words(bench: AttitudeBench) -> list[str]:
 
 
 def second_words(second: SecondLog) -> str:
-    """Say how a second log lies to the first, with the standard deviations."""
+    """Clock, mounting and scale of a second log relative to the first, with standard deviations."""
     roll, pitch, heading = second.mounting_deg
     sd = max(second.mounting_sd_deg)
     return (

@@ -1,4 +1,4 @@
-"""A chart as plain data, drawn alike in a page and in a picture."""
+"""A chart as plain data, drawn alike on a page and in a picture."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
-# Okabe and Ito's colours, which the colour-blind can tell apart.
+# Colors of Okabe and Ito, distinguishable by color-blind readers.
 ORANGE, SKY, GREEN, BLUE = "#E69F00", "#56B4E9", "#009E73", "#0072B2"
 VERMILLION, PURPLE, BLACK, GREY = "#D55E00", "#CC79A7", "#1b1f24", "#8a939e"
 AXIS_COLOURS = (VERMILLION, GREEN, BLUE)
 SERIES_COLOURS = (ORANGE, VERMILLION, GREEN, BLUE, PURPLE, SKY, "#7f6000", GREY, "#882255")
-# Who sees no colour tells lines by these. Nine of each: as many as there are algorithms in a
-# usual comparison.
+# Dashes and symbols distinguish lines without color. Nine of each: the number of algorithms in
+# a usual comparison.
 DASHES = ("solid", "solid", "solid", "dash", "dot", "dashdot", "dash", "dot", "longdash")
 SYMBOLS = (
     "circle",
@@ -29,42 +29,42 @@ SYMBOLS = (
     "pentagon",
 )
 
-# Points that a screen can show; more only makes the file larger.
+# Points that a screen can resolve; more only enlarge the file.
 BUCKETS = 1500
 
 
 @dataclass(frozen=True)
 class Line:
-    """One curve, thinned by `curve`, or points, or both.
+    """A curve, thinned by `curve`, or points, or both.
 
     Attributes
     ----------
     name : str
-        For the legend; lines of one name are one entry.
+        Legend entry; lines of one name share an entry.
     x, y : ndarray, (n,)
         NaN in `y` breaks the curve.
     colour : str
     dash : {'solid', 'dash', 'dot', 'dashdot', 'longdash'}
     width : float
     points : bool
-        Points alone.
+        Points alone, without a curve.
     symbol : str
         One of `SYMBOLS`.
     dots : bool
         Points on the curve.
     hollow : bool
-        Points are drawn as outlines.
+        Whether points are drawn as outlines.
     size : float
         Of a point, in pixels; 0 for a label alone.
     labels : tuple of str
-        One a point, or none.
+        One per point, or none.
     places : tuple of (int, int)
-        Where each label stands (`label_places.PLACES`); above its point if not given.
+        Position of each label (`path_marks.PLACES`); by default above its point.
     low, high : ndarray, (n,), or None
         Ends of a horizontal bar through each point.
     legend : bool
     inside : float
-        Opacity of the inside of a closed outline; NaN parts one outline from the next.
+        Fill opacity of a closed outline; NaN separates outlines.
     """
 
     name: str
@@ -88,12 +88,12 @@ class Line:
 
 @dataclass(frozen=True)
 class Fill:
-    """A band between two curves, below every line: a bound, or what is assumed.
+    """A band between two curves, below every line: a bound or an assumption.
 
     Attributes
     ----------
     name : str
-        For the legend; a line of the same name is the entry of both.
+        Legend entry; a line of the same name shares it.
     x, low, high : ndarray, (n,)
         NaN in `low` or `high` breaks the band.
     colour : str
@@ -112,25 +112,25 @@ class Fill:
 
 @dataclass(frozen=True)
 class Bars:
-    """Bars: across in a panel of categories, else upright.
+    """Bars: horizontal in a panel of categories, else upright.
 
     Attributes
     ----------
     name : str
-        For the legend; bars of one name are one entry.
+        Legend entry; bars of one name share an entry.
     at : ndarray, (n,)
-        Middle of each: the number of a category, or a value of the horizontal axis.
+        Middle of each bar: the number of a category, or a value of the horizontal axis.
     values : ndarray, (n,)
-        Where each ends.
+        End of each bar.
     colour : str
     start : ndarray, (n,), or None
-        Where each begins; zero if not given.
+        Start of each bar; zero by default.
     width : float
         In the unit of `at`.
     pattern : {'', '/', 'x', '-', '|', '+', '.'}
-        For who sees no colour.
+        Distinguishes bars without color.
     labels : tuple of str
-        One a bar, at its end, or none.
+        One per bar, at its end, or none.
     legend : bool
     """
 
@@ -147,7 +147,7 @@ class Bars:
 
 @dataclass(frozen=True)
 class Mark:
-    """A value of the horizontal axis that matters, as a vertical line with a label."""
+    """A labeled vertical line at a value of the horizontal axis."""
 
     x: float
     label: str
@@ -155,7 +155,7 @@ class Mark:
 
 @dataclass(frozen=True)
 class Level:
-    """A value of the vertical axis that matters, as a horizontal line with a label."""
+    """A labeled horizontal line at a value of the vertical axis."""
 
     y: float
     label: str
@@ -163,7 +163,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Band:
-    """A stretch of time, shaded."""
+    """A shaded stretch of time."""
 
     start: float
     end: float
@@ -185,21 +185,21 @@ class Panel:
     levels : tuple of Level
     categories : tuple of str
         Names on the vertical axis at 0, 1, …, from the top. Where other panels of the chart have
-        none, this one is as high as `height` says.
+        none, this panel has the height `height`.
     x_label : str
-        With its unit, of a plane: both axes have one scale, and the horizontal one is the panel's
+        With its unit, for a plane: both axes have one scale, and the horizontal axis is the panel's
         own, without marks and bands. Empty where the panel shares the chart's horizontal axis.
     height : float
-        In ordinary panels.
+        In units of an ordinary panel.
     steady : float
-        Values that span less are drawn as a constant, on an axis that spans one unit: rounding
-        should not look like a signal.
+        Values that span less are drawn as a constant, on an axis that spans one unit, so that
+        rounding does not look like a signal.
     fills : tuple of Fill
     bars : tuple of Bars
     step : float
-        Between ticks of the vertical axis, such as 30 degrees; 0 leaves them to the drawing.
+        Between ticks of the vertical axis, such as 30 degrees; 0 for automatic ticks.
     x_step : float
-        The same of the horizontal axis, where it is the panel's own, or in the last panel.
+        The same for the horizontal axis, if it is the panel's own or in the last panel.
     """
 
     y_label: str
@@ -219,14 +219,14 @@ class Panel:
 
 @dataclass(frozen=True)
 class Chart:
-    """Panels above each other that share the horizontal axis, or beside each other.
+    """Panels above each other that share the horizontal axis, or side by side.
 
-    Planes come first, above what shares the axis.
+    Planes come first, above the panels that share the axis.
 
     Attributes
     ----------
     slug : str
-        Name of the file.
+        File name.
     title, caption : str
     x_label : str
         With its unit.
@@ -236,7 +236,7 @@ class Chart:
     log_x : bool
         Whether the horizontal axis is logarithmic.
     beside : bool
-        Whether the panels stand beside each other, each with its own horizontal axis.
+        Whether the panels are side by side, each with its own horizontal axis.
     """
 
     slug: str
@@ -251,7 +251,7 @@ class Chart:
 
 
 def steady_range(panel: Panel) -> tuple[float, float] | None:
-    """Ends of the vertical axis where the values are steady; else None."""
+    """Ends of the vertical axis if the values are steady; else None."""
     if not panel.steady:
         return None
     ends = [v for fill in panel.fills for v in (fill.low, fill.high)]
@@ -264,7 +264,7 @@ def steady_range(panel: Panel) -> tuple[float, float] | None:
 
 
 def strip_range(chart: Chart) -> tuple[float, float] | None:
-    """Ends of the horizontal axis where a strip of categories stands above other panels."""
+    """Ends of the horizontal axis if a strip of categories is above other panels."""
     strips = [p for p in chart.panels if p.categories]
     if not strips or len(strips) == len(chart.panels):
         return None
@@ -278,14 +278,14 @@ def strip_range(chart: Chart) -> tuple[float, float] | None:
 
 
 def runs(*columns: Array) -> list[slice]:
-    """Stretches in which all columns are finite, which is how NaN breaks a curve."""
+    """Stretches in which all columns are finite; NaN breaks a curve."""
     whole = np.isfinite(np.vstack(columns)).all(axis=0)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], whole, [False]]).astype(np.int8)))
     return [slice(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
 def look(k: int) -> dict[str, str]:
-    """Colour, dash and symbol of the k-th series; the same in every chart of a page."""
+    """Color, dash and symbol of the k-th series; the same in every chart of a page."""
     return {
         "colour": SERIES_COLOURS[k % len(SERIES_COLOURS)],
         "dash": DASHES[k % len(DASHES)],
@@ -294,7 +294,7 @@ def look(k: int) -> dict[str, str]:
 
 
 def short_span(values: ArrayLike, most: float = 30.0) -> bool:
-    """Tell whether positive numbers span so little that powers of ten would not label them."""
+    """Whether positive numbers span too little to be labeled by powers of ten."""
     v = np.asarray(values, dtype=np.float64)
     v = v[np.isfinite(v) & (v > 0.0)]
     return not v.size or float(v.max() / v.min()) < most
@@ -309,12 +309,12 @@ def curve(
     width: float = 1.4,
     buckets: int = BUCKETS,
 ) -> Line:
-    """Make a line of as many points as a screen can show."""
+    """Make a line thinned to the resolution of a screen."""
     return Line(name, *thin(x, y, buckets), colour, dash, width)
 
 
 def thin(x: ArrayLike, y: ArrayLike, buckets: int = BUCKETS) -> tuple[Array, Array]:
-    """Thin a curve to what a screen shows, keeping every peak.
+    """Thin a curve to the resolution of a screen, keeping every peak.
 
     Parameters
     ----------
@@ -325,14 +325,14 @@ def thin(x: ArrayLike, y: ArrayLike, buckets: int = BUCKETS) -> tuple[Array, Arr
     Returns
     -------
     x, y : ndarray
-        The least and the greatest of each of so many equal runs of samples, in their order.
+        The minimum and maximum of each of `buckets` equal runs of samples, in time order.
     """
     xs, ys = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
     if xs.size <= 2 * buckets:
         return xs, ys
     width = -(-xs.size // buckets)
     first = np.arange(0, xs.size, width)
-    # The last run is filled up with its own last value, which adds no peak and no break.
+    # The last run is padded with its own last value, which adds no peak and no break.
     body = np.pad(ys, (0, first.size * width - xs.size), mode="edge").reshape(-1, width)
     gap = np.isnan(body)
     keep = [

@@ -1,4 +1,4 @@
-"""A forecast of coasting as files: page, JSON, cone, sealed in a bundle."""
+"""Write a GNSS outage prediction as a sealed bundle: page, JSON, cone of the drift."""
 
 from __future__ import annotations
 
@@ -35,23 +35,23 @@ __all__ = ["coast_json", "read_coasting_run", "rerun_coast", "write_coast", "wri
 
 
 def read_coasting_run(source: str | Path) -> tuple[NavigationSpec | None, Path | None]:
-    """Return the run of navigation that a source names; nothing of a sensor.
+    """Return the navigation run that a source names; None for a sensor.
 
     Parameters
     ----------
     source : str or Path
-        A folder that ``strapdown navigate`` wrote, the configuration of a run, or a sensor.
+        A folder written by ``strapdown navigate``, the configuration of a run, or a sensor.
 
     Returns
     -------
     spec : NavigationSpec or None
     file : Path or None
-        Its configuration, where it is a file.
+        The configuration file, if there is one.
 
     Raises
     ------
     DataError
-        The folder is of another command, or what it read is not there any more, or has changed.
+        The folder is of another command, or its inputs are missing or have changed.
     """
     path = Path(source)
     if str(source).lower() in SENSORS:
@@ -102,7 +102,7 @@ def _of_bundle(path: Path) -> tuple[NavigationSpec, Path | None]:
 
 
 def rerun_coast(configuration: dict[str, Any], out: Path, *, report: bool = True) -> Seal:
-    """Run a sealed forecast again from its configuration, with or without its page."""
+    """Re-run a sealed outage prediction from its configuration, with or without its page."""
     table = configuration.get("navigation")
     navigation = None if table is None else navigation_spec(table)
     path = configuration.get("file_path")
@@ -122,19 +122,19 @@ def write_coast(
     force: bool = False,
     progress: Progress = silent,
 ) -> Seal:
-    """Write a forecast of coasting as a sealed bundle.
+    """Write an outage prediction as a sealed bundle.
 
     Parameters
     ----------
     result : CoastResult
     out : str or Path
-        Folder to make.
+        Folder to create.
     name : str, optional
-        Of the folder, as the report names it; that of `out`, if not given.
+        Folder name shown in the report; by default that of `out`.
     report : bool
-        Whether the page and the figures are written, too.
+        Whether to write the page and the figures.
     force : bool
-        Replace a bundle that is there.
+        Overwrite an existing bundle.
     progress : callable, optional
 
     Returns
@@ -173,7 +173,7 @@ def write_coast(
     return seals[0]
 
 
-# A forecast of coasting as JSON and as tables of numbers.
+# JSON and tables of an outage prediction.
 
 
 Array = NDArray[np.float64]
@@ -190,7 +190,7 @@ SHOWN = {
 
 
 def coast_json(result: CoastResult) -> dict[str, Any]:
-    """Return everything that a program would ask of a forecast.
+    """Return an outage prediction as plain data for programs.
 
     Parameters
     ----------
@@ -199,7 +199,7 @@ def coast_json(result: CoastResult) -> dict[str, Any]:
     Returns
     -------
     dict
-        Lengths in m, times in s, angles in deg; sizes of sources in SI.
+        Lengths in m, times in s, angles in deg; sizes of error sources in SI.
     """
     found, recorded = result.forecast, result.recorded
     whole = {q: float(v[-1]) for q, v in _variances(result).items()}
@@ -258,13 +258,13 @@ def coast_json(result: CoastResult) -> dict[str, Any]:
 
 
 def write_coast_tables(result: CoastResult, folder: Path) -> None:
-    """Write the cone, its budget over time, and the drifts that came.
+    """Write the cone, its error budget over time, and the observed drifts.
 
     Parameters
     ----------
     result : CoastResult
     folder : Path
-        ``cone.csv``, ``budget.csv``, and ``drifts.csv`` where there were fixes.
+        ``cone.csv``, ``budget.csv``, and ``drifts.csv`` if there were fixes.
     """
     told = {"coasting": result.name, "outage_s": f"{result.spec.outage_s:g}"}
     recorded = result.recorded

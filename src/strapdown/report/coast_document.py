@@ -1,4 +1,4 @@
-"""The report of a forecast of coasting: the answer first, then what it rests on."""
+"""Report of a GNSS outage prediction: the answer first, then its basis."""
 
 from __future__ import annotations
 
@@ -64,13 +64,13 @@ __all__ = [
 
 
 def coast_document(result: CoastResult, name: str) -> Document:
-    """Return the report of a forecast.
+    """Return the report of an outage prediction.
 
     Parameters
     ----------
     result : CoastResult
     name : str
-        Of the folder, for the command that verifies it.
+        Folder name, for the verification command.
 
     Returns
     -------
@@ -161,19 +161,19 @@ def _method(result: CoastResult, name: str) -> tuple[Block, ...]:
     )
 
 
-# Tables of a forecast of coasting: the drift over time, its budget, and what came.
+# Tables of an outage prediction: drift over time, error budget, observed drifts.
 
 
-#: Shares of an outage that are told.
+#: Fractions of an outage in the table.
 _AT = (0.0, 1.0 / 6.0, 1.0 / 3.0, 0.5, 2.0 / 3.0, 5.0 / 6.0, 1.0)
-#: Letters of a bar that is the whole.
+#: Characters of a full-length bar.
 _BAR = 20
-#: What is less of the variance is not told by itself.
+#: Smallest share of the variance with its own row.
 _LEAST = 5e-4
 
 
 def time_table(result: CoastResult) -> TableBlock:
-    """The drift over the outage."""
+    """Drift over the outage."""
     found, recorded = result.forecast, result.recorded
     grid = found.time if recorded is None else recorded.time
     bound = found.bound if recorded is None else recorded.bound
@@ -220,7 +220,7 @@ def time_table(result: CoastResult) -> TableBlock:
 
 
 def budget_table(result: CoastResult) -> TableBlock:
-    """What each source adds to the horizontal drift at the end."""
+    """Contribution of each error source to the horizontal drift at the end."""
     found = result.forecast
     whole = float(found.variance("horizontal")[-1])
     rows, rest = [], 0.0
@@ -263,7 +263,7 @@ def _part(part: float) -> tuple[str, str]:
 
 
 def drift_table(result: CoastResult) -> TableBlock | None:
-    """The outages that were tried."""
+    """Table of the outage tests."""
     recorded = result.recorded
     drifts = [] if recorded is None else [d for d in recorded.drifts if d.time.size]
     if not drifts:
@@ -289,24 +289,24 @@ def drift_table(result: CoastResult) -> TableBlock | None:
     )
 
 
-# Charts of a forecast of coasting: the cone over time and from above, and its budget.
+# Charts of an outage prediction: the cone over time and from above, and its error budget.
 
 
 Array = NDArray[np.float64]
 
 TIME = "time since the outage began, s"
-#: Sources that are drawn by themselves; the others are one.
+#: Error sources drawn separately; the others are joined.
 MOST = 7
-#: Of the whole variance: what is less is with the others.
+#: Share of the total variance below which a source is joined with the others.
 _COAST_CHARTS_LEAST = 0.005
-#: Shares of the outage at which the plane has an ellipse.
+#: Fractions of the outage at which the plan has an ellipse.
 _RINGS = (0.25, 0.5, 0.75, 1.0)
 _CORNERS = 90
 _INSIDE, _OUTSIDE = "a drift that came, within its 95 %", "outside of it"
 
 
 def cone_chart(result: CoastResult) -> Chart:
-    """The cone over time with the drifts that came, and what makes it."""
+    """Cone over time with the observed drifts, and its error budget."""
     found, recorded = result.forecast, result.recorded
     if recorded is None:
         time, bound, sd = found.time, found.bound, found.sd("horizontal")
@@ -353,7 +353,7 @@ def _tried(drifts: Sequence[Drift]) -> str:
 
 
 def _came(result: CoastResult, value: object) -> list[Line]:
-    """The drifts that came, over time."""
+    """Observed drifts over time."""
     lines = []
     for d in () if result.recorded is None else result.recorded.drifts:
         if not d.time.size:
@@ -377,7 +377,7 @@ def _came(result: CoastResult, value: object) -> list[Line]:
 
 
 def _stack(result: CoastResult) -> tuple[tuple[Fill, ...], str]:
-    """Bands of the sources, as high as their shares of the variance are of the whole."""
+    """Bands of the error sources, as high as their shares of the variance."""
     found = result.forecast
     whole = np.maximum(found.variance("horizontal"), 1e-30)
     parts = [(source_words(s.source.name), s.variance["horizontal"]) for s in found.shares]
@@ -411,7 +411,7 @@ def _stack(result: CoastResult) -> tuple[tuple[Fill, ...], str]:
 
 
 def plane_chart(result: CoastResult) -> Chart:
-    """The drift from above: where it may be, relative to where it is."""
+    """Possible drift seen from above, relative to the true position."""
     found, recorded = result.forecast, result.recorded
     if recorded is None:
         time = found.time
@@ -428,7 +428,7 @@ def plane_chart(result: CoastResult) -> Chart:
     for k, share in enumerate(_RINGS):
         at = share * result.spec.outage_s
         row = int(np.argmin(np.abs(time - at)))
-        # Across to the right, along upward.
+        # Cross-track to the right, along-track upward.
         ring = ellipse(np.zeros(2), planes[row][::-1, ::-1], _CORNERS)
         ring = np.vstack([ring, ring[:1]])
         name = f"95 % after {duration_words(at)}"
@@ -471,7 +471,7 @@ def plane_chart(result: CoastResult) -> Chart:
 
 
 def parts_chart(result: CoastResult) -> Chart:
-    """Along, across, height, speed and heading over the outage."""
+    """Along-track, cross-track, height, speed and heading over the outage."""
     found, recorded = result.forecast, result.recorded
     time = found.time if recorded is None else recorded.time
 
@@ -500,7 +500,7 @@ def parts_chart(result: CoastResult) -> Chart:
 
 
 def budget_chart(result: CoastResult) -> Chart:
-    """Shares of the variance at the end, the largest first."""
+    """Shares of the variance at the end, largest first."""
     found = result.forecast
     whole = float(found.variance("horizontal")[-1])
     parts = [

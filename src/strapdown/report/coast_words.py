@@ -1,4 +1,4 @@
-"""What a forecast of coasting says in words: its answer, what limits it, and what would help."""
+"""Results of an outage prediction in words: the answer, its limiting sources, and remedies."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ aids_name = "noise of the aids that stay"
 
 
 def source_words(name: str) -> str:
-    """Name of a source of drift in words."""
+    """Name of a drift source in words."""
     aid, dot, own = name.rpartition(".")
     if dot:
         return f"{aid}: {own.replace('_', ' ')}"
@@ -91,7 +91,7 @@ def source_words(name: str) -> str:
 
 
 def at_start(share: Share, result: CoastResult) -> str:
-    """How large a source is where the outage begins, with its unit."""
+    """Size of an error source at the start of the outage, with its unit."""
     name = share.source.name
     triad = result.sensors.gyro if name.startswith("gyro") else result.sensors.accel
     if name.endswith("_noise"):
@@ -117,20 +117,20 @@ def at_start(share: Share, result: CoastResult) -> str:
 
 
 def _three(value: float) -> str:
-    """A number of three digits."""
+    """Format a number to three digits."""
     if value == 0.0 or not math.isfinite(value):
         return "0"
     return plain(value, min(6, max(0, 2 - math.floor(math.log10(abs(value))))))
 
 
 def end_bound(result: CoastResult) -> float:
-    """Bound of 95 % at the end of the outage, m: of all that were tried, if they were."""
+    """95 % bound at the end of the outage, m; over all outage tests, if there were any."""
     bound = result.forecast.bound if result.recorded is None else result.recorded.bound
     return float(bound[-1])
 
 
 def motion_words(result: CoastResult) -> str:
-    """How it moves, in words."""
+    """The motion in words."""
     if result.navigation is not None:
         return "along its own trajectory"
     asked = result.spec.motion
@@ -151,7 +151,7 @@ def _speed(value: float) -> str:
 
 
 def start_words(result: CoastResult) -> str:
-    """What is known where it begins, and where from."""
+    """Knowledge of the state at the start of the outage, and its origin."""
     if result.recorded is not None:
         return "what its filter knew at each outage, with all that binds its errors"
     start, begin = result.spec.start, result.forecast.begin
@@ -172,13 +172,13 @@ def start_words(result: CoastResult) -> str:
 
 
 def outage_words(result: CoastResult) -> str:
-    """How long the outage is: ``60 s``."""
+    """Length of the outage: ``60 s``."""
     seconds = result.spec.outage_s
     return f"{seconds:g}{GAP}s" if seconds < 600.0 else duration_words(seconds)
 
 
 def headline(result: CoastResult) -> str:
-    """The answer in a sentence."""
+    """Return the answer in a sentence."""
     outage = outage_words(result)
     said = (
         f"after {outage} {motion_words(result)}, 95 % are within {length_words(end_bound(result))}"
@@ -189,7 +189,7 @@ def headline(result: CoastResult) -> str:
 
 
 def remedy(result: CoastResult) -> str:
-    """What is the most of it, and what would help."""
+    """Return the largest contributor to the drift, and its remedy."""
     found = result.forecast
     whole = float(found.variance("horizontal")[-1])
     first = found.shares[0]
@@ -208,7 +208,7 @@ def remedy(result: CoastResult) -> str:
 
 
 def inside_words(result: CoastResult) -> str:
-    """How many of the actual drifts were as foretold; empty where none is known."""
+    """Number of observed drifts within the predicted bound; empty if none were observed."""
     drifts = [] if result.recorded is None else [d for d in result.recorded.drifts if d.time.size]
     if not drifts:
         return ""
@@ -225,7 +225,7 @@ def inside_words(result: CoastResult) -> str:
 
 
 def key_figures(result: CoastResult) -> tuple[KeyFigure, ...]:
-    """The numbers that matter."""
+    """Return the key figures."""
     found = result.forecast
     said = "95 % at the end"
 

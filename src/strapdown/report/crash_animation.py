@@ -1,4 +1,4 @@
-"""The vehicle moving along its path in space, and instants of it on paper."""
+"""Animation of the vehicle along its path in 3D, and still instants for paper."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ __all__ = ["MOST_FRAMES", "VehicleBody", "crash_stills", "path_animation", "vehi
 
 Array = NDArray[np.float64]
 
-#: More than these a slider of a page cannot tell apart.
+#: A slider on a page cannot resolve more frames.
 MOST_FRAMES = 120
 _FRAME = 60  # ms
-_DIGITS = 4  # a tenth of a millimetre
+_DIGITS = 4  # a tenth of a millimeter
 _TICKS = 5
 _PAPER = {"showbackground": False, "gridcolor": "#e6e9ed", "zeroline": False}
 
@@ -50,7 +50,7 @@ def path_animation(
     reference: pd.DataFrame | None = None,
     reference_name: str = "reference",
 ) -> Animation:
-    """Let the vehicle move along its path, as it was turned.
+    """Animate the vehicle along its path with its attitude.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def path_animation(
         In vehicle axes.
     events : sequence of CrashEvent
     point : sequence of float, (3,), m
-        The reference point in vehicle axes, whose path it is.
+        Reference point of the path, in vehicle axes.
     names : (str, str)
         Of the first two axes of the path.
     reference : DataFrame, optional
@@ -119,7 +119,7 @@ def path_animation(
 
 
 def _space(points: Sequence[Array], ground: float) -> tuple[Array, Array]:
-    """Least and greatest north, east, down of everything, and a little room."""
+    """Minimum and maximum north, east, down of all points, with a margin."""
     every = np.vstack(points)
     every = every[np.isfinite(every).all(axis=1)]
     low, high = every.min(axis=0), every.max(axis=0)
@@ -131,7 +131,7 @@ def _space(points: Sequence[Array], ground: float) -> tuple[Array, Array]:
 
 
 def _drawn(points: Array) -> Array:
-    """East to the right, north away, up upwards."""
+    """Drawing axes: x east, y north, z up."""
     return points[:, [1, 0, 2]] * [1.0, 1.0, -1.0]
 
 
@@ -227,7 +227,7 @@ def _layout(
 ) -> dict[str, Any]:
     low, high = space
     size = (high - low)[[1, 0, 2]]
-    # The longest side fills the scene; a long path is not made smaller than it can be seen.
+    # The longest side fills the scene, so that a long path is drawn as large as possible.
     share = size / float(np.sqrt((size**2).sum())) * 2.1
     steps = [
         {
@@ -304,15 +304,15 @@ def _layout(
     }
 
 
-# Instants of the motion in space, in parallel projection from right, ahead and above.
+# Still instants of the motion in 3D, in parallel projection from right, ahead and above.
 
 
 _WIDTH, _GAP, _HEAD = 640.0, 10.0, 20.0
 _MOST = 6
-# Where the eye is: so far ahead of the right side, and so high, deg.
+# Direction of the viewer: angle ahead of the right side, and elevation, deg.
 _AHEAD, _ABOVE = 28.0, 30.0
 _GRID = "#dfe4ea"
-# Wider than so many times its height, and two views stand in a row instead of three.
+# Above this ratio of width to height, a row has two views instead of three.
 _WIDE = 2.0
 
 
@@ -332,14 +332,14 @@ def crash_stills(
     body : VehicleBody
     events : sequence of CrashEvent
     point : sequence of float, (3,), m
-        The reference point in vehicle axes.
+        Reference point in vehicle axes.
     ground : float, m
-        How far down the ground is drawn, in the axes of the path.
+        Down coordinate of the drawn ground, in the axes of the path.
 
     Returns
     -------
     Picture
-        One scale for all.
+        All views have one scale.
     """
     places = path.table[NED].to_numpy(dtype=np.float64)
     instants = _instants(path, events)
@@ -387,7 +387,7 @@ def crash_stills(
 
 
 class _Projection:
-    """Parallel projection onto a page: right, and up; depth grows away from the eye."""
+    """Parallel projection onto a page: right and up; depth grows away from the viewer."""
 
     def __init__(self, heading_deg: float) -> None:
         heading, around = math.radians(heading_deg), -math.radians(_AHEAD)
@@ -405,7 +405,7 @@ class _Projection:
 
 
 def _instants(path: CrashPath, events: Sequence[CrashEvent]) -> list[tuple[str, float]]:
-    """The instants that matter, and others where there is most time between."""
+    """The key instants, with others added in the longest intervals between them."""
     found = path_moments(path, events)
     if len(found) > _MOST:
         found = [one for one in found if one[0] != "begin"]
@@ -432,7 +432,7 @@ def _cell(out: Drawing, box: tuple[float, float, float, float], when: str, name:
 
 
 def _step(places: Array, corners: list[Array]) -> float:
-    """Between lines on the ground, m."""
+    """Spacing of the lines on the ground, m."""
     every = np.vstack([places, *corners])[:, :2]
     return nice_step(float(np.ptp(every, axis=0).max()) / 12.0)
 
@@ -461,20 +461,20 @@ def _body(
     flat: _Projection,
     pixels: Callable[[Array], Array],
 ) -> None:
-    """Faces that the eye sees."""
+    """Draw the visible faces."""
     for f in body.seen(corners, flat.away):
         points = pixels(corners[list(body.faces[f])])
         out.shape(points, "#3d5166", 0.6, fill=body.colours[f])
 
 
-# The vehicle as a body in space: its outline given a height, its front marked.
+# The vehicle as a 3D body: its outline with a height, its front marked.
 
 
-# Heights of no vehicle in particular, m, down from the vehicle's origin: the origin of a car is
-# taken half a metre above the ground.
+# Typical heights, m, down from the vehicle's origin; the origin of a car is taken half a meter
+# above the ground.
 _SILL, _BELT, _ROOF = 0.50, -0.30, -0.95
-_RING = 16  # corners of the outline that are kept
-# Of length and width: the cabin at the belt and at the roof.
+_RING = 16  # corners kept of the outline
+# Shares of length and width: the cabin at the belt and at the roof.
 _CABIN = ((0.09, 0.735, 0.90), (0.19, 0.565, 0.72))
 _CABIN_FACES = 5
 _SIDE, _TOP, _GLASS, _FRONT = "#9fb3c8", "#cdd8e2", "#3d5166", "#D55E00"
@@ -482,18 +482,18 @@ _SIDE, _TOP, _GLASS, _FRONT = "#9fb3c8", "#cdd8e2", "#3d5166", "#D55E00"
 
 @dataclass(frozen=True, eq=False)
 class VehicleBody:
-    """Corners and faces of a body.
+    """Corners and faces of a vehicle body.
 
     Attributes
     ----------
     corners : ndarray, (n, 3), m
         Vehicle axes forward, right, down, from the vehicle's origin.
     faces : tuple of tuple of int
-        Corners of each face.
+        Corner indices of each face.
     colours : tuple of str
-        Of each face.
+        One per face.
     cabin : int
-        How many of the last faces are those of a cabin on top of the rest.
+        Number of faces, at the end, that belong to a cabin on top of the body.
     """
 
     corners: Array = field(repr=False)
@@ -503,12 +503,12 @@ class VehicleBody:
 
     @property
     def bottom(self) -> float:
-        """How far down it reaches from the origin, m."""
+        """Down coordinate of the lowest corner, from the origin, m."""
         return float(self.corners[:, 2].max())
 
     @property
     def triangles(self) -> tuple[Array, tuple[str, ...]]:
-        """Corners of triangles that make up the faces, (k, 3), and the colour of each."""
+        """Corners of the triangles of all faces, (k, 3), and the color of each."""
         rows, colours = [], []
         for face, colour in zip(self.faces, self.colours, strict=True):
             for j in range(1, len(face) - 1):
@@ -526,14 +526,14 @@ class VehicleBody:
         return tuple(found)
 
     def seen(self, corners: Array, away: Array) -> list[int]:
-        """Faces that are seen, the farthest first, however the body is turned.
+        """Visible faces, farthest first, for any attitude of the body.
 
         Parameters
         ----------
         corners : ndarray, (n, 3), m
-            As `placed`.
+            As returned by `placed`.
         away : ndarray, (3,)
-            Direction of sight, in the same axes.
+            Viewing direction, in the same axes.
         """
         lower = range(len(self.faces) - self.cabin)
         upper = range(len(self.faces) - self.cabin, len(self.faces))
@@ -547,7 +547,7 @@ class VehicleBody:
                 outward = normal if normal @ (a - middle) > 0.0 else -normal
                 if outward @ away < 0.0:
                     order[part].append(f)
-        # Both parts are convex, and the top of the lower one lies between them.
+        # Both parts are convex and separated by the top of the lower one.
         cap = lower[-1]
         above = cap in order[0]
         return [*order[0], *order[1]] if above else [*order[1], *order[0]]
@@ -558,17 +558,17 @@ class VehicleBody:
         Parameters
         ----------
         at : array_like, (3,), m
-            Where `point` is.
+            Position of `point`.
         q_nb : array_like, (4,)
         point : array_like, (3,), m
-            Of the vehicle, vehicle axes.
+            Of the vehicle, in vehicle axes.
         """
         arms = self.corners - np.asarray(point, dtype=np.float64)
         return np.asarray(rotation.rotate(q_nb, arms) + np.asarray(at, dtype=np.float64))
 
 
 def vehicle_body(outline: Outline) -> VehicleBody:
-    """Make a body of an outline: a car with a cabin, or a plain one of a stated outline.
+    """Make a body from an outline: a car with a cabin, or a plain body for a stated outline.
 
     Parameters
     ----------

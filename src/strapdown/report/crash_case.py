@@ -1,4 +1,4 @@
-"""A crash case as files: page, PDF, JSON, tables and figures, sealed in a bundle."""
+"""Write a crash case as a sealed bundle: page, PDF, JSON, tables and figures."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ __all__ = ["file_name", "rerun_crash", "write_crash"]
 
 
 def rerun_crash(configuration: dict[str, Any], out: Path, *, report: bool = True) -> Seal:
-    """Run a sealed case again from its configuration, with or without its report."""
+    """Re-run a sealed case from its configuration, with or without its report."""
     spec = CaseSpec.model_validate(configuration["case"])
     path = configuration.get("case_path")
     name = str(configuration["name"])
@@ -55,13 +55,13 @@ def write_crash(
     ----------
     result : CaseResult
     out : str or Path
-        Folder to make.
+        Folder to create.
     name : str, optional
-        Of the folder, as the report names it; that of `out`, if not given.
+        Folder name shown in the report; by default that of `out`.
     report : bool
-        Whether page, PDF and figures are written, too.
+        Whether to write page, PDF and figures.
     force : bool
-        Replace a bundle that is there.
+        Overwrite an existing bundle.
     progress : callable, optional
 
     Returns
@@ -118,13 +118,13 @@ def _write_numbers(result: CaseResult, folder: Path) -> None:
 
 
 def file_name(name: str, made: set[str]) -> str:
-    """Return a name that may be a file's, another for each of those already made.
+    """Return a valid file name that differs from those already made.
 
     Parameters
     ----------
     name : str
     made : set of str
-        Is added to.
+        The new name is added.
     """
     plain = "".join(c if c.isascii() and c.isalnum() else "-" for c in name.lower()).strip("-")
     plain = plain[:60] or "recorder"

@@ -1,4 +1,4 @@
-"""The change of velocity over each event, of every unit and of their mean."""
+"""Charts of the delta-V of each event, by every unit and by their mean."""
 
 from __future__ import annotations
 
@@ -64,19 +64,19 @@ Array = NDArray[np.float64]
 
 AXES = ("forward", "right", "down", "resultant")
 KMH = 3.6
-# Instants at which the bound is found; between them it is smooth.
+# Instants at which the bound is computed; it is smooth between them.
 _INSTANTS = 31
 _SYMBOLS = ("square", "diamond", "triangle-up", "star", "pentagon", "cross")
 
 
 @dataclass(frozen=True)
 class StatedDeltaV:
-    """A change of velocity that somebody else states.
+    """A delta-V stated by another source.
 
     Attributes
     ----------
     time : float, s
-        From the trigger; the change is that from time zero to then.
+        From the trigger; the delta-V is from time zero to this instant.
     value, sd : float, m/s
     name : str
     axis : {'forward', 'right', 'down', 'resultant'}
@@ -96,7 +96,7 @@ def delta_v_course(acceleration: Acceleration, zero: float, low: float, high: fl
     ----------
     acceleration : Acceleration
     zero, low, high : float, s
-        Zero where the change is; the others are cut to the record.
+        `zero` is the origin of the change; `low` and `high` are clipped to the record.
 
     Returns
     -------
@@ -123,14 +123,14 @@ def delta_v_half_widths(
     instants: Array,
     gravity: float = STANDARD_GRAVITY,
 ) -> Array:
-    """Half widths of what holds 95 % of a change of velocity since time zero.
+    """95 % half widths of the change of velocity since time zero.
 
     Parameters
     ----------
     unit : UnitReconstruction
     zero, zero_sd : float, s
     instants : ndarray, (n,), s
-        After `zero`. They are taken as exact, as those of a clock.
+        After `zero`; taken as exact, as clock times.
     gravity : float, m/s²
 
     Returns
@@ -170,17 +170,17 @@ def delta_v_chart(
     ----------
     units : sequence of UnitReconstruction
     combined : UnitReconstruction or None
-        The mean of the units, whose event and bound are drawn; those of the first unit if None.
+        Mean of the units, whose event and bound are drawn; if None, those of the first unit.
     event : int
-        Of the mean, from 0.
+        Index into the events of the mean, from 0.
     gravity : float, m/s²
     stated : sequence of StatedDeltaV
-        Laid over with their 95 %.
+        Drawn with their 95 % bounds.
 
     Returns
     -------
     Chart or None
-        None where there is no such event.
+        None if the event does not exist.
     """
     main = units[0] if combined is None else combined
     if not 0 <= event < len(main.events.events):
@@ -300,17 +300,17 @@ def _stated_lines(stated: Sequence[StatedDeltaV]) -> list[Line]:
     return out
 
 
-# What each contributor adds to the uncertainty of the answers.
+# Error budget of delta-V and of the end position.
 
 
 _SUM = "all together"
-# Of the largest sum: what is less is no bar, and joined with the others.
+# Smallest share of the largest sum with its own bar; smaller ones are joined.
 _LEAST = 0.01
 _REST = "others"
 
 
 def delta_v_budget(change: VelocityChange) -> pd.DataFrame:
-    """Standard deviations that each contributor adds to a change of velocity.
+    """Standard deviation that each contributor adds to a change of velocity.
 
     Returns
     -------
@@ -323,7 +323,7 @@ def delta_v_budget(change: VelocityChange) -> pd.DataFrame:
 
 
 def delta_v_budget_chart(change: VelocityChange) -> Chart:
-    """Chart the contributors to the uncertainty of a change of velocity, the largest first.
+    """Chart the error budget of a change of velocity, largest contributor first.
 
     Parameters
     ----------
@@ -343,7 +343,7 @@ def delta_v_budget_chart(change: VelocityChange) -> Chart:
 
 
 def place_budget_chart(path: CrashPath, names: tuple[str, str] = ("forward", "right")) -> Chart:
-    """Chart the contributors to the uncertainty of the end of the path, the largest first.
+    """Chart the error budget of the end position, largest contributor first.
 
     Parameters
     ----------
@@ -369,10 +369,10 @@ def _chart(slug: str, title: str, caption: str, table: pd.DataFrame, unit: str) 
     total = np.sqrt((table**2).sum())
     table = _joined(table, float(total.max()))
     size = np.sqrt((table**2).sum(axis=1))
-    # Stable, so that equal ones keep the order of the budget; the rest always last.
+    # A stable sort keeps the budget's order for equal contributors; the rest is always last.
     order = sorted(table.index, key=lambda name: (name == _REST, -float(size[name])))
     categories = (_SUM, *(str(name) for name in order))
-    # Three digits of the larger sum, and as many decimals of all that adds up to it.
+    # Three digits of the larger sum, and the same number of decimals for its contributors.
     most = float(total.max())
     digits = max(0, 2 - math.floor(math.log10(most))) if most > 0.0 else 0
     panels = []
@@ -401,7 +401,7 @@ def _bars(name: str, at: Sequence[int] | range, values: object, colour: str, dig
 
 
 def _joined(table: pd.DataFrame, most: float) -> pd.DataFrame:
-    """The contributors with what is too little to be seen as one."""
+    """Contributors, with those too small to be seen joined into one."""
     small = (table < _LEAST * most).all(axis=1)
     if int(small.sum()) < 2:
         return table
@@ -410,7 +410,7 @@ def _joined(table: pd.DataFrame, most: float) -> pd.DataFrame:
     return kept
 
 
-# On what the direction of force hangs: the length of the window, and time zero.
+# Sensitivity of the principal direction of force to the window length and to time zero.
 
 
 _LABEL = "direction of force, deg"
@@ -424,20 +424,20 @@ _STEADY = 0.02
 def pdof_by_window_chart(
     units: Sequence[UnitReconstruction], combined: UnitReconstruction | None, event: int = 0
 ) -> Chart | None:
-    """Chart the direction of force against the length of the window from time zero.
+    """Chart the direction of force against the window length from time zero.
 
     Parameters
     ----------
     units : sequence of UnitReconstruction
     combined : UnitReconstruction or None
-        The mean of the units, whose event it is; the first unit if None.
+        Mean of the units, whose event it is; if None, the first unit.
     event : int
         From 0.
 
     Returns
     -------
     Chart or None
-        None where there is no such event.
+        None if the event does not exist.
     """
     main = units[0] if combined is None else combined
     if not 0 <= event < len(main.body):
@@ -475,7 +475,7 @@ def pdof_by_shift_chart(
     Returns
     -------
     Chart or None
-        None where there is no such event.
+        None if the event does not exist.
     """
     main = units[0] if combined is None else combined
     if not 0 <= event < len(main.body):
@@ -499,7 +499,7 @@ def pdof_by_shift_chart(
 
 
 def _near(angle_deg: Array, middle_deg: float) -> Array:
-    """Angles within half a turn of another: one at 180 deg is not split."""
+    """Angles within half a turn of `middle_deg`, so that a curve at 180 deg is not split."""
     return middle_deg + np.asarray(within_half_turn(angle_deg - middle_deg))
 
 
@@ -519,7 +519,7 @@ def _lines(
         try:
             found = table(unit)
         except DataError:
-            # Its record does not reach over any of the windows.
+            # The record of this unit covers none of the windows.
             continue
         look = unit_look(number, len(units) == 1)
         line = Line(
@@ -551,7 +551,7 @@ def _chosen(main: UnitReconstruction, event: int, at: float, name: str) -> list[
     return [Line("bar", np.repeat(x, 2), ends, BLACK, width=2.4, legend=False), point]
 
 
-# The units against each other at the reference point.
+# Comparison of the units at the reference point.
 
 
 _AXES = ("forward", "right", "down")
@@ -560,7 +560,7 @@ _X = "time from the trigger, ms"
 
 
 def differences_chart(comparison: UnitComparison, names: Sequence[str]) -> Chart | None:
-    """Chart how far the change of velocity of each unit is from that of all together.
+    """Chart the difference of each unit's change of velocity from that of all together.
 
     Parameters
     ----------
@@ -571,7 +571,7 @@ def differences_chart(comparison: UnitComparison, names: Sequence[str]) -> Chart
     Returns
     -------
     Chart or None
-        Of the axes that two or more units measure; None where there are none.
+        For axes that two or more units measure; None if there are none.
     """
     edges = 1e3 * comparison.edges
     panels = []
@@ -614,7 +614,7 @@ def accelerations_chart(
     combined: UnitReconstruction | None,
     events: Sequence[CrashEvent] = (),
 ) -> Chart:
-    """Chart the acceleration of the reference point by every unit, one over the other.
+    """Chart the acceleration of the reference point from every unit.
 
     Parameters
     ----------
@@ -625,7 +625,7 @@ def accelerations_chart(
     Returns
     -------
     Chart
-        After a low-pass of class CFC 60 where the common rate carries it.
+        Low-pass filtered with CFC 60 where the common rate permits.
     """
     main = units[0] if combined is None else combined
     span = crash_span(events, main.acceleration.begin, main.acceleration.end)
@@ -665,11 +665,11 @@ def accelerations_chart(
     )
 
 
-# Risk of injury against the change of velocity, and where this crash is on the curve.
+# Injury risk against delta-V, with this crash on the curve.
 
 
 _POINTS = 121
-# Where a model tells no range, up to this many times our value.
+# Upper end of a model without a stated range, as a multiple of this case's delta-V.
 _BEYOND = 2.5
 _KMH = 3.6
 
@@ -680,20 +680,20 @@ def risk_chart(
     sd: float,
     inputs: Mapping[str, float | str] | None = None,
 ) -> Chart | None:
-    """Chart the models that gave an answer, each within its range.
+    """Chart the injury-risk models that gave an answer, each within its range.
 
     Parameters
     ----------
     risks : sequence of InjuryRisk
     delta_v, sd : float, m/s
-        What they were asked with.
+        Inputs of the models.
     inputs : mapping, optional
-        Their other inputs.
+        Further inputs of the models.
 
     Returns
     -------
     Chart or None
-        None where no model uses a change of velocity or none gave an answer.
+        None if no model uses a change of velocity or none gave an answer.
     """
     lines: list[Line] = []
     reach = TWO_SIDED_95 * sd
@@ -744,14 +744,14 @@ def _curve(
     factor = SPEEDS.get(model.unit("delta_v"), 1.0)
     low, high = model.validity.get("delta_v", (0.0, _BEYOND * delta_v / factor))
     at = np.linspace(low * factor, high * factor, _POINTS)
-    # Rounding may put an end just outside.
+    # Rounding may put an end just outside of the range.
     at[[0, -1]] += np.array([1e-9, -1e-9]) * (at[-1] - at[0])
     x, y = [], []
     for value in at.tolist():
         try:
             risk = injury_risk(model, {**inputs, "delta_v": value})
         except StrapdownError:
-            # A logarithm has no value at zero; an input is missing.
+            # A logarithm is undefined at zero, or an input is missing.
             continue
         x.append(_KMH * value)
         y.append(risk.probability)

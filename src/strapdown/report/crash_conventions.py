@@ -1,4 +1,4 @@
-"""Axes, angles, origin and mounting points on the vehicle of a case, in three views."""
+"""Picture of the axes, angles, origin and mounting points of a vehicle, in three views."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ __all__ = ["MountingPoint", "Project", "conventions_picture", "draw_behind", "dr
 _WIDTH, _HEIGHT = 640.0, 376.0
 _TOP_VIEW = (172.0, 196.0)
 _SIDE_VIEW, _REAR_VIEW = (458.0, 92.0), (458.0, 272.0)
-_LONG, _ACROSS = 196.0, 96.0  # pixels that the longest side, and the width, may take
+_LONG, _ACROSS = 196.0, 96.0  # pixels available to the longest side, and to the width
 _CLOCK = 150.0
 _SOFT, _BODY = "#4a525c", "#3d5166"
 _FORWARD, _RIGHT, _DOWN = AXIS_COLOURS
 _FORCE = "#882255"
-_EXAMPLE = 40.0  # deg, of the force that shows the sense of the angle
+_EXAMPLE = 40.0  # deg, of the example force that shows the sign of the angle
 
 
 @dataclass(frozen=True)
 class MountingPoint:
-    """Where a unit sits.
+    """Mounting position of a unit.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class MountingPoint:
     position : sequence of float, (3,), m
         Vehicle axes, from the vehicle's origin.
     number : int
-        Of the unit, from 0: for its colour.
+        Index of the unit, from 0; sets its color.
     """
 
     name: str
@@ -53,7 +53,7 @@ def conventions_picture(
     point: Sequence[float] = (0.0, 0.0, 0.0),
     point_name: str = "reference point",
 ) -> Picture:
-    """Draw what forward, right, down, roll, pitch, heading and direction of force mean here.
+    """Draw the sign conventions of axes, roll, pitch, heading and direction of force.
 
     Parameters
     ----------
@@ -61,13 +61,13 @@ def conventions_picture(
         In vehicle axes.
     units : sequence of MountingPoint
     point : sequence of float, (3,), m
-        The reference point, vehicle axes from the vehicle's origin.
+        Reference point, in vehicle axes from the vehicle's origin.
     point_name : str
 
     Returns
     -------
     Picture
-        The vehicle from above, from its right side and from behind, to one scale.
+        The vehicle from above, from its right side and from behind, at one scale.
     """
     where = ", ".join(f"{u.name} at {_place(u.position)}" for u in units)
     alt = (
@@ -166,7 +166,7 @@ def _axes(out: Drawing, outline: Outline, above: Project, side: Project, behind:
     reach = max(side((front, 0.0, 0.0))[0] - x, 0.0) + 24.0
     out.arrow((x, y), (x + reach, y), _FORWARD, 2.2)
     out.text((x + reach + 4.0, y), "x forward", SMALL, _FORWARD, bold=True, halo=True)
-    # Seen from the right the nose, on the right, goes up: counter-clockwise.
+    # Seen from the right, with the nose on the right, a nose-up pitch is counterclockwise.
     turn = math.degrees(34.0 / reach)
     _arc(out, (x, y), reach - 8.0, 84.0, 84.0 - turn, INK)
     at = _polar((x, y), reach - 8.0, 84.0 - turn)
@@ -177,7 +177,7 @@ def _axes(out: Drawing, outline: Outline, above: Project, side: Project, behind:
     reach = max(behind((0.0, right, 0.0))[0] - x, 0.0) + 30.0
     out.arrow((x, y), (x + reach, y), _RIGHT, 2.2)
     out.text((x + reach + 4.0, y), "y right", SMALL, _RIGHT, bold=True, halo=True)
-    # Seen from behind the right side goes down: clockwise.
+    # Seen from behind, the right side goes down: clockwise.
     turn = math.degrees(38.0 / reach)
     _arc(out, (x, y), reach - 8.0, 84.0 - turn, 84.0, INK)
     at = _polar((x, y), reach - 8.0, 84.0 - turn)
@@ -193,7 +193,7 @@ def _down(out: Drawing, view: Project, origin: tuple[float, float]) -> None:
 
 
 def _through(out: Drawing, at: tuple[float, float], colour: str, towards: bool) -> None:
-    """An axis through the page: a point towards the eye, a cross away from it."""
+    """Draw an axis through the page: a dot towards the viewer, a cross away from the viewer."""
     out.circle(at, 7.0, colour, 1.8, fill="#ffffff")
     if towards:
         out.circle(at, 2.0, None, fill=colour)
@@ -205,7 +205,7 @@ def _through(out: Drawing, at: tuple[float, float], colour: str, towards: bool) 
 def _points(
     out: Drawing, view: Project, units: Sequence[MountingPoint], point: Sequence[float]
 ) -> None:
-    """Numbers where the units are; those that lie on each other share a place."""
+    """Number the units at their positions; units at the same position share a label."""
     taken: list[tuple[float, float]] = []
     for unit in units:
         x, y = view(unit.position)
@@ -256,21 +256,21 @@ def _arc(
     end_deg: float,
     colour: str,
 ) -> None:
-    """An arc with an arrow's head at its end; angles clockwise from up."""
+    """Draw an arc with an arrowhead at its end; angles clockwise from up."""
     angles = np.linspace(start_deg, end_deg, 24).tolist()
     points = [_polar(centre, radius, a) for a in angles]
     out.shape(points[:-3], colour, 1.5, closed=False)
     out.arrow(points[-5], points[-1], colour, 1.5)
 
 
-# The vehicle from its right side and from behind.
+# Side and rear views of the vehicle.
 
 
-#: Pixels of a place in vehicle axes, m.
+#: Maps a position in vehicle axes, m, to pixels.
 Project = Callable[[Sequence[float]], tuple[float, float]]
 _CRASH_SILHOUETTE_BODY = "#3d5166"
-# A car from its side, along its length (0 the rear) and down from its origin, m; from behind, of
-# half its width. Of no car in particular.
+# Generic car from its side, along its length (0 the rear) and down from its origin, m; from
+# behind, in half widths.
 _SIDE = (
     *((0.0, 0.30), (0.0, -0.22), (0.03, -0.33), (0.13, -0.39), (0.24, -0.91), (0.30, -0.95)),
     *((0.50, -0.95), (0.56, -0.92), (0.70, -0.37), (0.93, -0.24), (0.99, -0.10), (1.0, 0.08)),
@@ -284,7 +284,7 @@ _WHEEL = 0.31  # m
 
 
 def draw_side(out: Drawing, outline: Outline, view: Project, scale: float) -> None:
-    """Draw a vehicle from its right side: `view` makes pixels of places, `scale` of metres."""
+    """Draw a vehicle from its right side: `view` maps positions to pixels, `scale` is pixels/m."""
     low, high = float(outline.low[0]), float(outline.high[0])
     ground = view((low, 0.0, 0.5))[1]
     out.line(
@@ -310,7 +310,7 @@ def draw_side(out: Drawing, outline: Outline, view: Project, scale: float) -> No
 
 
 def draw_behind(out: Drawing, outline: Outline, view: Project) -> None:
-    """Draw a vehicle from behind; `view` makes pixels of places."""
+    """Draw a vehicle from behind; `view` maps positions to pixels."""
     middle = 0.5 * float(outline.low[1] + outline.high[1])
     half = 0.5 * float(outline.high[1] - outline.low[1])
     ground = view((0.0, 0.0, 0.5))[1]

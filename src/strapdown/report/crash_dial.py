@@ -1,4 +1,4 @@
-"""The direction of force on a clock about the vehicle, with the interval it is known within."""
+"""Clock dial of the direction of force about the vehicle, with its 95 % interval."""
 
 from __future__ import annotations
 
@@ -19,31 +19,31 @@ from strapdown.report.values import plain
 __all__ = ["Direction", "pdof_dial"]
 
 _WIDTH, _SMALL_WIDTH, _RADIUS, _TOP = 330.0, 304.0, 118.0, 142.0
-_CAR = 0.53  # of the dial's radius that the farthest corner of the vehicle reaches
-_RING = 0.86  # of it, where the ring of the intervals begins
+_CAR = 0.53  # distance of the vehicle's farthest corner, as a share of the dial's radius
+_RING = 0.86  # inner edge of the interval ring, as a share of the dial's radius
 Point = tuple[float, float]
 _SOFT = "#4a525c"
 _SMALL_CAPTION = "Where the force came from, seen from above: 0° the front, clockwise; wedge: 95 %."
-# The least that is drawn of an interval, deg: a stroke that can be seen.
+# Smallest interval drawn, deg, to keep the stroke visible.
 _LEAST_WEDGE = 1.0
 
 
 @dataclass(frozen=True)
 class Direction:
-    """The direction of force of one event.
+    """Direction of force of one event.
 
     Attributes
     ----------
     name : str
     horizontal_deg : float, deg
-        Where the force came from, clockwise from the front.
+        Direction from which the force came, clockwise from the front.
     interval : AngleInterval or None
-        That holds 95 %.
+        The 95 % interval.
     clock : int
     delta_v : float, m/s
         Length of the change of velocity.
     main : bool
-        Drawn strong; the others thin.
+        Drawn with a strong line; the others thin.
     """
 
     name: str
@@ -62,25 +62,25 @@ def pdof_dial(
     point_name: str = "reference point",
     small: bool = False,
 ) -> Picture:
-    """Draw directions of force about a vehicle, seen from above, its front upward.
+    """Draw directions of force about a vehicle, seen from above with its front upward.
 
     Parameters
     ----------
     outline : Outline
         In vehicle axes.
     directions : sequence of Direction
-        One an event, in order of time.
+        One per event, in time order.
     point : sequence of float, m
-        The reference point in vehicle axes, which the dial is about.
+        Reference point in vehicle axes, at the center of the dial.
     point_name : str
     small : bool
-        The dial alone, for a page that tells the numbers beside it.
+        Draw the dial alone, for a page with the numbers beside it.
 
     Returns
     -------
     Picture
-        An arrow from where each force came from towards the point, its interval as a wedge; a
-        shaded ring where no direction is contradicted.
+        An arrow from the origin of each force towards the point, its interval as a wedge; a shaded
+        ring if the direction is undetermined.
     """
     rows = sorted(directions, key=lambda d: not d.main)
     height = 2.0 * _TOP + 26.0 + sum(64.0 if d.main else 33.0 for d in rows)
@@ -167,7 +167,7 @@ def _clock(out: Drawing, centre: Point) -> None:
 
 
 def _scale(outline: Outline, point: Sequence[float]) -> float:
-    """Pixels a metre, about the point."""
+    """Pixels per meter about the point."""
     reach = np.abs(outline.body - np.asarray(point, np.float64)[:2])
     return _CAR * _RADIUS / max(float(np.hypot(*reach.T).max()), 1e-3)
 
@@ -175,7 +175,7 @@ def _scale(outline: Outline, point: Sequence[float]) -> float:
 def _vehicle(out: Drawing, centre: Point, outline: Outline, point: Sequence[float]) -> None:
     scale = _scale(outline, point)
     origin = np.array(centre)
-    # Forward is up the page: a heading of -90 deg where x is to the right and y down.
+    # Forward is up the page: a heading of -90 deg in axes x right, y down.
     there = outline.placed((0.0, 0.0), -90.0, point)
     pixels = Outline(
         origin + scale * there.body,

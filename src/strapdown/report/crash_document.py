@@ -1,4 +1,4 @@
-"""The report of a crash case: what stands on page one, and the sections after it."""
+"""Report of a crash case: page one and the sections after it."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def crash_document(result: CaseResult, figures: CrashFigures, name: str) -> Docu
     result : CaseResult
     figures : CrashFigures
     name : str
-        Of the folder, for the command that verifies it.
+        Folder name, for the verification command.
 
     Returns
     -------

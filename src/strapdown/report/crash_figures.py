@@ -1,4 +1,4 @@
-"""Every chart and picture of the report of a crash."""
+"""Every chart and picture of a crash report."""
 
 from __future__ import annotations
 
@@ -45,33 +45,34 @@ __all__ = ["CrashFigures", "crash_figures", "reference_in_path_axes"]
 
 @dataclass(frozen=True)
 class CrashFigures:
-    """Charts and pictures of one case, each with its caption; None where there is none.
+    """Charts and pictures of one case, each with its caption; None where not available.
 
-    Time is from the trigger, ms (of overviews s). Every bound holds 95 %. Along the turning axes of
-    the vehicle: forward, right, down. Of the path: north, east, down, or, where no heading was
-    stated, forward, right, down as the vehicle stood at the entry.
+    Time is from the trigger, ms (s in overviews). Every bound is a 95 % bound. Axes are the turning
+    axes of the vehicle: forward, right, down. Those of the path are north, east, down or, without a
+    stated heading, forward, right, down of the vehicle at the entry.
 
     Attributes
     ----------
     front : tuple of Picture
-        For page one: direction of force of every event on a clock about the vehicle, where it came
-        from, 0 the front, positive clockwise, 95 % as a wedge, if any; and the path, small.
+        For page one: direction of force of every event on a clock about the vehicle, from the
+        origin of the force, 0 the front, positive clockwise, 95 % as a wedge, if any; and the path,
+        small.
     path : Picture
-        From above, m; ellipses of 95 %; outlines at the entry, time zero, event ends and end.
+        From above, m; 95 % ellipses; outlines at the entry, time zero, event ends and end.
     signals : tuple of UnitSignals
-        Of every unit: specific force, g, and rates, deg/s, of the crash and the whole record.
+        For every unit: specific force, g, and rates, deg/s, of the crash and the whole record.
     delta_v : tuple of Chart
-        One an event: forward, right, down, resultant, km/h, of every unit and the mean.
+        One per event: forward, right, down, resultant, km/h, of every unit and the mean.
     pdof_by_window, pdof_by_time_zero : Chart or None
-        Direction of force of the main event, deg, against the choices it hangs on.
+        Direction of force of the main event, deg, against window length and time zero.
     motion : Animation
-        The vehicle on its path in space, m; on paper six instants.
+        The vehicle on its path in 3D, m; on paper six instants.
     place, velocity, attitude : Chart
-        Of the path over time: m, m/s, deg; linear and Monte Carlo's bounds.
+        Path over time: m, m/s, deg; linear and Monte Carlo bounds.
     references : tuple of Chart
-        Path less each reference path, m, with the bound of both.
+        Path minus each reference path, m, with the bound of both.
     units : Chart or None
-        Change of velocity of each unit less that of all, m/s.
+        Change of velocity of each unit minus that of all, m/s.
     accelerations : Chart or None
         All units at the reference point, g.
     delta_v_budget : Chart or None
@@ -104,7 +105,7 @@ class CrashFigures:
 
     @property
     def charts(self) -> tuple[Chart, ...]:
-        """All charts in the order of the report; each has a slug of its own."""
+        """All charts in report order; each has its own slug."""
         found = [
             *self.delta_v,
             self.pdof_by_window,
@@ -125,12 +126,12 @@ class CrashFigures:
 
     @property
     def pictures(self) -> tuple[Picture, ...]:
-        """All pictures, those of the animation on paper with them."""
+        """All pictures, including those of the animation on paper."""
         return (*self.front, self.path, self.motion.stills, self.conventions)
 
 
 def crash_figures(result: CaseResult) -> CrashFigures:
-    """Draw everything that the report of a case shows.
+    """Draw all charts and pictures of the report of a case.
 
     Parameters
     ----------
@@ -139,7 +140,7 @@ def crash_figures(result: CaseResult) -> CrashFigures:
     Returns
     -------
     CrashFigures
-        The same for the same result, to the last byte.
+        Byte-identical for the same result.
     """
     found, spec = result.reconstruction, result.spec
     main, events = found.main, found.main.events.events
@@ -225,19 +226,19 @@ def crash_figures(result: CaseResult) -> CrashFigures:
 
 
 def reference_in_path_axes(path: CrashPath, answer: ReferenceAnswer) -> pd.DataFrame:
-    """Places of a reference path, moved so that it agrees with the reconstructed at the entry.
+    """Positions of a reference path, shifted to agree with the reconstruction at the entry.
 
     Parameters
     ----------
     path : CrashPath
-        That it was compared with.
+        Reconstructed path of the comparison.
     answer : ReferenceAnswer
-        Of a path.
+        Answer with a reference path.
 
     Returns
     -------
     DataFrame
-        ``north east down``, m, indexed by time, s: what the comparison of both has compared.
+        ``north east down``, m, indexed by time, s, as used in the comparison.
     """
     assert answer.path is not None
     from scipy.interpolate import CubicHermiteSpline
@@ -263,7 +264,7 @@ def _directions(main: UnitReconstruction, which: int | None) -> list[Direction]:
 
 
 def _stated(result: CaseResult, main: UnitReconstruction) -> list[StatedDeltaV]:
-    """Changes of velocity that others state, at the end of the main event if not told when."""
+    """Delta-V stated by other sources, at the end of the main event if no time is stated."""
     which = main_event(main)
     found = []
     for answer in result.references:
@@ -277,7 +278,7 @@ def _stated(result: CaseResult, main: UnitReconstruction) -> list[StatedDeltaV]:
 
 
 def _belongs(main: UnitReconstruction, event: int, at: float) -> bool:
-    """Whether an instant is told from the time zero of this event."""
+    """Whether the time zero of this event is the last one before an instant."""
     zeros = [e.time_zero for e in main.events.events]
     return event == max((k for k, zero in enumerate(zeros) if zero <= at), default=0)
 

@@ -45,7 +45,7 @@ def crash_json(result: CaseResult) -> dict[str, Any]:
     Returns
     -------
     dict
-        Bounds hold 95 %. What is no number is null.
+        Bounds are 95 % bounds. NaN and infinity are null.
     """
     made = result.reconstruction
     found: dict[str, Any] = {
@@ -69,7 +69,7 @@ def crash_json(result: CaseResult) -> dict[str, Any]:
 
 
 def _numbers(value: Any) -> Any:
-    """With null for what is no number."""
+    """Replace NaN and infinity by null."""
     if isinstance(value, dict):
         return {key: _numbers(v) for key, v in value.items()}
     if isinstance(value, list | tuple):
@@ -80,7 +80,7 @@ def _numbers(value: Any) -> Any:
 
 
 def _named(value: Any, key: str = "") -> Any:
-    """The case with files told by name: where they lie is no result."""
+    """The case specification with file names instead of paths."""
     if isinstance(value, dict):
         return {k: _named(v, k) for k, v in value.items()}
     if isinstance(value, list):
@@ -205,7 +205,7 @@ def _comparison(comparison: UnitComparison) -> dict[str, Any]:
 
 
 def _finding(finding: Finding) -> dict[str, Any]:
-    """The finding as data, and its sentence and remedy for people."""
+    """The finding as data, with its sentence and remedy."""
     said = {"what": finding.sentence("file"), "remedy": finding.advice("file")}
     return {**finding.plain(), **said}
 
@@ -241,14 +241,14 @@ def _reference(answer: ReferenceAnswer) -> dict[str, Any]:
     }
 
 
-# What came of a crash case, as tables in CSV: the path, and the signals at the reference point.
+# CSV tables of a crash case: the path, and the signals at the reference point.
 
 
 UNITS = dict.fromkeys(NED, "m") | dict.fromkeys(VELOCITY, "m_per_s") | dict.fromkeys(EULER, "deg")
 
 
 def trajectory_table(path: CrashPath) -> pd.DataFrame:
-    """Return the path with its standard deviations, each column with its unit.
+    """Return the path with its standard deviations; column names carry units.
 
     Parameters
     ----------
@@ -257,7 +257,7 @@ def trajectory_table(path: CrashPath) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        ``time_s``, place, velocity, attitude, then the standard deviations of each.
+        ``time_s``, position, velocity, attitude, then their standard deviations.
     """
     values = path.table.rename(columns={c: f"{c}_{u}" for c, u in UNITS.items()})
     sd = path.sd.rename(columns={c: f"{c}_sd_{u}" for c, u in UNITS.items()})
@@ -267,7 +267,7 @@ def trajectory_table(path: CrashPath) -> pd.DataFrame:
 
 
 def signals_table(unit: UnitReconstruction) -> pd.DataFrame:
-    """Return what one recorder says at the reference point, gravity in it.
+    """Return the signals of one recorder at the reference point, including gravity.
 
     Parameters
     ----------
@@ -276,9 +276,9 @@ def signals_table(unit: UnitReconstruction) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        Specific force forward, right, down in m/s² and rates in deg/s at the common stamps, and
-        for a recorder of several ranges which of them spoke (0 the lowest) and where it was at
-        its end, by sensor axis.
+        Specific force forward, right, down in m/s² and rates in deg/s at the common stamps; for a
+        recorder of several ranges also the selected range (0 the lowest) and the samples at the end
+        of its range, by sensor axis.
     """
     imu = unit.at_point.imu
     table = pd.DataFrame({"time_s": imu.index.to_numpy()})
@@ -302,12 +302,12 @@ def write_table(table: pd.DataFrame, path: Path, comments: dict[str, str]) -> No
     table : DataFrame
     path : Path
     comments : dict of str to str
-        At the top.
+        Written at the top.
     """
     csv.write(path, {str(c): table[c].to_numpy() for c in table.columns}, comments)
 
 
-# What the recorders say at the reference point, as one crash record: for ISO MME.
+# Signals of the recorders at the reference point, as one crash record for ISO MME.
 
 
 Array = NDArray[np.float64]
@@ -326,13 +326,13 @@ def signal_record(
         Name of the reference point.
     answers : sequence of UnitReconstruction
     rate_hz : float, Hz
-        Of the common stamps.
+        Sample rate of the common stamps.
 
     Returns
     -------
     CrashRecord
-        Of each recorder, and of their mean, specific force (gravity in it) and rates along the
-        vehicle's axes.
+        Specific force (including gravity) and rates of each recorder and of their mean, along
+        the vehicle's axes.
     """
     channels = []
     for unit in answers:

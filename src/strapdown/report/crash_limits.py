@@ -1,4 +1,4 @@
-"""What limits the answers of a case, from what happened in it, the gravest first."""
+"""Limitations of the answers of a case, from its own events, most serious first."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ __all__ = [
 ]
 
 
-#: What makes an answer wrong, and not only less precise.
+#: Limitations that make an answer wrong, not only less precise.
 GRAVE = frozenset(
     (
         "event-beyond-record",
@@ -41,7 +41,7 @@ GRAVE = frozenset(
 
 
 def limitations(result: CaseResult) -> tuple[tuple[str, str], ...]:
-    """Return what a reader must know before relying on the answers.
+    """Return the limitations that a reader must know before relying on the answers.
 
     Parameters
     ----------
@@ -50,18 +50,18 @@ def limitations(result: CaseResult) -> tuple[tuple[str, str], ...]:
     Returns
     -------
     tuple of (head, text)
-        Only of what happened in this case.
+        Only those that apply to this case.
     """
     return tuple((head, text) for _, head, text in _all(result))
 
 
 def grave_limitations(result: CaseResult) -> tuple[str, ...]:
-    """Return the heads of those that make an answer wrong, and not only less precise."""
+    """Return the heads of the limitations that make an answer wrong, not only less precise."""
     return tuple(head for code, head, _ in _all(result) if code in GRAVE)
 
 
 def _all(result: CaseResult) -> tuple[tuple[str, str, str], ...]:
-    """Return code, head and text of each."""
+    """Return code, head and text of each limitation."""
     return (
         *_event(result),
         *clipping(result),
@@ -207,12 +207,12 @@ def _no_reference(result: CaseResult) -> Iterator[tuple[str, str, str]]:
         )
 
 
-# What the sensors of a case limit: ranges, what is missing, rest, rate.
+# Limitations due to the sensors: range, missing axes, stationary stretch, sample rate.
 
 
-# A rest that is shorter leaves biases that a longer one would have told.
+# A shorter stationary stretch determines the biases less well.
 SHORT_REST = 2.0  # s
-# Below this rate a structure that rings is not integrated: a quarter of the rate is the fastest.
+# Below this rate structural ringing is not resolved: up to a quarter of the rate is usable.
 RINGS = 1000.0  # Hz
 AXES = ("forward", "right", "down")
 
@@ -224,7 +224,7 @@ def _prepared(result: CaseResult) -> Iterator[tuple[UnitReconstruction, Prepared
 
 
 def clipping(result: CaseResult) -> Iterator[tuple[str, str, str]]:
-    """Return which sensors were at the end of their range."""
+    """Return the sensors that reached the end of their range."""
     cut: dict[str, list[tuple[str, str]]] = {"accelerometer": [], "gyro": []}
     for unit, prepared in _prepared(result):
         time = unit.at_point.time
@@ -260,7 +260,7 @@ def clipping(result: CaseResult) -> Iterator[tuple[str, str, str]]:
 
 
 def assumed(result: CaseResult) -> Iterator[tuple[str, str, str]]:
-    """Return what was not measured, once for all recorders of which the same is true."""
+    """Return the unmeasured quantities, once for all recorders that share them."""
     told: dict[str, list[str]] = {}
     for spec in result.spec.units:
         given, parts = spec.assumed, []
@@ -292,14 +292,14 @@ def assumed(result: CaseResult) -> Iterator[tuple[str, str, str]]:
 
 
 def _each(sd: float | tuple[float, float, float], unit: str, names: str) -> str:
-    """One standard deviation for all axes, or one for each."""
+    """Format one standard deviation for all axes, or one for each."""
     if isinstance(sd, float):
         return f"{sd:g}{unit}"
     return f"{sd[0]:g}, {sd[1]:g} and {sd[2]:g}{unit} ({names})"
 
 
 def rest(result: CaseResult) -> Iterator[tuple[str, str, str]]:
-    """Return what the stretch before the crash does not tell."""
+    """Return the shortcomings of the stationary stretch before the crash."""
     told: dict[tuple[str, str], list[str]] = {}
     for unit, prepared in _prepared(result):
         still, level = prepared.rest, prepared.levelling
@@ -332,7 +332,7 @@ def rest(result: CaseResult) -> Iterator[tuple[str, str, str]]:
 
 
 def borrowed(result: CaseResult) -> Iterator[tuple[str, str, str]]:
-    """Return who has no gyro, and whose turning it takes."""
+    """Return the recorders without a gyro, and the recorder whose gyro they use."""
     told: dict[str, list[str]] = {}
     for unit in result.units:
         if unit.gyro is None and unit.gyro_from is not None:
@@ -347,7 +347,7 @@ def borrowed(result: CaseResult) -> Iterator[tuple[str, str, str]]:
 
 
 def ringing(result: CaseResult) -> Iterator[tuple[str, str, str]]:
-    """Return whose samples are too few for a structure that rings."""
+    """Return the recorders whose sample rate is too low for structural ringing."""
     slow = []
     for unit in result.units:
         stamps = unit.accelerometers[-1].table.index.to_numpy()
@@ -367,7 +367,7 @@ def ringing(result: CaseResult) -> Iterator[tuple[str, str, str]]:
         )
 
 
-# What a crash report takes for given, and its conventions.
+# Assumptions and conventions of a crash report.
 
 
 CONVENTIONS = (
@@ -404,7 +404,7 @@ CONVENTIONS = (
 
 
 def assumptions(result: CaseResult) -> tuple[tuple[str, str], ...]:
-    """Return what is taken for given in this case.
+    """Return the assumptions of this case.
 
     Returns
     -------
@@ -478,7 +478,7 @@ def assumptions(result: CaseResult) -> tuple[tuple[str, str], ...]:
 
 
 def method(result: CaseResult) -> tuple[str, ...]:
-    """Return the steps from the records to the answers, in order."""
+    """Return the processing steps from the records to the answers, in order."""
     steps = [
         "The clocks of the recorders are tied to the trigger, and all channels are brought to "
         "common stamps without aliasing; the delay of each low-pass is taken off.",
@@ -510,7 +510,7 @@ def method(result: CaseResult) -> tuple[str, ...]:
 
 
 def how_to_verify() -> tuple[tuple[str, str], ...]:
-    """Return how anybody checks the report, beside the command."""
+    """Return ways to check the report, besides the command."""
     return (
         (
             "Run it again",

@@ -1,4 +1,4 @@
-"""Instants and parts of a crash that several pictures share."""
+"""Instants and spans of a crash that several pictures share."""
 
 from __future__ import annotations
 
@@ -29,25 +29,25 @@ __all__ = [
     "unit_look",
 ]
 
-#: What is drawn before time zero and after the end of an event, s.
+#: Time drawn before time zero and after the end of an event, s.
 AROUND = (0.05, 0.10)
-# Of a record without an event, about the trigger.
+# For a record without an event: time about the trigger.
 _NO_EVENT = (-0.1, 0.3)
-# Of what is drawn: closer labels would lie on each other.
+# Share of the drawn span; closer labels would overlap.
 _CLOSE = 0.06
-# Told apart without colour, the mean's is solid.
+# Dashes distinguish the units without color; the mean is solid.
 _DASHES = ("dash", "dashdot", "longdash", "dot")
 
 
 def unit_look(number: int | None, alone: bool = False) -> dict[str, str]:
-    """Colour, dash and symbol of a unit in every picture of a report.
+    """Color, dash and symbol of a unit in every picture of a report.
 
     Parameters
     ----------
     number : int or None
-        Of the unit, from 0; None for the mean of the units.
+        Index of the unit, from 0; None for the mean of the units.
     alone : bool
-        There is one unit only, drawn solid.
+        Whether this is the only unit, drawn solid.
     """
     if number is None:
         return {"colour": BLACK, "dash": "solid", "symbol": "circle"}
@@ -56,12 +56,12 @@ def unit_look(number: int | None, alone: bool = False) -> dict[str, str]:
 
 
 def assumed_axes(unit: UnitReconstruction) -> tuple[str, ...]:
-    """What of forward, right, down, roll, pitch, heading no sensor of a unit has measured."""
+    """Axes of forward, right, down, roll, pitch, heading that no sensor of a unit measured."""
     return unit.at_point.assumed_axes
 
 
 def crash_span(events: Sequence[CrashEvent], begin: float, end: float) -> tuple[float, float]:
-    """What of a record is drawn to show the crash: all its events, and a little about them, s."""
+    """Span drawn to show the crash, s: all its events with a margin."""
     if events:
         low, high = events[0].time_zero - AROUND[0], events[-1].end + AROUND[1]
     else:
@@ -71,13 +71,13 @@ def crash_span(events: Sequence[CrashEvent], begin: float, end: float) -> tuple[
 
 
 def path_moments(path: CrashPath, events: Sequence[CrashEvent]) -> list[tuple[str, float]]:
-    """Name the instants of a path that matter, in order of time; each within the path.
+    """Name the key instants of a path in time order; each is within the path.
 
     Returns
     -------
     list of (str, float)
         ``begin`` (of the window), ``entry``, ``time zero`` and ``event end`` of each event,
-        ``end``; the names of instants that are one sample are joined by commas.
+        ``end``; names of instants at the same sample are joined by commas.
     """
     many = len(events) > 1
     begin, end = float(path.time[0]), float(path.time[-1])
@@ -111,21 +111,21 @@ def event_marks(
 def marks_apart(
     named: Sequence[tuple[float, str]], begin: float, end: float, scale: float = 1e3
 ) -> tuple[Mark, ...]:
-    """Marks at instants, whose labels do not lie on each other.
+    """Marks at instants, with labels that do not overlap.
 
     Parameters
     ----------
     named : sequence of (float, str)
-        Instants in s; those outside are left out.
+        Instants in s; those outside are dropped.
     begin, end : float, s
-        Of what is drawn.
+        Ends of the drawn span.
     scale : float
-        Of the axis: 1000 where it is in ms.
+        Of the axis: 1000 for ms.
 
     Returns
     -------
     tuple of Mark
-        Of marks that stand close the last has all names.
+        Of marks close to each other, the last carries all names.
     """
     out: list[Mark] = []
     for at, name in sorted(named):
@@ -139,14 +139,14 @@ def marks_apart(
 
 
 def angle_words(angle_deg: float, digits: int) -> str:
-    """Write an angle in degrees, in (-180, 180]."""
+    """Format an angle in degrees, in (-180, 180]."""
     wrapped = -math.remainder(-angle_deg, 360.0)
     text = plain(wrapped, digits)
     return f"{text.removeprefix('−') if wrapped <= -179.9999 else text}°"
 
 
 def interval_words(angle_deg: float, interval: AngleInterval | None) -> tuple[str, str]:
-    """Write a direction and its interval: ``−8.3°``, ``−12.1° to −4.2°`` or ``undetermined``."""
+    """Format a direction and its interval: ``−8.3°``, ``−12.1° to −4.2°`` or ``undetermined``."""
     if interval is None:
         return angle_words(angle_deg, 1), ""
     if interval.undetermined:

@@ -1,4 +1,4 @@
-"""The path over time: place, velocity and attitude, with their bounds; against references."""
+"""Charts of position, velocity and attitude over time with bounds, and against references."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 __all__ = ["attitude_chart", "place_chart", "reference_chart", "velocity_chart"]
 
 _X = "time from the trigger, ms"
-# Instants at which the Monte Carlo's bounds are taken: they are as smooth as the path.
+# Instants at which the Monte Carlo bounds are taken; they are as smooth as the path.
 _INSTANTS = 160
 _STEADY = 1e-3
 
@@ -48,7 +48,7 @@ def place_chart(
     reference: pd.DataFrame | None = None,
     reference_name: str = "reference",
 ) -> Chart:
-    """Chart the place of the reference point over time.
+    """Chart the position of the reference point over time.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def place_chart(
     names : (str, str)
         Of the first two axes of the path.
     samples : PathSamples, optional
-        Of its Monte Carlo, whose 95 % are drawn beside the linear ones.
+        Monte Carlo samples, whose 95 % bounds are drawn beside the linear ones.
     events : sequence of CrashEvent
     reference : DataFrame, optional
         ``north east down`` in the axes of the path, m, indexed by time.
@@ -126,7 +126,7 @@ def reference_chart(
     names: tuple[str, str] = ("forward", "right"),
     number: int = 1,
 ) -> Chart:
-    """Chart how far the path is from a reference, and how far it may be.
+    """Chart the difference of the path from a reference, with its bound.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def reference_chart(
     names : (str, str)
         Of the first two axes of the path.
     number : int
-        Of the reference, for the name of the file.
+        Index of the reference, for the file name.
     """
     time = 1e3 * comparison.errors.index.to_numpy(dtype=np.float64)
     panels = []
@@ -161,7 +161,7 @@ def reference_chart(
 
 
 def _sampled(samples: PathSamples | None, first: int) -> list[Array] | None:
-    """Low and high ends of the Monte Carlo's 95 % for three columns of its errors."""
+    """Low and high ends of the Monte Carlo 95 % interval for three columns of its errors."""
     if samples is None:
         return None
     low, high = samples.interval(0.95)
@@ -175,7 +175,7 @@ def _sampled_angles(path: CrashPath, samples: PathSamples | None) -> list[Array]
     out = [np.full((2, len(path.time)), np.nan) for _ in EULER]
     nominal = rotation.euler_from_quaternion(path.q_nb)
     for row in rows.tolist():
-        # What is true is the error after what was computed.
+        # The error angles are applied after the computed attitude.
         turned = rotation.quaternion_from_rotation_vector(samples.errors[:, row, :3])
         true = rotation.euler_from_quaternion(rotation.compose(turned, path.q_nb[row]))
         off = rotation.within_half_turn(true - nominal[row])
@@ -193,7 +193,7 @@ def _panels(
         y = path.table[column].to_numpy(dtype=np.float64)
         if column == "heading":
             y = np.unwrap(y, period=360.0)
-            # A heading of 359.9 deg at the entry is one of -0.1.
+            # A heading of 359.9 deg at the entry is shown as -0.1 deg.
             y = y - 360.0 * np.round(y[path.anchor] / 360.0)
         half = TWO_SIDED_95 * sd[column].to_numpy(dtype=np.float64)
         first = k == 0

@@ -1,4 +1,4 @@
-"""The vehicle from above: its outline, how one sees where its front is, and where it stands."""
+"""The vehicle from above: its outline, the marking of its front, and its position."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ Array = NDArray[np.float64]
 
 __all__ = ["Outline", "draw_outline", "vehicle_outline"]
 
-# Half of a car, along (0 the rear, 1 the front) and to the side (1 the widest): its body, and
-# what tells its front. Of no car in particular.
+# Half of a generic car, along (0 the rear, 1 the front) and to the side (1 the widest): its
+# body, and the details that mark its front.
 _BODY = (
     *((0.000, 0.55), (0.004, 0.72), (0.016, 0.86), (0.045, 0.95), (0.120, 0.99), (0.300, 1.00)),
     *((0.620, 1.00), (0.800, 0.985), (0.880, 0.955), (0.940, 0.890), (0.975, 0.780)),
@@ -26,7 +26,7 @@ _WINDSCREEN = ((0.565, 0.70), (0.700, 0.86), (0.722, 0.55), (0.728, 0.0))
 _SCREEN_FOOT = ((0.565, 0.0),)
 _REAR_WINDOW = ((0.085, 0.0), (0.092, 0.60), (0.105, 0.78), (0.185, 0.68), (0.190, 0.0))
 _BONNET = ((0.745, 0.80), (0.965, 0.58))
-# Of the smaller side of a stated outline: the arrow that marks its front.
+# Size of the arrow that marks the front of a stated outline, as a share of its smaller side.
 _ARROW = 0.28
 
 
@@ -37,13 +37,13 @@ class Outline:
     Attributes
     ----------
     body : ndarray, (n, 2), m
-        Corners, each neighbour's next; in vehicle axes forward and right, or where it was placed.
+        Corners in order around the body, in vehicle axes forward and right, or as placed.
     windows : tuple of ndarray, (k, 2), m
-        Filled: the windscreen first, or an arrow towards the front of a stated outline.
+        Filled shapes: the windscreen first, or an arrow towards the front of a stated outline.
     folds : tuple of ndarray, (k, 2), m
         Lines on the body.
     stated : bool
-        Whether the outline is the case's own, and not a car's of its length and width.
+        Whether the outline is stated in the case, instead of a car of its length and width.
     """
 
     body: Array = field(repr=False)
@@ -53,12 +53,12 @@ class Outline:
 
     @property
     def low(self) -> Array:
-        """Least coordinates, (2,), m."""
+        """Minimum coordinates, (2,), m."""
         return np.asarray(self.body.min(axis=0))
 
     @property
     def high(self) -> Array:
-        """Greatest coordinates, (2,), m."""
+        """Maximum coordinates, (2,), m."""
         return np.asarray(self.body.max(axis=0))
 
     def placed(self, at: ArrayLike, heading_deg: float, point: ArrayLike = (0.0, 0.0)) -> Outline:
@@ -67,7 +67,7 @@ class Outline:
         Parameters
         ----------
         at : array_like, (2,), m
-            Where `point` is: north and east, or whatever a heading of zero and of 90 deg are.
+            Position of `point`: north and east, or the axes of headings of zero and of 90 deg.
         heading_deg : float, deg
             Clockwise from above. Roll and pitch are not shown.
         point : array_like, (2,), m
@@ -88,7 +88,7 @@ class Outline:
         )
 
     def edge(self, point: ArrayLike, direction_deg: float) -> float:
-        """How far from a point the outline ends in a direction, m; zero where it is not met.
+        """Distance from a point to the outline in a direction, m; zero if it does not intersect.
 
         Parameters
         ----------
@@ -154,18 +154,18 @@ def draw_outline(
     opacity: float = 1.0,
     details: bool = True,
 ) -> None:
-    """Draw a vehicle whose points are in pixels already.
+    """Draw a vehicle whose points are already in pixels.
 
     Parameters
     ----------
     drawing : Drawing
     pixels : Outline
     colour, width, dash
-        Of its edge.
+        Style of its edge.
     fill, opacity
-        Of its body.
+        Style of its body.
     details : bool
-        Whether all windows and folds are drawn, and not only what tells the front.
+        Whether all windows and folds are drawn, or only the marking of the front.
     """
     drawing.shape(pixels.body, colour, width, dash, fill=fill, opacity=opacity)
     for k, window in enumerate(pixels.windows):

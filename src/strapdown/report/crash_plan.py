@@ -1,4 +1,4 @@
-"""The path of the reference point from above, with its bound and the vehicle at a few instants."""
+"""Plan of the reference point's path with its bound and the vehicle at a few instants."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _WIDTH, _SMALL_WIDTH, _LEFT, _TOP = 640.0, 370.0, 58.0, 12.0
 _HEIGHTS = (170.0, 380.0)
 _UNDER = 36.0  # ticks and name of the axis
 _ENLARGED = 270.0  # width of the second view
-# A path shorter than this part of the vehicle's length is drawn a second time, larger.
+# A path shorter than this share of the vehicle's length is also drawn enlarged.
 _SHORT = 0.6
 _BAND, _BAND_EDGE = "#d3e8f6", SKY
 _LOOKS = (
@@ -40,7 +40,7 @@ _LOOKS = (
 )
 _ARROW = 44.0  # pixels
 _SMALL_CAPTION = "The vehicle at the instants named, in m from its place at the entry."
-_SLOW, _EVERY = 0.05, 0.1  # m/s, below it there is no arrow; s between dots
+_SLOW, _EVERY = 0.05, 0.1  # m/s, slower entries have no arrow; s between dots
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,19 +82,19 @@ def path_plan(
         In vehicle axes.
     events : sequence of CrashEvent
     point : sequence of float, m
-        The reference point in vehicle axes, whose path it is.
+        Reference point of the path, in vehicle axes.
     names : (str, str)
         Of the first two axes of the path.
     reference : DataFrame, optional
         ``north east`` of the point in the axes of the path, m, indexed by time.
     reference_name : str
     small : bool
-        For half a page's width, in letters as large as of the whole width.
+        Draw for half a page width, with letters as large as at the whole width.
 
     Returns
     -------
     Picture
-        A path short against the vehicle is drawn a second time, larger, if there is the width.
+        A path short against the vehicle is also drawn enlarged, if the width permits.
     """
     plan = _plan(path, events, reference)
     whole = _SMALL_WIDTH if small else _WIDTH
@@ -228,7 +228,7 @@ def _entry_arrow(
 
 
 def _draw_band(out: Drawing, view: PlanView, plan: _Plan) -> None:
-    """The edge of all areas together: first each with its edge, then all insides over it."""
+    """Draw the outer edge of all areas: first each with its edge, then all insides over it."""
     areas = [view.pixels(area) for area in plan.areas]
     for area in areas:
         out.shape(area, _BAND_EDGE, 1.6, fill=_BAND)
@@ -256,7 +256,7 @@ def _draw_path(out: Drawing, view: PlanView, plan: _Plan, faint: bool) -> None:
 def _legend_rows(
     plan: _Plan, reference_name: str, width: float
 ) -> list[list[tuple[float, str, str, str]]]:
-    """Rows of entries: place from the left, kind, colour, words."""
+    """Rows of legend entries: position from the left, kind, color, text."""
     speed = math.hypot(*plan.path.entry.velocity[:2])
     told = f"{plain(speed, 1)} m/s ({plain(3.6 * speed, 1)} km/h)" if speed >= _SLOW else "at rest"
     entries = [

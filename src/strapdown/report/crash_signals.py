@@ -1,4 +1,4 @@
-"""What each unit recorded: its ranges, what was merged of them, and where they were at an end."""
+"""Charts of each unit's record: its ranges, their merged signal, and range limits reached."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class UnitSignals:
     crash : Chart
         Specific force about the crash: as recorded and merged.
     rates : Chart or None
-        Rates about the crash; None where the unit has no gyro of its own.
+        Rates about the crash; None if the unit has no gyro of its own.
     overview : Chart
         The whole record.
     """
@@ -82,7 +82,7 @@ def unit_signals(
     number: int,
     events: Sequence[CrashEvent],
 ) -> UnitSignals:
-    """Chart what a unit recorded.
+    """Chart the record of a unit.
 
     Parameters
     ----------
@@ -91,9 +91,9 @@ def unit_signals(
     synchronised : SynchronisedUnit
     unit : UnitReconstruction
     number : int
-        Of the unit, from 0: for its colour.
+        Index of the unit, from 0; sets its color.
     events : sequence of CrashEvent
-        Of the crash, as the mean of the units has them.
+        Events of the crash, from the mean of the units.
     """
     if unit.at_point.prepared is None:
         raise ValueError(f"{unit.name} is a mean of units, which recorded nothing")
@@ -179,14 +179,14 @@ def _about_the_crash(
 
 
 def _told(assumed: Sequence[str]) -> str:
-    """What is not drawn, for a caption."""
+    """Caption text on the axes that are not drawn."""
     if not assumed:
         return ""
     return f" Not recorded but assumed, and not drawn: {', '.join(assumed)}."
 
 
 def _once(lines: list[Line]) -> list[Line]:
-    """Lines that hold something."""
+    """Lines with finite values."""
     return [line for line in lines if np.isfinite(line.y).any()]
 
 
@@ -277,21 +277,21 @@ def _overview(unit: UnitReconstruction, number: int, events: Sequence[CrashEvent
     )
 
 
-# A triad as recorded: its curves in vehicle axes, and the ends of its range.
+# A triad as recorded: its curves in vehicle axes, and the limits of its range.
 
 Flags = NDArray[np.bool_]
 
-#: Buckets of a curve, of which a report has many.
+#: Buckets per curve; a report has many curves.
 BUCKETS = 700
-# A sensor's axis that is along one of the vehicle's within 18 deg has its limits there, too.
+# A sensor axis within 18 deg of a vehicle axis also has its limits drawn there.
 _ALONG = 0.95
 _PART = 0.3
-# Limits are drawn from this part of the range on: others would only make the signal small.
+# Limits are drawn from this share of the range on; others would compress the signal.
 _NEAR = 0.5
 
 
 def in_vehicle_axes(values: Array, C: Array) -> Array:
-    """Turned; an axis that is missing spoils only what it has a part in."""
+    """Rotate to vehicle axes; a missing sensor axis affects only the axes it contributes to."""
     parts = np.where(np.abs(C) < 0.02, 0.0, C)[None] * np.where(
         np.abs(C)[None] < 0.02, 0.0, values[:, None, :]
     )
@@ -299,7 +299,7 @@ def in_vehicle_axes(values: Array, C: Array) -> Array:
 
 
 def flags_in_vehicle_axes(flags: Flags, C: Array) -> Flags:
-    """Whether a sensor's axis that has a part in one of the vehicle's is at its end."""
+    """Whether a sensor axis that contributes to a vehicle axis is at the end of its range."""
     return np.asarray((flags[:, None, :] & (np.abs(C)[None] > _PART)).any(axis=2))
 
 
@@ -313,7 +313,7 @@ def triad_lines(
     look: tuple[str, str],
     legend: Callable[[int], bool],
 ) -> list[list[Line]]:
-    """One triad as recorded, by vehicle axis, and a symbol where it is at its end."""
+    """Curves of one triad as recorded, by vehicle axis, with symbols at the end of its range."""
     C = unit.mounting.C_vs
     stamps = triad.table.index.to_numpy(dtype=np.float64) - offset
     inside = (stamps >= span[0]) & (stamps <= span[1])
@@ -350,7 +350,7 @@ def triad_lines(
 def near_levels(
     triad: RecordedTriad, C: Array, lines: Sequence[Line], axis: int, scale: float, unit: str
 ) -> list[Level]:
-    """Ends of the range that a signal comes near, where they are along one axis."""
+    """Range limits that a signal comes near, if a sensor axis is along the vehicle axis."""
     own = int(np.argmax(np.abs(C[axis])))
     if abs(C[axis, own]) < _ALONG:
         return []

@@ -1,4 +1,4 @@
-"""The records of a simulated crash as files, with their case and the truth, sealed in a bundle."""
+"""Write the records of a simulated crash, its case and the truth as a sealed bundle."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ __all__ = [
 ]
 
 
-# Over which 49 CFR 563 looks for the change of an event; the pulses of all crashes here are over.
+# Interval in which 49 CFR 563 seeks the delta-V of an event; all pulses here end within it.
 SPAN = 0.15  # s
 
 
@@ -62,24 +62,24 @@ def write_crash_simulation(spec: CrashSimulationSpec, out: Path, *, force: bool 
     ----------
     spec : CrashSimulationSpec
     out : Path
-        Folder to make.
+        Folder to create.
     force : bool
-        Replace a bundle that is there.
+        Overwrite an existing bundle.
 
     Returns
     -------
     Seal
-        The folder holds one text table a part of each recorder (``imu1_low_g.csv``), or one test
-        in ISO MME a recorder (``imu1/imu1.mme``), on its own clock; ``cameras.csv``, the path of
-        the reference point that two cameras saw, and ``truth.csv``, the exact one with velocity
+        The folder holds one text table per part of each recorder (``imu1_low_g.csv``), or one test
+        in ISO MME per recorder (``imu1/imu1.mme``), on its own clock; ``cameras.csv``, the path of
+        the reference point seen by two cameras, and ``truth.csv``, the exact path with velocity
         and attitude, both by time from the trigger; ``case.toml``, which `strapdown crash` reads;
-        and ``scenario.json`` with the exact answers and every error that was drawn.
+        and ``scenario.json`` with the exact answers and every drawn error.
 
     Raises
     ------
     ConfigError
-        The crash, a recorder, a format or the sampling is unknown, the rate is too low to record
-        with, or `out` may not be written.
+        The crash, a recorder, a format or the sampling is unknown, the rate is too low, or `out`
+        may not be written.
     """
     check_destination(out, force)
     formats = _formats(spec)
@@ -96,7 +96,7 @@ def write_crash_simulation(spec: CrashSimulationSpec, out: Path, *, force: bool 
         seals=seals,
     ) as folder:
         places: dict[str, PartPlace] = {}
-        # The case reads what was named first.
+        # The case reads the format that was named first.
         for name in reversed(formats):
             for unit in recorded.units:
                 places |= RECORD_WRITERS[name](folder, unit)
@@ -130,7 +130,7 @@ def _parts(of: RecordedUnit) -> list[tuple[int | None, RecordedTriad]]:
 
 
 def _write_csv(folder: Path, of: RecordedUnit) -> dict[str, PartPlace]:
-    """One text table a part, as a recorder exports it."""
+    """Write one text table per part, as exported by a recorder."""
     places = {}
     for which, triad in _parts(of):
         name = part_file(of, which)
@@ -141,7 +141,7 @@ def _write_csv(folder: Path, of: RecordedUnit) -> dict[str, PartPlace]:
 
 
 def _write_mme(folder: Path, of: RecordedUnit) -> dict[str, PartPlace]:
-    """One test in ISO MME for all parts, as a laboratory hands it over."""
+    """Write one test in ISO MME for all parts, as delivered by a laboratory."""
     name = of.unit.name.lower()
     channels = {part_file(of, which): _channels(of, which, triad) for which, triad in _parts(of)}
     record = CrashRecord(
@@ -179,7 +179,7 @@ def _channels(
     return channel(0), channel(1), channel(2)
 
 
-#: What records are written in: a function that says where each part of a recorder then is.
+#: Writers by format; each returns the file location of each part of a recorder.
 RECORD_WRITERS: dict[str, Callable[[Path, RecordedUnit], dict[str, PartPlace]]] = {
     "csv": _write_csv,
     "mme": _write_mme,
@@ -187,7 +187,7 @@ RECORD_WRITERS: dict[str, Callable[[Path, RecordedUnit], dict[str, PartPlace]]] 
 
 
 def _description(spec: CrashSimulationSpec, recorded: RecordedCase) -> dict[str, Any]:
-    """What really happened, and what the recorders really did."""
+    """True motion, and true errors of the recorders."""
     case, entry = recorded.case, recorded.entry
     crash = case.crash
     return {
@@ -231,7 +231,7 @@ def _impacts(recorded: RecordedCase) -> list[dict[str, Any]]:
         found.append(
             {
                 "time_s": since,
-                # Of the blow alone, in the vehicle's axes as they lie when it begins.
+                # Of the impact alone, in the vehicle's axes at its start.
                 "delta_v_m_per_s": list(change),
                 "pdof_deg": pdof(change).horizontal_deg,
                 "span_s": SPAN,
@@ -246,7 +246,7 @@ def _impacts(recorded: RecordedCase) -> list[dict[str, Any]]:
 
 
 def _yaw(recorded: RecordedCase, since: float) -> float:
-    """Yaw rate about the vehicle's down axis, deg/s, exactly."""
+    """Exact yaw rate about the vehicle's down axis, deg/s."""
     crash = recorded.case.crash
     rate = crash.motion.rate(np.array([crash.start + since]))
     return math.degrees(float(rate[0, 2]))
@@ -296,10 +296,10 @@ def _mounting(mounting: Mounting) -> dict[str, list[float]]:
     return {"position_m": list(mounting.position), "angles_deg": list(mounting.angles_deg)}
 
 
-# The case file of a simulated crash: what an investigator would fill in, filled in.
+# Case file of a simulated crash, completed as by an investigator.
 
 
-# Attributes of a triad's uncertainty, and the keys of the catalogue in which a case states them.
+# Attributes of a triad's uncertainty, and the catalogue keys that state them in a case.
 _STATED: dict[str, dict[str, str]] = {
     "accel": {
         "noise_density": "noise_density_ug_per_sqrt_hz",
@@ -323,10 +323,10 @@ _STATED: dict[str, dict[str, str]] = {
         "bandwidth": "bandwidth_hz",
     },
 }
-# A catalogue states an uncertainty to fewer digits than this.
+# Digits of an uncertainty; a catalogue states fewer.
 _DIGITS = 7
 _COMMON_RATE = 200.0  # Hz
-# Where comments begin.
+# Column of the comments.
 _COLUMN = 34
 _HEAD = """\
 # {summary}.
@@ -414,7 +414,7 @@ seed = 0
 
 @dataclass(frozen=True)
 class PartPlace:
-    """Where a part of a recorder was written: the file, its three channels, and its stamps."""
+    """Location of a recorder's part: the file, its three channels, and its time stamps."""
 
     path: str
     channels: tuple[str, str, str]
@@ -430,12 +430,12 @@ def case_text(recorded: RecordedCase, places: Mapping[str, PartPlace], seed: int
     places : mapping of str to PartPlace
         By `part_file`.
     seed : int
-        Of the simulation, for the file's number.
+        Seed of the simulation, for the file's number.
 
     Returns
     -------
     str
-        TOML that states what is told of the recorders, and not what they really did.
+        TOML with the stated properties of the recorders, not their true errors.
     """
     case, entry = recorded.case, recorded.entry
     summary = case.summary[0].upper() + case.summary[1:]
@@ -483,7 +483,7 @@ def part_name(unit: RecordedUnit, which: int | None) -> str:
 
 
 def part_file(unit: RecordedUnit, which: int | None) -> str:
-    """Name of the file of a part, without ending."""
+    """File name of a part, without extension."""
     return f"{unit.unit.name}_{part_name(unit, which)}".lower().replace("-", "_")
 
 
@@ -541,7 +541,7 @@ def _triad_text(
 
 
 def _differences(kind: str, sensor: str, told: TriadUncertainty) -> list[str]:
-    """What is told of a triad and is not as its data sheet has it."""
+    """Stated uncertainties of a triad that differ from its data sheet."""
     sheet = uncertainty_of(load_sensor(sensor), kind)
     found = []
     for name, key in _STATED[kind].items():
@@ -568,7 +568,7 @@ def _gravity(recorded: RecordedCase) -> float:
 
 
 def _rate(recorded: RecordedCase) -> float:
-    """Of the common stamps: 200 Hz, or what the slowest recorder has."""
+    """Rate of the common stamps: 200 Hz, or that of the slowest recorder."""
     rates = [t.rate for u in recorded.units for t in u.recorder.design.accelerometers]
     return min(_COMMON_RATE, *rates)
 
@@ -587,7 +587,7 @@ def _text(text: str) -> str:
 
 
 def _aligned(text: str) -> str:
-    """Comments behind values, all in one column where the values leave room."""
+    """Align the comments behind values in one column, where the values leave room."""
     lines = []
     for line in text.splitlines():
         value, mark, comment = line.partition("  # ")
@@ -601,10 +601,10 @@ def _wrapped(text: str) -> list[str]:
     return textwrap.wrap(text, 94)
 
 
-# Errors of a sensor in words that carry their units.
+# Stated errors of a sensor, with keys that carry their units.
 
 
-# What follows the unit of the triad in a key, or stands instead of it.
+# Suffix to the unit of the triad in a key, or its replacement.
 _AFTER = {
     "noise_density": "_per_sqrt_hz",
     "random_walk": "_per_sqrt_s",
@@ -624,7 +624,7 @@ _UNITS = {
 
 
 def stated_errors(errors: TriadErrors, unit: str) -> dict[str, Any]:
-    """The errors that there are, each key with its unit."""
+    """The errors that are set; each key carries its unit."""
     none, stated = TriadErrors(), {}
     for f in fields(errors):
         value = getattr(errors, f.name)

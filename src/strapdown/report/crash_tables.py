@@ -51,7 +51,7 @@ FROM_THE_ENTRY = (
 
 
 def answers_table(result: CaseResult) -> TableBlock:
-    """Changes of velocity of every event, by every recorder."""
+    """Delta-V of every event, by every recorder."""
     rows: list[tuple[str, ...]] = []
     strong = []
     for unit in result.reconstruction.answers:
@@ -158,12 +158,12 @@ def _ends(interval: AngleInterval, shift: float = 0.0) -> str:
 
 
 def path_table(result: CaseResult) -> TableBlock:
-    """Places at the end of the path, by every recorder."""
+    """Positions at the end of the path, by every recorder."""
     rows = []
     for unit in result.reconstruction.answers:
         table, sd = unit.path.table.iloc[-1].copy(), unit.path.sd.iloc[-1]
         if not over_ground(result):
-            # As the charts: from where it pointed, and not round the compass.
+            # As in the charts: relative to the initial heading, within half a turn.
             table["heading"] = float(within_half_turn(table["heading"]))
         rows.append(
             (
@@ -186,7 +186,7 @@ def path_table(result: CaseResult) -> TableBlock:
 
 
 def budget_table(result: CaseResult) -> TableBlock | None:
-    """Return what makes the bounds: one standard deviation of each contributor."""
+    """Return the error budget: one standard deviation of each contributor."""
     unit = result.reconstruction.main
     ends = unit.path.variances()[NED]
     number = main_event(unit)
@@ -226,11 +226,11 @@ def _sizes(sizes: np.ndarray[tuple[int], np.dtype[np.float64]]) -> tuple[str, ..
     return tuple("–" if s < 5e-4 else plain(float(s), 3) for s in scaled)
 
 
-# Tables of a crash report that hold its answers against recorders, models and references.
+# Comparison with other recorders, injury-risk models and references.
 
 
 def comparison_table(result: CaseResult) -> TableBlock | None:
-    """Return how pairs of recorders agree."""
+    """Return the agreement of pairs of recorders."""
     comparison = result.reconstruction.comparison
     if comparison is None:
         return None
@@ -272,7 +272,7 @@ def comparison_table(result: CaseResult) -> TableBlock | None:
 
 
 def severity_table(result: CaseResult) -> TableBlock | None:
-    """Return what models of injury risk say."""
+    """Return the results of the injury-risk models."""
     if not result.severity:
         return None
     rows = []
@@ -303,7 +303,7 @@ def severity_table(result: CaseResult) -> TableBlock | None:
 
 
 def reference_tables(result: CaseResult) -> tuple[TableBlock, ...]:
-    """Return the answers beside what else is known: changes of velocity, and paths."""
+    """Return the answers beside references: delta-V values, and paths."""
     changes: list[tuple[str, ...]] = []
     paths: list[tuple[str, ...]] = []
     for answer in result.references:
@@ -351,14 +351,14 @@ def _name(answer: ReferenceAnswer, result: CaseResult) -> str:
     return MEAN if combined is not None and answer.unit == combined.name else answer.unit
 
 
-# Tables of what a crash report rests on: records, recorders, sensors, files.
+# Inputs of a crash report: records, recorders, sensors, files.
 
 
 DEG = math.degrees(1.0)
 
 
 def records_table(result: CaseResult) -> TableBlock:
-    """Return what was taken from each record, for which recorder."""
+    """Return the channels taken from each record, and their recorder."""
     rows = []
     for spec, unit in zip(result.spec.units, result.units, strict=True):
         for triad_spec, triad in zip(spec.accelerometers, unit.accelerometers, strict=True):
@@ -401,7 +401,7 @@ def _rate(triad: RecordedTriad) -> str:
 
 
 def units_table(result: CaseResult) -> TableBlock:
-    """Where each recorder sits and how its clock is tied."""
+    """Mounting position and clock synchronization of each recorder."""
     rows = []
     for unit, at in zip(result.units, result.reconstruction.synchronised.units, strict=True):
         mounting = unit.mounting
@@ -436,7 +436,7 @@ def units_table(result: CaseResult) -> TableBlock:
 
 
 def sensors_table(result: CaseResult) -> TableBlock:
-    """What is stated of each triad of sensors."""
+    """Stated properties of each sensor triad."""
     rows = []
     for spec, unit in zip(result.spec.units, result.units, strict=True):
         for triad_spec, triad in zip(spec.accelerometers, unit.accelerometers, strict=True):
@@ -482,7 +482,7 @@ def _sensor(
 
 
 def inputs_table(result: CaseResult) -> TableBlock:
-    """Return the files that the report rests on."""
+    """Return the input files of the report."""
     rows = []
     for item in result.inputs:
         for file, digest in zip(item.files, item.digests, strict=True):

@@ -1,4 +1,4 @@
-"""What a case found, in sentences; terminal, page and PDF say the same."""
+"""Results of a case in sentences, shared by terminal, page and PDF."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def direction(unit: UnitReconstruction, number: int) -> str:
 
 
 def key_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
-    """Return the numbers of page one."""
+    """Return the key figures of page one."""
     unit = result.reconstruction.main
     number = main_event(unit)
     figures: list[KeyFigure] = []
@@ -144,7 +144,7 @@ def key_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
 
 
 def lead(result: CaseResult) -> str:
-    """Return the one paragraph of page one."""
+    """Return the lead paragraph of page one."""
     unit = result.reconstruction.main
     number = main_event(unit)
     parts = []
@@ -180,7 +180,7 @@ def lead(result: CaseResult) -> str:
 
 
 def entry_words(result: CaseResult) -> str:
-    """Return how the vehicle came, and how that is known."""
+    """Return the entry speed and its source."""
     entry = result.spec.entry
     if entry.kind == "standstill":
         return "The vehicle stood still when the record began."
@@ -201,7 +201,7 @@ def entry_words(result: CaseResult) -> str:
 
 
 def path_words(result: CaseResult) -> str:
-    """Return where the path ends."""
+    """Return the end position of the path."""
     unit = result.reconstruction.main
     place, half = _end(unit)
     (ahead, aside, _), (first, second, _) = (axis_names(result), place)
@@ -213,7 +213,7 @@ def path_words(result: CaseResult) -> str:
 
 
 def units_words(result: CaseResult) -> str:
-    """Return how many recorders there are, and whether they agree."""
+    """Return the number of recorders, and whether they agree."""
     made = result.reconstruction
     names = [u.name for u in made.units]
     if len(names) == 1:
@@ -237,17 +237,17 @@ def _axes(result: CaseResult) -> str:
 
 
 def _end(unit: UnitReconstruction) -> tuple[list[float], list[float]]:
-    """Place at the end of the path and the half widths of its bound, m."""
+    """Position at the end of the path and the half widths of its bound, m."""
     place = unit.path.table[NED].iloc[-1].tolist()
     half = (TWO_SIDED_95 * unit.path.sd[NED].iloc[-1]).tolist()
     return place, half
 
 
-# What is told where recorders do not agree: each by itself, and the span of all.
+# Wording for recorders that disagree: each one separately, and the span of all.
 
 
 def apart(result: CaseResult) -> bool:
-    """Tell whether there are recorders that do not agree, so that there is no mean of them."""
+    """Whether the recorders disagree, so that they have no mean."""
     made = result.reconstruction
     return made.comparison is not None and not made.comparison.agree and made.combined is None
 
@@ -264,7 +264,7 @@ def apart_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
     Parameters
     ----------
     result : CaseResult
-        Of recorders that do not agree.
+        Of recorders that disagree.
     """
     units = result.reconstruction.units
     spans = [span for span in map(_span, units) if span is not None]
@@ -326,10 +326,10 @@ def _directions(units: tuple[UnitReconstruction, ...]) -> str:
     return " / ".join(f"{plain(angle, 0)}°" for angle in angles) or "not determined"
 
 
-# What was noticed in the records of a case, and what a record says of itself.
+# Findings in the records of a case, and the metadata of a record.
 
 
-# A number whose digits beyond the sixth tell nothing, as 15.858333333.
+# A number with needless digits, as 15.858333333.
 LONG = re.compile(r"-?\d+\.\d{5,}")
 # Keys of a record that end with their unit.
 UNITS = {"_m_per_s": "m/s", "_kg": "kg", "_m": "m", "_deg": "deg"}
@@ -338,20 +338,20 @@ UNITS = {"_m_per_s": "m/s", "_kg": "kg", "_m": "m", "_deg": "deg"}
 def notes(
     findings: Sequence[Finding], result: CaseResult, *, remedies: bool = True
 ) -> tuple[tuple[str, str], ...]:
-    """Return findings as items, one for all files and recorders of which the same is said.
+    """Return findings as items; files and recorders with the same finding share an item.
 
     Parameters
     ----------
     findings : sequence of Finding
     result : CaseResult
-        Whose mean of the recorders is called that.
+        Supplies the name of the recorders' mean.
     remedies : bool
-        Whether each says what can be done about it.
+        Whether each item includes its remedy.
 
     Returns
     -------
     tuple of (str, str)
-        Where, and what, with what can be done about it.
+        Location, and finding with its remedy.
     """
     combined = result.reconstruction.combined
     told: dict[tuple[str, str], list[str]] = {}
@@ -372,7 +372,7 @@ def notes(
         alike = [k for k in told if _alike(alike_by[k], finding)]
         alike_by[key] = finding
         if file == MEAN and alike:
-            # What differs from the mean's in its numbers alone is said once, with those of it.
+            # A finding of the mean that differs only in numbers is joined with the recorders'.
             files = [f for k in alike for f in told.pop(k)]
             told[key] = [*files, file]
         else:
@@ -384,7 +384,7 @@ def notes(
 
 
 def _alike(first: Finding, second: Finding) -> bool:
-    """Whether two say the same with other numbers."""
+    """Whether two findings differ only in their numbers."""
     return (
         first.code == second.code
         and first.quantity == second.quantity
@@ -416,7 +416,7 @@ def _sentence(text: str) -> str:
 
 
 def record_facts(record: CrashRecord) -> tuple[tuple[str, str], ...]:
-    """Return what a record says of the test, once, with units.
+    """Return the test metadata of a record, with units.
 
     Parameters
     ----------
@@ -425,7 +425,7 @@ def record_facts(record: CrashRecord) -> tuple[tuple[str, str], ...]:
     Returns
     -------
     tuple of (str, str)
-        Empty where it says nothing but the name of its file.
+        Empty if the record has only its file name.
     """
     rows = []
     if record.title and record.title != record.path.stem:

@@ -1,4 +1,4 @@
-"""The first page of a demonstration: what several runs answered, each with its picture."""
+"""First page of a demonstration: the answers of several runs, each with its picture."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["Shown", "demo_page", "shown_answer", "shown_truth"]
 
 _MS_TO_KMH = 3.6
 _SMALL_DEG = 1e-3
-# Narrower than this many of its units, a letter of a picture cannot be read.
+# Smallest width, as a share of the picture's own units, with readable letters.
 _LEAST_SHARE = 0.55
 _SIZE = re.compile(r"<svg[^>]*?viewBox=\"[\d.\-]+ [\d.\-]+ ([\d.]+) [\d.]+\"", re.S)
 
@@ -31,19 +31,19 @@ class Shown:
     Attributes
     ----------
     part : str
-        A, B or C: which of the three systems.
+        A, B or C: one of the three systems.
     slug : str
         Its folder beside the page.
     title : str
     question : str
     command : str
-        What makes it again, as typed beside the page's own folder.
+        Command that reproduces it, typed beside the page's own folder.
     figures : tuple of str
-        Figures of the bundle, without their ending.
+        Figures of the bundle, without their extension.
     pages : tuple of (file, words)
-        What to open.
+        Pages to open.
     records : str, optional
-        Folder of the records with the truth, of a simulated crash.
+        Folder of the records with the truth, for a simulated crash.
     """
 
     part: str
@@ -57,12 +57,12 @@ class Shown:
 
 
 def shown_answer(bundle: Path) -> str:
-    """What a bundle answers, in one sentence or two.
+    """Return the answer of a bundle in one or two sentences.
 
     Parameters
     ----------
     bundle : Path
-        Of `attitude`, `crash`, `navigate` or `coast`.
+        From `attitude`, `crash`, `navigate` or `coast`.
 
     Returns
     -------
@@ -80,7 +80,7 @@ def shown_answer(bundle: Path) -> str:
 
 
 def shown_truth(bundle: Path, records: Path | None = None) -> str | None:
-    """What is known beside a bundle's answer, and how far that is from it.
+    """Return the truth or reference of a bundle, and the error of its answer.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def shown_truth(bundle: Path, records: Path | None = None) -> str | None:
     Returns
     -------
     str or None
-        None where nothing is known.
+        None without a truth or reference.
     """
     kind, told = _told(bundle)
     if kind == "attitude":
@@ -104,20 +104,20 @@ def shown_truth(bundle: Path, records: Path | None = None) -> str | None:
 
 
 def demo_page(shown: Sequence[Shown], folder: Path, missing: str | None = None) -> str:
-    """Lay out the page.
+    """Return the page.
 
     Parameters
     ----------
     shown : sequence of Shown
-        Their bundles stand in `folder`.
+        Runs with their bundles in `folder`.
     folder : Path
     missing : str, optional
-        What could not be shown, and why.
+        Missing parts, and the reason.
 
     Returns
     -------
     str
-        HTML that needs no network; the same for the same bundles.
+        HTML that needs no network; identical for the same bundles.
     """
     runs = [
         {
@@ -161,7 +161,7 @@ def _degrees(value: float) -> str:
 
 def _crash_truth(scenario: dict[str, Any]) -> str:
     (impact,) = scenario["impacts"]
-    # The report tells both along the axes of the vehicle, which turns meanwhile.
+    # The report states both along the axes of the vehicle, which turns meanwhile.
     change = math.hypot(*impact["delta_v_along_turning_axes_m_per_s"]) * _MS_TO_KMH
     return (
         f"Simulated: the change of velocity is {plain(change, 2)} km/h, the force comes from "

@@ -1,4 +1,4 @@
-"""A report as plain data: sections of blocks, which a page and a PDF show alike."""
+"""A report as plain data: sections of blocks, shown alike by page and PDF."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Paragraph:
-    """Words in a row; plain text, which no reader takes for markup.
+    """A paragraph of plain text, never interpreted as markup.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class Paragraph:
 
 @dataclass(frozen=True)
 class Items:
-    """A list; each with a head, which may be empty, and its text."""
+    """A list; each item has a head, which may be empty, and its text."""
 
     rows: tuple[tuple[str, str], ...]
     numbered: bool = False
@@ -53,7 +53,7 @@ class Items:
 
 @dataclass(frozen=True)
 class Facts:
-    """Names and what they are: two columns without a head."""
+    """Names and values in two columns without a header."""
 
     rows: tuple[tuple[str, str], ...]
 
@@ -68,10 +68,10 @@ class TableBlock:
         With units.
     rows : tuple of tuple of str
     text : tuple of int
-        Columns of words, to the left; others are numbers, to the right.
+        Left-aligned text columns; the others are right-aligned numbers.
     caption : str
     strong : tuple of int
-        Rows that stand out, such as a sum.
+        Emphasized rows, such as a sum.
     """
 
     columns: tuple[str, ...]
@@ -83,24 +83,24 @@ class TableBlock:
 
 @dataclass(frozen=True)
 class ChartBlock:
-    """A chart: alive in the page, drawn as SVG in the PDF and among the figures."""
+    """A chart: interactive in the page, drawn as SVG in the PDF and among the figures."""
 
     chart: Chart
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture drawn by hand, the same in page and PDF.
+    """A custom SVG picture, the same in page and PDF.
 
     Attributes
     ----------
     slug : str
-        Name of the file among the figures.
+        File name among the figures.
     svg : str
-        A whole SVG; every text in it from outside is escaped.
+        A whole SVG; all external text in it is escaped.
     title, caption : str
     alt : str
-        In words, for who cannot see it.
+        Text alternative for readers who cannot see it.
     width_mm : float
         On paper.
     """
@@ -115,17 +115,17 @@ class Picture:
 
 @dataclass(frozen=True)
 class Animation:
-    """A figure of plotly with frames in the page; stills in the PDF.
+    """A plotly figure with frames in the page; stills in the PDF.
 
     Attributes
     ----------
     slug : str
     figure : mapping
-        Plain data: ``data``, ``layout``, ``frames``, each with a name that says when it is, and
-        ``interval_ms`` between them, if not 60. The page has the button and the slider.
+        Plain data: ``data``, ``layout``, ``frames``, each named by its time, and ``interval_ms``
+        between them, if not 60. The page has the button and the slider.
     stills : Picture
     live_caption : str
-        What is true of the page alone.
+        Caption that applies to the page only.
     """
 
     slug: str
@@ -138,7 +138,7 @@ class Animation:
 
 @dataclass(frozen=True)
 class KeyFigure:
-    """A number that matters: its name, the value with its unit, and its bound in words."""
+    """A key number: its name, the value with its unit, and its bound in words."""
 
     name: str
     value: str
@@ -148,7 +148,7 @@ class KeyFigure:
 
 @dataclass(frozen=True)
 class KeyFigures:
-    """Numbers that matter, beside each other, and the pictures that belong to them."""
+    """Key numbers side by side, with their pictures."""
 
     figures: tuple[KeyFigure, ...]
     pictures: tuple[Picture, ...] = ()
@@ -174,14 +174,14 @@ class Document:
     ----------
     title, subtitle : str
     facts : tuple of (str, str)
-        Under the title: case, vehicle, what it was made with.
+        Under the title: case, vehicle, software.
     front : tuple of Block
         Page one.
     sections : tuple of Section
     footer : str
         On every page of the PDF, beside the page number.
     links : tuple of (str, str)
-        Files beside the page, and what they are; of the page alone.
+        Files beside the page, with their descriptions; in the page only.
     """
 
     title: str
@@ -193,11 +193,10 @@ class Document:
     links: tuple[tuple[str, str], ...] = ()
 
 
-# A document with every text made plain, whoever wrote it.
+# Conversion of every text in a document to plain text.
 
 
-# Characters, by what holds them: there is less room in a heading, a cell or a chart than in a
-# paragraph.
+# Maximum characters, by block: a heading, a cell or a chart has less room than a paragraph.
 _TITLE, _LABEL, _CELL, _WORDS = 300, 160, 1000, 4000
 _LIMITS: dict[type, dict[str, int]] = {
     Chart: {"caption": _WORDS, "title": _TITLE},
@@ -212,7 +211,7 @@ _LIMITS: dict[type, dict[str, int]] = {
     Animation: {"caption": _WORDS, "live_caption": _TITLE, "title": _TITLE},
 }
 _MARKED = len("[U+10FFFF]")
-# What plotly may read as markup; it would make links of others.
+# Markup that plotly may interpret, for example as links.
 _MARKUP = re.compile(r"<(?!/?(?:b|i|br|sub|sup)\s*/?>)", re.IGNORECASE)
 _SLUG = re.compile(r"[^A-Za-z0-9_-]+")
 
@@ -229,10 +228,10 @@ def plain_document(document: Document) -> Document:
     Returns
     -------
     Document
-        By `plain_text`: paragraphs, items and captions to 4000 characters, facts and cells to
-        1000, titles and what stands under a key figure to 300, its value to 40, other words to
-        160; slugs to 80 letters, digits, ``_`` and ``-``. The page and the PDF do this themselves;
-        whoever writes charts to files beside them does it first. A second pass does nothing.
+        Texts as `plain_text`: paragraphs, items and captions to 4000 characters, facts and cells to
+        1000, titles and the notes of a key figure to 300, its value to 40, other words to 160;
+        slugs to 80 letters, digits, ``_`` and ``-``. The page and the PDF call this themselves;
+        call it before writing charts to separate files. The operation is idempotent.
     """
     return _plain(document, _LABEL)
 
@@ -264,9 +263,9 @@ def _field(owner: Any, name: str) -> Any:
 
 
 def _plain_figure(value: Any) -> Any:
-    """Copy of plotly's plain data in which texts cannot link to anywhere."""
+    """Copy of plotly's plain data whose texts cannot contain links."""
     if isinstance(value, str):
-        # Numbers may be packed into long texts: nothing is cut.
+        # Numbers may be packed into long texts, which must not be cut.
         return _MARKUP.sub("&lt;", plain_text(value, _MARKED * len(value) + 1))
     if isinstance(value, Mapping):
         return {str(key): _plain_figure(item) for key, item in value.items()}
@@ -275,35 +274,35 @@ def _plain_figure(value: Any) -> Any:
     return value
 
 
-# Text from outside as text that shows what it is: no character acts, none is invisible.
+# Sanitizing of external text: no control characters, no invisible characters.
 
 
 _CUT = "… ({} characters)"
-# More of them on one letter would run over the lines above and below.
+# More combining marks on one letter would overlap the lines above and below.
 _MOST_COMBINING = 3
-# Control, format (direction, zero width), lone surrogates, private use: none has its own shape.
+# Control, format (direction, zero width), lone surrogates, private use: no glyph of their own.
 _SHAPELESS = frozenset({"Cc", "Cf", "Cs", "Co"})
 _COMBINING = frozenset({"Mn", "Me"})
 
 
 def plain_text(text: str, limit: int = 4000, *, lines: bool = False) -> str:
-    r"""Text in which every character is seen and none commands.
+    r"""Return text in which every character is visible and none acts as a control.
 
     Parameters
     ----------
     text : str
-        From a file, a case or a person.
+        From a file, a case or a user.
     limit : int
-        Longest result; a longer text is cut and says how long it was.
+        Maximum length of the result; a longer text is cut and its length stated.
     lines : bool
-        Whether ends of lines stay; otherwise they are spaces, as are tabs.
+        Whether line ends are kept; otherwise they become spaces, as do tabs.
 
     Returns
     -------
     str
-        Characters without a shape (``\x00``, the override of direction U+202E, the joiner of zero
-        width U+200D, a lone surrogate) stand as ``[U+202E]``; so does what follows the third
-        combining mark on one letter. Plain text is unchanged, so that a second pass does nothing.
+        Characters without a glyph (``\x00``, the override of direction U+202E, the joiner of zero
+        width U+200D, a lone surrogate) are written as ``[U+202E]``, as are combining marks after
+        the third on one letter. Plain text is unchanged, so the operation is idempotent.
     """
     marked = _marked(text[:limit].replace("\r\n", "\n"), "\n" if lines else " ")
     if len(text) <= limit and len(marked) <= limit:
@@ -313,7 +312,7 @@ def plain_text(text: str, limit: int = 4000, *, lines: bool = False) -> str:
 
 
 def _marked(text: str, end_of_line: str) -> str:
-    # What is printable has a shape; only a heap of combining marks can be wrong with it.
+    # Printable characters have a glyph; only too many combining marks must be marked.
     if text.isprintable() and (text.isascii() or not _COMBINING & _kinds(text)):
         return text
     out: list[str] = []

@@ -1,4 +1,4 @@
-"""A document as plain data, from which a page and a PDF are laid out alike."""
+"""A document as plain data, from which page and PDF are laid out alike."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from strapdown.report.still_chart import still
 __all__ = ["document_data", "draw_stills", "no_stills"]
 
 Place = Callable[[str], str]
-_INTERVAL_MS = 60  # between frames, where an animation does not say
+_INTERVAL_MS = 60  # between frames, if an animation does not state it
 
 
 def draw_stills(document: Document) -> tuple[str, ...]:
@@ -40,13 +40,13 @@ def draw_stills(document: Document) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        An SVG of each, in their order.
+        One SVG per chart, in document order.
     """
     return tuple(still(chart) for chart in _charts(plain_document(document)))
 
 
 def no_stills(document: Document) -> tuple[str, ...]:
-    """Return as many empty drawings as `draw_stills` gives: for a page of live charts alone."""
+    """Return as many empty drawings as `draw_stills`: for a page with interactive charts only."""
     return tuple("" for _ in _charts(document))
 
 
@@ -70,21 +70,21 @@ def document_data(
     stills : sequence of str
         From `draw_stills`.
     place : callable
-        Takes a whole SVG, and returns what the template refers to it by.
+        Takes a whole SVG and returns the template's reference to it.
     alive : bool
-        Whether charts come with plotly's data, too.
+        Whether to include plotly's data of the charts.
 
     Returns
     -------
     dict
-        Strings, numbers, lists and dicts; charts under ``figure`` where alive.
+        Strings, numbers, lists and dicts; charts under ``figure`` if alive.
 
     Raises
     ------
     DataError
-        If a picture is no XML.
+        If a picture is not XML.
     ValueError
-        If a row of a table has not as many cells as there are columns.
+        If a row of a table does not have as many cells as there are columns.
     """
     plain = plain_document(document)
     writer = _Writer(iter(stills), place, alive)
@@ -112,7 +112,7 @@ def _pairs(rows: tuple[tuple[str, str], ...]) -> list[list[str]]:
 
 
 class _Writer:
-    """Blocks as data; figures and tables are numbered in their order."""
+    """Blocks as data; figures and tables are numbered in document order."""
 
     def __init__(self, stills: Iterator[str], place: Place, alive: bool) -> None:
         self._stills, self._place, self._alive = stills, place, alive

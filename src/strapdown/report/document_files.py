@@ -1,4 +1,4 @@
-"""The drawings of a document, each a file beside the page."""
+"""Drawings of a document as files beside the page."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["drawings", "write_drawings", "write_text"]
 
 
 def drawings(document: Document) -> list[ChartBlock | Picture | Animation]:
-    """Return every chart, picture and animation, in the order of the report."""
+    """Return every chart, picture and animation, in report order."""
     found: list[ChartBlock | Picture | Animation] = []
     for block in (*document.front, *(b for s in document.sections for b in s.blocks)):
         if isinstance(block, ChartBlock | Picture | Animation):
@@ -22,13 +22,13 @@ def drawings(document: Document) -> list[ChartBlock | Picture | Animation]:
 
 
 def write_drawings(document: Document, stills: Sequence[str], folder: Path) -> None:
-    """Put every drawing of a report into a folder, which is made.
+    """Write every drawing of a report to a folder, which is created.
 
     Parameters
     ----------
     document : Document
     stills : sequence of str
-        Its charts, from `document_data.draw_stills`; as many as there are of them.
+        Drawn charts from `document_data.draw_stills`, one per chart.
     folder : Path
     """
     folder.mkdir()

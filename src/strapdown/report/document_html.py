@@ -15,24 +15,24 @@ from strapdown.report.document_data import document_data, draw_stills
 __all__ = ["document_page"]
 
 
-_HEIGHT = 420  # pixels, of a figure that does not say
+_HEIGHT = 420  # pixels, of a figure without a stated height
 
 
 def document_page(document: Document, *, stills: Sequence[str] | None = None) -> str:
-    """Lay a document out as a page.
+    """Lay out a document as an HTML page.
 
     Parameters
     ----------
     document : Document
-        Texts are made plain by `document_text.plain_document`, then escaped.
+        Texts are made plain by `document.plain_document`, then escaped.
     stills : sequence of str, optional
-        Charts for paper from `document_data.draw_stills`, where they are drawn already.
+        Drawn charts from `document_data.draw_stills`, if already made.
 
     Returns
     -------
     str
-        HTML; the same for the same document. Pictures stand in it as images, which run nothing and
-        fetch nothing, and a policy in the page forbids both to everything else.
+        HTML, the same for the same document. Pictures are embedded as images, which cannot run
+        scripts or fetch resources; a content policy in the page forbids both to everything else.
     """
     from markupsafe import Markup
     from plotly.offline import get_plotlyjs
@@ -58,7 +58,7 @@ def document_page(document: Document, *, stills: Sequence[str] | None = None) ->
 
 
 def _without_controls(figure: dict[str, Any]) -> dict[str, Any]:
-    """Leave out plotly's own buttons and sliders: the page has some that keys can reach."""
+    """Remove plotly's own buttons and sliders: the page has keyboard-accessible ones."""
     layout = {k: v for k, v in figure["layout"].items() if k not in ("updatemenus", "sliders")}
     return figure | {"layout": layout}
 
@@ -70,16 +70,16 @@ def _image(svg: str) -> str:
 
 
 def _digest(script: str) -> str:
-    """Name of a script in the page's policy; one that is not named does not run."""
+    """Digest of a script for the page's content policy; an unlisted script does not run."""
     whole = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
     return f"'sha256-{whole}'"
 
 
-# Pages: one offline file, every text from outside escaped.
+# Pages: one offline file, every external text escaped.
 
 
 def render(template: str, context: Mapping[str, Any]) -> str:
-    """Render a template into a page that needs nothing else.
+    """Render a template into a self-contained page.
 
     Parameters
     ----------
@@ -104,12 +104,12 @@ def render(template: str, context: Mapping[str, Any]) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    # The one text that is code: plotly's own.
+    # The only text that is code: plotly's own.
     return environment.get_template(template).render(plotly_js=Markup(get_plotlyjs()), **context)
 
 
 def embedded(figure: Mapping[str, Any]) -> Any:
-    """JSON that may stand inside a script element, whatever text it holds.
+    """Encode JSON safely for a script element, whatever text it holds.
 
     Parameters
     ----------

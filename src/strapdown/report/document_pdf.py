@@ -27,23 +27,23 @@ def write_pdf(document: Document, path: Path, *, stills: Sequence[str] | None = 
     Parameters
     ----------
     document : Document
-        Texts are made plain by `document_text.plain_document`, and reach typst as values only.
+        Texts are made plain by `document.plain_document`, and reach typst as values only.
     path : Path
     stills : sequence of str, optional
-        Charts for paper from `document_data.draw_stills`, where they are drawn already.
+        Drawn charts from `document_data.draw_stills`, if already made.
 
     Raises
     ------
     ConfigError
         If typst is not installed.
     DataError
-        If a picture is no SVG, or the document cannot be laid out.
+        If a picture is not SVG, or the document cannot be laid out.
 
     Notes
     -----
-    No date, and no font but those inside typst; what these cannot show stands as its number, such
-    as ``[U+1F697]``. Tagged, PDF/UA-1. Typst reads from a folder of its own, which is gone
-    afterwards, and from nowhere else.
+    Contains no date and no fonts but those inside typst; characters without a glyph are written as
+    their code point, such as ``[U+1F697]``. Tagged, PDF/UA-1. Typst reads only from a temporary
+    folder, which is removed afterwards.
     """
     path.write_bytes(_pdf(document, draw_stills(document) if stills is None else stills))
 
@@ -77,7 +77,7 @@ def _pdf(document: Document, stills: Sequence[str]) -> bytes:
 
 
 def _compiled(typst: Any, folder: Path) -> bytes:
-    """Return the PDF, for readers of the screen if its letters allow it (PDF/UA-1)."""
+    """Return the PDF, accessible to screen readers if its letters allow it (PDF/UA-1)."""
 
     def compiled(**options: Any) -> bytes:
         pdf: bytes = typst.compile(
@@ -96,7 +96,7 @@ def _compiled(typst: Any, folder: Path) -> bytes:
     try:
         return compiled(pdf_standards="ua-1")
     except typst.TypstError as error:
-        # Marks that no font joins to their letter are shown as boxes, which PDF/UA does not allow.
+        # Marks that no font joins to their letter are shown as boxes, which PDF/UA forbids.
         if "PDF/UA-1" not in str(error):
             raise
         return compiled()
@@ -110,12 +110,12 @@ def _typst() -> Any:
     return typst
 
 
-# Which characters the fonts inside typst can show.
+# Characters that the fonts inside typst can show.
 
 
 # Of Libertinus Serif, New Computer Modern and DejaVu Sans Mono, as they are inside typst 0.15, by
-# their character maps; one of them stands in where another has no glyph.
-# Without the few that typst finds in none all the same. Hexadecimal.
+# their character maps; typst falls back from one font to another. Without the few that typst does
+# not find anyway. Hexadecimal.
 _BEYOND_ASCII = """
 A0-AC AE-377 37A-37F 384-38A 38C 38E-3A1 3A3-4FF 510-513 51A-51D 531-556 559-58A 58D-58F 591-5C7
 5D0-5EA 5EF-5F4 606-60C 615 61B 61F 621-63A 640-655 65A 660-66D 674 679-67B 67E-680 683-684
@@ -140,23 +140,23 @@ FE70-FE74 FE76-FEFC FFFC-FFFD 10140-1018E 102E0-102FB 1D106-1D107 1D400-1D454 1D
 1EEA1-1EEA3 1EEA5-1EEA9 1EEAB-1EEBB 1EEF0-1EEF1 1F12F 1F6D1 1F780-1F7D8 1F7E0-1F7EB 1F800-1F80B
 1F810-1F847 1F850-1F859 1F860-1F887 1F890-1F8AD 1F8B0-1F8B1
 """
-# They choose between a letter as text and as a picture; there is one form here.
+# Variation selectors choose between text and picture form; only one form exists here.
 _ONE_FORM = re.compile("[\ufe00-\ufe0f]")
 _BEYOND = re.compile(r"[^\x00-\x7f]")
 
 
 def shown(text: str) -> str:
-    """Text in which every character has a glyph.
+    """Return text in which every character has a glyph.
 
     Parameters
     ----------
     text : str
-        Plain, or of JSON or SVG, whose own signs are ASCII.
+        Plain, or JSON or SVG, whose own signs are ASCII.
 
     Returns
     -------
     str
-        A character without a glyph stands as its number, such as ``[U+1F697]``.
+        A character without a glyph is written as its code point, such as ``[U+1F697]``.
     """
     if text.isascii():
         return text

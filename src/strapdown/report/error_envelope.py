@@ -1,4 +1,4 @@
-"""The area that a point is within with 95 %, along its path."""
+"""Area that contains a point with 95 % probability, along its path."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _CORNERS = 28
 
 
 def ellipse(centre: Array, covariance: Array, corners: int = _CORNERS) -> Array:
-    """Ellipse that holds 95 % of a normal error in a plane.
+    """95 % ellipse of a normal error in a plane.
 
     Parameters
     ----------
@@ -29,19 +29,19 @@ def ellipse(centre: Array, covariance: Array, corners: int = _CORNERS) -> Array:
     Returns
     -------
     ndarray, (corners, 2)
-        On it; all at the centre where there is no error.
+        Points on the ellipse; all at the center if the error is zero.
     """
     values, vectors = np.linalg.eigh(np.where(np.isfinite(covariance), covariance, 0.0))
     turn = np.linspace(0.0, 2.0 * math.pi, corners, endpoint=False)
     round_ = np.column_stack([np.cos(turn), np.sin(turn)])
     axes = vectors * (PLANE_95 * np.sqrt(np.maximum(values, 0.0)))
-    # Which end of an eigenvector is given, and so the first corner, is the library's affair.
+    # The sign of an eigenvector, and so the first corner, depends on the library.
     axes = axes * np.where(axes.sum(axis=0) < 0.0, -1.0, 1.0)
     return np.asarray(centre + round_ @ axes.T)
 
 
 def hull(points: Array) -> Array:
-    """Convex hull of points in a plane, (n, 2), counter-clockwise; they may lie on a line."""
+    """Convex hull of points in a plane, (n, 2), counterclockwise; they may be collinear."""
     ordered = sorted({(float(x), float(y)) for x, y in points})
     if len(ordered) < 3:
         return np.array(ordered, dtype=np.float64).reshape(-1, 2)
@@ -68,12 +68,12 @@ def envelope(places: Array, covariances: Array, pieces: int = 60) -> list[Array]
     places : ndarray, (n, 2)
     covariances : ndarray, (n, 2, 2)
     pieces : int
-        At most.
+        Maximum number of areas.
 
     Returns
     -------
     list of ndarray, (k, 2)
-        Each the convex hull of two ellipses that follow each other, so that no gap is between.
+        Convex hulls of consecutive pairs of ellipses, without gaps between them.
     """
     rows = np.unique(np.linspace(0, len(places) - 1, min(pieces + 1, len(places))).astype(int))
     rings = [ellipse(places[k], covariances[k]) for k in rows]

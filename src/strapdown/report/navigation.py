@@ -1,4 +1,4 @@
-"""A run of navigation as files: page, JSON, tables, paths for maps, sealed in a bundle."""
+"""Write a navigation run as a sealed bundle: page, JSON, tables, paths for maps."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ __all__ = ["rerun_navigation", "write_navigation"]
 
 
 def rerun_navigation(configuration: dict[str, Any], out: Path, *, report: bool = True) -> Seal:
-    """Run a sealed run of navigation again from its configuration, with or without its page."""
+    """Re-run a sealed navigation run from its configuration, with or without its page."""
     spec = navigation_spec(configuration["navigation"])
     path = configuration.get("file_path")
     name = str(configuration["name"])
@@ -43,19 +43,19 @@ def write_navigation(
     force: bool = False,
     progress: Progress = silent,
 ) -> Seal:
-    """Write a run of navigation as a sealed bundle.
+    """Write a navigation run as a sealed bundle.
 
     Parameters
     ----------
     result : NavigationResult
     out : str or Path
-        Folder to make.
+        Folder to create.
     name : str, optional
-        Of the folder, as the report names it; that of `out`, if not given.
+        Folder name shown in the report; by default that of `out`.
     report : bool
-        Whether the pages and the figures are written, too.
+        Whether to write the pages and the figures.
     force : bool
-        Replace a bundle that is there.
+        Overwrite an existing bundle.
     progress : callable, optional
 
     Returns

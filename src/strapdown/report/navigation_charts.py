@@ -1,4 +1,4 @@
-"""Charts of a run of navigation over time: the state with its bounds, and the bounds alone."""
+"""Charts of a navigation run over time: the state with its bounds, and the bounds alone."""
 
 from __future__ import annotations
 
@@ -60,14 +60,14 @@ Array = NDArray[np.float64]
 TIME = "time, s"
 BOUND = "95 % bound"
 SHADED = "Shaded: times without an aid."
-#: Bounds that change by more have a logarithmic axis: within less it would have no label or one.
+#: Bounds that vary by a larger factor have a logarithmic axis; else it has at most one label.
 WIDE = 3.0
 
 
 def over_time(
     slug: str, title: str, caption: str, panels: tuple[Panel, ...], record: NavigationRecord
 ) -> Chart:
-    """Put panels over time under the strip of modes and aids."""
+    """Put panels over time below the strip of modes and measurements."""
     above = strip(record)
     bands = outage_bands(record)
     told = f"{caption} {SHADED}" if bands else caption
@@ -82,7 +82,7 @@ def over_time(
 
 
 def bound_chart(told: NavigationTold) -> Chart:
-    """How well place, velocity and attitude are known over the run."""
+    """95 % bounds of position, velocity and attitude over the run."""
     record = told.record
     time = record.sd.index.to_numpy(dtype=np.float64)
     groups = (
@@ -129,7 +129,7 @@ def _bound(record: NavigationRecord, column: str, name: str) -> tuple[str, Array
 
 
 def height_chart(told: NavigationTold) -> Chart:
-    """Height over the ellipsoid with its bound."""
+    """Height above the ellipsoid with its bound."""
     panel = _state_panel(told, "alt", "down", "height, m")
     return over_time(
         "height",
@@ -141,7 +141,7 @@ def height_chart(told: NavigationTold) -> Chart:
 
 
 def velocity_chart(told: NavigationTold) -> Chart:
-    """Velocity over the ground with its bounds."""
+    """Velocity over ground with its bounds."""
     panels = tuple(
         _state_panel(told, name, name, f"{words}, m/s")
         for name, words in zip(VELOCITY, NED, strict=True)
@@ -170,9 +170,9 @@ def _state_panel(
     label: str,
     shown: tuple[Array, Array] | None = None,
 ) -> Panel:
-    """A quantity of the trajectory, its bound at the marks, and the truth where there is one.
+    """Panel of a trajectory quantity, its bound at the marks, and the truth if there is one.
 
-    What is shown of it over the trajectory and at the marks is given where it is not the column.
+    `shown` holds the values over the trajectory and at the marks, if not those of the column.
     """
     record = told.record
     time = record.trajectory.index.to_numpy(dtype=np.float64)
@@ -198,14 +198,14 @@ def _true(told: NavigationTold, column: str, navigated: Array) -> Line:
         values = break_jumps(values % 360.0)
     elif column == "heading" and values.size:
         values = unwrapped(values)
-        # The same turn as the navigated heading.
+        # Same number of turns as the navigated heading.
         values = values + 360.0 * np.round((navigated[0] - values[0]) / 360.0)
     stamps = within.index.to_numpy(dtype=np.float64)
     return curve("truth", stamps, values, BLACK, "dot", 1.1, buckets=BUCKETS)
 
 
 def state_charts(record: NavigationRecord) -> tuple[Chart, ...]:
-    """Estimates of the errors of sensors and aids, with their bounds."""
+    """Estimated sensor and measurement errors, with their bounds."""
     return tuple(_block_chart(record, block) for block in blocks_of(record))
 
 
@@ -232,7 +232,7 @@ def _block_chart(record: NavigationRecord, block: StateBlock) -> Chart:
     )
 
 
-# The strip above charts over time: modes, and when each aid was there.
+# Strip above charts over time: modes, and availability of each measurement source.
 
 
 _MODES = {"coarse": GREY, "fine": SKY, "navigation": BLUE}
@@ -240,13 +240,13 @@ _MORE = (PURPLE, ORANGE)
 _ROW, _PAD = 0.115, 0.05  # of a panel
 _LETTER = 0.0085  # of the axis
 _MOST_ROWS, _MOST_MARKS = 7, 200
-# Epochs farther apart than so many usual ones are no longer one stretch; of fewer than so many
-# nothing is usual. An epoch alone is as wide as this part of the whole.
+# A step of more than this many usual steps ends a stretch; with fewer epochs than this no step is
+# usual. Width of a single epoch, as a share of the whole.
 _PAUSE, _FEW, _ALONE = 5.0, 4, 1.0 / 300.0
 
 
 def mode_colour(name: str, names: tuple[str, ...]) -> str:
-    """Colour of a mode among those of a run."""
+    """Color of a mode among those of a run."""
     for known, colour in _MODES.items():
         if name.startswith(known):
             return colour
@@ -255,22 +255,22 @@ def mode_colour(name: str, names: tuple[str, ...]) -> str:
 
 
 def outage_bands(record: NavigationRecord) -> tuple[Band, ...]:
-    """Shades of the times over which an aid was missing."""
+    """Shaded bands of the outages."""
     spans = {(s.begin, s.end) for spans in record.outages.values() for s in spans}
     return tuple(Band(begin, end, "outage") for begin, end in sorted(spans))
 
 
 def strip(record: NavigationRecord) -> Panel | None:
-    """Modes and aids in rows; None where there is neither."""
+    """Rows of modes and measurement sources; None if there are neither."""
     time = record.trajectory.index.to_numpy(dtype=np.float64)
     begins = [float(time[0]), *(m.begin for m in record.modes)]
     finishes = [float(time[-1]), *(m.end for m in record.modes)]
     whole = Span("", min(begins), max(finishes))
-    # Before that aids were not used for navigation, but for an alignment.
+    # Earlier measurements were used for an alignment, not for navigation.
     going = Span("", float(time[0]), float(time[-1]))
     rows: list[str] = []
     fills: list[Fill] = []
-    # From end to end, whatever stands in the rows.
+    # Spans the whole axis, whatever the rows contain.
     ends = np.array([whole.begin, whole.end])
     lines = [Line("", ends, np.full(2, np.nan), GREY, points=True, size=0.0, legend=False)]
     if record.modes:
@@ -305,7 +305,7 @@ def strip(record: NavigationRecord) -> Panel | None:
 
 
 def _aids(record: NavigationRecord) -> list[str]:
-    """Names of the aids: those with outages first."""
+    """Names of the measurement sources: those with outages first."""
     seen = [name.rpartition(".")[0] or name for name in record.innovations]
     return list(dict.fromkeys([*record.outages, *seen]))
 
@@ -320,7 +320,7 @@ def _epochs(record: NavigationRecord, aid: str) -> Array:
 
 
 def _rejected(record: NavigationRecord, aid: str, whole: Span) -> Array:
-    """Times of epochs that were not used, as many as can be told apart."""
+    """Times of rejected epochs, thinned to as many as can be distinguished."""
     found = []
     for name in _of_aid(record, aid):
         table = record.innovations[name]
@@ -335,7 +335,7 @@ def _rejected(record: NavigationRecord, aid: str, whole: Span) -> Array:
 
 
 def _stretches(time: Array, whole: Span) -> tuple[Span, ...]:
-    """Stretches in which epochs follow each other as they usually do, wide enough to be seen."""
+    """Stretches of epochs at their usual steps, widened to be visible."""
     if not time.size:
         return ()
     steps = np.diff(time)
@@ -354,7 +354,7 @@ def _stretches(time: Array, whole: Span) -> tuple[Span, ...]:
 
 
 def _between(out: tuple[Span, ...], whole: Span) -> tuple[Span, ...]:
-    """What is left of the whole without some spans."""
+    """Return the remainder of a span outside of other spans."""
     found, at = [], whole.begin
     for span in sorted(out, key=lambda s: s.begin):
         if span.begin > at:
@@ -390,7 +390,7 @@ def _modes(modes: tuple[Span, ...]) -> list[Fill]:
 
 
 def _names(modes: tuple[Span, ...], whole: Span) -> list[Line]:
-    """Names of modes in their bars, where there is room."""
+    """Names of modes in their bars, where they fit."""
     length = max(whole.end - whole.begin, 1e-9)
     fit = [m for m in modes if (m.end - m.begin) / length > _LETTER * (len(m.name) + 2)]
     if not fit:
@@ -413,7 +413,7 @@ def _names(modes: tuple[Span, ...], whole: Span) -> list[Line]:
     ]
 
 
-# Charts of a run of navigation against its truth.
+# Charts of a navigation run against its truth.
 
 
 _LEAST = 1e-2
@@ -421,7 +421,7 @@ _NAMES = dict(zip(VELOCITY, NED, strict=True))
 
 
 def error_charts(told: NavigationTold, found: NavigationErrors) -> tuple[Chart, ...]:
-    """Errors of place, velocity and attitude within their bounds."""
+    """Errors of position, velocity and attitude within their bounds."""
     out = []
     for slug, title, columns, unit in (
         ("errors-place", "Errors of place", NED, "m"),
@@ -445,7 +445,7 @@ def error_charts(told: NavigationTold, found: NavigationErrors) -> tuple[Chart, 
 
 
 def nees_chart(told: NavigationTold, found: NavigationErrors) -> Chart | None:
-    """Normalised errors squared of place, velocity and attitude; None where no bound is told."""
+    """NEES of position, velocity and attitude; None without bounds."""
     if not found.freedom:
         return None
     low, high = bounds(found.freedom)
@@ -467,19 +467,19 @@ def nees_chart(told: NavigationTold, found: NavigationErrors) -> Chart | None:
     )
 
 
-# Charts of what was observed beside what was expected.
+# Innovation charts.
 
 
-# What lies beyond so many times the usual bound is drawn at the edge.
+# Innovations beyond this multiple of the usual bound are drawn at the edge.
 _REACH, _USUAL = 2.5, 0.97
-# Epochs of a mean, and the least that is drawn of a sum of squares.
+# Epochs of a mean, and the smallest sum of squares drawn.
 _WINDOW, _NAVIGATION_INNOVATION_CHARTS_LEAST = 20, 1e-2
-# Points of a panel; of those within so many standard deviations no more are drawn.
+# Points per panel; innovations within this many standard deviations are thinned to it.
 _POINTS, _FAR = 500, 3.0
 
 
 def innovation_chart(record: NavigationRecord, agreement: Agreement) -> Chart:
-    """Innovations of one observation with the bounds that were expected."""
+    """Innovations of one observation with their expected 95 % bounds."""
     panels = []
     beyond = 0
     step = max(1, agreement.epochs // _POINTS)
@@ -520,7 +520,7 @@ def innovation_chart(record: NavigationRecord, agreement: Agreement) -> Chart:
 
 
 def _some(one: Agreement, k: int, which: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """All that are far off, and of the others even in time as many as can be seen."""
+    """Select all large innovations, and the others thinned evenly in time."""
     step = max(1, one.epochs // _POINTS)
     with np.errstate(divide="ignore", invalid="ignore"):
         far = np.abs(one.nu[:, k]) > _FAR * one.sd[:, k]
@@ -545,7 +545,7 @@ def _points(
 
 
 def nis_chart(record: NavigationRecord, found: tuple[Agreement, ...]) -> Chart | None:
-    """Normalised innovations squared of every observation, with what is expected of them."""
+    """NIS of every observation, with its expected range."""
     panels = []
     thin = any(one.epochs >= 2 * _POINTS for one in found)
     for k, one in enumerate(found):

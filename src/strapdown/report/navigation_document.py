@@ -1,4 +1,4 @@
-"""The report of a run of navigation: the answer first, then what it rests on."""
+"""Report of a navigation run: the answer first, then its basis."""
 
 from __future__ import annotations
 
@@ -40,17 +40,17 @@ def navigation_document(
     found: NavigationFound | None = None,
     light: Section | None = None,
 ) -> Document:
-    """Return the report of a run of navigation.
+    """Return the report of a navigation run.
 
     Parameters
     ----------
     told : NavigationTold
     name : str
-        Of the folder, for the command that verifies it; no command, if empty.
+        Folder name, for the verification command; no command if empty.
     found : NavigationFound, optional
-        Of `examine`, where it was worked out already.
+        From `examine`, if already computed.
     light : Section, optional
-        Whether it can be trusted, of a run whose verdict is a page beside this one.
+        Integrity section, for a run whose verdict is on a separate page.
 
     Returns
     -------
@@ -161,7 +161,7 @@ def _observations(found: NavigationFound) -> tuple[Block | None, ...]:
 
 
 def _verdicts(found: NavigationFound) -> tuple[Block, ...]:
-    """What the innovations say against what was stated, beyond what chance makes."""
+    """Conclusions from the innovations on the stated errors, beyond chance."""
     rows: list[tuple[str, str]] = []
     for one in found.agreements:
         kinds = dict.fromkeys(v.kind for v in one.consistency.verdicts)
@@ -218,7 +218,7 @@ def _method(found: NavigationFound, name: str) -> tuple[Block | None, ...]:
     )
 
 
-# Conventions of the report of a run of navigation.
+# Conventions of the report of a navigation run.
 
 
 CONVENTIONS = (

@@ -1,4 +1,4 @@
-"""A run of navigation with everything that its report works out of it once."""
+"""Evaluation of a navigation run, computed once for its report."""
 
 from __future__ import annotations
 
@@ -56,18 +56,18 @@ __all__ = [
 
 @dataclass(frozen=True, eq=False)
 class NavigationFound:
-    """What was told of a run, and what it shows.
+    """A navigation run with its evaluation.
 
     Attributes
     ----------
     told : NavigationTold
     agreements : tuple of Agreement
-        One a name of an observation.
+        One per observation name.
     errors : NavigationErrors or None
         Against the truth.
     smoother : SmootherConsistency or None
     forward_errors : NavigationErrors or None
-        Of a run that was smoothed: the filter beside its smoother, and against the truth.
+        For a smoothed run: agreement of filter and smoother, and the filter's errors.
     """
 
     told: NavigationTold
@@ -78,22 +78,22 @@ class NavigationFound:
 
     @property
     def record(self) -> NavigationRecord:
-        """Of the run."""
+        """Record of the run."""
         return self.told.record
 
     @property
     def filtered(self) -> NavigationRecord:
-        """Of the filter alone, by which it is seen how sensors and aids came to be known."""
+        """Record of the filter alone, which shows the convergence of the estimated errors."""
         return self.told.forward or self.told.record
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """Of the run and of its comparison."""
+        """Findings of the run and of its comparison with the truth."""
         return (*self.told.findings, *(() if self.errors is None else self.errors.findings))
 
 
 def examine(told: NavigationTold) -> NavigationFound:
-    """Work out what a report says of a run.
+    """Evaluate a run for its report.
 
     Parameters
     ----------
@@ -116,27 +116,27 @@ def examine(told: NavigationTold) -> NavigationFound:
     return NavigationFound(told, agreed, navigation_errors(told), smoother, before)
 
 
-# Whether innovations are as large, and as free of memory, as the filter expected.
+# Consistency of innovations: size and whiteness, against the filter's expectation.
 
 
 Array = NDArray[np.float64]
 
-#: A root mean square of innovations beyond this many of the expected standard deviation, or below
-#: one over it, speaks against what was stated.
+#: An RMS of normalized innovations above this factor, or below its inverse, contradicts the
+#: stated errors.
 FAR_OFF = 2.0
-#: Where half of the epochs are beyond so many times what was expected, the answer itself is
-#: refuted: outliers do not reach a median.
+#: Median normalized innovation, as a multiple of its expected value, that refutes the answer;
+#: outliers do not affect a median.
 REFUTES, LEAST_EPOCHS = 3.0, 5
-#: From so large a correlation on, errors of an aid that last matter for the bounds.
+#: Correlation above which time-correlated measurement errors matter for the bounds.
 REMEMBER = 0.3
 
 
 @dataclass(frozen=True, eq=False)
 class Agreement:
-    """Innovations of one observation beside what was expected of them.
+    """Innovations of one observation with their consistency statistics.
 
-    Components are taken one after the other, so that their innovations are independent, and the
-    normalised innovation squared of an epoch is the sum of nu²/s.
+    Components are processed sequentially, so their innovations are independent, and the normalized
+    innovation squared (NIS) of an epoch is the sum of nu²/s.
 
     Attributes
     ----------
@@ -146,11 +146,11 @@ class Agreement:
     time : ndarray, (n,), s
     nu, sd : ndarray, (n, m)
     weight : ndarray, (n, m)
-        0 where it was rejected.
+        0 if rejected.
     consistency : ObservationConsistency
-        What they say of the filter.
+        Consistency statistics of the filter.
     stated : bool
-        Whether it is stated that they last.
+        Whether the errors are stated as time-correlated.
     """
 
     name: str
@@ -164,44 +164,44 @@ class Agreement:
 
     @cached_property
     def used(self) -> NDArray[np.bool_]:
-        """Epochs of which no component was rejected, (n,)."""
+        """Epochs without a rejected component, (n,)."""
         return np.asarray((self.weight > 0.0).all(axis=1) & (self.sd > 0.0).all(axis=1))
 
     @cached_property
     def nis(self) -> Array:
-        """Normalised innovation squared of each epoch, (n,)."""
+        """Normalized innovation squared of each epoch, (n,)."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(np.square(self.nu / self.sd).sum(axis=1))
 
     @property
     def freedom(self) -> int:
-        """Components of an epoch."""
+        """Components per epoch."""
         return len(self.labels)
 
     @property
     def epochs(self) -> int:
-        """How many there are."""
+        """Number of epochs."""
         return len(self.time)
 
     @property
     def rejected(self) -> int:
-        """Epochs of which something was not used at all."""
+        """Number of epochs with a rejected component."""
         return int((self.weight <= 0.0).any(axis=1).sum())
 
     @property
     def weakened(self) -> int:
-        """Epochs of which something was used with less than its whole weight."""
+        """Number of epochs with a component of reduced weight and none rejected."""
         some = (self.weight > 0.0) & (self.weight < 1.0)
         return int((some.any(axis=1) & (self.weight > 0.0).all(axis=1)).sum())
 
     @cached_property
     def mean_nis(self) -> float:
-        """Mean over the epochs that were used; NaN where there is none."""
+        """Mean NIS over the used epochs; NaN if there are none."""
         return float(self.nis[self.used].mean()) if self.used.any() else math.nan
 
     @cached_property
     def band(self) -> tuple[float, float]:
-        """Between which that mean is in 95 of 100 cases, where all is as stated."""
+        """95 % interval of the mean NIS of a consistent filter."""
         count = int(self.used.sum())
         if not count:
             return math.nan, math.nan
@@ -209,12 +209,12 @@ class Agreement:
 
     @property
     def ratio(self) -> float:
-        """Root mean square of the innovations in their expected standard deviations."""
+        """RMS of the innovations in units of their expected standard deviations."""
         return math.sqrt(self.mean_nis / self.freedom) if self.freedom else math.nan
 
     @property
     def usual(self) -> float:
-        """Half of the epochs are beyond so many times what half of them should be within."""
+        """Square root of the median NIS over its expected median."""
         from scipy.special import chdtri
 
         if not self.used.any():
@@ -224,7 +224,7 @@ class Agreement:
 
     @property
     def refutes(self) -> bool:
-        """Whether most epochs contradict the answer, or were refused for that, or errors last."""
+        """Whether most epochs contradict the answer or are rejected, or errors correlate."""
         if self.epochs < LEAST_EPOCHS:
             return False
         lasts = self.ratio > REFUTES and self.remembers
@@ -232,27 +232,28 @@ class Agreement:
 
     @property
     def correlation(self) -> float:
-        """Largest correlation of a component with itself an epoch later; NaN for too few."""
+        """Largest lag-1 autocorrelation of a component; NaN for too few epochs."""
         found = [float(one.autocorrelation[0]) for one in self._long]
         return max(found, key=abs, default=math.nan)
 
     @property
     def correlation_bound(self) -> float:
-        """Below which that is in 95 of 100 cases for each component, where there is no memory."""
+        """95 % bound of the lag-1 autocorrelation of each component for white innovations."""
         return max((one.autocorrelation_bound for one in self._long), default=math.nan)
 
     @property
     def _long(self) -> list[ComponentConsistency]:
-        """Components with epochs enough to tell of memory."""
+        """Components with enough epochs for an autocorrelation."""
         return [one for one in self.consistency.components if one.autocorrelation.size]
 
     @property
     def remembers(self) -> bool:
-        """Whether they hang together from epoch to epoch far more than by chance, to harm.
+        """Whether the innovations are correlated in time so much that a bound may be too narrow.
 
-        Errors that last do as much as independent ones of `lasting` their size: where that is no
-        more than was stated, as of a constraint whose deviation is stated for it, no bound is too
-        narrow. Where it is stated that they last, that is held to `FAR_OFF`, as a scatter is.
+        Time-correlated errors have the effect of independent ones of `lasting` times the stated
+        size. If that is at most the stated size, as for a constraint whose deviation is stated
+        accordingly, no bound is too narrow. For errors stated as time-correlated the limit is
+        `FAR_OFF`, as for the size.
         """
         size = abs(self.correlation)
         far = bool(size > max(REMEMBER, 2.0 * self.correlation_bound))
@@ -261,7 +262,7 @@ class Agreement:
 
     @property
     def lasting(self) -> float:
-        """`ratio`, by which independent errors would do as much: those of a first-order process."""
+        """`ratio` of independent errors with the effect of these first-order Gauss-Markov ones."""
         rho = min(self.correlation, 1.0 - 1.0 / max(int(self.used.sum()), 2))
         if not rho > 0.0:
             return self.ratio
@@ -269,24 +270,24 @@ class Agreement:
 
     @property
     def inside(self) -> bool:
-        """Whether the mean is within its band."""
+        """Whether the mean NIS is within its 95 % interval."""
         return self.band[0] <= self.mean_nis <= self.band[1]
 
     @property
     def acceptable(self) -> bool:
-        """Whether they are within a factor of two of what was expected, and if they last."""
+        """Whether the size is as expected within a factor of two, correlation included."""
         near = self.ratio < FAR_OFF and max(self.ratio, self.lasting) > 1.0 / FAR_OFF
         return self.inside or near
 
 
 def agreements(record: NavigationRecord, lasting: Collection[str] = ()) -> tuple[Agreement, ...]:
-    """Return the innovations of each observation that has any.
+    """Return the consistency of each observation that has innovations.
 
     Parameters
     ----------
     record : NavigationRecord
     lasting : collection of str
-        Names of the aids that state that their errors last.
+        Names of the measurement sources with stated time-correlated errors.
     """
     found = (
         _agreement(name, table, (name.rpartition(".")[0] or name) in lasting)
@@ -296,7 +297,7 @@ def agreements(record: NavigationRecord, lasting: Collection[str] = ()) -> tuple
 
 
 def chi_square_far(freedom: float) -> float:
-    """Quantile of chi-square that as few exceed as exceed three standard deviations."""
+    """Quantile of chi-square with the two-sided exceedance probability of three sigma."""
     from scipy.special import chdtri, ndtr
 
     return float(chdtri(freedom, 2.0 * float(ndtr(-3.0))))
@@ -321,10 +322,10 @@ def _agreement(name: str, table: pd.DataFrame, stated: bool) -> Agreement:
     )
 
 
-# A run of navigation beside its truth: errors, their bounds, and the two together.
+# A navigation run against its truth: errors, their bounds, and consistency.
 
 
-#: An instant stands for no more than so long, s, or than three of the usual steps.
+#: Longest time that one instant represents, s, or three usual steps if longer.
 LONGEST = 1.5
 
 
@@ -336,13 +337,13 @@ class Score:
     ----------
     quantity, unit : str
     rms : float
-        Over time: instants stand close where much is observed and wide apart in an outage.
+        Weighted by time: instants are dense where measurements are frequent, sparse in an outage.
     largest : float
     largest_at : float, s
     bound : float
-        Root mean square of the bounds of 95 %.
+        Root mean square of the 95 % bounds.
     share : float
-        Of the time in which the error is within its bound.
+        Share of the time in which the error is within its bound.
     """
 
     quantity: str
@@ -356,7 +357,7 @@ class Score:
 
 @dataclass(frozen=True, eq=False)
 class NavigationErrors:
-    """Errors beside what the run itself claims of them.
+    """Errors against the truth, with the run's own bounds.
 
     Attributes
     ----------
@@ -367,24 +368,24 @@ class NavigationErrors:
 
     @property
     def time(self) -> Array:
-        """Of the samples that are compared, (n,), s."""
+        """Times of the compared samples, (n,), s."""
         return self.comparison.time
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """Of the comparison."""
+        """Findings of the comparison."""
         return self.comparison.findings
 
     @property
     def nees(self) -> Array:
-        """Normalised error squared of place, velocity and attitude, (n,)."""
+        """Normalized error squared (NEES) of position, velocity and attitude, (n,)."""
         if not self.freedom:
             return np.full(len(self.time), np.nan)
         return self.comparison.nees["all"].to_numpy(dtype=np.float64)
 
     @property
     def freedom(self) -> int:
-        """Errors that it is of: those of which the run has states."""
+        """Degrees of freedom of the NEES: errors for which the run has states."""
         return self.comparison.freedom.get("all", 0)
 
     def error(self, column: str) -> Array:
@@ -392,12 +393,12 @@ class NavigationErrors:
         return self.comparison.differences[column].to_numpy(dtype=np.float64)
 
     def bound(self, column: str) -> Array:
-        """Bounds of 95 % of them, (n,)."""
+        """95 % bounds of the errors of a quantity, (n,)."""
         return TWO_SIDED_95 * self.comparison.sd[column].to_numpy(dtype=np.float64)
 
     @cached_property
     def scores(self) -> tuple[Score, ...]:
-        """Errors of each quantity, and of the horizontal place."""
+        """Scores of each quantity, and of the horizontal position."""
         units = (
             dict.fromkeys(NED, "m") | dict.fromkeys(VELOCITY, "m/s") | dict.fromkeys(EULER, "deg")
         )
@@ -406,11 +407,11 @@ class NavigationErrors:
         return self._score("horizontal", "m", size, self._plane(size)), *found
 
     def score(self, quantity: str) -> Score:
-        """That of one quantity."""
+        """Score of one quantity."""
         return next(s for s in self.scores if s.quantity == quantity)
 
     def _plane(self, size: Array) -> Array:
-        """Reach of the ellipse of 95 % in the direction of the horizontal error, (n,), m.
+        """Radius of the 95 % ellipse in the direction of the horizontal error, (n,), m.
 
         The error is within it if and only if it is within the ellipse.
         """
@@ -422,11 +423,11 @@ class NavigationErrors:
 
     @cached_property
     def _weight(self) -> Array:
-        """Share of the time that each instant stands for, (n,)."""
+        """Share of the time that each instant represents, (n,)."""
         steps = np.diff(self.time)
         if not steps.size:
             return np.ones(len(self.time)) / len(self.time)
-        # Where the truth is missing for long, nothing stands for that.
+        # A long gap of the truth counts only up to this limit.
         steps = np.minimum(steps, max(LONGEST, 3.0 * float(np.median(steps))))
         about = 0.5 * (np.append(steps, 0.0) + np.insert(steps, 0, 0.0))
         return np.asarray(about / about.sum())
@@ -459,7 +460,7 @@ def navigation_errors(told: NavigationTold) -> NavigationErrors | None:
     Raises
     ------
     DataError
-        As `truth_comparison.compare_with_truth`: they have no instant in common.
+        As `truth_comparison.compare_with_truth`: no common instant.
     """
     if told.truth is None:
         return None
@@ -471,23 +472,23 @@ def navigation_errors(told: NavigationTold) -> NavigationErrors | None:
     )
 
 
-# What the report of a run of navigation is made of.
+# Input of the report of a navigation run.
 
 
 @dataclass(frozen=True)
 class Withheld:
-    """A stretch over which an aid was kept from the navigator, and what came of it.
+    """A GNSS outage test: an interval of withheld measurements, and the resulting error.
 
     Attributes
     ----------
     aid : str
     begin, end : float, s
     error_m : float
-        The largest horizontal distance from what was withheld.
+        Largest horizontal distance from the withheld fixes.
     bound_m : float
-        The run's own bound of 95 % at that instant: the longer half axis of its ellipse.
+        The run's own 95 % bound at that instant: the semi-major axis of its ellipse.
     forward_m : float, optional
-        Of a run that is smoothed, what the largest distance was before.
+        For a smoothed run, the largest distance before smoothing.
     """
 
     aid: str
@@ -505,32 +506,32 @@ class Withheld:
 
 @dataclass(frozen=True, eq=False)
 class NavigationTold:
-    """A run of navigation, and what is known of it beside its own record.
+    """A navigation run with the references known beside its own record.
 
     Attributes
     ----------
     record : NavigationRecord
     forward : NavigationRecord, optional
-        Of a run that is smoothed, what the filter alone said.
+        For a smoothed run, the record of the filter alone.
     name, what : str
-        Of the log: its file, and what it is (``recorded log``).
+        Of the log: its file, and its kind (``recorded log``).
     title : str
-        Of the report; made of `name`, if empty.
+        Of the report; made from `name` if empty.
     chain : tuple of (str, str)
-        Slots and what is in them, in words.
+        Slots and their modules, in words.
     fixes : mapping of str to DataFrame
-        By name of the aid, Gnss tables: drawn as points.
+        Gnss tables by name of the measurement source, drawn as points.
     truth : DataFrame, optional
         Trajectory table on the clock of the run.
     truth_name : str
-        In words, as they stand after "error against".
+        Words that follow "error against".
     points : ControlPointScore, optional
-        The path at its control points.
+        Comparison with control points.
     withheld : tuple of Withheld
     findings : tuple of Finding
     ellipsoid : Ellipsoid
     lasting : tuple of str
-        Names of the aids that state that their errors last.
+        Names of the measurement sources with stated time-correlated errors.
     """
 
     record: NavigationRecord
@@ -549,14 +550,14 @@ class NavigationTold:
     lasting: tuple[str, ...] = ()
 
 
-# What a report is told of the result of ``strapdown navigate``.
+# Report input from the result of ``strapdown navigate``.
 
 
 NO_RULE = "none: every observation counts in full, however far off it is"
 
 
 def told_of(result: NavigationResult) -> NavigationTold:
-    """Return what a report is made of.
+    """Return the report input of a navigation result.
 
     Parameters
     ----------
@@ -608,7 +609,7 @@ def _of_aid(aid: ChoiceSpec) -> str:
 
 
 def withheld_of(aid: str, scores: Sequence[WithheldScores]) -> tuple[Withheld, ...]:
-    """Return stretches that were withheld as a report shows them.
+    """Return the GNSS outage tests of a measurement source as a report shows them.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A run of navigation as JSON: where it ended, how well, what was estimated, and how."""
+"""A navigation run as JSON: final state, bounds, estimated errors, and method."""
 
 from __future__ import annotations
 
@@ -38,18 +38,18 @@ Array = NDArray[np.float64]
 def navigation_json(
     result: NavigationResult, found: NavigationFound | None = None
 ) -> dict[str, Any]:
-    """Return everything that a program would ask of a run of navigation.
+    """Return a navigation run as plain data for programs.
 
     Parameters
     ----------
     result : NavigationResult
     found : NavigationFound, optional
-        Of `examine`, where it was worked out already.
+        From `examine`, if already computed.
 
     Returns
     -------
     dict
-        Angles and their standard deviations in degrees; estimates of the sensors in SI.
+        Angles and their standard deviations in degrees; estimated sensor errors in SI.
     """
     record, source = result.record, result.source
     time = record.trajectory.index
@@ -120,7 +120,7 @@ def navigation_json(
 
 
 def _smoothing(found: NavigationFound) -> dict[str, Any] | None:
-    """How filter and smoother agree; None of a run that was not smoothed."""
+    """Agreement of filter and smoother; None for a run without smoothing."""
     one = found.smoother
     if one is None:
         return None
@@ -135,7 +135,7 @@ def _smoothing(found: NavigationFound) -> dict[str, Any] | None:
 
 
 def _method(result: NavigationResult) -> dict[str, Any]:
-    """The modules and their options; where files stand is no part of it."""
+    """The modules and their options, without file paths."""
     chosen: dict[str, Any] = result.spec.model_dump(
         mode="json",
         include=set(MODULES),
@@ -148,7 +148,7 @@ def _method(result: NavigationResult) -> dict[str, Any]:
 
 
 def _against(found: NavigationFound) -> dict[str, Any] | None:
-    """Errors beside the truth, at the samples that follow the marks of the covariance."""
+    """Errors against the truth, at the samples after the covariance marks."""
     errors = found.errors
     if errors is None:
         return None
@@ -164,7 +164,7 @@ def _against(found: NavigationFound) -> dict[str, Any] | None:
 
 
 def _points(found: NavigationFound) -> dict[str, Any] | None:
-    """The path at its control points, after the origin and heading that fit best."""
+    """Errors at the control points, after the best fit of origin and heading."""
     score = found.told.points
     if score is None:
         return None
@@ -181,7 +181,7 @@ def _points(found: NavigationFound) -> dict[str, Any] | None:
 
 
 def _outages(record: NavigationRecord) -> list[dict[str, Any]]:
-    """Each with the largest bound at a mark in it; None where there is no mark."""
+    """Outages, each with the largest bound at a mark in it; None without a mark."""
     out = []
     for aid, spans in record.outages.items():
         for span in spans:
@@ -210,7 +210,7 @@ def _score(score: Score) -> dict[str, Any]:
 
 
 def _state(found: NavigationFound, row: int) -> dict[str, Any]:
-    """Place, velocity and attitude with the standard deviations of the nearest mark."""
+    """Position, velocity and attitude with the standard deviations of the nearest mark."""
     record = found.record
     at, how = record.trajectory.iloc[row], record.sd.iloc[row]
     units = dict.fromkeys(VELOCITY, "m_per_s") | dict.fromkeys(EULER, "deg")
@@ -238,7 +238,7 @@ def _alignment(one: Alignment | None) -> dict[str, Any] | None:
 
 
 def _innovations(one: Agreement) -> dict[str, Any]:
-    """How often an aid was taken, and how its innovations lie to what was expected of them."""
+    """Counts of used and rejected epochs, and innovation statistics, of one observation."""
     return {
         "components": list(one.labels),
         "epochs": one.epochs,
@@ -270,14 +270,14 @@ def _number(value: Any) -> float | None:
     return number if math.isfinite(number) else None
 
 
-# What a run of navigation writes beside its report: tables by time, and paths for maps.
+# Files of a navigation run beside its report: tables over time, and paths for maps.
 
 
 UNITS = {"lat": "deg", "lon": "deg", "alt": "m"}
 UNITS |= dict.fromkeys(NED, "m") | dict.fromkeys(VELOCITY, "m_s") | dict.fromkeys(EULER, "deg")
-#: Units in names of columns.
+#: Units in column names.
 _WORDS = {"rad/s": "rad_s", "m/s²": "m_s2", "1": "", "(rad/s)/(m/s²)": "rad_s_per_m_s2"}
-#: Maps draw no more points than this.
+#: Largest number of points of a map path.
 MOST_POINTS = 10_000
 
 
@@ -288,9 +288,9 @@ def write_navigation_files(result: NavigationResult, folder: Path) -> None:
     ----------
     result : NavigationResult
     folder : Path
-        ``trajectory.*`` in the forms that are asked for, ``sd.csv``, ``sensor_errors.csv``,
-        ``innovations/NAME.csv``, ``events.csv``, and ``errors.csv`` where the truth is known; of a
-        run that is smoothed the first three by the filter alone, too, in ``forward``.
+        ``trajectory.*`` in the requested formats, ``sd.csv``, ``sensor_errors.csv``,
+        ``innovations/NAME.csv``, ``events.csv``, and ``errors.csv`` if the truth is known; for a
+        smoothed run also the first three from the filter alone, in ``forward``.
     """
     record = result.record
     told = {"run": result.source.name, "ellipsoid": result.ellipsoid.name}
@@ -335,7 +335,7 @@ def write_navigation_files(result: NavigationResult, folder: Path) -> None:
 def _write_states(
     result: NavigationResult, record: NavigationRecord, folder: Path, told: dict[str, str]
 ) -> None:
-    """Write a trajectory, its standard deviations, and the errors of the sensors."""
+    """Write a trajectory, its standard deviations, and the estimated sensor errors."""
     options = TrajectoryFileOptions(ellipsoid=result.ellipsoid, most_points=MOST_POINTS)
     for form in result.spec.output.files:
         path = folder / f"trajectory.{form}"
@@ -346,7 +346,7 @@ def _write_states(
 
 
 def _sensors(record: NavigationRecord) -> pd.DataFrame:
-    """Estimates beside their standard deviations, with units."""
+    """Estimates with their standard deviations and units."""
     units = {n: _WORDS.get(u, u.replace("/", "_per_")) for n, u in record.units.items()}
     ends = {n: f"_{u}" if u else "" for n, u in units.items()}
     estimates = record.sensors.rename(columns={n: f"{n}{e}" for n, e in ends.items()})
@@ -355,7 +355,7 @@ def _sensors(record: NavigationRecord) -> pd.DataFrame:
 
 
 def _column(name: str) -> str:
-    """``nu north, m`` as ``nu_north_m``."""
+    """Convert ``nu north, m`` to ``nu_north_m``."""
     return re.sub(r"\W+", "_", name.replace("²", "2")).strip("_")
 
 

@@ -1,4 +1,4 @@
-"""Where a run of navigation went, seen from above, and how well that is known."""
+"""Plan of a navigation run: its path from above with 95 % ellipses."""
 
 from __future__ import annotations
 
@@ -38,18 +38,18 @@ __all__ = [
 Array = NDArray[np.float64]
 
 MOST_POINTS, MOST_FIXES, MOST_SAMPLES = 1500, 600, 100_000
-# From here on a plan is in kilometres.
+# Plans of at least this size, m, are in kilometers.
 _FAR = 20e3
-# Bar of the scale and arrow to the north, as shares of the view, and what they keep off.
+# Scale bar, north arrow and their free corner, as shares of the view.
 _BAR, _ARROW, _CORNER = 0.12, 0.05, 0.22
-# Height of the plan over its width, at most.
+# Largest ratio of the plan's height to its width.
 _TALL = 0.9
-# What moves less has no path, m.
+# A run that moves less has no plan, m.
 NO_PATH = 0.05
 
 
 def plan_chart(told: NavigationTold) -> Chart | None:
-    """Draw the path to one scale, what it was fixed by, and ellipses of 95 %.
+    """Draw the path to one scale, with its fixes and 95 % ellipses.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def plan_chart(told: NavigationTold) -> Chart | None:
     Returns
     -------
     Chart or None
-        None where nothing moves.
+        None for a run without motion.
     """
     record = told.record
     table = record.trajectory
@@ -105,7 +105,7 @@ def plan_chart(told: NavigationTold) -> Chart | None:
 
 
 def _rows(told: NavigationTold) -> NDArray[np.intp]:
-    """Rows that keep the course, and those at which a mode or an outage begins or ends."""
+    """Rows that preserve the course, and those at the ends of modes and outages."""
     table = told.record.trajectory
     rows = _course(table, told)
     spans = [*told.record.modes, *(s for v in told.record.outages.values() for s in v)]
@@ -114,8 +114,8 @@ def _rows(told: NavigationTold) -> NDArray[np.intp]:
 
 
 def _course(table: pd.DataFrame, told: NavigationTold) -> NDArray[np.intp]:
-    """Rows that keep the course, the last among them."""
-    # No vehicle leaves its course between samples of so many a run.
+    """Rows that preserve the course, including the last one."""
+    # At this sampling no vehicle leaves its course between samples.
     step = max(1, len(table) // MOST_SAMPLES)
     rows = step * thin(table.iloc[::step], MOST_POINTS, told.ellipsoid).rows
     return np.append(rows, len(table) - 1) if rows[-1] < len(table) - 1 else rows
@@ -127,7 +127,7 @@ def _with_margin(view: View) -> View:
 
 
 def _around(plane: Plane) -> list[tuple[Array, Array]]:
-    """Corners about the ellipses, which may be larger than the path is long."""
+    """Corners about the ellipses, which may be larger than the path."""
     along, ends = ellipse_rows(plane.told.record)
     rows = [*along, *(k for k, _ in ends)]
     if not rows:
@@ -138,7 +138,7 @@ def _around(plane: Plane) -> list[tuple[Array, Array]]:
 
 
 def _path(record: NavigationRecord, time: Array, path: tuple[Array, Array]) -> list[Line]:
-    """The path in pieces: by mode, and by what was missing."""
+    """Segments of the path by mode and by outage."""
     middle = 0.5 * (time[1:] + time[:-1])
     names = tuple(dict.fromkeys(m.name for m in record.modes))
     what = np.full(middle.size, "path", dtype=object)
@@ -160,7 +160,7 @@ def _path(record: NavigationRecord, time: Array, path: tuple[Array, Array]) -> l
             colour = mode_colour(name, names) if name in names else BLUE
         x, y = _pieces(what == name, path)
         out.append(Line(str(name), x, y, colour, width=3.2 if name in lost else 2.0))
-    # What is missing lies on top.
+    # Outages are drawn on top.
     return sorted(out, key=lambda line: line.name in lost)
 
 
@@ -176,7 +176,7 @@ def _pieces(of: NDArray[np.bool_], path: tuple[Array, Array]) -> tuple[Array, Ar
 
 
 def _fixes(plane: Plane, view: View) -> tuple[list[Line], str]:
-    """What was measured, as faint points; words on what lies outside of the view."""
+    """Fixes as faint points; text on those outside of the view."""
     out: list[Line] = []
     beyond = 0
     for aid, table in plane.told.fixes.items():
@@ -240,7 +240,7 @@ def _truth(plane: Plane) -> list[Line]:
 
 
 def _points(plane: Plane) -> list[Line]:
-    """Control points, turned and shifted onto the path, and how far it is from each."""
+    """Control points, rotated and shifted to the path, and the distance of the path from each."""
     score = plane.told.points
     if score is None:
         return []
@@ -257,7 +257,7 @@ def _points(plane: Plane) -> list[Line]:
 
 
 def _scale(view: View, path: tuple[Array, Array], unit: str) -> list[Line]:
-    """A bar of round length and an arrow to the north, in the emptiest corner."""
+    """Scale bar of round length and north arrow, in the emptiest corner."""
     size = view.high - view.low
     best, fewest = view.low, math.inf
     for x_side in (0, 1):
@@ -296,17 +296,17 @@ def _scale(view: View, path: tuple[Array, Array], unit: str) -> list[Line]:
     ]
 
 
-# Ellipses of 95 % on the plan of a run, and what they are labelled with.
+# 95 % ellipses on the plan of a run, and their labels.
 
 
-# Ellipses: so many at ends of outages, and along the way; the largest as a share of the view.
+# Number of ellipses at ends of outages, and along the path; the largest, as a share of the view.
 _AT_OUTAGES, _ALONG, _LARGEST = 8, 6, 0.05
-# A letter and a line of text, as shares of the width and of the height.
+# Width of a letter and height of a line of text, as shares of the view.
 _LETTER, _TEXT = 0.0082, 0.04
 
 
 def ellipse_rows(record: NavigationRecord) -> tuple[list[int], list[tuple[int, Span]]]:
-    """Marks at which ellipses are drawn: along the way, and at the ends of outages.
+    """Covariance marks at which ellipses are drawn: along the path, and at the ends of outages.
 
     Parameters
     ----------
@@ -315,9 +315,9 @@ def ellipse_rows(record: NavigationRecord) -> tuple[list[int], list[tuple[int, S
     Returns
     -------
     along : list of int
-        Even over the way, the end among them; none in an outage.
+        Evenly spaced along the path, including its end; none in an outage.
     at_outages : list of (int, Span)
-        The last mark before each ends; of many those that are known least.
+        The last mark before the end of each; if there are many, those of largest uncertainty.
     """
     time = record.sd.index.to_numpy(dtype=np.float64)
     bounds = plane_bound(record.covariance)
@@ -347,7 +347,7 @@ def ellipse_rows(record: NavigationRecord) -> tuple[list[int], list[tuple[int, S
 
 
 def ellipses(plane: Plane, view: View) -> tuple[list[Line], str, list[tuple[int, Span]]]:
-    """Return ellipses, magnified alike so that the largest can be seen, and what to say of them.
+    """Return ellipses, magnified by one factor to be visible, and their caption.
 
     Parameters
     ----------
@@ -358,9 +358,9 @@ def ellipses(plane: Plane, view: View) -> tuple[list[Line], str, list[tuple[int,
     -------
     lines : list of Line
     said : str
-        Empty where there are none.
+        Caption text; empty without ellipses.
     at_outages : list of (int, Span)
-        As `ellipse_rows`.
+        As in `ellipse_rows`.
     """
     record = plane.told.record
     along, ends = ellipse_rows(record)
@@ -403,7 +403,7 @@ def centres(plane: Plane, rows: list[int]) -> Array:
 
 
 def _round_down(value: float) -> float:
-    """The greatest of 1, 2, 5 times a power of ten that is not above a number."""
+    """Largest of 1, 2, 5 times a power of ten that is not above a number."""
     power = 10.0 ** math.floor(math.log10(value))
     return next(f * power for f in (5.0, 2.0, 1.0) if f * power <= value * (1.0 + 1e-9))
 
@@ -415,18 +415,18 @@ def bound_labels(
     marks: list[Line],
     ends: list[tuple[int, Span]],
 ) -> list[Line]:
-    """Return labels of what the bound had grown to where an outage ended.
+    """Return labels of the bound reached at the end of each outage.
 
     Parameters
     ----------
     plane : Plane
     view : View
     path : tuple of ndarray, (n,)
-        East and north: what labels keep off.
+        East and north, which labels avoid.
     marks : list of Line
-        Whose labels they keep off, too.
+        Marks whose labels are avoided, too.
     ends : list of (int, Span)
-        Of `ellipses`.
+        From `ellipses`.
     """
     if not ends:
         return []
@@ -456,7 +456,7 @@ def bound_labels(
 
 
 def _text(mark: Line, view: View) -> Array:
-    """Points on the labels of marks, about where they stand, (n, 2)."""
+    """Points on the labels of marks, (n, 2), approximately."""
     letter, line = _LETTER * view.width, _TEXT * float(view.high[1] - view.low[1])
     found = [np.column_stack([mark.x, mark.y])]
     for x, y, label, (side, rise) in zip(mark.x, mark.y, mark.labels, mark.places, strict=True):
@@ -467,12 +467,12 @@ def _text(mark: Line, view: View) -> Array:
     return np.vstack(found)
 
 
-# The level plane at the start of a run, in the unit of its plan.
+# Level plane at the start of a run, in the unit of its plan.
 
 
 @dataclass(frozen=True)
 class Plane:
-    """East and north in the unit of the plan about the start.
+    """East and north about the start, in the unit of the plan.
 
     Attributes
     ----------
@@ -482,7 +482,7 @@ class Plane:
     unit : str
         ``m`` or ``km``.
     scale : float
-        From m to it.
+        Plan units per m.
     """
 
     origin: Array
@@ -491,11 +491,11 @@ class Plane:
     scale: float
 
     def of(self, table: pd.DataFrame) -> tuple[Array, Array]:
-        """East and north of the rows of a table of places, each (n,)."""
+        """East and north of the rows of a table of positions, each (n,)."""
         ned = ned_from_geodetic(places_of(table), self.origin, ellipsoid=self.told.ellipsoid)
         return self.scale * ned[:, 1], self.scale * ned[:, 0]
 
 
 def within_span(time: Array, span: Span) -> NDArray[np.bool_]:
-    """Which instants are within a span."""
+    """Mask of the instants within a span."""
     return np.asarray((time >= span.begin) & (time <= span.end))

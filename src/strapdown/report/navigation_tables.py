@@ -1,4 +1,4 @@
-"""Tables of a run of navigation: start and end, states, observations, outages, errors."""
+"""Tables of a navigation run: start and end, states, observations, outages, errors."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _MOST_EVENTS = 40
 
 
 def end_table(found: NavigationFound) -> TableBlock:
-    """Place, velocity and attitude at the start and at the end, with bounds."""
+    """Position, velocity and attitude at the start and at the end, with bounds."""
     record = found.record
     rows = [
         ("time", *(instant(float(record.trajectory.index[k])) for k in (0, -1))),
@@ -63,7 +63,7 @@ def end_table(found: NavigationFound) -> TableBlock:
 
 
 def state_table(found: NavigationFound) -> TableBlock | None:
-    """Errors of sensors and aids: what was known before, and what is known now."""
+    """Sensor and measurement errors: uncertainty before and after the run."""
     record = found.filtered
     if record.sensors.empty or not len(record.sensors.columns):
         return None
@@ -91,7 +91,7 @@ def state_table(found: NavigationFound) -> TableBlock | None:
 
 
 def observation_table(found: NavigationFound) -> TableBlock | None:
-    """What was observed, how far from what was expected, and what was not used."""
+    """Observations with their innovation statistics and rejected epochs."""
     rows = []
     for one in found.agreements:
         band = "–"
@@ -134,7 +134,7 @@ def observation_table(found: NavigationFound) -> TableBlock | None:
 
 
 def outage_table(found: NavigationFound) -> TableBlock | None:
-    """Outages with the largest bound in each."""
+    """Outages, each with its largest bound."""
     rows = [
         (
             aid,
@@ -155,7 +155,7 @@ def outage_table(found: NavigationFound) -> TableBlock | None:
 
 
 def withheld_table(found: NavigationFound) -> TableBlock | None:
-    """What was withheld on purpose, and how far off the run was by it."""
+    """GNSS outage tests with the resulting errors."""
     rows = [
         (
             w.aid,
@@ -185,7 +185,7 @@ def withheld_table(found: NavigationFound) -> TableBlock | None:
 
 
 def point_table(found: NavigationFound) -> TableBlock | None:
-    """The path at its control points."""
+    """Errors at the control points."""
     score = found.told.points
     if score is None:
         return None
@@ -208,7 +208,7 @@ def point_table(found: NavigationFound) -> TableBlock | None:
 
 
 def error_table(found: NavigationFound) -> TableBlock | None:
-    """Errors against the truth beside their bounds."""
+    """Errors against the truth with their bounds."""
     if found.errors is None:
         return None
     names = {"horizontal": "horizontal", "down": "down (height)"}
@@ -242,7 +242,7 @@ def _places(value: float) -> int:
 
 
 def event_table(found: NavigationFound) -> TableBlock | None:
-    """Events, the first of them where there are many."""
+    """Events; only the first ones if there are many."""
     events = found.record.events
     if not events:
         return None

@@ -1,4 +1,4 @@
-"""Fewer points for a screen, with every extreme kept."""
+"""Thinning of curves for a screen that keeps every extreme."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ __all__ = ["BUCKETS", "broken", "kept_rows", "thin_fill"]
 
 Array = NDArray[np.float64]
 
-#: Of a curve over time: a point each two pixels of a page.
+#: For a curve over time: one point per two pixels of a page.
 BUCKETS = 350
 
 
 def kept_rows(columns: tuple[Array, ...], buckets: int = BUCKETS) -> NDArray[np.intp]:
-    """Rows that hold the least and the greatest of each column in each of equal runs.
+    """Rows of the minimum and maximum of each column in each of equal runs.
 
     Parameters
     ----------
     columns : tuple of ndarray, (n,)
-        NaN is left out, but for the first of each run of samples, which breaks a curve.
+        NaN is skipped, except the first of each run of samples, which breaks a curve.
     buckets : int
 
     Returns
     -------
     ndarray of int
-        In order, both ends among them; all, where there are not many.
+        In order, including both ends; all rows if there are few.
     """
     n = columns[0].size
     if n <= 2 * buckets:
@@ -58,20 +58,20 @@ def thin_fill(
     legend: bool = True,
     buckets: int = BUCKETS // 2,
 ) -> Fill:
-    """Make a band of few points whose lowest and highest reach is that of all."""
+    """Make a band of few points that keeps the lowest and highest values."""
     rows = kept_rows((low, high), buckets)
     return Fill(name, x[rows], low[rows], high[rows], colour, opacity, legend)
 
 
 def broken(time: Array, *columns: Array, longest: float = 5.0) -> tuple[Array, ...]:
-    """Copies with a row of NaN in each gap, so that no curve bridges it.
+    """Insert a row of NaN in each gap, so that no curve bridges it.
 
     Parameters
     ----------
     time : ndarray, (n,), s
     *columns : ndarray, (n,)
     longest : float
-        A gap is a step of more than so many usual ones.
+        Longest step without a gap, in usual steps.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Whether a run of navigation can be trusted: what it shows for its bounds and against them."""
+"""Judge whether a navigation run can be trusted, from its consistency with its bounds."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from strapdown.tables import EULER
 
 __all__ = ["trust"]
 
-# The errors of one run hang together in time, so that less than 95 of 100 may lie in a good bound.
+# Errors of one run are correlated in time, so less than 95 % may lie within a good bound.
 _ENOUGH = 0.8
-# Of the epochs: more that are refused are no outliers.
+# Share of the epochs; more rejected epochs are not outliers.
 _MANY = 0.1
 
 
 def trust(found: NavigationFound) -> Trust:
-    """Judge a run by what it shows.
+    """Judge a run by its consistency.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def trust(found: NavigationFound) -> Trust:
     reasons += [_innovations(one) for one in found.agreements if one.used.any()]
     reasons += [_memory(one) for one in found.agreements if one.remembers]
     reasons += _rejected(found)
-    # A note is shown among the findings, and speaks against nothing.
+    # Notes appear among the findings and do not count against the run.
     reasons += [f for f in found.findings if f.severity == "warning" and not _of_truth(found, f)]
     reasons += _silence(found)
     against = [one for one in reasons if one.severity == "warning"]
@@ -42,7 +42,7 @@ def trust(found: NavigationFound) -> Trust:
 
 
 def _silence(found: NavigationFound) -> list[Finding]:
-    """Nothing that was measured can bear an answer out by sensors alone."""
+    """Reason against a run without measurements, truth or outage test: it cannot be confirmed."""
     if found.errors is not None or found.told.withheld:
         return []
     if any(one.used.any() for one in found.agreements):

@@ -1,4 +1,4 @@
-"""The charts of a run of navigation as figures, for a notebook."""
+"""Charts of a navigation run as figures for a notebook."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ def plot(result: NavigationResult, kind: str) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        Of no window and no global state.
+        Belongs to no window or global state.
 
     Raises
     ------
     ConfigError
-        There is no such chart.
+        The chart does not exist.
     """
     observed = result.filtered.innovations
     if kind in observed:

@@ -1,4 +1,4 @@
-"""What a run of navigation came to, in sentences; terminal and page say the same."""
+"""Results of a navigation run in sentences, shared by terminal and page."""
 
 from __future__ import annotations
 
@@ -45,14 +45,14 @@ __all__ = [
 ]
 
 
-# A heading known less than so many deg is not known.
+# 95 % bound in deg from which a heading is unknown.
 _NO_HEADING = 180.0
-# A bound that fell by less than this share says that the motion did not tell.
+# A smaller relative reduction of a bound means that the motion made the state not observable.
 _FELL = 0.1
 
 
 def headline(found: NavigationFound) -> str:
-    """Return where it ended, how far it went, and how well that is known."""
+    """Return the end position, the distance traveled, and the bounds."""
     record = found.record
     return (
         f"Ended at {place_words(found)} after {duration_words(_duration(found))} and "
@@ -72,7 +72,7 @@ def place_words(found: NavigationFound, row: int = -1) -> str:
 
 
 def key_figures(found: NavigationFound) -> tuple[KeyFigure, ...]:
-    """Return the numbers of the top of the page."""
+    """Return the key figures at the top of the page."""
     record = found.record
     sd = record.sd.iloc[-1]
     last = record.trajectory.iloc[-1]
@@ -107,7 +107,7 @@ def key_figures(found: NavigationFound) -> tuple[KeyFigure, ...]:
 
 
 def _known(found: NavigationFound) -> KeyFigure:
-    """What matters most beside the end: the error, the worst outage, or the worst bound."""
+    """The main figure besides the end: the error, the worst outage, or the worst bound."""
     if found.errors is not None:
         score = found.errors.score("horizontal")
         up = found.errors.score("down")
@@ -137,7 +137,7 @@ def _known(found: NavigationFound) -> KeyFigure:
 
 
 def longest_outages(found: NavigationFound) -> list[tuple[str, Span, float]]:
-    """Aid, span and largest horizontal bound in m of each outage, in the order of time."""
+    """Source, span and largest horizontal bound in m of each outage, in time order."""
     out = []
     for aid, spans in found.record.outages.items():
         for span in spans:
@@ -148,7 +148,7 @@ def longest_outages(found: NavigationFound) -> list[tuple[str, Span, float]]:
 
 
 def cautions(found: NavigationFound) -> tuple[tuple[str, str], ...]:
-    """Return what to be careful about, each with its number."""
+    """Return the cautions, each with its number."""
     return (
         *_outages(found),
         *_ended_without(found),
@@ -233,7 +233,7 @@ def _refused(found: NavigationFound) -> list[tuple[str, str]]:
 
 
 def _not_told(found: NavigationFound) -> list[tuple[str, str]]:
-    """States whose bounds hardly fell."""
+    """States whose bounds hardly decreased."""
     sd = found.filtered.sensors_sd
     if len(sd) < 2:
         return []
@@ -272,18 +272,18 @@ def _duration(found: NavigationFound) -> float:
     return float(time[-1] - time[0])
 
 
-# What a smoother made of a run: bounds and errors beside those of the filter alone.
+# Effect of the smoother: bounds and errors beside those of the filter alone.
 
 
 Array = NDArray[np.float64]
 
-#: A smaller share of the differences within three standard deviations is not by chance.
+#: A smaller share of the differences within three standard deviations is not due to chance.
 SHARE = 0.95
 UNITS = dict.fromkeys(NED, "m") | dict.fromkeys(VELOCITY, "m/s") | dict.fromkeys(EULER, "°")
 
 
 def smoothing_chart(found: NavigationFound) -> Chart | None:
-    """Bounds of place, height and heading over time, before and after."""
+    """Bounds of position, height and heading over time, filter and smoother."""
     forward, record = found.told.forward, found.record
     if forward is None:
         return None
@@ -311,7 +311,7 @@ def smoothing_chart(found: NavigationFound) -> Chart | None:
 
 
 def smoothing_table(found: NavigationFound) -> TableBlock | None:
-    """Median bounds and, beside the truth, errors before and after."""
+    """Median bounds and errors against the truth, filter and smoother."""
     forward, agreement = found.told.forward, found.smoother
     if forward is None or agreement is None:
         return None
@@ -346,14 +346,14 @@ def smoothing_table(found: NavigationFound) -> TableBlock | None:
 
 
 def _errors(found: NavigationFound, column: str) -> tuple[str, ...]:
-    """Root mean square errors before and after, where the truth is known."""
+    """RMS errors of filter and smoother, if the truth is known."""
     if found.errors is None or found.forward_errors is None:
         return ()
     return tuple(_figure(one.score(column).rms) for one in (found.forward_errors, found.errors))
 
 
 def smoothing_words(found: NavigationFound) -> str | None:
-    """What the smoother did, in a sentence."""
+    """Effect of the smoother in a sentence."""
     forward = found.told.forward
     if forward is None:
         return None
@@ -367,7 +367,7 @@ def smoothing_words(found: NavigationFound) -> str | None:
 
 
 def agreement_words(found: NavigationFound) -> tuple[tuple[str, str], ...]:
-    """What is to be careful about where filter and smoother cannot both be right."""
+    """Cautions where filter and smoother are inconsistent."""
     agreement = found.smoother
     if agreement is None:
         return ()
@@ -392,12 +392,12 @@ def _apart(agreement: SmootherConsistency, k: int) -> bool:
 
 
 def _bound(record: NavigationRecord, column: str) -> Array:
-    """The bound of a component, over the marks."""
+    """95 % bound of a component at the covariance marks."""
     return TWO_SIDED_95 * record.sd[column].to_numpy(dtype=np.float64)
 
 
 def _plane(record: NavigationRecord) -> Array:
-    """The bound of the horizontal place, over the marks."""
+    """95 % bound of the horizontal position at the covariance marks."""
     return plane_bound(record.covariance)
 
 

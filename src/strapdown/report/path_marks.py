@@ -1,4 +1,4 @@
-"""What tells on a plan which way a path goes, and when: arrows, times, start and end."""
+"""Arrows, times, start and end that mark direction and timing of a path on a plan."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ __all__ = [
 
 Path = tuple[Array, Array]
 
-# Height of a plan as a share of its width, for one as wide as the picture; a panel of height 1
-# has the share 0.24.
+# Height of a plan as a share of its width, for one as wide as the picture: least, greatest; a
+# panel of height 1 has the third share.
 _LEAST, _MOST, _PANEL = 0.3, 0.62, 0.24
-# Of the longer side of the view.
+# Shares of the longer side of the view.
 _ARROW, _APART, _EVERY = 0.008, 0.045, 0.25
-# At most: arrows between two marks, and times.
+# Maximum numbers of arrows between two marks, and of times.
 _ARROWS, _TIMES = 3, 8
-# s
+# Steps between times, s.
 _STEPS = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1200, 1800, 3600, 7200, 10800)
 _HALF_DAY = 43200.0
 
 
 @dataclass(frozen=True)
 class View:
-    """What a plan of equal scales shows.
+    """Extent of a plan with equal scales.
 
     Attributes
     ----------
@@ -51,14 +51,14 @@ class View:
 
     @classmethod
     def of(cls, paths: list[Path], most: float = _MOST) -> View:
-        """The least view of all paths in which the panel is neither too low nor too high.
+        """Smallest view of all paths with a panel neither too low nor too high.
 
         Parameters
         ----------
         paths : list of (ndarray, ndarray)
             East and north of each.
         most : float
-            Height of the panel over its width, for one as wide as the picture.
+            Largest height of the panel over its width, for one as wide as the picture.
         """
         points = np.hstack([np.vstack(path) for path in paths])
         low, high = points.min(axis=1), points.max(axis=1)
@@ -70,12 +70,12 @@ class View:
 
     @property
     def width(self) -> float:
-        """From west to east."""
+        """Extent from west to east."""
         return float(self.high[0] - self.low[0])
 
     @property
     def height(self) -> float:
-        """Of the panel, in ordinary ones."""
+        """Height of the panel, in units of an ordinary panel."""
         return float((self.high[1] - self.low[1]) / self.width / _PANEL)
 
     @property
@@ -85,17 +85,17 @@ class View:
 
 
 def path_marks(time: Array, paths: list[Path], view: View, colour: str) -> list[Line]:
-    """Start, end, and places at round times on the first path, labelled; between them arrows.
+    """Mark start, end, and positions at round times on the first path, with arrows between them.
 
     Parameters
     ----------
     time : ndarray, (n,), s
-        Of the points of the first path.
+        Times of the points of the first path.
     paths : list of (ndarray, ndarray)
-        East and north of each; labels keep off all.
+        East and north of each; labels avoid all paths.
     view : View
     colour : str
-        Of the arrows.
+        Color of the arrows.
 
     Returns
     -------
@@ -108,7 +108,7 @@ def path_marks(time: Array, paths: list[Path], view: View, colour: str) -> list[
     labels, lengths = [], [0.0]
     for at in _round_times(float(time[0]), float(time[-1])):
         place = (float(np.interp(at, time, east)), float(np.interp(at, time, north)))
-        # A vehicle that stands has one dot, and none beside its start and its end.
+        # Skip positions near the start, the end or another mark, as of a stationary vehicle.
         if all(np.hypot(place[0] - x, place[1] - y) > _APART * view.width for x, y in ends + dots):
             dots.append(place)
             labels.append(f"{at:.12g} s")
@@ -120,7 +120,7 @@ def path_marks(time: Array, paths: list[Path], view: View, colour: str) -> list[
         ["start", "end", *labels],
         np.vstack([view.corners, *map(_along, paths)]),
     )
-    # The end is the smaller, so that both show where a path comes back.
+    # The end mark is smaller, so that both show where a path returns to its start.
     marks = [
         ("start", points[:1], GREEN, "circle", 15.0, ("start",), places[:1]),
         ("end", points[1:2], VERMILLION, "square", 9.0, ("end",), places[1:2]),
@@ -146,7 +146,7 @@ def path_marks(time: Array, paths: list[Path], view: View, colour: str) -> list[
 
 
 def _between(lengths: Array, width: float) -> Array:
-    """Lengths of the way at which arrows stand: even between two marks, and more where far."""
+    """Path lengths of the arrows: evenly spaced between marks, more for longer distances."""
     found = []
     for start, end in pairwise(lengths.tolist()):
         if end - start > _APART * width:
@@ -156,14 +156,14 @@ def _between(lengths: Array, width: float) -> Array:
 
 
 def _arrows(east: Array, north: Array, tips: Array, size: float, colour: str) -> Line:
-    """Arrowheads at lengths of the way as one broken curve, to be drawn to one scale."""
+    """Arrowheads at given path lengths as one broken curve, to be drawn to one scale."""
     way = _way(east, north)
     behind, ahead = (
         _at(way, np.clip(tips + side, 0.0, way[-1]), east, north) for side in (-size, size)
     )
     along = ahead - behind
     length = np.hypot(*along)
-    # Where the path turns back at this very place, it has no direction.
+    # At a reversal of the path the direction is undefined.
     good = length > 0.0
     along, tip = along[:, good] / length[good], _at(way, tips, east, north)[:, good]
     across = np.vstack([-along[1], along[0]])
@@ -185,52 +185,52 @@ def _way(east: Array, north: Array) -> Array:
 
 
 def _at(way: Array, where: Array, east: Array, north: Array) -> Array:
-    """East and north at lengths of the way, (2, m)."""
+    """East and north at given path lengths, (2, m)."""
     return np.vstack([np.interp(where, way, east), np.interp(where, way, north)])
 
 
 def _along(path: Path) -> Array:
-    """Places at even distances along a path, which a label should not cover, (m, 2)."""
+    """Evenly spaced positions along a path that labels should avoid, (m, 2)."""
     way = _way(*path)
     return _at(way, np.linspace(0.0, way[-1], 150), *path).T
 
 
-# Where the labels of points stand, so that they do not cover each other.
+# Positions of point labels that avoid overlap.
 
 
 LabelPlacesArray = NDArray[np.float64]
 
-#: Where a label may stand, the best first: on which side of its point (-1 left, 0 above or below,
-#: 1 right), and how many lines of text above it; from two on, a thin line leads to it.
+#: Label positions, best first: side of the point (-1 left, 0 above or below, 1 right), and lines
+#: of text above the point; from two lines on, a thin line leads to the point.
 PLACES: tuple[tuple[int, int], ...] = (
     *((side, rise) for rise in (1, -1) for side in (0, 1, -1)),
     (1, 0),
     (-1, 0),
     *((side, sign * rise) for rise in (2, 3, 4) for sign in (1, -1) for side in (0, 1, -1)),
 )
-# Of an axis, in its length: a character, a line of text and a point of a chart of 900 by 320
-# pixels.
+# Size of a character, a line of text and a point, as shares of the axis, for a chart of 900 by
+# 320 pixels.
 _CHARACTER, _LINE, _POINT = 0.0082, 0.05, 0.02
 
 
 def place_labels(
     x: ArrayLike, y: ArrayLike, labels: Sequence[str], obstacles: ArrayLike = ()
 ) -> tuple[tuple[int, int], ...]:
-    """Choose a place for each label, the longest first.
+    """Choose a position for each label, the longest label first.
 
     Parameters
     ----------
     x, y : array_like, (n,)
-        Points on axes that are drawn linearly (logarithms, where an axis is logarithmic).
+        Points on linear axes (logarithms for a logarithmic axis).
     labels : sequence of str
     obstacles : array_like, (m, 2)
-        Further points that a label should not cover.
+        Further points that labels should avoid.
 
     Returns
     -------
     tuple of (int, int)
-        Of `PLACES`, in the order of the labels: where the least of a label lies on other
-        labels, on points or outside.
+        Entries of `PLACES`, in the order of the labels, with the least overlap with other labels,
+        points and the outside of the axes.
     """
     if not labels:
         return ()
@@ -246,7 +246,7 @@ def place_labels(
             4.0 * sum(_overlap(box, other) for other in taken)
             + sum(_overlap(box, dots[j]) for j in _touched(box, dots) if j != k)
             + _outside(box)
-            # Near is better where nothing is covered anyway.
+            # Prefer a near position if none overlaps.
             + 1e-7 * number
             for number, box in enumerate(boxes)
         ]
@@ -257,7 +257,7 @@ def place_labels(
 
 
 def _on_axes(points: LabelPlacesArray) -> LabelPlacesArray:
-    """Points as shares of the axes, which leave a margin about them."""
+    """Points as shares of the axes, including their margins."""
     low, high = points.min(axis=0), points.max(axis=0)
     unit = np.full(points.shape, 0.5)
     wide = high > low
@@ -266,7 +266,7 @@ def _on_axes(points: LabelPlacesArray) -> LabelPlacesArray:
 
 
 def _touched(box: LabelPlacesArray, others: LabelPlacesArray) -> list[int]:
-    """Which of many boxes, (n, 4), share an area with one."""
+    """Indices of boxes, (n, 4), that overlap one box."""
     apart = np.minimum(others[:, 2:], box[2:]) <= np.maximum(others[:, :2], box[:2])
     touched: list[int] = np.flatnonzero(~apart.any(axis=1)).tolist()
     return touched
@@ -288,27 +288,27 @@ def _overlap(a: LabelPlacesArray, b: LabelPlacesArray) -> float:
 
 
 def _outside(box: LabelPlacesArray) -> float:
-    """Area beyond the axes, which weighs most: it would be cut off."""
+    """Area outside of the axes, which weighs most because it would be cut off."""
     whole = float((box[2] - box[0]) * (box[3] - box[1]))
     return 10.0 * (whole - _overlap(box, np.array([0.0, 0.0, 1.0, 1.0])))
 
 
-# Where the names of vertical marks stand above a chart, so that none lies on another.
+# Positions of the names of vertical marks above a chart, without overlap.
 
 
-#: Letters of a level's name that find room beside the axes; a longer one stands on its line.
+#: Longest name of a level, in letters, that fits beside the axes; longer ones go on its line.
 LONGEST_BESIDE = 18
-# Between names in one row, letters.
+# Gap between names in one row, in letters.
 _MARK_PLACES_APART = 1.5
 
 
 def label_side(share: float, label: str, letter: float) -> str:
-    """Return how a name stands to its mark, so that it does not leave the axes.
+    """Return the alignment of a name at its mark that keeps it within the axes.
 
     Parameters
     ----------
     share : float
-        Of the axis that lies left of the mark.
+        Position of the mark, as a share of the axis from the left.
     label : str
     letter : float
         Width of a letter, as a share of the axis.
@@ -316,7 +316,7 @@ def label_side(share: float, label: str, letter: float) -> str:
     Returns
     -------
     {'left', 'center', 'right'}
-        What of the name lies at the mark.
+        Part of the name at the mark.
     """
     half = 0.5 * letter * len(label)
     if share < half:
@@ -330,12 +330,12 @@ def label_rows(shares: Sequence[float], labels: Sequence[str], letter: float) ->
     Parameters
     ----------
     shares, labels, letter
-        As in `label_side`, of every mark.
+        As in `label_side`, for every mark.
 
     Returns
     -------
     tuple of int
-        The lowest row in which a name lies on none of those to its left.
+        The lowest row without overlap with the names to the left.
     """
     ends: list[float] = []
     rows = [0] * len(shares)

@@ -1,4 +1,4 @@
-"""A level plane in a picture: one scale on both axes, ticks with units, a bar of the scale."""
+"""A level plane in a picture: equal scale on both axes, ticks with units, a scale bar."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ Array = NDArray[np.float64]
 __all__ = ["PlanView", "nice_step", "tick_words"]
 
 _SOFT, _GRID = "#4a525c", "#e6e9ed"
-# Pixels between neighbouring ticks, and of the bar of the scale, at least.
+# Minimum pixels between neighboring ticks, and of the scale bar.
 _TICK, _BAR = 40.0, 60.0
-# Room below the points for that bar.
+# Height below the points for the scale bar.
 _FOOT = 18.0
 
 
 def nice_step(least: float) -> float:
-    """The least of 1, 2, 5 times a power of ten that is not below a number."""
+    """Smallest of 1, 2, 5 times a power of ten that is not below a number."""
     if not (math.isfinite(least) and least > 0.0):
         return 1.0
     power = 10.0 ** math.floor(math.log10(least))
@@ -33,7 +33,7 @@ def nice_step(least: float) -> float:
 
 
 def tick_words(value: float, step: float) -> str:
-    """Write a tick with as many digits as its step needs."""
+    """Format a tick with as many digits as its step needs."""
     digits = max(0, -math.floor(math.log10(step) + 1e-9))
     text = f"{value:.{digits}f}"
     return (text if float(text) else text.removeprefix("-")).replace("-", "−")
@@ -41,19 +41,19 @@ def tick_words(value: float, step: float) -> str:
 
 @dataclass(frozen=True)
 class PlanView:
-    """Where points of a plane lie in a picture.
+    """Mapping of a level plane to a picture.
 
     Attributes
     ----------
     left, top, width, height : float
-        Of the frame, pixels.
+        Of the frame, in pixels.
     middle : (float, float), m
-        First and second coordinate (north and east, or forward and right) of its middle.
+        First and second coordinate (north and east, or forward and right) of the frame's middle.
     scale : float
-        Pixels a metre.
+        Pixels per meter.
     names : (str, str)
         Of the two coordinates. North is drawn up and east to the right; forward to the right and
-        right downward, which is the same plane turned by a quarter, seen from above.
+        right downward, which is the same plane rotated by a quarter turn, seen from above.
     """
 
     left: float
@@ -66,7 +66,7 @@ class PlanView:
 
     @property
     def north_up(self) -> bool:
-        """Whether the first coordinate runs up the page."""
+        """Whether the first coordinate points up the page."""
         return self.names[0] == "north"
 
     @classmethod
@@ -79,24 +79,24 @@ class PlanView:
         heights: tuple[float, float],
         margin: float = 14.0,
     ) -> PlanView:
-        """The largest view that holds all points.
+        """The largest view that contains all points.
 
         Parameters
         ----------
         points : ndarray, (n, 2), m
         names : (str, str)
         at : (float, float)
-            Its upper left corner.
+            Upper left corner of the frame.
         width : float
         heights : (float, float)
-            The least and the greatest height that it may have.
+            Minimum and maximum height of the frame.
         margin : float
-            Pixels about the points.
+            Pixels around the points.
         """
         finite = points[np.isfinite(points).all(axis=1)]
         low, high = (finite.min(axis=0), finite.max(axis=0)) if len(finite) else (-np.ones(2),) * 2
         across, up = (high - low)[::-1] if names[0] == "north" else (high - low)
-        # What does not move at all is shown in a square of a centimetre.
+        # Points without extent are shown in a square of one centimeter.
         across, up = max(float(across), 0.01), max(float(up), 0.01)
         edges = 2.0 * margin + _FOOT
         scale = min((width - 2.0 * margin) / across, (heights[1] - edges) / up)
@@ -109,7 +109,7 @@ class PlanView:
         return cls(at[0], at[1], width, height, (a, b), scale, names)
 
     def pixels(self, points: ArrayLike) -> Array:
-        """Places in the picture, (n, 2), of points, (n, 2), m."""
+        """Pixel positions, (n, 2), of points, (n, 2), m."""
         a, b = (np.asarray(points, dtype=np.float64).reshape(-1, 2) - self.middle).T
         x, y = (b, -a) if self.north_up else (a, b)
         centre = self.left + 0.5 * self.width, self.top + 0.5 * self.height
@@ -117,13 +117,13 @@ class PlanView:
 
     @property
     def corners(self) -> Array:
-        """Least and greatest coordinates within the frame, (2, 2), m."""
+        """Minimum and maximum coordinates within the frame, (2, 2), m."""
         half = 0.5 * np.array([self.width, self.height]) / self.scale
         half = half[::-1] if self.north_up else half
         return np.vstack([np.array(self.middle) - half, np.array(self.middle) + half])
 
     def draw_grid(self, out: Drawing) -> None:
-        """Draw the frame, its ticks and what the axes are."""
+        """Draw the frame, its ticks and axis names."""
         step = nice_step(_TICK / self.scale)
         low, high = self.corners
         right, bottom = self.left + self.width, self.top + self.height
@@ -156,7 +156,7 @@ class PlanView:
         out.shape(box, "#c3cad2", 1.0)
 
     def draw_bar(self, out: Drawing) -> None:
-        """Draw a bar of round length."""
+        """Draw a scale bar of round length."""
         length = nice_step(_BAR / self.scale)
         x, y = self.left + 10.0, self.top + self.height - 10.0
         end = x + length * self.scale

@@ -1,4 +1,4 @@
-"""Charts for a page: plotly's figure as plain data, without loading plotly itself."""
+"""Charts for a page as plotly figures in plain data, without loading plotly itself."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ __all__ = ["bar_labels", "bar_traces", "fill_traces", "numbers", "see_through"]
 _GRID, _RED, _INK, _FAINT = "#e6e9ed", "#b42318", "#1b1f24", "#8a939e"
 FONT = {"family": "Inter, Segoe UI, Helvetica, Arial, sans-serif", "size": 13, "color": _INK}
 LOOK = {"font": FONT, "paper_bgcolor": "#ffffff", "plot_bgcolor": "#ffffff"}
-_LETTER = 0.008  # of the axis, a letter of a mark's name
-_ROW = 30  # pixels a category
+_LETTER = 0.008  # width of a letter of a mark's name, as a share of the axis
+_ROW = 30  # pixels per category
 _UNDER_PLANE = 58  # pixels
 _SPACE = {False: 0.06, True: 0.09}  # between panels, above or beside each other
 
@@ -45,24 +45,24 @@ def figure(chart: Chart) -> dict[str, Any]:
     Returns
     -------
     dict
-        For ``Plotly.newPlot``. Names are escaped, because plotly reads some HTML in them.
+        For ``Plotly.newPlot``. Names are escaped, because plotly interprets some HTML in them.
     """
     count = len(chart.panels)
-    # Planes, which come first, have a horizontal axis of their own; the others share one.
+    # Planes come first and have their own horizontal axes; the other panels share one.
     planes = sum(bool(panel.x_label) for panel in chart.panels)
     layout: dict[str, Any] = {
         **LOOK,
         "margin": {"l": 70, "r": 18, "t": 34, "b": 54},
         "height": _height(chart),
         "hovermode": "closest" if chart.log_x or planes else "x unified",
-        # No letters of thousands: what stands on an axis may be a stamp.
+        # No thousands separators: axis values may be time stamps.
         "separators": ".",
         "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0},
         "shapes": [],
         "annotations": [],
     }
     if chart.marks or any(panel.title for panel in chart.panels):
-        # The panels' titles or the names of marks stand where the legend would.
+        # The panel titles or the names of marks occupy the usual position of the legend.
         layout["legend"] |= {"y": -60.0 / layout["height"] - 0.06, "yanchor": "top"}
     traces: list[dict[str, Any]] = []
     named: set[str] = set()
@@ -81,13 +81,13 @@ def figure(chart: Chart) -> dict[str, Any]:
             anchor = f"y{suffix if own else _suffix(count - 1)}"
             layout[f"xaxis{x_suffix}"] = _x_axis(chart, across, panel) | {"anchor": anchor}
             if chart.beside and number:
-                # What stands beside each other is to be compared.
+                # Panels side by side are to be compared.
                 layout[f"xaxis{x_suffix}"]["matches"] = "x"
                 if not panel.categories:
                     layout[f"yaxis{suffix}"]["matches"] = "y"
             if not panel.x_label:
                 rows = _mark(layout, chart, x_suffix, domain[1])
-                # A title stands above the labels of marks.
+                # A title is above the labels of marks.
                 beyond = rows if panel.title else rows - 1
                 layout["margin"]["t"] += max(0, 15 * beyond)
         if panel.x_label:
@@ -121,19 +121,19 @@ def _height(chart: Chart) -> int:
 
 
 def _suffix(number: int) -> str:
-    """What plotly adds to the names of the axes of a panel."""
+    """Plotly's suffix for the axis names of a panel."""
     return str(number + 1) if number else ""
 
 
 def _domains(chart: Chart) -> list[tuple[tuple[float, float], tuple[float, float]]]:
-    """Where each panel lies across and up, as shares of the whole."""
+    """Horizontal and vertical extent of each panel, as shares of the whole."""
     count, space = len(chart.panels), _SPACE[chart.beside]
     if chart.beside or count == 1:
         width = (1.0 - space * (count - 1)) / count
         starts = [number * (width + space) for number in range(count)]
         return [((start, min(1.0, start + width)), (0.0, 1.0)) for start in starts]
     planes = [bool(panel.x_label) for panel in chart.panels]
-    # Low panels stand closer; under a plane there is its own axis with its title.
+    # Low panels are closer together; below a plane is its own axis with its title.
     least = min(panel.height for panel in chart.panels)
     gaps = [_UNDER_PLANE / _height(chart) if own else space * least for own in planes[:-1]]
     length = (1.0 - sum(gaps)) / sum(panel.height for panel in chart.panels)
@@ -166,7 +166,7 @@ def _x_axis(chart: Chart, domain: tuple[float, float], panel: Panel) -> dict[str
         "gridcolor": _GRID,
         "zeroline": False,
         "domain": list(domain),
-        # Stamps, and metres, in all of their digits.
+        # Time stamps and meters with all their digits.
         "exponentformat": "none",
     }
     if panel.bars and panel.categories:
@@ -179,7 +179,7 @@ def _x_axis(chart: Chart, domain: tuple[float, float], panel: Panel) -> dict[str
         return axis
     values = [_all(p.lines, what) for p in chart.panels for what in ("x", "low", "high")]
     marks = np.array([mark.x for mark in chart.marks])
-    # A line of labels has room for those of two powers of ten.
+    # A row of labels has room for those of two powers of ten.
     return axis | _log_ticks(np.concatenate([*values, marks]), most=100.0)
 
 
@@ -213,7 +213,7 @@ def _y_axis(panel: Panel, domain: tuple[float, float]) -> dict[str, Any]:
 
 
 def _mark(layout: dict[str, Any], chart: Chart, suffix: str, top: float) -> int:
-    """Draw what stands at one value, or between two, of a horizontal axis; rows of its names."""
+    """Draw the marks and bands of a horizontal axis; return the number of rows of their names."""
     axis = f"x{suffix}"
     for band in chart.bands:
         layout["shapes"].append(
@@ -234,7 +234,7 @@ def _mark(layout: dict[str, Any], chart: Chart, suffix: str, top: float) -> int:
 
 
 def _shares(chart: Chart) -> list[float]:
-    """Where each mark lies on the horizontal axis, as a share of what is drawn."""
+    """Position of each mark on the horizontal axis, as a share of the drawn range."""
     panels = [panel for panel in chart.panels if not panel.x_label]
     drawn = [
         x for p in panels for x in (*(v.x for v in p.lines), *(v.x for v in p.fills)) if x.size
@@ -254,7 +254,7 @@ def _upright(kind: str, axis: str, x0: float, x1: float, top: float) -> dict[str
 
 
 def _mark_label(mark: Mark, axis: str, log: bool, top: float) -> dict[str, Any]:
-    # Plotly wants an annotation's place on a logarithmic axis as a logarithm, a shape's not.
+    # On a logarithmic axis plotly expects an annotation's position as a logarithm, a shape's not.
     return {
         "x": math.log10(mark.x) if log else mark.x,
         "xref": axis,
@@ -326,7 +326,7 @@ def _mode(line: Line) -> str:
 
 
 def _labels(line: Line, x: str, y: str, log: tuple[bool, bool]) -> list[dict[str, Any]]:
-    """Return the labels of points as annotations, a thin line leading to those farther off."""
+    """Return point labels as annotations, with a leader line for the more distant ones."""
     found = []
     places = line.places or ((0, 1),) * len(line.labels)
     for at, value, label, (side, rise) in zip(
@@ -396,20 +396,20 @@ def _traces(panel: Panel, x_axis: str, y_axis: str, named: set[str]) -> list[dic
     return out
 
 
-# What a page's chart shows as areas: bands between curves, and bars.
+# Areas of a page's chart: bands between curves, and bars.
 
 
 Axes = tuple[str, str]
 
 
 def see_through(colour: str, opacity: float) -> str:
-    """A colour such as ``#0072B2`` with an opacity, as CSS writes it."""
+    """A color such as ``#0072B2`` with an opacity, in CSS notation."""
     red, green, blue = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
     return f"rgba({red},{green},{blue},{opacity:g})"
 
 
 def fill_traces(panel: Panel, axes: Axes, named: set[str]) -> list[dict[str, Any]]:
-    """Return the bands of a panel, which lie below its lines.
+    """Return the bands of a panel, which are below its lines.
 
     Parameters
     ----------
@@ -417,7 +417,7 @@ def fill_traces(panel: Panel, axes: Axes, named: set[str]) -> list[dict[str, Any
     axes : (str, str)
         Names of the horizontal and the vertical axis.
     named : set of str
-        What the legend names already; added to.
+        Names already in the legend; extended here.
 
     Returns
     -------
@@ -436,7 +436,7 @@ def _fill_trace(fill: Fill, axes: Axes, named: set[str], has_line: bool) -> dict
     y: list[float | None] = []
     for run in runs(fill.x, fill.low, fill.high):
         there = fill.x[run]
-        # There along the low curve, back along the high one; None parts it from the next.
+        # Forward along the low curve, back along the high one; None separates polygons.
         x += [*numbers(np.concatenate([there, there[::-1]]), 9), None]
         y += [*numbers(np.concatenate([fill.low[run], fill.high[run][::-1]]), 6), None]
     return {
@@ -464,7 +464,7 @@ def bar_traces(panel: Panel, axes: Axes, named: set[str]) -> list[dict[str, Any]
     panel : Panel
     axes : (str, str)
     named : set of str
-        What the legend names already; added to.
+        Names already in the legend; extended here.
 
     Returns
     -------
@@ -504,7 +504,7 @@ def _bar_trace(bars: Bars, axes: Axes, named: set[str], across: bool) -> dict[st
 
 
 def bar_labels(panel: Panel, x: str, y: str) -> list[dict[str, Any]]:
-    """Return what stands at the ends of the bars of a panel."""
+    """Return the labels at the ends of the bars of a panel."""
     across, found = bool(panel.categories), []
     for bars in panel.bars:
         start = np.zeros_like(bars.values) if bars.start is None else bars.start
@@ -524,9 +524,9 @@ def bar_labels(panel: Panel, x: str, y: str) -> list[dict[str, Any]]:
     return found
 
 
-# Numbers as plotly wants them.
+# Numbers in plotly's form.
 
 
 def numbers(values: Array, digits: int) -> list[float | None]:
-    """Numbers to so many significant digits; None, which breaks a line, for NaN."""
+    """Round to significant digits; NaN becomes None, which breaks a line."""
     return [None if math.isnan(v) else float(f"{v:.{digits}g}") for v in values.tolist()]

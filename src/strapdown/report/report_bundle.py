@@ -1,4 +1,4 @@
-"""The sealed folder of a report, with what makes its run again."""
+"""The sealed folder of a report, with the inputs needed to re-run it."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ __all__ = ["report_bundle"]
 
 
 class Ran(Protocol):
-    """What was run: by which specification, from which files."""
+    """A completed run with its specification and input files."""
 
     @property
     def spec(self) -> Spec:
-        """As it was read."""
+        """The specification as read."""
 
     @property
     def inputs(self) -> Sequence[InputFiles]:
-        """Each with its role."""
+        """Input files with their roles."""
 
 
 @contextmanager
@@ -48,23 +48,23 @@ def report_bundle(
     ----------
     result : Ran
     out : str or Path
-        Folder to make.
+        Folder to create.
     command : str
-        Which command can run it again.
+        Command that can re-run it.
     key, path_key : str
-        Where the specification stands in what is sealed, and where the path of its file.
+        Keys of the specification, and of the path of its file, in the sealed configuration.
     name : str
-        Of the folder, as the report names it.
+        Folder name shown in the report.
     force : bool
-        Replace a bundle that is there.
+        Overwrite an existing bundle.
     seals : list of Seal
-        The seal is appended when the bundle stands.
+        The seal is appended when the bundle is complete.
     role : str
-        Of the file that the specification was read from, among the inputs.
+        Role of the specification's file among the inputs.
     beside : mapping of str to Spec, optional
-        Further specifications that were run, by where they stand in what is sealed.
+        Further specifications of the run, by their keys in the sealed configuration.
     report : bool
-        Whether it has its pages and figures; sealed where it has not.
+        Whether it has its pages and figures; recorded in the seal if not.
 
     Yields
     ------

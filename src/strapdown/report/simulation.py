@@ -1,4 +1,4 @@
-"""A simulated log as files, with its exact attitude, sealed in a bundle."""
+"""Write a simulated log with its exact attitude as a sealed bundle."""
 
 from __future__ import annotations
 
@@ -44,40 +44,40 @@ def simulate(
     ----------
     name : str
         One of `simulation.SCENARIOS`, the path of a trajectory's file, which ends in ``.toml``, or
-        one of `simulation.crash_cases.CASES`. What is None below is as the file says, or else as
-        named here.
+        one of `simulation.crash_cases.CASES`. Arguments that are None take the value of the file,
+        else the default stated here.
     out : str or Path
-        Folder to make.
+        Folder to create.
     rate : float, Hz
-        100; of a crash each recorder's own.
+        100; for a crash each recorder's own rate.
     sampling : {'instantaneous', 'mean'}
-        The rate at each stamp (as without it), or its exact mean over the interval that ends there.
+        The rate at each stamp (the default), or its exact mean over the interval that ends there.
     seed : int
-        Of the errors; 0.
+        Seed of the errors; 0.
     sensor : str, optional
         One of `sensors.catalogue.SENSORS`, or the path of a file in the same form: the errors
-        of one unit of it, drawn with the seed, take the place of the scenario's own.
+        of one unit, drawn with the seed, replace those of the scenario.
     formats : sequence of str
         Of `formats.log_writers.LOG_WRITERS`, of a crash of `crash_simulation.RECORD_WRITERS`, or
         ``all``; ``csv``.
     units : sequence of str
-        Of a crash: names of its recorders, or ``all``.
+        For a crash: names of its recorders, or ``all``.
     force : bool
-        Replace a bundle that is there.
+        Overwrite an existing bundle.
 
     Returns
     -------
     Seal
         The folder holds ``log.*`` (rad/s, body forward-right-down, with the true attitude in
         further columns), ``scenario.json``, and the truth: ``truth.csv`` with the attitude of a
-        scenario, ``trajectory.csv`` with the place, velocity and attitude of a trajectory. That of
+        scenario, ``trajectory.csv`` with the position, velocity and attitude of a trajectory. For
         a crash: as `crash_simulation.write_crash_simulation`.
 
     Raises
     ------
     ConfigError
         The scenario, the rate, the sampling, the sensor or a format is unknown, `out` may not be
-        written, or something in the file does not fit; the message names the key.
+        written, or an entry of the file is invalid; the message names the key.
     """
     wanted = [formats] if isinstance(formats, str) else formats and list(formats)
     if wanted is not None and not wanted:
@@ -175,7 +175,7 @@ def write_simulation(spec: SimulateSpec, out: Path, *, force: bool = False) -> S
 
 
 def _describe_motion(motion: Motion) -> dict[str, object]:
-    """Numbers that make the motion: its pulses, or the fields of its class with their names."""
+    """Parameters of the motion: its pulses, or the fields of its class with their names."""
     if isinstance(motion, PulseMotion):
         pulses = [
             {

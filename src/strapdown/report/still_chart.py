@@ -1,4 +1,4 @@
-"""A chart as a still for paper: an SVG of lines and words, the same bytes every time."""
+"""A chart as a static SVG for paper, the same bytes every time."""
 
 from __future__ import annotations
 
@@ -45,12 +45,12 @@ __all__ = [
 ]
 
 
-# Points, samples of the legend and patterns of a still.
+# Points, legend samples and patterns of a static chart.
 
 
-_SIZE = 10.0  # pixels, of letters
+_SIZE = 10.0  # pixels, font size
 _STILL_MARKS_ROW, _SAMPLE, _GAP = 15.0, 24.0, 16.0
-_POINT, _RIM = 0.4, 0.5  # radius of a point: over its size, and more in pixels
+_POINT, _RIM = 0.4, 0.5  # radius of a point over its size, and its rim in pixels
 _HATCH = 6.0  # pixels between the lines of a pattern
 
 
@@ -85,7 +85,7 @@ _OUTLINES = {
 
 
 def draw_points(drawing: Drawing, line: Line, at: Array) -> None:
-    """Draw the points of a line at places in the picture, (n, 2)."""
+    """Draw the points of a line at positions in the picture, (n, 2)."""
     drawing.points(
         at[np.isfinite(at).all(axis=1)],
         _OUTLINES[line.symbol],
@@ -120,7 +120,7 @@ def draw_pattern(drawing: Drawing, pattern: str, box: Box) -> None:
 
 @dataclass(frozen=True)
 class Entry:
-    """A name of the legend and what it is shown by."""
+    """A legend entry: its name and its sample."""
 
     name: str
     shown: Line | Fill | Bars
@@ -131,7 +131,7 @@ def entries(chart: Chart) -> list[Entry]:
     found: dict[str, Line | Fill | Bars] = {}
     for panel in chart.panels:
         lines = {line.name for line in panel.lines if line.legend}
-        # A line of a band's name is the entry of both.
+        # A line with a band's name shares its entry.
         fills = [fill for fill in panel.fills if fill.name not in lines]
         shown: list[Line | Fill | Bars] = [*fills, *panel.lines, *panel.bars]
         for one in shown:
@@ -141,7 +141,7 @@ def entries(chart: Chart) -> list[Entry]:
 
 
 def _placed(legend: list[Entry], left: float, right: float) -> Iterator[tuple[Entry, float, int]]:
-    """Entries, where each begins, and its row."""
+    """Legend entries, each with its left end and its row."""
     x, row = left, 0
     for entry in legend:
         wide = _SAMPLE + text_width(entry.name, _SIZE)
@@ -152,7 +152,7 @@ def _placed(legend: list[Entry], left: float, right: float) -> Iterator[tuple[En
 
 
 def legend_height(legend: list[Entry], left: float, right: float) -> float:
-    """Return the room that a legend takes below the panels, in pixels."""
+    """Return the height of a legend below the panels, in pixels."""
     rows = [row for _, _, row in _placed(legend, left, right)]
     return _STILL_MARKS_ROW * (rows[-1] + 1) + 4.0 if rows else 0.0
 
@@ -186,11 +186,11 @@ def _sample(drawing: Drawing, shown: Line | Fill | Bars, x: float, y: float) -> 
         draw_points(drawing, shown, np.array([[0.5 * (box[0] + box[2]), y]]))
 
 
-# One panel of a still: its axes, and what is drawn between them.
+# One panel of a static chart: its axes and content.
 
 
 RED = "#b42318"
-#: Pixels: of labels of ticks, of names of axes, of names of levels and marks, of a tick.
+#: Pixels: tick labels, axis names, names of levels and marks, tick length.
 TICK, AXIS, LEVEL, LONG = 10.0, 10.5, 9.5, 3.5
 _FAINT, _GRID, _SHADE = "#8a939e", "#e6e9ed", "#0072B2"
 _STILL_PANEL_POINT = 96.0 / 72.0  # pixels
@@ -199,18 +199,18 @@ _SIDE, _RISE = 9.0, 13.0  # pixels of a label from its point
 
 @dataclass(frozen=True)
 class Frame:
-    """A panel with its place in the picture and its axes.
+    """A panel with its position in the picture and its axes.
 
     Attributes
     ----------
     panel : Panel
     box : Box
-        Left, top, right, bottom of what is between the axes.
+        Left, top, right, bottom of the area between the axes.
     x, y : Scale
-        `y` from the bottom upward; of categories from the top downward.
+        `y` from the bottom upward; for categories from the top downward.
     x_ticks, y_ticks : list of Tick
     x_named, y_named : bool
-        Whether the ticks have their labels here.
+        Whether the tick labels are written here.
     """
 
     panel: Panel
@@ -223,7 +223,7 @@ class Frame:
     y_named: bool = True
 
     def at(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """Return points in the picture, (n, 2); NaN where an axis has no such value."""
+        """Return points in the picture, (n, 2); NaN for values that an axis cannot show."""
         left, top, right, bottom = self.box
         across = left + (right - left) * self.x.share(x)
         up = self.y.share(y)
@@ -232,7 +232,7 @@ class Frame:
         return np.column_stack([across, bottom - (bottom - top) * up])
 
     def draw(self, drawing: Drawing, bands: tuple[Band, ...], marks: tuple[Mark, ...]) -> None:
-        """Draw everything but what is outside of the axes for all panels."""
+        """Draw everything within the axes of the panel."""
         panel, (left, top, right, bottom) = self.panel, self.box
         with drawing.within(self.box):
             for band in bands:
@@ -344,7 +344,7 @@ class Frame:
                 drawing.text((left - LONG - 3.0, y), tick.text, TICK, anchor="end")
 
     def _names(self, drawing: Drawing) -> None:
-        """Write what stands at points, at the ends of bars, and beside levels."""
+        """Write the labels of points, of the ends of bars, and of levels."""
         left, top, right, bottom = self.box
         taken: list[Box] = []
         for level in self.panel.levels:
@@ -354,7 +354,7 @@ class Frame:
             beside = len(level.label) <= LONGEST_BESIDE
             at = (right + 4.0, y) if beside else (right, y - 0.6 * LEVEL - 1.0)
             anchor = "start" if beside else "end"
-            # Of names at one height the first has its place, the next gives way.
+            # Of names at one height the first keeps its position, the next moves up.
             box = drawing.box_of(at, level.label, LEVEL, anchor=anchor)
             while any(overlap(box, other) for other in taken):
                 at = (at[0], at[1] - 2.0)
@@ -394,14 +394,14 @@ Array = NDArray[np.float64]
 _WIDTH = 643.0  # pixels: 170 mm
 _INCH = 96.0
 _EDGE, _BETWEEN = 4.0, 7.0  # pixels
-_LINE = 13.0  # of a name of an axis
+_LINE = 13.0  # pixels per line of an axis name
 _TITLE = 12.0
 _DOWN, _ACROSS = 15.0, 64.0  # pixels of a step between ticks
 _ROW = LEVEL + 2.0
 
 
 def still(chart: Chart) -> str:
-    """Draw a chart as a still for the column of a printed page, which says the title itself.
+    """Draw a chart as a static SVG for the column of a printed page, which prints the title itself.
 
     Parameters
     ----------
@@ -414,8 +414,8 @@ def still(chart: Chart) -> str:
 
     Notes
     -----
-    `svg_chart.draw` shows the same by matplotlib, for who wants a picture of a chart alone; it
-    takes some 100 ms a chart, mostly for the objects that its ticks are made of.
+    `svg_chart.draw` draws the same chart with matplotlib, for a picture of a single chart; it takes
+    about 100 ms per chart, mostly for its tick objects.
     """
     legend = entries(chart)
     below = legend_height(legend, _EDGE, _WIDTH - _EDGE)
@@ -430,7 +430,7 @@ def still(chart: Chart) -> str:
 
 
 def _height(chart: Chart) -> float:
-    """Inches of a chart in a column of print: two of three panels fill a page with what is said."""
+    """Height of a chart in a print column, inches; two charts of three panels fill a page."""
     if min(len(panel.categories) for panel in chart.panels):
         return 0.8 + 0.19 * max(len(panel.categories) for panel in chart.panels)
     if chart.beside:
@@ -442,7 +442,7 @@ def _height(chart: Chart) -> float:
 
 @dataclass(frozen=True)
 class _Room:
-    """What a panel needs outside of its axes, in pixels."""
+    """Margins of a panel outside of its axes, in pixels."""
 
     left: float = 0.0
     right: float = 0.0
@@ -491,7 +491,7 @@ def _frames(chart: Chart, height: float) -> list[Frame]:
 
 
 def _x_scales(chart: Chart) -> list[Scale]:
-    """Horizontal axes: one that all panels share, and their own of planes."""
+    """Horizontal axes: one shared by all panels, and the planes' own."""
     values: list[Array] = [np.array([b.start, b.end]) for b in chart.bands]
     values.append(np.array([mark.x for mark in chart.marks]))
     margin = 0.05
@@ -531,7 +531,7 @@ def _y_scale(panel: Panel) -> Scale:
 
 
 def _one_scale(x: Scale, y: Scale, shape: float) -> tuple[Scale, Scale]:
-    """Widen one axis of a plane, so that both have one scale in a panel of a shape."""
+    """Widen one axis of a plane, so that both axes have one scale in a panel of given shape."""
     wide, high = x.high - x.low, y.high - y.low
     if wide < shape * high:
         room = 0.5 * (shape * high - wide)
@@ -547,7 +547,7 @@ def _y_ticks(panel: Panel, scale: Scale, tall: float) -> list[Tick]:
 
 
 def _upright(chart: Chart, k: int, named: bool, x: Scale, y: Scale) -> _Room:
-    """Room above and below a panel."""
+    """Margins above and below a panel."""
     panel = chart.panels[k]
     above = _EDGE + (_TITLE + 6.0) * bool(panel.title)
     if y.power:
@@ -574,7 +574,7 @@ def _x_name(chart: Chart, k: int) -> str:
 
 
 def _letter(chart: Chart) -> float:
-    """Width of a letter of a mark's name as a share of the axis, about."""
+    """Approximate width of a letter of a mark's name, as a share of the axis."""
     beside = len(chart.panels) if chart.beside else 1
     return 0.56 * LEVEL / (0.87 * _WIDTH / beside)
 
@@ -585,7 +585,7 @@ def _mark_rows(chart: Chart, x: Scale) -> tuple[int, ...]:
 
 
 def _name_lines(name: str, tall: float) -> list[str]:
-    """A name of an axis in lines that its panel is long enough for, broken between words."""
+    """Break an axis name between words into lines that fit its panel."""
     lines = [""]
     for word in name.split():
         longer = f"{lines[-1]} {word}".strip()
@@ -597,7 +597,7 @@ def _name_lines(name: str, tall: float) -> list[str]:
 
 
 def _sides(panel: Panel, y_ticks: list[Tick], span: tuple[float, float]) -> tuple[float, float]:
-    """Room to the left and to the right of a panel."""
+    """Margins to the left and to the right of a panel."""
     left = _EDGE + LONG + 3.0
     left += max((text_width(tick.text, TICK) for tick in y_ticks), default=0.0)
     lines = _name_lines(panel.y_label, span[1] - span[0] + 2.0 * _BETWEEN)
@@ -611,7 +611,7 @@ def _sides(panel: Panel, y_ticks: list[Tick], span: tuple[float, float]) -> tupl
 
 
 def _across(chart: Chart, sides: list[_Room]) -> list[tuple[float, float]]:
-    """Left and right of each panel's axes."""
+    """Left and right end of each panel's axes."""
     if not chart.beside:
         left, right = max(s.left for s in sides), max(s.right for s in sides)
         return [(left, _WIDTH - right)] * len(sides)
@@ -624,7 +624,7 @@ def _across(chart: Chart, sides: list[_Room]) -> list[tuple[float, float]]:
 
 
 def _around(drawing: Drawing, chart: Chart, frame: Frame) -> None:
-    """Write what stands outside of a panel's axes."""
+    """Write the text outside of a panel's axes."""
     k = next(j for j, panel in enumerate(chart.panels) if panel is frame.panel)
     panel, (left, top, right, bottom) = frame.panel, frame.box
     above = top - 3.0
@@ -671,10 +671,10 @@ def _power(power: int) -> str:
     return "10" + str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
-# Axes of a still: their ends, and where they have ticks.
+# Axes of a static chart: their ends and ticks.
 
 
-# Numbers beyond are written with a power of ten beside the axis.
+# Numbers beyond this are written with a power of ten beside the axis.
 _SMALL, _LARGE = 1e-3, 1e6
 
 
@@ -687,7 +687,7 @@ class Scale:
     log: bool = False
 
     def share(self, values: ArrayLike) -> Array:
-        """Return where values lie, from 0 at the low end to 1; NaN where a log axis has none."""
+        """Return the position of values, from 0 at the low end to 1; NaN if a log axis has none."""
         v = np.asarray(values, dtype=np.float64)
         if not self.log:
             return np.asarray((v - self.low) / (self.high - self.low))
@@ -706,7 +706,7 @@ class Scale:
 
 @dataclass(frozen=True)
 class Tick:
-    """A place on an axis; without a grid line, if it is between others."""
+    """A position on an axis; a minor tick has no grid line."""
 
     at: float
     text: str
@@ -714,15 +714,15 @@ class Tick:
 
 
 def fitted(values: Sequence[ArrayLike], log: bool = False, margin: float = 0.05) -> Scale:
-    """Make an axis that holds values, with a margin at both ends.
+    """Make an axis that contains the values, with a margin at both ends.
 
     Parameters
     ----------
     values : sequence of array_like
-        What is not finite, or not positive on a logarithmic axis, is left out.
+        Values that are not finite, or not positive on a logarithmic axis, are ignored.
     log : bool
     margin : float
-        Of what the values span.
+        As a share of the span of the values.
 
     Returns
     -------
@@ -749,11 +749,11 @@ def ticks(scale: Scale, most: int, *, step: float = 0.0, between: float = 30.0) 
     ----------
     scale : Scale
     most : int
-        Steps that it has room for.
+        Maximum number of steps.
     step : float
-        Between them, where it is asked for; not of a logarithmic axis.
+        Requested step, if any; not for a logarithmic axis.
     between : float
-        A logarithmic axis that spans less has labels at twice and five times powers of ten.
+        A logarithmic axis of a smaller ratio also has labels at 2 and 5 times powers of ten.
 
     Returns
     -------

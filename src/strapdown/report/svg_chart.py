@@ -55,19 +55,19 @@ _STYLE: Any = {
 }
 _WIDTH = 9.0  # inches
 _DPI = 160
-_MARK = 7.0  # points, of the names of marks and levels
-_TITLE, _CAPTION = 90, 155  # characters a line
+_MARK = 7.0  # points, font size of the names of marks and levels
+_TITLE, _CAPTION = 90, 155  # characters per line
 
 
 def draw(chart: Chart, path: Path, *, caption: bool = False) -> None:
-    """Draw a chart into an SVG or a PNG file, as its ending says.
+    """Draw a chart into an SVG or a PNG file, by its extension.
 
     Parameters
     ----------
     chart : Chart
     path : Path
     caption : bool
-        Whether the caption stands in the picture: where no page says it.
+        Whether to write the caption in the picture, for use without a page.
     """
     with _own_style():
         figure = _figure(chart, caption)
@@ -78,7 +78,7 @@ def draw(chart: Chart, path: Path, *, caption: bool = False) -> None:
 
 
 def notebook_figure(chart: Chart) -> Figure:
-    """Return a chart as a figure, which belongs to no window and to no global state.
+    """Return a chart as a figure that belongs to no window and no global state.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def notebook_figure(chart: Chart) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        It shows itself in a notebook; `savefig` writes it.
+        Displays itself in a notebook; `savefig` writes it.
     """
     with _own_style():
         return _figure(chart)
@@ -95,11 +95,11 @@ def notebook_figure(chart: Chart) -> Figure:
 
 @contextmanager
 def _own_style() -> Iterator[None]:
-    """Not the style of whoever runs it: the picture belongs to the seal."""
+    """Use a fixed style instead of the user's, because the picture is sealed."""
     import matplotlib as mpl
 
     with mpl.rc_context(), warnings.catch_warnings():
-        # A letter that the font lacks, in a name of the user's, is a box.
+        # A character that the font lacks, in a user's name, is drawn as a box.
         warnings.filterwarnings("ignore", "Glyph .* missing from font")
         mpl.rcdefaults()
         mpl.rcParams.update(_STYLE)
@@ -111,7 +111,7 @@ def _figure(chart: Chart, caption: bool = False) -> Figure:
     from matplotlib.figure import Figure
 
     class Picture(Figure):
-        """Shows itself where pyplot, which would do it otherwise, was never loaded."""
+        """Display itself in a notebook where pyplot was never loaded."""
 
         def _repr_png_(self) -> bytes:
             from io import BytesIO
@@ -123,7 +123,7 @@ def _figure(chart: Chart, caption: bool = False) -> Figure:
         def draw(self, renderer: Any) -> None:
             engine = self.get_layout_engine()
             if isinstance(engine, RoundedLayout) and self.canvas.is_saving():
-                # Saving draws once before, only for the layout; it takes it away then.
+                # Saving first draws only for the layout, and then removes the layout engine.
                 engine.execute(self)
                 return
             super().draw(renderer)
@@ -153,7 +153,7 @@ def _figure(chart: Chart, caption: bool = False) -> Figure:
             loc="outside lower left",
             ncols=columns,
             frameon=False,
-            # Nothing else below the panels gives way to a legend.
+            # Only a legend gets space below the panels, so the caption is its title.
             title=wrapped(chart.caption, _CAPTION) if caption else None,
             title_fontsize=8,
             alignment="left" if caption else "center",
@@ -217,7 +217,7 @@ def _label_marks(chart: Chart, axis: Axes) -> None:
             annotation_clip=False,
         )
     if title := axis.get_title(loc="left"):
-        # The panel's title gives way upward.
+        # The panel's title moves up.
         pad = 6.0 + (_MARK + 1.5) * (1 + max(rows))
         axis.set_title(title, loc="left", fontsize=9, fontweight="bold", pad=pad)
 
@@ -273,7 +273,7 @@ def _draw_panel(panel: Panel, axis: Axes, chart: Chart) -> None:
 def _draw_line(line: Line, axis: Axes) -> None:
     if line.inside:
         fill_outline(line, axis)
-    # Matplotlib leaves a name that begins with an underscore out of the legend.
+    # Matplotlib omits a name that begins with an underscore from the legend.
     style: dict[str, Any] = {
         "color": line.colour,
         "label": line.name if line.legend else "_",
@@ -304,10 +304,10 @@ def _draw_line(line: Line, axis: Axes) -> None:
 
 
 def _plain_labels(axis: Axis, most: float = 30.0) -> None:
-    """Label a logarithmic axis without mathematics.
+    """Label a logarithmic axis without math text.
 
-    Matplotlib's own labels are mathematics, which is switched off for the sake of names that
-    contain a dollar sign.
+    Matplotlib's own labels are math text, which is switched off for names that contain a dollar
+    sign.
     """
     from matplotlib.ticker import FuncFormatter
 
@@ -320,7 +320,7 @@ def _plain_labels(axis: Axis, most: float = 30.0) -> None:
     axis.set_minor_formatter(FuncFormatter(between))
 
 
-# What a picture's chart shows as areas: bands between curves, outlines filled, and bars.
+# Areas of a picture's chart: bands between curves, filled outlines, and bars.
 
 
 _INK = "#1b1f24"
@@ -352,13 +352,13 @@ def _draw_fill(fill: Fill, axis: Axes, named: bool) -> None:
 
 
 def fill_outline(line: Line, axis: Axes) -> None:
-    """Fill the inside of a closed outline, or of several."""
+    """Fill the inside of one or more closed outlines."""
     for run in runs(line.x, line.y):
         axis.fill(line.x[run], line.y[run], color=line.colour, alpha=line.inside, lw=0)
 
 
 def draw_bars(panel: Panel, axis: Axes) -> None:
-    """Draw the bars of a panel: across if it has categories, else upright."""
+    """Draw the bars of a panel: horizontal if it has categories, else upright."""
     for bars in panel.bars:
         _draw_bars(bars, axis, bool(panel.categories))
     if panel.bars and panel.categories:
@@ -398,7 +398,7 @@ def _draw_bars(bars: Bars, axis: Axes, across: bool) -> None:
 
 
 def set_ticks(panel: Panel, axis: Axes) -> None:
-    """Set ticks at equal steps where a panel asks for it."""
+    """Set ticks at equal steps if the panel requests them."""
     from matplotlib.ticker import MultipleLocator
 
     if panel.step:
@@ -407,21 +407,21 @@ def set_ticks(panel: Panel, axis: Axes) -> None:
         axis.xaxis.set_major_locator(MultipleLocator(panel.x_step))
 
 
-# The layout of a picture, the same every time. Loads matplotlib.
+# Reproducible layout of a picture. Loads matplotlib.
 
 
 class RoundedLayout(ConstrainedLayoutEngine):
     """Matplotlib's constrained layout, rounded.
 
-    Its solver takes sums in the order of addresses in memory, so that the last bit of a place
-    differs from run to run, and with it the names of clips in an SVG, which are hashes.
+    Its solver sums in the order of memory addresses, so the last bit of a position differs from run
+    to run, and with it the names of clips in an SVG, which are hashes.
     """
 
     def execute(self, fig: Figure) -> None:
-        """Place the axes of a figure, to a millionth of its size."""
+        """Position the axes of a figure, to a millionth of its size."""
         super().execute(fig)
         for axes in fig.axes:
             bounds = [round(float(v), 6) for v in axes.get_position(original=True).bounds]
             axes.set_position((bounds[0], bounds[1], bounds[2], bounds[3]), which="original")
-            # Axes whose place was set are left out of the next layout.
+            # Axes with a set position are left out of the next layout.
             axes.set_in_layout(True)

@@ -1,4 +1,4 @@
-"""A picture of lines, shapes and words as SVG: every word escaped, the same bytes every time."""
+"""A picture of lines, shapes and text as SVG: all text escaped, the same bytes every time."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ Box = tuple[float, float, float, float]
 __all__ = ["INK", "SMALL", "Box", "Drawing", "number", "overlap", "shortened", "text_width"]
 
 INK = "#1b1f24"
-#: The least size of a letter, in pixels of a picture at its size on paper.
+#: Smallest font size, in pixels of a picture at its size on paper.
 SMALL = 9.5
-# Dashes as they are named in charts, in widths of a thin line.
+# Dash names of charts, in widths of a thin line.
 _DASHES = {"dash": "6 4", "dot": "1.5 3", "dashdot": "7 3 1.5 3", "longdash": "11 4"}
-# Widths of letters over the size: those of DejaVu Sans, the widest of the usual fonts.
+# Letter widths over the font size, of DejaVu Sans, the widest of the usual fonts.
 _NARROW, _WIDE = frozenset("iIjl.,:;'|!()[] /tfr°′·"), frozenset("mwMWO@%Q—→←")
 _LINE = 1.18
 
 
 def number(value: float) -> str:
-    """Write a coordinate to a hundredth of a pixel, without trailing zeros."""
+    """Format a coordinate to a hundredth of a pixel, without trailing zeros."""
     text = f"{value:.2f}".rstrip("0").rstrip(".")
     return "0" if text in ("-0", "") else text
 
 
 def text_width(text: str, size: float, bold: bool = False) -> float:
-    """Width of a line of text in pixels, rather too much than too little."""
+    """Upper estimate of the width of a line of text in pixels."""
     ems = sum(0.40 if c in _NARROW else 0.95 if c in _WIDE else 0.64 for c in text)
     return ems * size * (1.08 if bold else 1.0)
 
 
 def shortened(text: str, width: float, size: float, bold: bool = False) -> str:
-    """Cut a text that is longer than so many pixels, and say so by dots."""
+    """Cut a text longer than a width in pixels, marked by an ellipsis."""
     if text_width(text, size, bold) <= width:
         return text
     while text and text_width(text + "…", size, bold) > width:
@@ -47,26 +47,26 @@ def shortened(text: str, width: float, size: float, bold: bool = False) -> str:
 
 
 def overlap(a: Box, b: Box) -> float:
-    """Area that two boxes (left, top, right, bottom) share."""
+    """Overlap area of two boxes (left, top, right, bottom)."""
     across = min(a[2], b[2]) - max(a[0], b[0])
     up = min(a[3], b[3]) - max(a[1], b[1])
     return max(across, 0.0) * max(up, 0.0)
 
 
 class Drawing:
-    """Elements of an SVG, one after the other; y runs down the page.
+    """Sequence of SVG elements; y points down the page.
 
     Parameters
     ----------
     width, height : float
         In pixels, 1/96 inch at the picture's size on paper.
     alt : str
-        What the picture shows, in words.
+        Text alternative for the picture.
 
     Attributes
     ----------
     boxes : list of (str, Box)
-        Where each line of text stands, for who places others.
+        Extent of each line of text, for the placement of others.
     """
 
     def __init__(self, width: float, height: float, alt: str = "") -> None:
@@ -90,7 +90,7 @@ class Drawing:
 
     @contextmanager
     def within(self, box: Box) -> Iterator[None]:
-        """Cut what is drawn inside of this at a box (left, top, right, bottom)."""
+        """Clip everything drawn in this context to a box (left, top, right, bottom)."""
         left, top, right, bottom = box
         size = f"{number(left)} {number(top)} {number(right - left)} {number(bottom - top)}"
         x, y, width, height = size.split()
@@ -123,7 +123,7 @@ class Drawing:
         opacity: float = 1.0,
         closed: bool = True,
     ) -> None:
-        """Draw a polygon, or a line of several points; not where fewer than two are finite."""
+        """Draw a polygon, or a line of several points; skip fewer than two finite points."""
         array = np.asarray(points, dtype=np.float64).reshape(-1, 2)
         array = array[np.isfinite(array).all(axis=1)]
         if len(array) < 2:
@@ -157,7 +157,7 @@ class Drawing:
     def curve(
         self, points: Array, colour: str = INK, width: float = 1.0, dash: str = "solid"
     ) -> None:
-        """Draw a line of many points, (n, 2), all finite, to a tenth of a pixel."""
+        """Draw a line of many finite points, (n, 2), to a tenth of a pixel."""
         if len(points) < 2:
             return
         self._parts.append(
@@ -165,7 +165,7 @@ class Drawing:
         )
 
     def area(self, points: Array, fill: str, opacity: float = 1.0) -> None:
-        """Fill an outline of many points, (n, 2), all finite, to a tenth of a pixel."""
+        """Fill an outline of many finite points, (n, 2), to a tenth of a pixel."""
         if len(points) < 3:
             return
         more = f' fill-opacity="{number(opacity)}"' if opacity < 1.0 else ""
@@ -198,7 +198,7 @@ class Drawing:
         width: float = 2.0,
         dash: str = "solid",
     ) -> None:
-        """Draw an arrow with a filled head; nothing where it has no length."""
+        """Draw an arrow with a filled head; skipped if it has no length."""
         x, y = tip[0] - tail[0], tip[1] - tail[1]
         length = math.hypot(x, y)
         if not length > 0.0:
@@ -223,7 +223,7 @@ class Drawing:
         turn: float = 0.0,
         halo: bool = False,
     ) -> Box:
-        """Write a line of text, its middle at the height of `at`; return where it stands.
+        """Write a line of text, vertically centered at `at`; return its extent.
 
         Parameters
         ----------
@@ -237,7 +237,7 @@ class Drawing:
         turn : float, deg
             Clockwise.
         halo : bool
-            Whether a white rim keeps it from what is below.
+            Whether to draw a white rim that separates it from the background.
         """
         x, y = at
         box = self.box_of(at, text, size, anchor=anchor, bold=bold, turn=turn)
@@ -266,7 +266,7 @@ class Drawing:
         bold: bool = False,
         turn: float = 0.0,
     ) -> Box:
-        """Where a line of text would stand."""
+        """Return the extent of a line of text without writing it."""
         width = text_width(text, size, bold)
         left = {"start": 0.0, "middle": -0.5, "end": -1.0}[anchor] * width
         corners = np.array([[left, -0.5], [left + width, -0.5], [left + width, 0.5], [left, 0.5]])
@@ -287,7 +287,7 @@ class Drawing:
         away: float = 8.0,
         avoid: Sequence[Box] = (),
     ) -> Box:
-        """Write beside a point where the least is covered, with a thin line if far from it."""
+        """Write beside a point with the least overlap, with a thin line if far from the point."""
         best: tuple[float, tuple[float, float], str, bool] | None = None
         for far, (dx, dy) in _tries(away, size):
             anchor = "start" if dx > 0.1 else "end" if dx < -0.1 else "middle"
@@ -327,12 +327,12 @@ def _stroke(colour: str | None, width: float, dash: str) -> str:
 
 
 def _tenths(points: Array) -> str:
-    """Write many points at once."""
+    """Format many points at once."""
     return " ".join(["%.1f,%.1f"] * len(points)) % tuple(points.ravel().tolist())
 
 
 def _clean(text: str) -> str:
-    """Escape markup, and leave out what XML cannot hold."""
+    """Escape markup, and remove characters that XML does not allow."""
     kept = "".join(c if c >= " " and not "\ud800" <= c <= "\udfff" else " " for c in text)
     kept = "".join(c for c in kept if c not in "\ufffe\uffff\x7f")
     return escape(kept)

@@ -1,4 +1,4 @@
-"""A simulated trajectory as files: the log, the exact truth, and what made them, sealed."""
+"""Write a simulated trajectory as a sealed bundle: log, exact truth, configuration."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from strapdown.tables import EULER, places_of
 __all__ = ["simulation_chart", "trajectory_chart", "write_trajectory_simulation"]
 
 
-# Row of a Trajectory table to keys with units.
+# Row of a Trajectory table as keys with units.
 _ROW = {
     "lat": "lat_deg",
     "lon": "lon_deg",
@@ -52,16 +52,16 @@ def write_trajectory_simulation(spec: TrajectorySpec, out: Path, *, force: bool 
     ----------
     spec : TrajectorySpec
     out : Path
-        Folder to make.
+        Folder to create.
     force : bool
-        Replace a bundle that is there.
+        Overwrite an existing bundle.
 
     Returns
     -------
     Seal
         The folder holds ``log.*`` (rad/s, m/s², body forward-right-down, with the true attitude in
-        further columns), ``trajectory.csv`` and other forms of it, ``trajectory.svg``, a picture
-        of it, and ``scenario.json`` with the resolved configuration.
+        further columns), ``trajectory.csv`` and other formats, ``trajectory.svg``, its picture,
+        and ``scenario.json`` with the resolved configuration.
 
     Raises
     ------
@@ -127,7 +127,7 @@ def write_trajectory_simulation(spec: TrajectorySpec, out: Path, *, force: bool 
 
 
 def simulation_chart(spec: TrajectorySpec, trajectory: pd.DataFrame) -> Chart:
-    """Return the chart of a simulated trajectory, titled as its file says.
+    """Return the chart of a simulated trajectory, titled as its file states.
 
     Parameters
     ----------
@@ -144,27 +144,27 @@ def simulation_chart(spec: TrajectorySpec, trajectory: pd.DataFrame) -> Chart:
 
 
 def _state(trajectory: pd.DataFrame, row: int) -> dict[str, float]:
-    """One row, each value with its unit in its key."""
+    """One row, each value under a key with its unit."""
     at = trajectory.iloc[row]
     return {"time_s": float(trajectory.index[row])} | {k: float(at[c]) for c, k in _ROW.items()}
 
 
-# The chart of a trajectory: its path as a plan, and height, speed and attitude over time.
+# Chart of a trajectory: its path as a plan, and height, speed and attitude over time.
 
 
-# As many points of a plan, and buckets of a curve over time, as a picture of 900 pixels shows.
+# Points of a plan, and buckets of a curve over time, that a picture of 900 pixels can resolve.
 MOST_POINTS, BUCKETS = 1500, 700
-# What moves less has no path, m; what changes less is drawn as constant: m, m/s, deg.
+# Smaller motion has no path, m; smaller changes are drawn as constant: m, m/s, deg.
 NO_PATH = 1e-3
 _STEADY = 1e-3
-# From here on a plan is in kilometres.
+# Plans of at least this size, m, are in kilometers.
 _FAR = 20e3
 _LOW = 0.6  # height of a panel over time
 
 
 @dataclass(frozen=True)
 class _Drawn:
-    """One trajectory, its thinned path in metres about the start, and how it is drawn."""
+    """One trajectory, its thinned path in meters about the start, and its style."""
 
     table: pd.DataFrame
     time: Array
@@ -189,33 +189,33 @@ def trajectory_chart(
     ellipsoid: Ellipsoid = WGS84,
     slug: str = "trajectory",
 ) -> Chart:
-    """Chart a trajectory: where it went, and height, speed and attitude over time.
+    """Chart a trajectory: plan, height, speed and attitude over time.
 
     Parameters
     ----------
     trajectory : DataFrame
-        A Trajectory table. The plan is about its first place.
+        A Trajectory table. The plan is about its first position.
     other : DataFrame, optional
         A second one on the same clock, a reference or an estimate, drawn over the first.
     title : str
     names : (str, str)
-        Of the two, for the legend; there is none for one alone.
+        Of the two, for the legend; a single trajectory has no legend.
     ellipsoid : Ellipsoid
     slug : str
-        Name of the file.
+        File name.
 
     Returns
     -------
     Chart
-        Without the plan where nothing moves by 1 mm over the ground, and then without height and
-        speed, too, unless the height changes by that. The plan is the projection along the
-        vertical of the start onto its level plane, in which a straight path is straight: 0.1 % of
-        a distance is lost 490 km away.
+        Without the plan if the trajectory moves by less than 1 mm over ground, and then also
+        without height and speed, unless the height changes by that. The plan is the projection
+        along the vertical of the start onto its level plane, in which a straight path is straight:
+        0.1 % of a distance is lost 490 km away.
 
     Raises
     ------
     DataError
-        A place cannot be, as `frames.ned_from_geodetic`.
+        A position is invalid, as in `frames.ned_from_geodetic`.
     """
     origin = places_of(trajectory.iloc[:1])[0]
     drawn = [_drawn(trajectory, origin, ellipsoid, names[0], other is not None)]

@@ -1,4 +1,4 @@
-"""Numbers of a crash report as a reader sees them: rounded by their bound, with their unit."""
+"""Formatting of report numbers: rounded by their bound, with their unit."""
 
 from __future__ import annotations
 
@@ -59,19 +59,19 @@ __all__ = [
 ]
 
 
-#: m/s in km/h.
+#: km/h per m/s.
 KMH = 3.6
-#: Name of what is combined of all recorders, in every table and chart.
+#: Name of the recorders' mean, in every table and chart.
 MEAN = "mean of the recorders"
 MINUS = "\u2212"
-# Between a number, its bound and their unit: they stay in one line.
+# No-break space between a number, its bound and their unit.
 GAP = "\u00a0"
-# A bound is told to this many digits, and its value to the same place.
+# Significant digits of a bound; its value is rounded to the same decimal.
 DIGITS = 2
 
 
 def plain(value: float, places: int) -> str:
-    """Write a number to so many places, with a real minus, and zero without a sign.
+    """Format a number with fixed decimals, a real minus sign, and zero without a sign.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def plain(value: float, places: int) -> str:
     Returns
     -------
     str
-        A dash for what is no number.
+        A dash for NaN or infinity.
     """
     if not math.isfinite(value):
         return "–"
@@ -92,25 +92,25 @@ def plain(value: float, places: int) -> str:
 
 
 def _places(half: float) -> int:
-    """Places at which a bound has its second digit, at most four."""
+    """Number of decimals of the second digit of a bound, at most four."""
     if not (math.isfinite(half) and half > 0.0):
         return 2
     return min(4, max(0, DIGITS - 1 - math.floor(math.log10(half))))
 
 
 def about(value: float, half: float, unit: str) -> str:
-    """Write a value with the half width of its bound.
+    """Format a value with the half width of its bound.
 
     Parameters
     ----------
     value, half : float
-        In the unit.
+        In the given unit.
     unit : str
 
     Returns
     -------
     str
-        As ``7.34 ± 0.27 m/s``, with spaces at which no line breaks.
+        As ``7.34 ± 0.27 m/s``, with no-break spaces.
     """
     places = _places(half)
     both = f"{plain(value, places)}{GAP}±{GAP}{plain(half, places)}"
@@ -118,12 +118,12 @@ def about(value: float, half: float, unit: str) -> str:
 
 
 def speed(value: float, half: float) -> str:
-    """Write a speed in m/s with its bound, in km/h."""
+    """Format a speed in m/s with its bound, in km/h."""
     return about(KMH * value, KMH * half, "km/h")
 
 
 def speed_range(value: float, half: float) -> str:
-    """Write the bound of a speed in m/s as a range, in km/h and m/s."""
+    """Format the bound of a speed in m/s as a range, in km/h and m/s."""
     places = _places(KMH * half)
     low, high = KMH * (value - half), KMH * (value + half)
     ends = f"{plain(low, places)} to {plain(high, places)}{GAP}km/h with 95{GAP}%"
@@ -131,32 +131,32 @@ def speed_range(value: float, half: float) -> str:
 
 
 def instant(time: float) -> str:
-    """Write an instant or a length of time in s, to a tenth of a millisecond."""
+    """Format an instant or a duration in s, to a tenth of a millisecond."""
     text = plain(time, 4).rstrip("0").rstrip(".")
     return f"{'0' if text == MINUS + '0' else text}{GAP}s"
 
 
 def angle_range(interval: AngleInterval) -> str:
-    """Write the bound of a direction."""
+    """Format the bound of a direction."""
     if interval.undetermined:
         return "not determined: no direction is excluded with 95 %"
     return f"{plain(interval.low_deg, 1)}° to {plain(interval.high_deg, 1)}° with 95{GAP}%"
 
 
 def moment(time: float) -> str:
-    """Say when an instant is: ``0.7 ms before the trigger``."""
+    """Describe an instant: ``0.7 ms before the trigger``."""
     if abs(time) < 5e-5:
         return "the trigger"
     return f"{plain(1e3 * abs(time), 1)}{GAP}ms {'before' if time < 0.0 else 'after'} the trigger"
 
 
 def recorder(unit: UnitReconstruction, result: CaseResult) -> str:
-    """Name whose answer it is: a recorder's, or the mean's."""
+    """Return the name of an answer's recorder, or of the mean."""
     return MEAN if unit is result.reconstruction.combined else unit.name
 
 
 def side_words(forward: float, right: float) -> str:
-    """Say in words which way a change of velocity is, or a displacement: ``backward``."""
+    """Return the direction of a delta-V or a displacement in words: ``backward``."""
     ahead = "forward" if forward > 0.0 else "backward"
     aside = "to the right" if right > 0.0 else "to the left"
     if abs(forward) > 2.5 * abs(right):
@@ -167,7 +167,7 @@ def side_words(forward: float, right: float) -> str:
 
 
 def over_ground(result: CaseResult) -> bool:
-    """Whether a heading is known, so that the path is told over ground."""
+    """Whether a heading is known, so that the path is given over ground."""
     entry = result.spec.entry
     return entry.kind == "gnss" or bool(entry.heading_deg)
 
@@ -178,11 +178,11 @@ def axis_names(result: CaseResult) -> tuple[str, str, str]:
 
 
 def spaced(text: str) -> str:
-    """Return a text with ordinary spaces, for what is searched and not set on a page."""
+    """Return a text with ordinary spaces, for searching instead of typesetting."""
     return text.replace(GAP, " ")
 
 
-# Numbers of a run of navigation: how far, how well known, in units that people use.
+# Numbers of a navigation run: distances and bounds in convenient units.
 
 
 Array = NDArray[np.float64]
@@ -194,7 +194,7 @@ MOST_TURN = 900.0
 
 @dataclass(frozen=True)
 class StateBlock:
-    """States of one kind, with the unit that they are shown in.
+    """States of one kind, with their display unit.
 
     Attributes
     ----------
@@ -202,12 +202,12 @@ class StateBlock:
         In words: ``gyro bias``, ``rtk: lever arm``.
     slug : str
     columns : tuple of str
-        Of the record.
+        Columns of the record.
     labels : tuple of str
         ``x``, ``y``, ``z``.
     unit : str
     factor : float
-        From SI.
+        Conversion from SI.
     """
 
     name: str
@@ -219,14 +219,14 @@ class StateBlock:
 
 
 def blocks_of(record: NavigationRecord) -> tuple[StateBlock, ...]:
-    """Return the blocks of states of sensors and aids, in their order."""
+    """Return the blocks of sensor and measurement error states, in their order."""
     groups: dict[str, list[str]] = {}
     for column in record.sensors.columns:
         groups.setdefault(str(column).rpartition("_")[0] or str(column), []).append(str(column))
     out = []
     for name, columns in groups.items():
         labels = [c.removeprefix(name).lstrip("_") for c in columns]
-        # What was unknown at first, and what is known now, are both to be read.
+        # The unit must suit both the estimates and their standard deviations.
         sizes = [record.sensors[columns].to_numpy(), record.sensors_sd[columns].to_numpy()]
         size = max((float(np.nanmax(np.abs(v))) for v in sizes if v.size), default=0.0)
         factor, unit = shown_unit(record.units.get(columns[0], ""), size)
@@ -246,7 +246,7 @@ def blocks_of(record: NavigationRecord) -> tuple[StateBlock, ...]:
 
 
 def shown_unit(unit: str, size: float) -> tuple[float, str]:
-    """Factor and unit in which states of such a size are told."""
+    """Conversion factor and display unit for states of a given size."""
     if unit == "rad/s":
         slow = size * DEG_PER_HOUR < 1000.0
         return (DEG_PER_HOUR, "deg/h") if slow else (math.degrees(1.0), "deg/s")
@@ -263,7 +263,7 @@ def shown_unit(unit: str, size: float) -> tuple[float, str]:
 
 
 def unwrapped(heading: Array) -> Array:
-    """Headings in deg without jumps, the first of them within 0 to 360."""
+    """Headings in deg without jumps, starting within 0 to 360."""
     if not heading.size:
         return heading
     whole = np.unwrap(heading, period=360.0)
@@ -271,10 +271,10 @@ def unwrapped(heading: Array) -> Array:
 
 
 def heading_shown(record: NavigationRecord) -> tuple[Array, Array, str]:
-    """Heading over the trajectory and at the marks, deg, as it is drawn, and what to say of it.
+    """Heading over the trajectory and at the marks, deg, for display, with its caption.
 
-    It goes on over north, unless it turns so often that nothing could be read; then NaN breaks it
-    there.
+    It continues through north, unless it turns too often to be readable; then NaN breaks it at
+    north.
     """
     time = record.trajectory.index.to_numpy(dtype=np.float64)
     values = unwrapped(record.trajectory["heading"].to_numpy(dtype=np.float64))
@@ -289,7 +289,7 @@ def heading_shown(record: NavigationRecord) -> tuple[Array, Array, str]:
 
 
 def at_marks(record: NavigationRecord, column: str) -> Array:
-    """A column of the trajectory, but for the heading, at the marks of the covariance."""
+    """A trajectory column, other than heading, at the covariance marks."""
     time = record.trajectory.index.to_numpy(dtype=np.float64)
     values = record.trajectory[column].to_numpy(dtype=np.float64)
     return np.asarray(np.interp(record.sd.index.to_numpy(dtype=np.float64), time, values))
@@ -307,14 +307,14 @@ def worst_within(record: NavigationRecord, span: Span) -> tuple[float, float] | 
 
 
 def distance_over_ground(trajectory: pd.DataFrame) -> float:
-    """Way over the ground, m: the horizontal speed summed over time by the trapezoid rule."""
+    """Distance over ground, m: the horizontal speed integrated by the trapezoidal rule."""
     time = trajectory.index.to_numpy(dtype=np.float64)
     speed = np.hypot(*(trajectory[c].to_numpy(dtype=np.float64) for c in ("VN", "VE")))
     return float(np.trapezoid(speed, time))
 
 
 def length_words(metres: float) -> str:
-    """A length: ``0.021 m``, ``13.4 m``, ``388 m``, ``2.41 km``."""
+    """Format a length: ``0.021 m``, ``13.4 m``, ``388 m``, ``2.41 km``."""
     size = abs(metres)
     if not math.isfinite(size):
         return "–"
@@ -327,7 +327,7 @@ def length_words(metres: float) -> str:
 
 
 def duration_words(seconds: float) -> str:
-    """A length of time: ``221 s``, ``30 min 5 s``, ``1 h 12 min``."""
+    """Format a duration: ``221 s``, ``30 min 5 s``, ``1 h 12 min``."""
     if seconds < 10.0:
         return f"{plain(seconds, 2)}{GAP}s"
     whole = round(seconds)
@@ -341,12 +341,12 @@ def duration_words(seconds: float) -> str:
 
 
 def half(sd: float) -> float:
-    """Half width of the interval of 95 %."""
+    """Half width of the 95 % interval."""
     return TWO_SIDED_95 * float(sd)
 
 
 def share_words(share: float) -> str:
-    """A share: ``97.4 %``; never rounded to all or to nothing."""
+    """Format a share: ``97.4 %``; never rounded to 0 % or 100 %."""
     if not math.isfinite(share):
         return "–"
     places = 0 if share in (0.0, 1.0) else 1
@@ -354,16 +354,16 @@ def share_words(share: float) -> str:
     return f"{plain(value, places)}{GAP}%"
 
 
-# Numbers of an alignment as a reader sees them.
+# Numbers of an alignment.
 
 
-#: Bounds of roll, pitch and heading, in deg, that leave no angle out.
+#: Half widths of roll, pitch and heading, in deg, that exclude no angle.
 ANY = (180.0, 90.0, 180.0)
 NOT_KNOWN = "not known"
 
 
 def angle_bound(alignment: Alignment, which: int) -> str:
-    """An angle with its bound: ``90.60° ± 0.12°``; in words where it may be any."""
+    """Format an angle with its bound: ``90.60° ± 0.12°``; in words if it is undetermined."""
     value = float(alignment.roll_pitch_heading[which])
     half = TWO_SIDED_95 * float(alignment.sd_deg[which])
     if not half < ANY[which]:
@@ -374,25 +374,25 @@ def angle_bound(alignment: Alignment, which: int) -> str:
 
 
 def alignment_values_instant(time: float) -> str:
-    """Say a stamp to a hundredth of a second: ``243298.01 s``."""
+    """Format a time stamp to a hundredth of a second: ``243298.01 s``."""
     return f"{plain(time, 2).rstrip('0').rstrip('.')}{GAP}s"
 
 
 def rate_words(rate: float) -> str:
-    """A rate in rad/s in deg/h, or in deg/s where that is a large number."""
+    """Format a rate in rad/s in deg/h, or in deg/s if large."""
     if rate * DEG_PER_HOUR < 3600.0:
         return f"{small(rate * DEG_PER_HOUR)} deg/h"
     return f"{small(math.degrees(rate))} deg/s"
 
 
 def force_words(force: float) -> str:
-    """A specific force in m/s² in µg, or in mg where that is a large number."""
+    """Format a specific force in m/s² in µg, or in mg if large."""
     micro = force * MICRO_G
     return f"{micro:.3g} µg" if micro < 1e4 else f"{1e-3 * micro:.3g} mg"
 
 
 def small(value: float) -> str:
-    """Two digits of a small number."""
+    """Format a small number to two digits."""
     size = abs(value)
     if not math.isfinite(size):
         return "–"

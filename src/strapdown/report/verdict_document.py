@@ -1,4 +1,4 @@
-"""The verdict page of a run: can it be trusted, and if not, what speaks against it."""
+"""Verdict page of a run: whether it can be trusted, and the evidence against it."""
 
 from __future__ import annotations
 
@@ -53,18 +53,18 @@ __all__ = [
 ]
 
 
-#: Rows of a table of the page; the files have all.
+#: Rows per table of the page; the files have all.
 _MOST = 12
 
 
 def verdict_document(result: NavigationResult, name: str) -> Document:
-    """Return the verdict page of a run of navigation.
+    """Return the verdict page of a navigation run.
 
     Parameters
     ----------
     result : NavigationResult
     name : str
-        Of the folder.
+        Folder name.
 
     Returns
     -------
@@ -98,7 +98,7 @@ def verdict_document(result: NavigationResult, name: str) -> Document:
 
 
 def light_section(result: NavigationResult) -> Section:
-    """The light of the heading, as a section of the report."""
+    """Heading integrity, as a section of the report."""
     said = Paragraph(answer(result))
     return Section(
         "trust", "Can it be trusted?", (said, light_picture(result), *_of_filter(result))
@@ -106,7 +106,7 @@ def light_section(result: NavigationResult) -> Section:
 
 
 def _of_filter(result: NavigationResult) -> tuple[Block, ...]:
-    """Of a run that was smoothed, what is not."""
+    """Note for a smoothed run on the parts that use the filter alone."""
     if result.forward is None:
         return ()
     return (
@@ -163,7 +163,7 @@ def _agrees(result: NavigationResult) -> str:
         return "nothing"
     if trust.first is None:
         return "agrees"
-    # Single gross errors are none of the filter's.
+    # Single outliers are not inconsistencies of the filter.
     if trust.against_bounds is None:
         return "agrees, mostly"
     return "does not agree"
@@ -231,7 +231,7 @@ def _reasons(result: NavigationResult) -> TableBlock:
 
 
 def _against_truth(result: NavigationResult) -> TableBlock | None:
-    """How large errors were under each colour; None where the truth is not known."""
+    """Sizes of the errors under each status color; None if the truth is not known."""
     light = result.trust.light
     error = heading_error(result, light.table.index.to_numpy(dtype=np.float64))
     if error is None:
@@ -342,16 +342,16 @@ def _capital(text: str) -> str:
     return f"{text[:1].upper()}{text[1:]}"
 
 
-# Pictures of a verdict, drawn by hand: the light over time, and a run beside its repetition.
+# Pictures of a verdict: heading integrity over time, and the run against its re-run.
 
 
 Array = NDArray[np.float64]
 
-#: Colours of the light: those of Okabe and Ito, which the colour-blind can tell apart.
+#: Status colors from Okabe and Ito, distinguishable by color-blind readers.
 LIGHTS = {"green": "#009E73", "amber": "#E69F00", "red": "#D55E00"}
 WIDTH, LEFT, RIGHT = 940.0, 74.0, 14.0
 SMALL, STRIP, PANEL, VERDICT_PICTURE_GAP = 12.5, 34.0, 190.0, 30.0
-#: Points of a curve that a picture shows.
+#: Points per curve of a picture.
 BUCKETS = 500
 
 
@@ -368,7 +368,7 @@ class _Curve:
 
 @dataclass(frozen=True)
 class _Frame:
-    """A panel in a picture: its place, and what its edges stand for."""
+    """A panel in a picture: its position, and the values at its edges."""
 
     top: float
     height: float
@@ -388,7 +388,7 @@ class _Frame:
 
 
 def heading_error(result: NavigationResult, time: Array) -> Array | None:
-    """Error of the heading at some instants, deg; None where the truth is not known."""
+    """Heading error at given instants, deg; None if the truth is not known."""
     differences = result.filtered_differences
     if differences is None or not len(differences):
         return None
@@ -398,7 +398,7 @@ def heading_error(result: NavigationResult, time: Array) -> Array | None:
 
 
 def light_picture(result: NavigationResult) -> Picture:
-    """The light of each second, and the bounds that it goes by."""
+    """Heading integrity of each second, with the bounds that determine it."""
     light = result.trust.light
     table = light.table
     time = table.index.to_numpy(dtype=np.float64)
@@ -408,7 +408,7 @@ def light_picture(result: NavigationResult) -> Picture:
     begin, end = float(time[0]), max(float(time[-1]) + 1.0, float(time[0]) + 2.0)
     _strip(picture, light, begin, end, 8.0)
     bound = table["bound"].to_numpy(dtype=np.float64)
-    # Decades from below the best that is known up to where it is hardly known.
+    # Decades from below the smallest bound up to a practically unknown heading.
     known = min(float(np.nanmin(bound)), light.green) if np.isfinite(bound).any() else light.green
     error = heading_error(result, time)
     if error is not None and np.isfinite(error).any():
@@ -437,7 +437,7 @@ def light_picture(result: NavigationResult) -> Picture:
 
 
 def repeated_picture(result: NavigationResult) -> Picture | None:
-    """How far a run is from its repetition, beside the bounds of both; None without one."""
+    """Difference of a run from its re-run, with the bounds of both; None without a re-run."""
     repeated = result.trust.repeated
     if repeated is None or repeated.differences is None or repeated.record is None:
         return None
@@ -494,7 +494,7 @@ def _strip(picture: Drawing, light: HeadingIntegrity, begin: float, end: float, 
     seconds = _merged(light)
     for first, last, colour in seconds:
         a, b = LEFT + (first - begin) * scale, LEFT + (min(last, end) - begin) * scale
-        # Its height tells it, too, to who sees no colour.
+        # The height shows the status without color.
         up = top + {"green": 0.0, "amber": 0.25, "red": 0.5}[colour] * STRIP
         box = [(a, up), (b, up), (b, top + STRIP), (a, top + STRIP)]
         picture.shape(box, None, fill=LIGHTS[colour])
@@ -506,7 +506,7 @@ def _strip(picture: Drawing, light: HeadingIntegrity, begin: float, end: float, 
 
 
 def _merged(light: HeadingIntegrity) -> list[tuple[float, float, str]]:
-    """Stretches of one colour, whatever the reason."""
+    """Stretches of one color, whatever the reason."""
     out: list[tuple[float, float, str]] = []
     for span in light.spans:
         if out and out[-1][2] == span.colour:

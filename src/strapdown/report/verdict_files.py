@@ -1,4 +1,4 @@
-"""A verdict as files: the page, its values for programs, and the light second by second."""
+"""Write a verdict as files: the page, its values for programs, and heading integrity over time."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def write_verdict(result: NavigationResult, name: str, folder: Path) -> None:
     ----------
     result : NavigationResult
     name : str
-        Of the folder, as the page names it.
+        Folder name shown on the page.
     folder : Path
     """
     write_text(folder / "verdict.html", document_page(verdict_document(result, name)))
@@ -66,7 +66,7 @@ def write_verdict(result: NavigationResult, name: str, folder: Path) -> None:
 
 
 def verdict_json(result: NavigationResult) -> dict[str, Any]:
-    """Return a verdict for programs; angles in degrees, lengths in metres, times in s."""
+    """Return a verdict for programs; angles in degrees, lengths in meters, times in s."""
     trust, light = result.trust, result.trust.light
     bounds = plane_bound(result.record.covariance)
     spans = light.spans

@@ -1,4 +1,4 @@
-"""What a verdict says, in sentences; terminal and page say the same."""
+"""Verdict of a run in sentences, shared by terminal and page."""
 
 from __future__ import annotations
 
@@ -39,16 +39,16 @@ _KINDS = {
 
 
 def answer(result: NavigationResult) -> str:
-    """Return the one answer that a verdict begins with."""
+    """Return the first sentence of a verdict."""
     return f"{place_words(result)} {heading_words(result.trust)}"
 
 
 def place_words(result: NavigationResult) -> str:
-    """How far the place can be trusted."""
+    """Return the 95 % bound of the position, at the end and at its worst."""
     bounds = plane_bound(result.record.covariance)
     end, worst = float(bounds[-1]), int(np.argmax(bounds))
     most = float(bounds[worst])
-    # Of a run that ends as badly as it ever was, one number is enough.
+    # A run whose bound is largest at the end needs only one number.
     same = most <= 1.1 * end
     sized = f"{length_words(end)} at the end" + (
         "" if same else f" and to {length_words(most)} at its worst ({_at(result, worst)})"
@@ -68,7 +68,7 @@ def place_words(result: NavigationResult) -> str:
 
 
 def heading_words(trust: IntegrityReport) -> str:
-    """How much of the time the heading can be trusted, and whether at the end."""
+    """Return the share of time with a trusted heading, and the status at the end."""
     light = trust.light
     if not len(light.table):
         return "The run is too short to judge its heading."
@@ -87,7 +87,7 @@ def heading_words(trust: IntegrityReport) -> str:
 
 
 def unwitnessed_words(trust: IntegrityReport) -> str:
-    """Why nothing could confirm the heading, in words."""
+    """Return the reasons why no independent check could confirm the heading."""
     return "; ".join(one.sentence() for one in trust.unwitnessed)
 
 
@@ -96,7 +96,7 @@ def _failed(repeated: Repeated) -> str:
 
 
 def promise(trust: IntegrityReport) -> tuple[tuple[str, str], ...]:
-    """What each colour means, in plain words and numbers."""
+    """Return the definition of each status color, in words and numbers."""
     green, red = plain(trust.light.green, 1), plain(trust.light.red, 1)
     return (
         (
@@ -125,7 +125,7 @@ def promise(trust: IntegrityReport) -> tuple[tuple[str, str], ...]:
 
 
 def span_words(span: LightSpan) -> str:
-    """A stretch of one colour, in words."""
+    """A stretch of one color, in words."""
     return (
         f"{instant(span.begin)} to {instant(span.end)} ({duration_words(span.end - span.begin)}): "
         f"{REASONS[span.reason]}"
@@ -133,7 +133,7 @@ def span_words(span: LightSpan) -> str:
 
 
 def advice_words(advice: Advice, trust: IntegrityReport) -> str:
-    """What would have helped then."""
+    """Return the measures that would have helped at that time."""
     if not advice.options:
         return _without_fixes(trust)
     best, sd = advice.options[0]
@@ -146,7 +146,7 @@ def advice_words(advice: Advice, trust: IntegrityReport) -> str:
 
 
 def _without_fixes(trust: IntegrityReport) -> str:
-    """What would bear a heading out where there are no fixes."""
+    """Return the measures that would confirm a heading without fixes."""
     north = f"these gyros find north to ±{GAP}{degrees_words(trust.north_sd)} (one sd)"
     if trust.north_sd >= NO_NORTH:
         north = "these gyros find no north"
@@ -164,7 +164,7 @@ def _without_fixes(trust: IntegrityReport) -> str:
 
 
 def witness_words(trust: IntegrityReport) -> str:
-    """Who bore the heading out while it was green, the longest first; empty if nobody."""
+    """Independent heading checks that confirmed it while green, longest first; empty if none."""
     table = trust.light.table
     green = table[(table["light"] == 0) & (table["witness"] != "")]
     kinds = green["witness"].value_counts().index
@@ -172,12 +172,12 @@ def witness_words(trust: IntegrityReport) -> str:
 
 
 def kind_words(one: Inconsistency) -> str:
-    """What is wrong with it, in a few words."""
+    """Return the kind of an inconsistency in a few words."""
     return _KINDS[one.kind]
 
 
 def first_words(trust: IntegrityReport) -> str:
-    """The first measurement that is not as expected, as a sentence."""
+    """The first inconsistent measurement, as a sentence."""
     one = trust.first
     if not trust.consistency:
         return "Nothing was observed, and so nothing could speak against the run."
@@ -199,7 +199,7 @@ def first_words(trust: IntegrityReport) -> str:
 
 
 def repeated_words(result: NavigationResult) -> str:
-    """What came of the run without it."""
+    """Return the result of the re-run without it."""
     trust = result.trust
     repeated = trust.repeated
     if repeated is None:
@@ -259,7 +259,7 @@ def _style(trust: IntegrityReport) -> str:
 
 
 def _beyond(time: np.ndarray, apart: np.ndarray, marks: np.ndarray, bound: np.ndarray) -> str:
-    # Two runs of which one knows more are apart by no more than the other is off (Kalman).
+    # The run with more information differs from the other by at most that one's error (Kalman).
     share = float(np.mean(apart > np.interp(time, marks, bound)))
     if share == 0.0:
         return f"always within the repeated run's bound of 95{GAP}%"
@@ -271,7 +271,7 @@ def _at(result: NavigationResult, mark: int) -> str:
 
 
 def degrees_words(value: float) -> str:
-    """An angle with two digits or three: ``12.4°``, ``0.049°``."""
+    """Format an angle to two or three digits: ``12.4°``, ``0.049°``."""
     if not math.isfinite(value):
         return "unknown"
     places = 0 if value >= 20.0 else 1 if value >= 2.0 else 2 if value >= 0.1 else 3

@@ -1,4 +1,4 @@
-"""Run a sealed bundle again and compare, bit for bit and then number for number."""
+"""Re-run a sealed bundle and compare, bit for bit and then number for number."""
 
 from __future__ import annotations
 
@@ -37,26 +37,26 @@ from strapdown.systems.attitude_bench import run_bench
 __all__ = ["Verification", "changed_case", "verify"]
 
 
-# Another processor or library may round otherwise in the last places, and a long integration
-# carries that on. More than this is another result.
+# Another processor or library may round the last digits differently, and a long integration
+# amplifies that. A larger difference is a different result.
 EQUAL = 1e-6
 _NUMBER = re.compile(r"-?\d+\.?\d*(?:[eE][+-]?\d+)?")
 
 
 @dataclass(frozen=True)
 class Verification:
-    """What came of running a bundle again.
+    """Result of re-running a bundle.
 
     Attributes
     ----------
     verdict : str
         ``identical``, ``numerically equal`` or ``changed``.
     within : float
-        Largest difference of a number, relative where it exceeds 1; zero if identical.
+        Largest difference of a number, relative if it exceeds 1; zero if identical.
     digest : str
-        SHA-256 of the manifest, to be compared with the one that was printed or written down.
+        SHA-256 of the manifest, to be compared with the printed or recorded one.
     details : tuple of str
-        What changed, or what differs, one sentence each.
+        Changes and differences, one sentence each.
     """
 
     verdict: str
@@ -71,7 +71,7 @@ def _with_page(configuration: dict[str, Any]) -> bool:
 
 
 def _rerun_attitude(configuration: dict[str, Any], out: Path, sealed: set[str]) -> Seal:
-    # Pictures that were asked for in a second form change no number and are no configuration.
+    # Additional PNG figures change no number and are not part of the configuration.
     png = any(name.endswith(".png") for name in sealed)
     asked = {key: value for key, value in configuration.items() if key != "report"}
     bench = run_bench(AttitudeSpec.model_validate(asked))
@@ -115,24 +115,23 @@ RERUNS: dict[str, Callable[[dict[str, Any], Path, set[str]], Seal]] = {
 
 
 def verify(bundle: str | Path) -> Verification:
-    """Check a bundle against its seal, run it again from its configuration, and compare.
+    """Check a bundle against its seal, re-run it from its configuration, and compare.
 
     Parameters
     ----------
     bundle : str or Path
-        A folder that a run wrote.
+        A folder written by a run.
 
     Returns
     -------
     Verification
-        ``changed`` where a file is not as it was sealed (then nothing is run), where a number
-        differs by more than 1e-6, or where any byte differs under the same versions on the same
-        platform.
+        ``changed`` if a file differs from its seal (then it is not re-run), if a number differs by
+        more than 1e-6, or if any byte differs under the same versions on the same platform.
 
     Raises
     ------
     DataError
-        The folder is no bundle, or its manifest is damaged.
+        The folder is not a bundle, or its manifest is damaged.
     """
     root = Path(bundle).absolute()
     manifest = read_manifest(root)
@@ -175,7 +174,7 @@ def _compare(root: Path, again: Path, manifest: dict[str, Any], digest: str) -> 
         if sha256(again / name) == sealed[name]:
             continue
         if not conditions:
-            # The same code on the same machine gives the same bytes, or it is not the same run.
+            # The same code on the same machine must give the same bytes.
             details.append(f"{name}: differs, though versions and platform are the same")
             changed = True
             continue
@@ -201,9 +200,9 @@ def _read(manifest: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def _difference(a: Path, b: Path) -> float | None:
-    """Largest difference of two files' numbers; infinite where anything else differs.
+    """Largest difference of two files' numbers; infinite if anything else differs.
 
-    None for what is drawn, whose bytes follow the versions of the libraries that draw it.
+    None for drawings, whose bytes depend on the versions of the drawing libraries.
     """
     try:
         if a.suffix == ".json":
@@ -231,8 +230,8 @@ def _leaf_difference(one: tuple[str, Any], two: tuple[str, Any]) -> float:
     numbers = [_NUMBER.findall(text) for text in (x, y)]
     if _NUMBER.sub("#", x) != _NUMBER.sub("#", y):
         return math.inf
-    # Sentences quote numbers of three digits, the last of which may be rounded otherwise; what
-    # is printed as a power of ten below rounding is rounding.
+    # Sentences quote numbers to three digits, the last of which may round differently; numbers
+    # printed as a power of ten below rounding are rounding errors.
     near = (
         abs(float(p) - float(q)) <= 0.02 * abs(float(p)) + 1e-9
         for p, q in zip(*numbers, strict=True)
@@ -247,20 +246,20 @@ def _column_difference(one: dict[str, NDArray[Any]], two: dict[str, NDArray[Any]
 
 
 def _apart(name: str, one: NDArray[Any], two: NDArray[Any]) -> float:
-    """Largest difference, relative where a number exceeds 1; infinite where one is no number."""
+    """Largest difference, relative if a number exceeds 1; infinite if one is not a number."""
     if not {one.dtype.kind, two.dtype.kind} <= set("fiu"):
         return 0.0 if np.array_equal(one, two) else math.inf
-    # An empty field on both sides is the same.
+    # An empty field on both sides is equal.
     apart = np.where(np.isnan(one) & np.isnan(two), 0.0, np.abs(one - two))
     if name.endswith("heading_deg"):
-        # Just under 360 may come out just above 0 elsewhere.
+        # A heading just below 360 may be just above 0 on another platform.
         apart = np.minimum(apart, np.abs(apart - 360.0))
     largest = float(np.max(apart / np.fmax(1.0, np.abs(one)), initial=0.0))
     return largest if math.isfinite(largest) else math.inf
 
 
 def _leaves(value: Any, key: str = "") -> Iterator[tuple[str, Any]]:
-    """Every value in JSON under the name of the field that holds it."""
+    """Every value in JSON with the name of its field."""
     if isinstance(value, dict):
         for name, item in value.items():
             yield from _leaves(item, name)
@@ -283,7 +282,7 @@ def _other_conditions(manifest: dict[str, Any]) -> list[str]:
     ]
 
 
-# Which options of a sealed crash case are not those of the case file that lies beside it.
+# Differences between a sealed crash case and the case file in its bundle.
 
 
 def changed_case(root: Path, manifest: dict[str, Any]) -> list[str]:
@@ -299,8 +298,8 @@ def changed_case(root: Path, manifest: dict[str, Any]) -> list[str]:
     Returns
     -------
     list of str
-        One sentence an option, with the sealed value first; empty where both say the same, or
-        where the bundle is of no crash.
+        One sentence per option, with the sealed value first; empty if both agree, or if the bundle
+        is not of a crash.
     """
     configuration = manifest["configuration"]
     if manifest["command"] != "crash" or not isinstance(configuration, dict):
@@ -321,7 +320,7 @@ def changed_case(root: Path, manifest: dict[str, Any]) -> list[str]:
 
 
 def _told(value: Any) -> Any:
-    """Without the names of files, which are others in a bundle."""
+    """Remove file names, which differ in a bundle."""
     if isinstance(value, dict):
         return {k: _told(v) for k, v in value.items() if not names_file(k, v)}
     if isinstance(value, list):
