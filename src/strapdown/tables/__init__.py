@@ -15,7 +15,6 @@ Imu                     ``time`` s             ``gyro_x..z`` rad/s, and where th
 Increments              ``time`` s, its end    ``dt`` s, ``theta_x..z`` rad, ``dtheta_x..z`` rad
                                                (change of the rate over the step times `dt`)
 MotionIncrements        ``time`` s, its end    ``dt`` s, ``phi_x..z`` rad (rotation vector),
-                                                                                      ``dv_x..z`` m/s, ``dr_x..z`` m (specific force
                                                ``dv_x..z`` m/s, ``dr_x..z`` m (specific force
                                                integrated, body axes at the start of the step)
                                                VD`` m/s, ``roll pitch heading`` deg
