@@ -17,6 +17,7 @@ Increments              ``time`` s, its end    ``dt`` s, ``theta_x..z`` rad, ``d
 MotionIncrements        ``time`` s, its end    ``dt`` s, ``phi_x..z`` rad (rotation vector),
                                                ``dv_x..z`` m/s, ``dr_x..z`` m (specific force
                                                integrated, body axes at the start of the step)
+Trajectory              ``time`` s             ``lat lon`` deg, ``alt`` m (ellipsoidal), ``VN VE
                                                VD`` m/s, ``roll pitch heading`` deg
 TrajectoryError         ``time`` s             ``north east down`` m, ``VN VE VD`` m/s, ``roll pitch
                                                heading`` deg: errors (estimate minus truth), or
