@@ -55,10 +55,10 @@ def raw_log(
     arrays : dict of str to ndarray
         One- and two-dimensional; a second dimension of up to 16 becomes ``name[0]``,
         ``name[1]`` …
-    Units, where the file states them.
+    units : dict of str to str
         Where the file states them.
-    May hold ``sampling``, ``axes`` and a sampling rate.
-        ``sampling``, ``axes`` and a sampling rate are understood.
+    meta : dict
+        May hold ``sampling``, ``axes`` and a sampling rate.
 
     Returns
     -------

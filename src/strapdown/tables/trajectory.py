@@ -121,8 +121,8 @@ def trajectory_error_table(
     velocity : array_like, (n, 3), m/s
         North, east, down.
     euler : array_like, (n, 3), deg
-        Of roll, pitch, heading.
-    Roll, pitch, heading.
+        Roll, pitch, heading.
+    source : str, optional
         Name for messages.
 
     Returns
