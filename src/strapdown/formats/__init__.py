@@ -188,7 +188,7 @@ def read_joined(paths: Sequence[str | Path], options: ReadOptions | None = None)
     Parameters
     ----------
     paths : sequence of str or Path
-        One of them has the gyro; the others are interpolated to its stamps.
+        One has the gyro; the others are interpolated to its stamps.
     options : ReadOptions, optional
         User's statements about the logs. A column is named as in its log, or as
         ``log/column``.

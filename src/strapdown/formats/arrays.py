@@ -16,7 +16,7 @@ from strapdown.formats.recording import RawLog
 from strapdown.tables import SAMPLINGS
 
 RATES = ("sampling_rate", "sample_rate", "rate_hz", "fs", "freq", "frequency")
-# Largest expansion of a small file; longer logs compress less.
+# An array is refused if it declares more than SMALL and exceeds its stored bytes by this ratio.
 LARGEST_RATIO = 1000
 SMALL = 64 * 1024 * 1024  # bytes
 

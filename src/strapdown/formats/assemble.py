@@ -307,7 +307,7 @@ IMPOSSIBLE_RATE = 1e6  # rad/s
 LASTING_RATE = 20.0  # rad/s, 3 turns a second
 # No gyro in a phone, a toy, a car or an aircraft reads this; a wrong unit does.
 ABSURD_RATE = 100.0  # rad/s, 16 turns a second
-# Common full scales of gyros, deg/s. A run of equal readings at one of them is clipped.
+# Common full scales of gyros, deg/s. A run of equal readings at a full scale is clipped.
 FULL_SCALES = (125.0, 250.0, 400.0, 450.0, 500.0, 1000.0, 2000.0, 4000.0)
 CUT_OFF_RUN = 3  # samples
 

@@ -48,7 +48,8 @@ T = TypeVar("T")
 MOSTLY = 0.5
 # Relative evenness of the steps of an unnamed column, to be taken for a clock.
 EVEN = 0.01
-# Largest first step of a velocity change, as a fraction of the total: 10 ms of a 50 ms crash.
+# Limit of a velocity change in its first step, relative to its maximum; a step of 10 ms in a crash
+# of 50 ms gains less.
 SMALL = 0.2
 _OF_TRIAD = {"gyro": "rate", "accel": "acceleration", "mag": "other"}
 

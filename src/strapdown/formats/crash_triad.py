@@ -69,7 +69,7 @@ def triad_of_channels(
     unit : str, optional
         If the record does not state it. A unit that contradicts the record is refused.
     time : str, optional
-        Channel with the stamps, if the record has none for the triad or another one is meant.
+        Channel that holds the stamps, if the record assigns another one or none.
     time_unit : str, optional
         Unit of the stamps, if the record does not state it.
     rate_hz : float, optional, Hz

@@ -1,6 +1,6 @@
 """Fixes from solutions of RTKLIB (``.pos``).
 
-Lines of ``%`` at the top describe the file; the last of them names the columns, and its first word
+Lines of ``%`` at the top describe the file; the last names the columns, and its first word
 is the time system. Time is a date, or a GPS week with its seconds; the position is in degrees, in
 degrees, minutes and seconds, or Cartesian. ``sdne`` and similar are the square root of the
 magnitude of a covariance, with its sign. Layout: RTKLIB 2.4.3 manual, appendix B.1.
@@ -165,7 +165,7 @@ def _layout(lines: list[str], file: str, findings: list[Finding]) -> _Layout:
 def _columns(
     lines: list[str], layout: _Layout, ended: bool, file: str, findings: list[Finding]
 ) -> tuple[dict[str, Array], NDArray[np.int64]]:
-    """Return numbers by name; a date has six of them, degrees with minutes and seconds three."""
+    """Return numbers by name; a date has six, degrees with minutes and seconds three."""
     held = [(k, line) for k, line in enumerate(lines, 1) if line.strip() and line[0] != "%"]
     if not held:
         raise DataError("io.header-no-solution-under", file=file, row=layout.row)

@@ -51,7 +51,7 @@ def join(
     Parameters
     ----------
     logs : sequence of RawLog
-        One of them has the gyro. Their clocks have a common origin; units may differ.
+        One has the gyro. Their clocks have a common origin; units may differ.
     name : str
         Name of the result, for messages.
     files : tuple of Path, optional

@@ -202,7 +202,7 @@ def _head(
         notes.append(BODY_NOTE + clean(channel.body))
     if channel.low_pass and channel.low_pass != letter_says:
         notes.append(FILTER_NOTE + clean(channel.low_pass))
-    # Values in SI units count from zero already: no offset is to be subtracted when read.
+    # A velocity is noted as a change, so that a reader does not subtract its first value.
     remarks = [r for r in channel.remarks if r != CHANGE_NOTE]
     notes += [CHANGE_NOTE] if channel.quantity == "velocity" else []
     notes += [clean(r) for r in remarks]

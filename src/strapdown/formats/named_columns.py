@@ -19,7 +19,7 @@ __all__ = ["columns_of", "read_reference_path"]
 
 Array = NDArray[np.float64]
 
-#: Accepted units of each table unit, with their factors to it.
+#: Accepted units, each with its table unit and the factor to it.
 UNITS: dict[str, tuple[str, float]] = {
     "s": ("s", 1.0),
     "ms": ("s", 1e-3),

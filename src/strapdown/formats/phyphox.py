@@ -97,7 +97,7 @@ def _log(member: Member) -> RawLog:
 
 
 def _mention_linear(logs: list[RawLog]) -> list[RawLog]:
-    """Drop tables without any of the three sensors, and note that they are not used."""
+    """Note that tables without any of the three sensors are not used."""
     wanted = {f"{triad}_{a}" for triad in _TRIADS for a in XYZ}
     for log in logs:
         if not any(q in wanted for q, _ in log.stated.values()):

@@ -1,4 +1,4 @@
-"""Records in the form of recorder exports: one text table per triad, units in the headings."""
+"""Recorder exports: one text table per triad or path, with units in the headings."""
 
 from __future__ import annotations
 

@@ -40,8 +40,8 @@ def poses(
     Returns
     -------
     position : ndarray, (n, 3), m
-        ``enu`` and ``ned``: in the plane tangent to the ellipsoid below the first position, with
-        its origin there; the Earth curves away below it by ``d²/2R``. ``ecef``: from the Earth's
+        ``enu`` and ``ned``: from the first position, along the plane tangent to the ellipsoid
+        below it; the Earth curves away from that plane by ``d²/2R``. ``ecef``: from the Earth's
         center.
     q_wb : ndarray, (n, 4)
         Body to world, scalar first, with continuous sign. World and body axes are in

@@ -119,7 +119,7 @@ def units_of_triads(
 
 
 def _refuse_open(raw: RawLog, found: dict[str, Column], triad: str) -> None:
-    """Refuse a unit that the file leaves open: f and -f cannot be told apart from the numbers.
+    """Refuse a unit that the file leaves open: the numbers cannot decide between f and -f.
 
     Raises
     ------
