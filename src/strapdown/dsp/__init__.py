@@ -1,6 +1,6 @@
 """Digital filters: CFC classes, resampling, derivatives, delays between signals.
 
-Arrays in, arrays out; each tells what it does to noise and to time.
+Arrays in, arrays out; each states its effect on noise and on time.
 """
 
 from __future__ import annotations

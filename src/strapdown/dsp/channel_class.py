@@ -1,4 +1,4 @@
-"""Channel frequency classes of crash tests: the phaseless low-pass of SAE J211-1 and ISO 6487."""
+"""Channel frequency classes (CFC) of crash tests: zero-phase low-pass of SAE J211-1, ISO 6487."""
 
 from __future__ import annotations
 
@@ -24,13 +24,12 @@ __all__ = [
 ]
 
 CHANNEL_CLASSES = (60, 180, 600, 1000)
-# Design frequency of one pass over the class number.
+# Design frequency of one pass, divided by the class number.
 DESIGN_FREQUENCY = {"iso": 25.0 / 12.0, "sae": 2.0775}
-LEAST_RATE = 10.0  # samples per second, over the class number
+LEAST_RATE = 10.0  # sampling rate in Hz, divided by the class number
 LEAST_PADDING = 0.010  # s
 LEAST_PADDED = 100
-# What is left of a start that does not fit, after the padding; the standards' 10 ms leave 0.4 % of
-# it with class 60.
+# Start transient left after the padding, relative. The standards' 10 ms leave 0.4 % with class 60.
 FORGOTTEN = 1e-8
 
 
@@ -46,14 +45,14 @@ class CfcCoefficients:
 
 
 def cfc_coefficients(cfc: float, step: float, standard: str = "iso") -> CfcCoefficients:
-    """Coefficients of one pass of a channel frequency class.
+    """Compute the coefficients of one pass of a channel frequency class.
 
     Parameters
     ----------
     cfc : {60, 180, 600, 1000}
-        The class. Both passes together are 3 dB down at 5/3 of it, in Hz.
+        The class. The gain of both passes together is -3 dB at 5/3 of the class number, in Hz.
     step : float, s
-        Distance of samples.
+        Sampling interval.
     standard : {'iso', 'sae'}
         ISO 6487 with ``wd = 2π CFC 25/12``, or SAE J211-1 with ``wd = 2π CFC 2.0775``.
 
@@ -66,8 +65,8 @@ def cfc_coefficients(cfc: float, step: float, standard: str = "iso") -> CfcCoeff
     Raises
     ------
     ConfigError
-        No such class or standard, or a rate below ten times the class: towards the Nyquist
-        frequency the transformation is no longer that filter, and beyond it the tangent is
+        Unknown class or standard, or a sampling rate below ten times the class. Towards the
+        Nyquist frequency the transformation departs from the filter; beyond it the tangent is
         negative and the pass unstable (class 60 at 200 Hz).
     """
     step = positive_step(step)
@@ -114,7 +113,7 @@ def cfc_coefficients(cfc: float, step: float, standard: str = "iso") -> CfcCoeff
 def cfc_response(
     frequency: ArrayLike, cfc: float, step: float, standard: str = "iso"
 ) -> Array | float:
-    """Gain of both passes; their phase is zero.
+    """Compute the gain of both passes; their phase is zero.
 
     Parameters
     ----------
@@ -126,10 +125,10 @@ def cfc_response(
     Returns
     -------
     ndarray or float
-        ``1/(1 + (tan(π f step)/wa)⁴)``, which is what the bilinear transformation makes of a
-        two-pole Butterworth twice. At 10 kHz the classes 60, 180 and 600 lie in the corridor of
-        the standards throughout. So does 1000 from 12.5 kHz on; at 10 kHz it falls up to 3 dB too
-        much above 2.9 kHz, where less than a twentieth passes anyway.
+        ``1/(1 + (tan(π f step)/wa)⁴)``, a two-pole Butterworth filter applied twice after the
+        bilinear transformation. At 10 kHz the classes 60, 180 and 600 lie in the corridor of the
+        standards throughout; class 1000 does from 12.5 kHz on. At 10 kHz class 1000 is up to 3 dB
+        too low above 2.9 kHz, where the gain is below a twentieth.
     """
     cfc_coefficients(cfc, step, standard)
     wa = math.tan(math.pi * cfc * DESIGN_FREQUENCY[standard] * step)
@@ -139,11 +138,11 @@ def cfc_response(
 
 
 def cfc_noise_factor(cfc: float, step: float, standard: str = "iso") -> float:
-    """Standard deviation of the output per that of white noise in the samples, far from the ends.
+    """Compute the ratio of the standard deviations of output and input for white noise.
 
-    The mean square of the gain over all frequencies, by Parseval.
+    Square root of the mean square gain over all frequencies (Parseval), far from the ends.
     """
-    # The mean over an even grid of a periodic analytic function converges geometrically.
+    # The mean of a periodic analytic function over an even grid converges geometrically.
     grid = (np.arange(1 << 16) + 0.5) / (1 << 17)
     gain = np.asarray(cfc_response(grid / step, cfc, step, standard))
     return float(np.sqrt(np.mean(gain**2)))
@@ -155,7 +154,7 @@ def cfc_filter(values: ArrayLike, step: float, cfc: float, standard: str = "iso"
     Parameters
     ----------
     values : array_like, (n,) or (n, k)
-        Evenly spaced samples, one column a channel.
+        Evenly spaced samples, one column per channel.
     step : float, s
     cfc, standard
         As in `cfc_coefficients`.
@@ -163,18 +162,18 @@ def cfc_filter(values: ArrayLike, step: float, cfc: float, standard: str = "iso"
     Returns
     -------
     ndarray, of the shape of `values`
-        Without delay. Both ends are continued by their own samples, point-mirrored about the end
-        sample as ISO 6487 has it, over 10 ms or more (SAE J211-1's least) and 100 samples or more,
-        and in any case until a pass has forgotten its start to 1e-8, as far as there are samples;
-        each pass begins at rest with its first padded value. A constant passes to rounding, and a
-        straight line without a trace of the ends.
+        Without delay. Both ends are padded by the samples point-mirrored about the end sample
+        (ISO 6487), over at least 10 ms (the minimum of SAE J211-1) and at least 100 samples, and
+        until the start transient of a pass has decayed to 1e-8, as far as there are samples.
+        Each pass starts in the steady state of its first padded value. Constants pass to
+        rounding, and straight lines without end effects.
 
     Raises
     ------
     ConfigError
         As in `cfc_coefficients`.
     DataError
-        A sample is not finite, or the record is shorter than the 10 ms that are mirrored.
+        A sample is not finite, or the record is not longer than the 10 ms that are mirrored.
     """
     from scipy.signal import lfilter, lfilter_zi
 
@@ -191,7 +190,7 @@ def cfc_filter(values: ArrayLike, step: float, cfc: float, standard: str = "iso"
             least_padding=LEAST_PADDING * 1000.0,
             least=least + 1,
         )
-    # The pole's modulus squared is -b2.
+    # The squared modulus of the poles is -b2.
     memory = math.log(FORGOTTEN) / (0.5 * math.log(-c.b2))
     n = min(len(channels) - 1, max(least, LEAST_PADDED, math.ceil(memory)))
     first, last = channels[:1], channels[-1:]

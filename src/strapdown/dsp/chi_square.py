@@ -1,4 +1,4 @@
-"""Chi-square and normal distributions, without the time that loading scipy.stats takes."""
+"""Chi-square and normal distributions, without the load time of scipy.stats."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ __all__ = [
 
 
 def chi_square_quantile(share: Any, freedom: Any) -> Any:
-    """Return what a share of chi-square numbers is below.
+    """Compute the chi-square quantile of a probability.
 
     Parameters
     ----------
     share : array_like
-        0 to 1.
+        Probability of a value below the quantile, 0 to 1.
     freedom : array_like
-        Degrees of freedom, more than 0.
+        Degrees of freedom, above 0.
 
     Returns
     -------
     float or ndarray
-        ``2 P⁻¹(freedom/2, share)``, P the regularised incomplete gamma function (DLMF 8.2.4).
+        ``2 P⁻¹(freedom/2, share)``, P the regularized incomplete gamma function (DLMF 8.2.4).
     """
     from scipy.special import gammaincinv
 
@@ -37,35 +37,35 @@ def chi_square_quantile(share: Any, freedom: Any) -> Any:
 
 
 def chi_square_exceeded(share: Any, freedom: Any) -> Any:
-    """Return what a share of chi-square numbers is above, exact where it is small."""
+    """Compute the chi-square value exceeded with a probability; exact for small ones."""
     from scipy.special import chdtri
 
     return _plain(chdtri(freedom, share))
 
 
 def chi_square_below(value: Any, freedom: Any) -> Any:
-    """Return the probability of less than a value, 0 or more."""
+    """Compute the chi-square probability below a value of 0 or more."""
     from scipy.special import chdtr
 
     return _plain(chdtr(freedom, value))
 
 
 def chi_square_above(value: Any, freedom: Any) -> Any:
-    """Return the probability of more than a value, 0 or more, exact where it is small."""
+    """Compute the chi-square probability above a value of 0 or more; exact for small ones."""
     from scipy.special import chdtrc
 
     return _plain(chdtrc(freedom, value))
 
 
 def normal_quantile(share: Any) -> Any:
-    """Return what a share of normal numbers of mean 0 and variance 1 is below."""
+    """Compute the quantile of the standard normal distribution."""
     from scipy.special import ndtri
 
     return _plain(ndtri(share))
 
 
 def normal_above(value: Any) -> Any:
-    """Return the probability of more than a value, exact where it is small."""
+    """Compute the standard normal probability above a value; exact for small ones."""
     from scipy.special import ndtr
 
     return _plain(ndtr(-np.asarray(value)))

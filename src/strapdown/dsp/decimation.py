@@ -1,4 +1,4 @@
-"""To a lower rate without aliasing: a linear-phase low-pass read at the stamps, or true means."""
+"""Decimation without aliasing: a linear-phase low-pass at the output stamps, or true means."""
 
 from __future__ import annotations
 
@@ -29,28 +29,28 @@ __all__ = [
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-# Kaiser's length formula is fitted, and a gain of exactly 1 at zero shifts the passband's ripple to
-# one side; so much in reserve keeps what is stated.
+# Reserve: Kaiser's length formula is a fit, and a gain of exactly 1 at zero shifts the ripple of
+# the passband to one side.
 MARGIN = 5.0  # dB
-# Numbers in one block of weights: 16 MB.
+# Weights in one block: 16 MB.
 BLOCK = 2_000_000
-# Stamps off the record by rounding alone.
+# Tolerance for stamps outside the record by rounding.
 SLACK = 1e-6  # steps
 
 
 @dataclass(frozen=True, eq=False)
 class Resampled:
-    """Channels at other stamps.
+    """Channels at new stamps.
 
     Attributes
     ----------
     values : ndarray, (m, k)
     noise_factor : ndarray, (m,)
-        Standard deviation of each output per that of white noise of the samples, exact.
+        Standard deviation of each output divided by that of white noise of the samples, exact.
     whole : ndarray of bool, (m,)
-        False where an end of the record was continued to make the output.
+        False where the output uses the padding beyond an end of the record.
     touched : ndarray of bool, (m, k)
-        Whether a marked sample counts in the output.
+        Whether a marked sample contributes to the output.
     """
 
     values: Array
@@ -61,18 +61,18 @@ class Resampled:
 
 @dataclass(frozen=True)
 class LowPassDesign:
-    """A windowed sine cardinal that is symmetric about each output stamp.
+    """A windowed sinc low-pass, symmetric about each output stamp.
 
     Attributes
     ----------
     passband, stopband : float, Hz
         Up to `passband` the gain is 1, and from `stopband` on 0, both to `ripple`.
     attenuation : float, dB
-        Of the stopband.
+        Attenuation of the stopband.
     reach : float, s
         Half the length of the kernel.
     beta : float
-        Of Kaiser's window.
+        Shape parameter of the Kaiser window.
     """
 
     passband: float
@@ -83,18 +83,18 @@ class LowPassDesign:
 
     @property
     def ripple(self) -> float:
-        """Most by which the gain is off, in both bands."""
+        """Largest deviation of the gain, in both bands."""
         return math.pow(10.0, -self.attenuation / 20.0)
 
     def kernel(self, u: Array) -> Array:
-        """Weight, not normalised, of what lies `u` seconds from the stamp."""
+        """Compute the weight, not normalized, of a sample `u` seconds from the stamp."""
         cutoff = 0.5 * (self.passband + self.stopband)
         inside = np.clip(1.0 - (u / self.reach) ** 2, 0.0, None)
         window = np.i0(self.beta * np.sqrt(inside)) * (np.abs(u) <= self.reach)
         return np.asarray(np.sinc(2.0 * cutoff * u) * window)
 
     def response(self, frequency: ArrayLike, step: float) -> Array:
-        """Gain at frequencies in Hz, for samples of a step in s and stamps that lie on samples."""
+        """Compute the gain at frequencies in Hz, for samples of a step in s, stamps on samples."""
         half = int(self.reach / step)
         u: Array = step * np.arange(-half, half + 1, dtype=np.float64)
         weight = self.kernel(u)
@@ -105,16 +105,16 @@ class LowPassDesign:
 def low_pass_design(
     step: float, rate: float, *, passband: float = 0.5, attenuation: float = 80.0
 ) -> LowPassDesign:
-    """Design the low-pass before a lower rate.
+    """Design the anti-aliasing low-pass for a lower rate.
 
     Parameters
     ----------
     step : float, s
-        Of the samples.
+        Sampling interval.
     rate : float, Hz
-        Of the output; its Nyquist frequency is where the stopband begins.
+        Output rate. The stopband begins at its Nyquist frequency.
     passband : float
-        Its end, as a part of that Nyquist frequency. The kernel's length grows as
+        End of the passband, as a fraction of that Nyquist frequency. The kernel's length grows as
         ``1/(1 - passband)``: at 0.5 and 80 dB it reaches 10.9 output steps to either side.
     attenuation : float, dB
         40 to 150.
@@ -159,26 +159,26 @@ def decimate(
     design: LowPassDesign,
     marked: Flags | None = None,
 ) -> Resampled:
-    """Bring evenly spaced samples onto stamps, past a low-pass of zero delay.
+    """Resample evenly spaced samples to stamps with a zero-delay low-pass.
 
     Parameters
     ----------
     values : array_like, (n,) or (n, k)
     start, step : float, s
-        Stamp of the first sample, and their distance.
+        Stamp of the first sample, and the sampling interval.
     stamps : array_like, (m,), s
-        Anywhere in the record; any ratio of rates, no even grid needed.
+        Anywhere in the record, at any ratio of rates; they need not be even.
     design : LowPassDesign
-        As by `low_pass_design`.
+        From `low_pass_design`.
     marked : ndarray of bool, (n, k), optional
-        Samples whose part in the outputs is to be told.
+        Samples to trace: `Resampled.touched` marks the outputs that they contribute to.
 
     Returns
     -------
     Resampled
-        Each output is a sum of samples with the kernel centred at its stamp, so that there is no
-        delay to compensate, and of weights that sum to 1. Within `reach` of the ends the record
-        is continued by its point mirror: constants and straight lines pass as they are.
+        Each output is a weighted sum of samples, with the kernel centered at its stamp (zero
+        delay) and weights that sum to 1. Within `reach` of the ends the record is padded by its
+        point mirror, which preserves constants and straight lines.
 
     Raises
     ------
@@ -223,18 +223,18 @@ def mean_samples(
     sampling: str = "instantaneous",
     marked: Flags | None = None,
 ) -> Resampled:
-    """True averages over the interval that ends at each stamp.
+    """Average over the interval that ends at each stamp.
 
     Parameters
     ----------
     values : array_like, (n,) or (n, k)
     start, step : float, s
-        Stamp of the first sample, and their distance.
+        Stamp of the first sample, and the sampling interval.
     stamps : array_like, (m,), s
     length : float, s
-        Of the intervals; one step of the samples or more.
+        Length of the intervals; at least one step of the samples.
     sampling : {'instantaneous', 'mean'}
-        What a sample is: the value at its stamp, straight in between (trapezoids), or the mean
+        Whether a sample is the value at its stamp, linear in between (trapezoids), or the mean
         over the step that ends there.
     marked : ndarray of bool, (n, k), optional
         As in `decimate`.
@@ -242,14 +242,14 @@ def mean_samples(
     Returns
     -------
     Resampled
-        Integrals over intervals that follow one another add up to the integral of the whole, to
-        rounding. The gain at f is ``sinc(f length)`` (and ``sinc²(f step)`` of the trapezoids):
-        a mean is no strong low-pass, and its place is the middle of the interval.
+        Integrals over consecutive intervals add up to the integral of the whole, to rounding. The
+        gain at f is ``sinc(f length)``, times ``sinc²(f step)`` for the trapezoids: a mean is only
+        a weak low-pass. It belongs to the middle of the interval.
 
     Raises
     ------
     ConfigError
-        `sampling` is neither, or the intervals are shorter than a step.
+        `sampling` is unknown, or the intervals are shorter than a step.
     DataError
         A sample or stamp is not finite, or an interval does not lie in the record.
     """
@@ -282,13 +282,13 @@ def mean_samples(
 
 
 def _area_under_hat(u: Array) -> Array:
-    """Integral from -1 to u of the triangle that interpolates between samples."""
+    """Integrate from -1 to u the triangle that interpolates between samples."""
     v = np.clip(u, -1.0, 1.0)
     return np.asarray(0.5 + v - 0.5 * v * np.abs(v))
 
 
 def _area_under_step(u: Array) -> Array:
-    """Integral to u of the step that a mean over the step before its stamp stands for."""
+    """Integrate to u the unit step function of a mean over the step before its stamp."""
     return np.asarray(np.clip(u + 1.0, 0.0, 1.0))
 
 
@@ -299,7 +299,7 @@ def in_blocks(
     weigh: Callable[[slice], tuple[LocalWeights, Flags]],
     marked: Flags | None,
 ) -> Resampled:
-    """Apply weights that are made for a block of outputs at a time, so that memory stays small."""
+    """Compute and apply weights by blocks of outputs, to limit memory."""
     values, noise = np.empty((m, channels.shape[1])), np.empty(m)
     whole, touched = np.empty(m, dtype=bool), np.zeros(values.shape, dtype=bool)
     for rows in _slices(m, max(1, BLOCK // (width * channels.shape[1]))):
@@ -323,17 +323,17 @@ def _check_within(at: Array, low: float, high: float, step: float) -> None:
         )
 
 
-# Decimation by a whole number with fixed weights, in segments, that keeps integrals exactly.
+# Decimation by an integer factor with fixed weights, chunk by chunk. Integrals are kept exactly.
 
 
 @dataclass(frozen=True, eq=False)
 class FirState:
-    """What is remembered between segments.
+    """State between chunks.
 
     Attributes
     ----------
     first : int
-        Number of the oldest sample that is kept.
+        Index of the oldest sample kept.
     given : int
         Number of outputs so far.
     values : ndarray, (k, c)
@@ -346,20 +346,20 @@ class FirState:
 
 @dataclass(frozen=True, eq=False)
 class FirDecimation:
-    """A low-pass of fixed length before every `factor`-th sample.
+    """A low-pass of fixed length that keeps every `factor`-th sample.
 
-    Output j stands at sample ``centre + j factor``, in its middle: what is late is known and the
-    same at all frequencies, and is taken off by that stamp.
+    Output j has the stamp of sample ``centre + j factor``, in the middle of its window: the delay
+    is the same at all frequencies, and this stamp compensates it.
 
     Attributes
     ----------
     design : LowPassDesign
     step : float, s
-        Of the samples.
+        Sampling interval.
     factor : int
     means : bool
-        Whether a sample is a mean over the step that ends at its stamp: the weights then lie
-        symmetric about the output's stamp, half a step beside the samples' stamps.
+        Whether a sample is a mean over the step that ends at its stamp. The weights are then
+        symmetric about the output's stamp, half a step off the samples' stamps.
     """
 
     design: LowPassDesign
@@ -369,12 +369,12 @@ class FirDecimation:
 
     @cached_property
     def weights(self) -> Array:
-        """Weights, oldest sample first.
+        """Filter weights, oldest sample first.
 
-        Those of the design, and each sample counts the same in the sum of all outputs: the
-        weights that are `factor` apart sum to ``1/factor``. So constants pass as they are, the
-        gain at all multiples of the output's rate is zero to rounding, and the integral of the
-        outputs is that of the samples.
+        The weights of the design, corrected so that each sample counts the same in the sum of all
+        outputs: weights that are `factor` apart sum to ``1/factor``. Constants pass unchanged, the
+        gain at all multiples of the output rate is zero to rounding, and the integral of the
+        outputs equals that of the samples.
         """
         half = self.half
         count = 2 * half + int(not self.means)
@@ -382,32 +382,32 @@ class FirDecimation:
         raw = self.design.kernel(self.step * place)
         phase = np.arange(len(raw)) % self.factor
         shares = np.bincount(phase, raw, self.factor)
-        # Weights far from the middle are small: a branch is changed in proportion to its sum.
+        # In proportion to its sum, so that small weights far from the middle change little.
         return np.asarray(raw / (self.factor * shares[phase]))
 
     @property
     def half(self) -> int:
-        """Samples to either side of the middle."""
+        """Samples on either side of the middle."""
         return max(self.factor, math.floor(self.design.reach / self.step + 0.5 * self.means))
 
     @property
     def centre(self) -> int:
-        """Sample at whose stamp the first output stands: a multiple of `factor`."""
-        # A mean before the first stamp is one sample earlier.
+        """Sample at the stamp of the first output: a multiple of `factor`."""
+        # A mean before the first stamp counts as one sample earlier.
         return math.ceil((self.half - int(self.means)) / self.factor) * self.factor
 
     @property
     def delay(self) -> float:
-        """From an output's stamp to the last sample that it needs, s: how late it is known."""
+        """Latency in s: from an output's stamp to the last sample that it needs."""
         return (self.half - 0.5 * self.means) * self.step
 
     @property
     def noise_factor(self) -> float:
-        """Standard deviation of an output per that of white noise of the samples."""
+        """Ratio of the standard deviations of output and sample for white noise."""
         return float(np.linalg.norm(self.weights))
 
     def response(self, frequency: ArrayLike) -> Array:
-        """Gain at frequencies in Hz; of means that over the step counts, too."""
+        """Compute the gain at frequencies in Hz, with that of the mean over a step for `means`."""
         f = np.atleast_1d(np.asarray(frequency, dtype=np.float64))
         place = np.arange(len(self.weights)) - 0.5 * (len(self.weights) - 1)
         gain = np.cos(2.0 * np.pi * self.step * np.outer(f, place)) @ self.weights
@@ -418,7 +418,7 @@ class FirDecimation:
         return FirState(0, 0, np.empty((0, channels)))
 
     def advance(self, state: FirState, values: Array) -> tuple[FirState, Array]:
-        """Take a further segment; of outputs there are as many as are whole.
+        """Process a chunk of samples and return the outputs that are complete.
 
         Parameters
         ----------
@@ -450,7 +450,7 @@ def fir_decimation(
     passband: float = 0.5,
     attenuation: float = 80.0,
 ) -> FirDecimation:
-    """Design the low-pass before every so manyth sample.
+    """Design the low-pass for decimation by an integer factor.
 
     Parameters
     ----------
@@ -458,7 +458,7 @@ def fir_decimation(
     factor : int
         Two or more.
     means : bool
-        Whether the samples are means over the step that ends at their stamp.
+        Whether a sample is the mean over the step that ends at its stamp.
     passband, attenuation : float
         As `low_pass_design`.
 

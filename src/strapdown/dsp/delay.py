@@ -1,4 +1,4 @@
-"""Delay between two records of one motion, to a part of a sample, and how well it is known."""
+"""Delay between two records of one motion, to a fraction of a sample, with its uncertainty."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ __all__ = ["Delay", "EvenSignal", "find_delay", "lag_correlation", "repeats", "t
 
 Array = NDArray[np.float64]
 
-# Above, noise adds and hardly any signal: structures of vehicles ring at 30 to 300 Hz.
+# Rates above add noise and hardly any signal: structures of vehicles vibrate at 30 to 300 Hz.
 COMMON_RATE = 1000.0  # Hz
-# What brings the faster record to the rate of the slower one.
+# Decimates the faster record to the rate of the slower one.
 PASSBAND, ATTENUATION = 0.8, 60.0
 PEAKS = 16
 LEAST_CORRELATION = 0.7
 LEAST_SAMPLES = 16
-# Two maxima are one peak unless the coefficient falls by this between them.
+# Two maxima belong to one peak unless the coefficient drops by this much between them.
 LEAST_DIP = 0.05
 STEPS = 30
-# Standard deviations of the Gaussian before the fit, in samples. Between unsmoothed samples an
-# interpolated record has less noise than at them, which draws the fit to a grid; wider ones
-# leave less noise and less of the slopes.
+# Standard deviations, in samples, of the Gaussian smoothing before the fit. Unsmoothed, an
+# interpolated record has less noise between samples than at them, which draws the fit to the grid;
+# wider ones leave less noise, but also smaller slopes.
 WIDTHS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 TRUNCATE = 4.0
 
@@ -41,7 +41,7 @@ class EvenSignal:
     Attributes
     ----------
     start, step : float, s
-        Stamp of the first sample, and their distance, on the record's own clock.
+        Stamp of the first sample, and the sampling interval, on the record's own clock.
     values : ndarray, (n, k)
     """
 
@@ -57,24 +57,24 @@ class EvenSignal:
 
 @dataclass(frozen=True)
 class Delay:
-    """How much later one motion stands on the second clock than on the first.
+    """Delay of one motion between two clocks.
 
     Attributes
     ----------
     delay : float, s
-        Stamp on the second clock less stamp on the first, of one instant.
+        Stamp on the second clock minus stamp on the first, for the same instant.
     sd : float, s
         Standard deviation, from the residuals, their correlation in time, and the slopes.
     correlation : float
-        Coefficient at the delay.
+        Correlation coefficient at the delay.
     runner_up, runner_up_delay : float, s
-        The best other peak; 0 and NaN where there is none.
+        The next best peak; 0 and NaN where there is only one.
     ambiguous : bool
-        Whether that does about as well.
+        Whether the next best peak fits about as well.
     gain : float
-        Second record per first.
+        Second record divided by the first.
     shared : float, s
-        Length of what both cover.
+        Length of the overlap.
     """
 
     delay: float
@@ -95,38 +95,38 @@ def find_delay(
     near: tuple[float, float] | None = None,
     refuse_ambiguous: bool = True,
 ) -> Delay:
-    """Find the delay of the second record against the first by correlation.
+    """Estimate the delay of the second record against the first by correlation.
 
     Parameters
     ----------
     first, second : EvenSignal
-        Of any rates, with equally many channels that show one motion in one unit or in
-        proportion, as lengths of vectors, which do not know of mountings. Channels may be off by a
-        constant each.
+        Any rates; the same number of channels, which show one motion in one unit or in
+        proportion, such as magnitudes of vectors, which do not depend on the mounting. Each
+        channel may have a constant offset.
     least_shared : float, s, optional
-        What both must cover; half the shorter record where nothing is given.
+        Smallest overlap; half the shorter record if not given.
     near : tuple of float, s, optional
-        Guess and its reach: only delays within are looked at.
+        Guess and its half-width: only delays within are searched.
     refuse_ambiguous : bool
-        Raise where another peak does about as well; else only say so.
+        Raise where another peak fits about as well; otherwise only flag it.
 
     Returns
     -------
     Delay
-        Both are brought to the slower rate, at most 1 kHz. The highest coefficient gives the
-        delay to a sample; least squares, with a gain and constants, from there its parts, after
-        the Gaussian smoothing that leaves the least variance:
+        Both records are decimated to the slower rate, at most 1 kHz. The highest correlation
+        coefficient gives the delay to one sample. Least squares with a gain and constants refines
+        it to a fraction, after the Gaussian smoothing that gives the smallest variance:
         ``second(t + d) = g first(t) + c``. The variance is ``Σ r_l Σ_i x'_i x'_(i+l)`` over
-        ``(Σ x' y')²``, with the autocovariance r of the residuals; for white residuals it is
-        ``σ²/Σ x'²``, the bound of Cramér and Rao for known shapes (Kay, Fundamentals of
-        Statistical Signal Processing I, Eq. (3.14)). Where the two points of a vehicle do not
-        move alike, the difference stands in the residuals.
+        ``(Σ x' y')²``, with the autocovariance r of the residuals. For white residuals it is
+        ``σ²/Σ x'²``, the Cramér-Rao bound for known shapes (Kay, Fundamentals of Statistical
+        Signal Processing I, Eq. (3.14)). Where two points of a vehicle move differently, the
+        difference is part of the residuals.
 
     Raises
     ------
     DataError
-        Channels differ in number, there is too little in common, nothing varies, or the peak is
-        ambiguous.
+        The numbers of channels differ, the overlap is too short, the signal is constant, or the
+        peak is ambiguous.
     """
     one, two = _at_common_rate(first, second)
     step = one.step
@@ -198,7 +198,7 @@ def _at_common_rate(first: EvenSignal, second: EvenSignal) -> tuple[EvenSignal, 
 
 def _slower(signal: EvenSignal, step: float) -> EvenSignal:
     if signal.step * (1.0 + 1e-6) > step:
-        # The same to rounding: one step for both, so that lags are lags.
+        # The rates agree to rounding: use one step for both, so that lags are whole samples.
         return EvenSignal(signal.start, step, signal.values)
     design = low_pass_design(signal.step, 1.0 / step, passband=PASSBAND, attenuation=ATTENUATION)
     n = int((len(signal.values) - 1) * signal.step / step * (1.0 + 1e-9)) + 1
@@ -213,7 +213,7 @@ def _apart(score: Array, a: int, b: int) -> bool:
 
 
 def _refine(one: EvenSignal, two: EvenSignal, delay: float, coarse: float) -> Delay:
-    """Take the smoothing that leaves the least variance, of widths that double."""
+    """Fit with smoothing widths that double, and keep the smallest variance."""
     from scipy.ndimage import gaussian_filter1d
 
     shorter = min(len(one.values), len(two.values))
@@ -247,11 +247,11 @@ def _least_squares(
     width: float,
     noise: Array | None,
 ) -> tuple[Delay, Array | None]:
-    """Delay, a gain and constants, from the nearest sample on; and the noise of the samples.
+    """Fit the delay, a gain and constants from the nearest sample on; estimate the noise.
 
-    The variance is the larger of two: by the residuals' own correlation, which scatters and of
-    which the least over the widths is low by chance; and as of white noise before the smoothing,
-    with the variance that the narrowest width showed.
+    The variance is the larger of two: one from the correlation of the residuals, which scatters,
+    so that the smallest over the widths is low by chance; and one for white noise before the
+    smoothing, with the noise variance of the narrowest width.
     """
     from scipy.interpolate import CubicSpline
     from scipy.ndimage import gaussian_filter1d
@@ -269,7 +269,7 @@ def _least_squares(
         x, y = x - x.mean(axis=0), y - y.mean(axis=0)
         dx, dy = dx - dx.mean(axis=0), dy - dy.mean(axis=0)
         gain = float((x * y).sum() / (x * x).sum())
-        # Noise of the two records is not common: the product of slopes does not count it.
+        # The noise of the two records is independent: it does not bias the product of slopes.
         energy = gain * float((dx * dy).sum())
         if not energy > 0.0:
             return nothing, noise
@@ -280,7 +280,7 @@ def _least_squares(
     residual = y - gain * x
     common = float((x * y).sum() / math.sqrt((x * x).sum() * (y * y).sum()))
     if noise is None:
-        # A Gaussian leaves 1/(2 sqrt(π) width) of the variance of white noise.
+        # A Gaussian reduces the variance of white noise to 1/(2 sqrt(π) width).
         left = 2.0 * math.sqrt(math.pi) * width / max(len(t) - 3, 1)
         noise = left * (residual**2).sum(axis=0)
     felt = gaussian_filter1d(gain * dx, width, axis=0, truncate=TRUNCATE, mode="constant")
@@ -291,13 +291,13 @@ def _least_squares(
 
 
 def _variance(slope: Array, residual: Array, width: float) -> float:
-    """Variance of ``Σ slope residual`` for residuals that are correlated over up to a tenth."""
+    """Compute the variance of ``Σ slope residual``; correlation up to a tenth of the record."""
     from scipy.signal import correlate
 
     n = len(residual)
     reach = min(n, max(n // 10, int(12.0 * width)))
     lag = np.arange(reach)
-    # Whole over half the reach, then falling to nothing; both signs of a lag.
+    # Full weight over half the reach, then tapered to zero; both signs of a lag.
     taper = np.minimum(1.0, 2.0 - 2.0 * lag / reach) * np.where(lag, 2.0, 1.0) / (n - lag)
     total = 0.0
     for s, e in zip(slope.T, residual.T, strict=True):
@@ -305,7 +305,7 @@ def _variance(slope: Array, residual: Array, width: float) -> float:
             correlate(x, x, mode="full", method="fft")[n - 1 : n - 1 + reach] for x in (s, e)
         )
         total += float((taper * of_slope * of_residual).sum())
-    # What the gain, the constants and the delay took out of the residuals.
+    # Degrees of freedom that the gain, the constants and the delay took from the residuals.
     return max(total, 0.0) * n / max(n - 3, 1)
 
 
@@ -317,23 +317,23 @@ Flags = NDArray[np.bool_]
 def lag_correlation(
     x: Array, y: Array, known_x: Flags, known_y: Flags, least: float
 ) -> tuple[Array, Array]:
-    """Correlation coefficient for each lag: sample k of y lies at k + lag of x.
+    """Compute the correlation coefficient for each lag: sample k of y lies at k + lag of x.
 
     Parameters
     ----------
     x, y : ndarray, (n,) and (m,), or (n, k) and (m, k)
         On one step; channels are pooled, each about its own mean.
     known_x, known_y : ndarray of bool, (n,) and (m,)
-        False where there is no sample.
+        False where a sample is missing.
     least : float
-        Samples that both must have known at a lag.
+        Samples that both must have at a lag.
 
     Returns
     -------
     lags : ndarray
-        Those at which enough is shared.
+        Lags with enough overlap.
     coefficient : ndarray
-        -1 to 1; means and variances are those of what is shared at the lag.
+        -1 to 1; means and variances are taken over the overlap at the lag.
     """
     from scipy.signal import correlate
 
@@ -352,14 +352,14 @@ def lag_correlation(
         var_x += slide(p * p, w) - sum_x**2 / count
         var_y += slide(m, q * q) - sum_y**2 / count
     lags = np.arange(-(len(y) - 1), len(x), dtype=np.float64)
-    # A stretch that is nearly still correlates by its noise.
+    # A nearly constant stretch would correlate by its noise.
     floor = 1e-3 * min(float(s.var(axis=0).sum()) * len(s) for s in (x, y))
     good = (count >= least) & (var_x > floor) & (var_y > floor)
     return lags[good], cross[good] / np.sqrt(var_x[good] * var_y[good])
 
 
 def top_peaks(score: Array, most: int) -> NDArray[np.int64]:
-    """Positions of the highest positive local maxima, the highest first."""
+    """Find the highest positive local maxima; indices, the highest first."""
     inner = np.r_[-np.inf, score, -np.inf]
     top = np.flatnonzero((inner[1:-1] >= inner[:-2]) & (inner[1:-1] >= inner[2:]))
     order = top[np.argsort(score[top])[::-1][:most]]
@@ -367,8 +367,8 @@ def top_peaks(score: Array, most: int) -> NDArray[np.int64]:
 
 
 def repeats(best: float, runner_up: float) -> bool:
-    """Whether another peak does about as well as the best.
+    """Whether another peak fits about as well as the best.
 
-    Twice the best misfit, and a hundredth of the whole, is no clear winner.
+    True up to twice the best misfit plus a hundredth of the total.
     """
     return 1.0 - runner_up < 2.0 * (1.0 - best) + 0.01

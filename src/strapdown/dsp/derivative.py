@@ -1,4 +1,4 @@
-"""First derivative of noisy samples by sliding polynomials, with its noise, delay and losses."""
+"""First derivative of noisy samples by sliding polynomials, with noise, delay and attenuation."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ class Derivative:
     values : ndarray, (n, k), unit of the samples per s
         The derivative at ``stamp - delay``.
     noise_gain : ndarray, (n,), 1/s
-        Standard deviation of each output per that of white noise of the samples, exact. Outputs
-        whose windows overlap share their noise.
+        Standard deviation of each output divided by that of white noise of the samples, exact.
+        Outputs with overlapping windows have correlated noise.
     delay : float, s
     valid : ndarray of bool, (n,)
-        False for the first outputs of a causal fit, whose window is not filled yet; they are 0.
+        False for the first outputs of a causal fit, whose window is incomplete; they are 0.
     """
 
     values: Array
@@ -60,22 +60,22 @@ class Derivative:
 
 @dataclass(frozen=True)
 class SlidingFit:
-    """Savitzky and Golay's differentiator: the slope of a polynomial fitted to a window.
+    """Savitzky-Golay differentiator: slope of a polynomial fitted to a sliding window.
 
     Attributes
     ----------
     step : float, s
-        Of the samples.
+        Sampling interval.
     half : int
         The window has ``2 half + 1`` samples.
     degree : int
-        1 or 2 give the same slope at the middle, 3 or 4 the same (Savitzky & Golay 1964,
-        doi:10.1021/ac60214a047); up to ``2 half``.
+        Degrees 1 and 2 give the same slope at the middle, and so do 3 and 4 (Savitzky & Golay
+        1964, doi:10.1021/ac60214a047); up to ``2 half``.
 
     Raises
     ------
     ConfigError
-        There is no such fit.
+        The step, window or degree is out of its range.
     """
 
     step: float
@@ -102,11 +102,11 @@ class SlidingFit:
         return self.step * np.arange(-self.half, self.half + 1, dtype=np.float64)
 
     def noise_gain(self, at: int = 0) -> float:
-        """Standard deviation of the slope per that of white noise of the samples, in 1/s."""
+        """Compute the standard deviation of the slope per that of white noise, in 1/s."""
         return float(np.linalg.norm(self.weights(at)))
 
     def response(self, frequency: ArrayLike) -> Array:
-        """Output of the centred fit per true derivative of a sine, real: there is no delay.
+        """Compute the gain of the centered fit relative to the true derivative; real, no delay.
 
         Parameters
         ----------
@@ -120,12 +120,12 @@ class SlidingFit:
         return slope_response(self.weights(), self._window, frequency)
 
     def bandwidth(self, loss: float = 0.01) -> float:
-        """Frequency in Hz below which a sine's derivative is off by no more than `loss`."""
+        """Find the frequency in Hz up to which a sine's derivative is within `loss` (relative)."""
         # The response first leaves 1 before the first zero of the window's transform.
         return bandwidth(self._response, 0.5 / self.step, 64 * (2 * self.half + 1), loss)
 
     def pulse_loss(self, duration: float) -> float:
-        """What the peak of a haversine pulse of the derivative loses, relative.
+        """Compute the relative peak loss of a haversine pulse of the derivative.
 
         Parameters
         ----------
@@ -139,15 +139,15 @@ class SlidingFit:
 
 
 def widest_fit(step: float, duration: float, loss: float = 0.02, degree: int = 2) -> SlidingFit:
-    """Choose the widest window, thus the least noise, that keeps a pulse's peak.
+    """Choose the widest window, thus the least noise, that preserves a pulse's peak.
 
     Parameters
     ----------
     step : float, s
     duration : float, s
-        Of the shortest haversine pulse of the derivative that matters.
+        Duration of the shortest haversine pulse of the derivative that matters.
     loss : float
-        Most that its peak may lose, relative.
+        Largest relative loss of its peak.
     degree : int
 
     Raises
@@ -174,7 +174,7 @@ def widest_fit(step: float, duration: float, loss: float = 0.02, degree: int = 2
 
 
 def derivative(values: ArrayLike, fit: SlidingFit, *, causal: bool = False) -> Derivative:
-    """First derivative of evenly spaced samples, as an angular acceleration from rates.
+    """Differentiate evenly spaced samples, such as angular rates to angular acceleration.
 
     Parameters
     ----------
@@ -182,19 +182,18 @@ def derivative(values: ArrayLike, fit: SlidingFit, *, causal: bool = False) -> D
     fit : SlidingFit
     causal : bool
         Use past samples only: the same slopes, each at the stamp of the last sample of its
-        window, thus late by ``half`` steps exactly at every frequency.
+        window, with a delay of exactly ``half`` steps at every frequency.
 
     Returns
     -------
     Derivative
-        Centred: no delay, and the first and last ``half`` outputs are slopes of the polynomial
-        through the first or last window, away from its middle, with the larger noise that
-        `noise_gain` tells.
+        Centered: no delay. The first and last ``half`` outputs are off-center slopes of the
+        polynomial through the first or last window; `noise_gain` has their larger noise.
 
     Raises
     ------
     DataError
-        A sample is not finite, or there are fewer than a window.
+        A sample is not finite, or there are fewer samples than the window has.
     """
     channels = as_channels(values)
     n, window = len(channels), 2 * fit.half + 1
@@ -217,14 +216,14 @@ def derivative(values: ArrayLike, fit: SlidingFit, *, causal: bool = False) -> D
 
 
 def fitted_weights(time: Array, at: Array, degree: int) -> tuple[Array, Array]:
-    """Weights of the value and the slope of a polynomial of least squares.
+    """Compute the weights of the value and slope of a least-squares polynomial.
 
     Parameters
     ----------
     time : ndarray, (m, w), s
         Stamps of the samples of m windows, increasing, any spacing.
     at : ndarray, (m,), s
-        Where each is told.
+        Stamp of the output of each window.
     degree : int
         1 to w - 1.
 
@@ -235,8 +234,8 @@ def fitted_weights(time: Array, at: Array, degree: int) -> tuple[Array, Array]:
 
     Notes
     -----
-    With equal steps the filters of Savitzky and Golay (1964, doi:10.1021/ac60214a047). The basis
-    is Legendre's over the window, for which the normal equations are well conditioned.
+    With equal steps, the filters of Savitzky and Golay (1964, doi:10.1021/ac60214a047). The basis
+    is Legendre's over the window: its normal equations are well conditioned.
     """
     middle, half = 0.5 * (time[:, -1] + time[:, 0]), 0.5 * (time[:, -1] - time[:, 0])
     basis = legendre.legvander((time - middle[:, None]) / half[:, None], degree)
@@ -252,13 +251,13 @@ def fitted_weights(time: Array, at: Array, degree: int) -> tuple[Array, Array]:
 
 
 def slope_response(weights: Array, offset: Array, frequency: Array) -> NDArray[np.complex128]:
-    """Output of weights of a slope per true derivative of a sine.
+    """Compute the response of slope weights relative to the true derivative of a sine.
 
     Parameters
     ----------
     weights : ndarray, (w,), 1/s
     offset : ndarray, (w,), s
-        Of each sample from where the slope is told.
+        Stamp of each sample minus the stamp of the slope.
     frequency : ndarray, (k,), Hz
         Above zero.
 
@@ -273,16 +272,16 @@ def slope_response(weights: Array, offset: Array, frequency: Array) -> NDArray[n
 def bandwidth(
     response: Callable[[Array], NDArray[np.complex128]], highest: float, parts: int, loss: float
 ) -> float:
-    """Frequency below which the size of a response is off one by no more than a loss.
+    """Find the frequency up to which the magnitude of a response is within a loss of 1.
 
     Parameters
     ----------
     response : callable
-        Of frequencies, (k,), Hz.
+        Response at frequencies (k,), Hz.
     highest : float, Hz
-        Half the rate of the samples.
+        Nyquist frequency of the samples.
     parts : int
-        Of the grid on which the first frequency beyond is looked for.
+        Number of steps of the search grid.
     loss : float
 
     Returns
@@ -302,19 +301,19 @@ def bandwidth(
     return float(low)
 
 
-# Slope of a sampled signal from a polynomial of a few neighbours, with its exact noise.
+# Slope of a sampled signal from a polynomial through a few neighbors, with its exact noise.
 
 
-# So many rows are solved at once: a few megabytes.
+# Rows solved at once: a few megabytes.
 CHUNK = 20_000
 LEAST_SAMPLES = 3
-# Enough for a polynomial of degree four; fewer have one of degree two.
+# Enough samples for a polynomial of degree four; fewer take degree two.
 USUAL_SAMPLES = 7
 
 
 @dataclass(frozen=True, eq=False)
 class LocalSlope:
-    """Weights that make values and slopes of a signal from its samples.
+    """Weights that give values and slopes of a signal from its samples.
 
     Attributes
     ----------
@@ -323,8 +322,8 @@ class LocalSlope:
     slope, value : ndarray, (n, w)
         Weights of the samples of the window: of the slope, in 1/s, and of the value.
     bandwidth : float, Hz
-        Frequency at which the slope in the middle of a record has fallen to 1/√2 of the true
-        one (where the signal is late: is off by as much). Its delay is zero there: the window is
+        Frequency at which the slope in the middle of a record has fallen to 1/√2 of the true one
+        (for a delayed signal: deviates by as much). The delay is zero there: the window is
         symmetric.
     window : float, s
         From the first to the last sample of a window.
@@ -337,15 +336,15 @@ class LocalSlope:
     window: float
 
     def slope_of(self, y: Array) -> Array:
-        """Slope of samples (n, k) at each stamp, in their unit per s."""
+        """Compute the slope of samples (n, k) at each stamp, in their unit per s."""
         return LocalWeights(self.first, self.slope).apply(y)
 
     def value_of(self, y: Array) -> Array:
-        """Value of the signal (n, k) where the slopes are taken."""
+        """Compute the signal (n, k) at the stamps of the slopes."""
         return LocalWeights(self.first, self.value).apply(y)
 
     def weighted(self, rows: Array) -> tuple[Array, Array]:
-        """Weights of the samples in sums of slopes and of values.
+        """Compute the weights of the samples in sums of slopes and of values.
 
         Parameters
         ----------
@@ -362,7 +361,7 @@ class LocalSlope:
 
     @cached_property
     def _matrices(self) -> tuple[csr_array, csr_array]:
-        """The weights as matrices (n, n), nearly empty."""
+        """Build the weights as sparse matrices (n, n)."""
         from scipy.sparse import csr_array
 
         n, width = self.slope.shape
@@ -373,38 +372,37 @@ class LocalSlope:
 
 
 def local_slope(time: Array, *, window: float | None = None, delay: float = 0.0) -> LocalSlope:
-    """Weights of a polynomial fitted by least squares to each sample and its neighbours.
+    """Compute the weights of a least-squares polynomial about each sample.
 
     Parameters
     ----------
     time : ndarray, (n,), s
         Increasing stamps, any spacing.
     window : float, s, optional
-        Length of a window; seven samples if not given, and never fewer than three. The polynomial
-        is of degree four where there are seven samples or more, and of degree two otherwise.
+        Length of a window; seven samples if not given, at least three. The degree is four with
+        seven samples or more, and two otherwise.
     delay : float, s
-        By how much the signal is late: value and slope are taken this much after each stamp.
+        Delay of the signal: value and slope are taken this much after each stamp.
 
     Returns
     -------
     LocalSlope
-        With equal steps the filter of Savitzky and Golay. White noise s becomes
+        With equal steps, the Savitzky-Golay filter. White noise of standard deviation s becomes
         ``s sqrt(sum(slope²))``. Without delay the values are the samples themselves.
 
     Notes
     -----
-    By how much slopes are off, for steps h: those of a parabola through five samples by
-    ``17/30 h²`` times the third derivative, those of degree four through seven by ``-131/630 h⁴``
-    times the fifth. Of a pulse of 60 ms at 200 Hz that is 15 % and 1.6 %. White noise s leaves
-    0.32 and 0.51 s/h in a slope, and 0.48 and 0.59 s at each end of an integral of slopes: what a
-    change of velocity has of it.
+    Errors of the slope, for steps h: a parabola through five samples, ``17/30 h²`` times the third
+    derivative; degree four through seven samples, ``-131/630 h⁴`` times the fifth. For a pulse of
+    60 ms at 200 Hz these are 15 % and 1.6 %. White noise s gives 0.32 and 0.51 s/h in a slope, and
+    0.48 and 0.59 s at each end of an integral of slopes, which is the noise of a velocity change.
 
     Raises
     ------
     DataError
-        There are fewer than three samples.
+        Fewer than three samples.
     ConfigError
-        The window is not positive or the delay is longer than half of it.
+        The window is not positive, or the delay is longer than half the window.
     """
     n = time.size
     if n < LEAST_SAMPLES:
@@ -440,7 +438,7 @@ def local_slope(time: Array, *, window: float | None = None, delay: float = 0.0)
     return LocalSlope(first, slope, value, band, span)
 
 
-# Outputs that are each a weighted sum of near samples: applied, and the noise they pass.
+# Outputs that are local weighted sums of samples, and their noise.
 
 Indices = NDArray[np.int64]
 
@@ -460,22 +458,22 @@ class LocalWeights:
 
     @property
     def noise_factor(self) -> Array:
-        """Standard deviation of each output per that of independent samples, (m,)."""
+        """Standard deviation of each output divided by that of independent samples, (m,)."""
         return np.asarray(np.linalg.norm(self.weights, axis=1))
 
     def apply(self, values: Array) -> Array:
-        """Outputs of samples of shape (n, k), as (m, k)."""
+        """Compute the outputs, (m, k), of samples (n, k)."""
         near = values[self.first[:, None] + np.arange(self.weights.shape[1])]
         return np.asarray(np.einsum("ji,jik->jk", self.weights, near))
 
     def any_of(self, marked: NDArray[np.bool_], least: float = 0.01) -> NDArray[np.bool_]:
-        """Whether a marked sample counts in each output, (m, k).
+        """Whether a marked sample contributes to each output, (m, k).
 
         Parameters
         ----------
         marked : ndarray of bool, (n, k)
         least : float
-            A sample counts whose weight is more than this part of the output's largest.
+            Fraction of the output's largest weight above which a sample contributes.
         """
         size = np.abs(self.weights)
         counts = size > least * size.max(axis=1, keepdims=True)
@@ -484,9 +482,9 @@ class LocalWeights:
 
 
 def mirrored(first: Indices, weights: Array, n: int) -> LocalWeights:
-    """Weights that reach beyond a record, laid back onto its samples.
+    """Fold weights that reach beyond a record back onto its samples.
 
-    The record is continued by its point mirror about the end samples, ``x[-i] = 2 x[0] - x[i]``.
+    The record is padded by its point mirror about the end samples, ``x[-i] = 2 x[0] - x[i]``.
 
     Parameters
     ----------
@@ -494,7 +492,7 @@ def mirrored(first: Indices, weights: Array, n: int) -> LocalWeights:
         May be negative.
     weights : ndarray, (m, w)
     n : int
-        Samples of the record; `weights` reach beyond it by fewer.
+        Samples of the record; `weights` reach beyond it by fewer than n.
     """
     width = weights.shape[1]
     if first.min() >= 0 and first.max() + width <= n:

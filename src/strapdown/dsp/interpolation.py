@@ -1,4 +1,4 @@
-"""Between samples: polynomials through the six nearest, with the noise that they pass."""
+"""Interpolation by polynomials through the six nearest samples, with the noise gain."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ POINTS = 6
 def interpolate(
     time: ArrayLike, values: ArrayLike, stamps: ArrayLike, marked: Flags | None = None
 ) -> Resampled:
-    """Read samples at stamps between them.
+    """Interpolate samples to stamps.
 
     Parameters
     ----------
     time : array_like, (n,), s
-        Increasing; need not be even.
+        Increasing, any spacing.
     values : array_like, (n,) or (n, k)
     stamps : array_like, (m,), s
         Within the record.
@@ -35,17 +35,17 @@ def interpolate(
     Returns
     -------
     Resampled
-        By the polynomial of degree 5 through the six nearest samples, one-sided near the ends:
-        exact for polynomials up to that degree, and at samples themselves. Midway between even
-        samples the gain at f is ``150/128 cos x - 25/128 cos 3x + 3/128 cos 5x`` with
-        ``x = π f step``: 0.9990 at an eighth of the sampling rate, 0.950 at a quarter. The
-        noise factor there is 0.84; between the first two samples it is up to 1.6.
+        The polynomial of degree 5 through the six nearest samples, one-sided near the ends: exact
+        for polynomials up to that degree, and at the samples. Midway between even samples the
+        gain at f is ``150/128 cos x - 25/128 cos 3x + 3/128 cos 5x`` with ``x = π f step``: 0.9990
+        at an eighth of the sampling rate, 0.950 at a quarter. The noise factor there is 0.84;
+        between the first two samples it is up to 1.6.
 
     Raises
     ------
     DataError
-        Fewer than six samples, times that do not advance, a stamp outside the record, or a number
-        that is not finite.
+        Fewer than six samples, time does not advance, a stamp is outside the record, or a number
+        is not finite.
     """
     t, channels = as_channels(time, "time")[:, 0], as_channels(values)
     at = as_channels(stamps, "stamps")[:, 0]
@@ -89,7 +89,7 @@ def interpolate(
 
 
 def lagrange(nodes: Array, at: Array) -> Array:
-    """Weights (m, p) that read the polynomial through nodes (m, p) at points (m,)."""
+    """Compute weights (m, p) that evaluate polynomials through nodes (m, p) at points (m,)."""
     p = nodes.shape[1]
     weights = np.ones_like(nodes)
     for i in range(p):
@@ -106,14 +106,14 @@ def interpolated_means(
     length: float,
     marked: Flags | None = None,
 ) -> Resampled:
-    """Means of `interpolate` over intervals that end at stamps, by Gauss with three points.
+    """Average `interpolate` over intervals that end at stamps (three-point Gauss quadrature).
 
     Parameters
     ----------
     time, values, stamps, marked
         As in `interpolate`; the intervals lie within the record.
     length : float, s
-        Of the intervals, no longer than two steps of the samples.
+        Length of the intervals, at most two steps of the samples.
 
     Returns
     -------

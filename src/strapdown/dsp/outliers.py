@@ -1,4 +1,4 @@
-"""Outliers of evenly sampled channels: found by both sides, interpolated, in segments."""
+"""Outliers of evenly sampled channels: detected from both sides, interpolated, by chunks."""
 
 from __future__ import annotations
 
@@ -19,26 +19,26 @@ __all__ = ["KEPT", "REPLACED", "OutlierDesign", "OutlierState", "Screened"]
 
 #: Flags of `Screened`: as those of the kernel.
 REPLACED, KEPT = 1, 2
-# One over the size that a quarter of normal numbers reach: 0.75 = erf(1.1503/sqrt 2).
+# Inverse of the size that a quarter of normal numbers exceed: 0.75 = erf(1.1503/sqrt 2).
 TO_SIGMA = 0.8692952
-# Samples of either side that predict: a polynomial of degree five.
+# Samples on either side for the prediction: a polynomial of degree five.
 NODES = 3
 LEAST_WINDOW, LONGEST_RUN = 16, 5
 
 
 @dataclass(frozen=True, eq=False)
 class Screened:
-    """Samples that have been judged.
+    """Samples that have been checked.
 
     Attributes
     ----------
     first : int
-        Number of the first since the record began.
+        Index of the first sample, from the start of the record.
     values, raw : ndarray, (k, c)
-        With outliers replaced, and as they came.
+        With outliers replaced, and as recorded.
     flags : ndarray of int8, (k, c)
-        `REPLACED`; `KEPT` where a sample stands out, more than those beside it, but the two sides
-        do not agree that it should not, as at a step; or zero.
+        `REPLACED`; `KEPT` where a sample deviates more than its neighbors but the two sides do
+        not both contradict it, as at a step; otherwise zero.
     """
 
     first: int
@@ -49,22 +49,22 @@ class Screened:
 
 @dataclass(frozen=True, eq=False)
 class OutlierState:
-    """What is remembered between segments.
+    """State between chunks.
 
     Attributes
     ----------
     first : int
-        Number of the oldest sample that is kept.
+        Index of the oldest sample kept.
     judged : int
-        Number of the first sample that is not judged yet.
+        Index of the first sample not checked yet.
     given : int
-        Number of the first sample that was not handed out.
+        Index of the first sample not output yet.
     raw, work : ndarray, (c, n)
     flags : ndarray of int8, (c, n)
     ahead : ndarray of int64, (c,)
-        Where each channel goes on: a run may have reached beyond `judged`.
+        Next sample of each channel to check: a run may extend beyond `judged`.
     own : ndarray, (c, 3)
-        The step of the converter and the last run of each channel.
+        The quantization step and the last run of each channel.
     """
 
     first: int
@@ -79,39 +79,39 @@ class OutlierState:
 
 @dataclass(frozen=True)
 class OutlierDesign:
-    """What an outlier is: a run of few samples that both sides contradict.
+    """Outlier detector: an outlier is a short run of samples that both sides contradict.
 
-    A run is left out and predicted by the polynomial of degree five through three samples on
-    either side. It is replaced by that where, for its first and its last sample,
+    A run is predicted, without its own samples, by the polynomial of degree five through three
+    samples on either side. It is replaced by the prediction where, for its first and last sample,
 
-    - the residual is more than `threshold` standard deviations, by the size that a quarter of the
-      same residuals reach over `window` samples before it and over as many behind it, the larger
-      of both; what a tone of `bandwidth` with the amplitude seen around it would leave is taken
-      off first;
+    - the residual exceeds `threshold` standard deviations. The scale is the magnitude that a
+      quarter of the residuals reach over `window` samples before it and as many after it, the
+      larger of both; the residual of a tone of `bandwidth` with the amplitude around it is
+      subtracted first;
     - the straight lines through the two samples on either side of the run lie on the same side by
       at least half the residual, and for a single sample agree with each other. A step, a kink and
-      each piece of straight line are confirmed by one side, and so left alone.
+      each straight segment are confirmed by one side, and therefore kept.
 
-    A steady tone of any frequency is its own measure, and is never touched. A channel that mostly
-    repeats itself, for its steps are coarse, says what it has to say in the rest: there nothing
-    below 30 steps is an outlier. This needs the readings as they came, before channels are mixed.
+    A steady tone of any frequency sets its own scale and is never changed. In a channel that mostly
+    repeats its value because its quantization is coarse, only residuals of 30 quantization steps or
+    more are outliers. This needs the readings as recorded, before channels are mixed.
 
     Parameters
     ----------
     threshold : float
-        In standard deviations of the residual, which has 1.52 times that of white noise (runs of
-        two and three: 1.83 and 2.11). On such noise a sample is wrongly replaced with a
-        probability of ``E[erfc(threshold m / sqrt 2)]`` at most, m the larger of two independent
-        measures: 4.2e-8 for 6 and a window of 128, with runs 1e-7. Of outliers
-        of 10, 12, 15 and 20 standard deviations of the noise it finds 0.45, 0.82, 0.99 and 1.
+        In standard deviations of the residual, which is 1.52 times that of white noise (runs of
+        two and three: 1.83 and 2.11). On white noise a sample is wrongly replaced with a
+        probability of at most ``E[erfc(threshold m / sqrt 2)]``, m the larger of two independent
+        scales: 4.2e-8 for 6 and a window of 128, with runs 1e-7. Outliers of 10, 12, 15 and 20
+        standard deviations of the noise are detected with probability 0.45, 0.82, 0.99 and 1.
     window : int, samples
-        16 or more, on each side. A quarter of it may be residuals that outliers spoil, which is
-        some four outliers in 128 samples.
+        16 or more, on each side. Up to a quarter of the residuals in it may be spoiled by
+        outliers: some four outliers in 128 samples.
     longest_run : int, samples
-        1 to 5. A real pulse that is no longer and stands alone in quiet is taken for an outlier;
-        with 3, one of eight samples or more at its base is not, whatever its shape and size.
+        1 to 5. A real pulse of at most this length, isolated in a quiet signal, is taken for an
+        outlier; with 3, a pulse of eight samples or more at its base is not, whatever its shape.
     bandwidth : float
-        Of the motion, as a part of the sampling rate: below 0.25.
+        Of the motion, as a fraction of the sampling rate: below 0.25.
 
     Raises
     ------
@@ -142,7 +142,7 @@ class OutlierDesign:
 
     @cached_property
     def weights(self) -> Array:
-        """Weights of the six samples beside a run of m for its sample k: (m - 1, k, 6)."""
+        """Weights of the six samples beside a run of m, for its sample k: (m - 1, k, 6)."""
         out = np.zeros((self.longest_run, self.longest_run, 2 * NODES))
         for m in range(1, self.longest_run + 1):
             nodes = _nodes(m)
@@ -154,7 +154,7 @@ class OutlierDesign:
 
     @cached_property
     def allowed(self) -> Array:
-        """Largest residual of a tone up to `bandwidth`, of its amplitude, by length of run."""
+        """Largest residual of a tone up to `bandwidth`, relative to its amplitude, by length."""
         frequency = np.linspace(0.0, self.bandwidth, 400)
         out = np.empty(self.longest_run)
         for m in range(1, self.longest_run + 1):
@@ -164,17 +164,17 @@ class OutlierDesign:
 
     @property
     def guard(self) -> int:
-        """Samples from a run's first to the nearest residual that its noise is judged by."""
+        """Samples from the start of a run to the nearest residual that sets its noise scale."""
         return 2 * NODES + self.longest_run
 
     @property
     def ahead(self) -> int:
-        """Samples that must have come after one before it is judged."""
+        """Samples needed after a sample before it is checked."""
         return self.guard + self.window + self.longest_run + NODES - 1
 
     @property
     def latency(self) -> int:
-        """Samples that must have come after one before it is final: a run behind mends it."""
+        """Samples needed after a sample before it is final: a later run may still change it."""
         return self.ahead + NODES + self.longest_run
 
     @property
@@ -188,8 +188,8 @@ class OutlierDesign:
         ----------
         channels : int
         steps : ndarray, (channels,), optional
-            Step of each channel's converter, zero where there is none. Not given, the least
-            change from sample to sample that has been seen is taken: two such are never outliers.
+            Quantization step of each channel, zero where it has none. If not given, the smallest
+            change between samples so far is taken: two such steps are never outliers.
         """
         own = np.zeros((channels, 3))
         own[:, 0] = -np.inf if steps is None else np.where(np.asarray(steps) > 0.0, steps, TINY)
@@ -208,7 +208,7 @@ class OutlierDesign:
     def advance(
         self, state: OutlierState, values: Array, last: bool = False
     ) -> tuple[OutlierState, Screened]:
-        """Judge what can be judged with a further segment.
+        """Check the samples that a further chunk completes.
 
         Parameters
         ----------
@@ -222,7 +222,7 @@ class OutlierDesign:
         -------
         state : OutlierState
         screened : Screened
-            The same numbers however the record is cut.
+            The same numbers however the record is split into chunks.
 
         Raises
         ------
@@ -279,7 +279,7 @@ class OutlierDesign:
         )
 
 
-#: A step that no reading shows.
+#: A quantization step below any reading.
 TINY = 1e-300
 
 

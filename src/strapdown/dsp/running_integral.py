@@ -1,4 +1,4 @@
-"""Integral of a sampled signal from its first stamp to each."""
+"""Running integral of a sampled signal."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ def running_integral(time: Array, values: Array, *, means: bool = False) -> Arra
     Parameters
     ----------
     time : ndarray, (n,), s
-        At least one stamp, even or not.
+        At least one stamp, any spacing.
     values : ndarray, (n, ...)
         In any unit.
     means : bool
-        A sample is the mean over the interval that ends at its stamp, the first one unused;
-        otherwise it is the value at its stamp, straight in between (trapezoids; error of the
-        second order in the step).
+        A sample is the mean over the interval that ends at its stamp, and the first is unused.
+        Otherwise it is the value at its stamp, linear in between (trapezoids; error of second
+        order in the step).
 
     Returns
     -------
@@ -31,8 +31,8 @@ def running_integral(time: Array, values: Array, *, means: bool = False) -> Arra
 
     Notes
     -----
-    The trapezoids are those of `scipy.integrate.cumulative_trapezoid`, to the last bit; loading
-    that takes a fifth of a second, which every log with velocities would wait for.
+    The trapezoids equal `scipy.integrate.cumulative_trapezoid` to the last bit; importing that
+    takes a fifth of a second, for every log with velocities.
     """
     steps = np.diff(time).reshape(-1, *[1] * (values.ndim - 1))
     middle = values[1:] if means else 0.5 * (values[1:] + values[:-1])

@@ -1,4 +1,4 @@
-"""What every digital filter asks of its samples: finite numbers, a step, enough of them."""
+"""Checks of samples before digital filters: finite numbers, an even step, enough samples."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ Array = NDArray[np.float64]
 
 __all__ = ["as_channels", "check_segment", "even_step", "positive_step"]
 
-# Stamps that were printed to a tenth of a step still name an even grid.
+# Stamps printed to a tenth of a step still count as an even grid.
 JITTER = 0.1
 
 
 def as_channels(values: ArrayLike, quantity: str = "values") -> Array:
-    """Samples as floats of shape (n, k), every one finite.
+    """Convert samples to floats of shape (n, k), all finite.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ def as_channels(values: ArrayLike, quantity: str = "values") -> Array:
     Raises
     ------
     DataError
-        They are no such array, or one is not finite.
+        The shape is wrong, or a value is not finite.
     """
     try:
         array = np.asarray(values, dtype=np.float64)
@@ -54,20 +54,21 @@ def as_channels(values: ArrayLike, quantity: str = "values") -> Array:
 
 
 def check_segment(values: Array, first: int) -> None:
-    """Every value of a further segment is finite.
+    """Check that every value of a further chunk is finite.
 
     Parameters
     ----------
     values : ndarray, (k, c)
     first : int
-        Number of its first sample since the record began.
+        Index of its first sample, from the start of the record.
 
     Raises
     ------
     DataError
-        One is not: the row, counted from 1 over the whole record, and the channel are named.
+        A value is not finite. The message names the row, counted from 1 over the whole record,
+        and the channel.
     """
-    # A sum is finite only where everything in it is.
+    # A sum is finite only if every term is.
     with np.errstate(invalid="ignore", over="ignore"):
         total = values.sum()
     if np.isfinite(total) or np.isfinite(values).all():
@@ -83,12 +84,12 @@ def check_segment(values: Array, first: int) -> None:
 
 
 def positive_step(step: float) -> float:
-    """Distance of samples in s.
+    """Return the sampling interval in s.
 
     Raises
     ------
     ConfigError
-        It is not positive and finite.
+        The interval is not positive and finite.
     """
     if not (math.isfinite(step) and step > 0.0):
         raise ConfigError("dsp.no-distance-samples", quantity="step", step=step)
@@ -96,7 +97,7 @@ def positive_step(step: float) -> float:
 
 
 def even_step(time: ArrayLike, quantity: str = "time") -> float:
-    """Step of stamps that lie on an even grid.
+    """Return the step of evenly spaced stamps.
 
     Parameters
     ----------
@@ -107,13 +108,13 @@ def even_step(time: ArrayLike, quantity: str = "time") -> float:
     Returns
     -------
     float, s
-        First to last stamp over their number of steps. Stamps may be off the grid by a tenth of
-        it, as printed ones are.
+        Last minus first stamp, divided by the number of steps. Stamps may be off the grid by a
+        tenth of a step, as printed ones are.
 
     Raises
     ------
     DataError
-        Fewer than two stamps, time that stands or goes back, or no even grid.
+        Fewer than two stamps, time does not advance, or the stamps are not even.
     """
     stamps = as_channels(time, quantity)[:, 0]
     if len(stamps) < 2:

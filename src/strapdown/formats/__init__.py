@@ -1,4 +1,4 @@
-"""Readers and writers: one file a format, and the one table of them."""
+"""Readers and writers: one module per format, and the registry of readers."""
 
 from __future__ import annotations
 
@@ -47,14 +47,14 @@ __all__ = ["READERS", "ReadOptions", "Reader", "Recording", "read_joined", "read
 
 @dataclass(frozen=True)
 class Reader:
-    """How one format is recognised and read."""
+    """How one format is recognized and read."""
 
     title: str
     detect: Callable[[Path], bool]
     read: Callable[[Path], RawLog]
 
 
-#: In the order in which they are tried: known recordings first, general formats after.
+#: In the order of detection: formats of known recordings first, general formats last.
 READERS: dict[str, Reader] = {
     "mpu6050": Reader("folder of an MPU-6050 in MATLAB files", mpu6050.detect, mpu6050.read),
     "broad": Reader("BROAD trial, HDF5 with optical truth", broad.detect, broad.read),
@@ -95,14 +95,14 @@ READERS: dict[str, Reader] = {
 
 
 def read_raw(path: Path, form: str | None = None) -> RawLog:
-    """Read a log's columns as they stand in it.
+    """Read the raw columns of a log.
 
     Parameters
     ----------
     path : Path
         A file, or the folder of a known recording.
     form : str, optional
-        A key of `READERS`; recognised by the file itself where it is left out.
+        A key of `READERS`; detected from the file if not given.
 
     Returns
     -------
@@ -111,9 +111,9 @@ def read_raw(path: Path, form: str | None = None) -> RawLog:
     Raises
     ------
     ConfigError
-        There is no such file, or no such format.
+        The file does not exist, or the format is unknown.
     DataError
-        It is of no known format, or it is damaged.
+        The format is not recognized, or the file is damaged.
     """
     if not path.exists():
         raise ConfigError("io.no-such-log", file=str(path))
@@ -143,14 +143,14 @@ def read_raw(path: Path, form: str | None = None) -> RawLog:
     raise DataError("io.ending-no-known-format", file=path.name, suffix=path.suffix, kinds=kinds)
 
 
-#: Names of a folder that are looked through, and that a message has at most.
+#: Most names of a folder that are searched, and that a message lists.
 MOST_NAMES, MOST_SHOWN = 1000, 6
-#: Of files up to this size it is looked whether a gyro or an accelerometer is in them.
+#: Largest file that is searched for a gyro or an accelerometer, bytes.
 MOST_BYTES = 64 * 1024 * 1024
 
 
 def _no_recording(path: Path) -> DataError:
-    """A folder is no recording of its own: name what in it is one."""
+    """Make the error for a folder without a recording; it names the logs in the folder."""
     inside = sorted(path.iterdir())[:MOST_NAMES]
     may_be = [p for p in inside if any(r.detect(p) for r in READERS.values())]
     logs = [p.name for p in may_be if _has_sensors(p)]
@@ -183,14 +183,14 @@ def _has_sensors(path: Path) -> bool:
 
 
 def read_joined(paths: Sequence[str | Path], options: ReadOptions | None = None) -> Recording:
-    """Read logs of single sensors, with one clock, into one recording.
+    """Read logs of single sensors on one clock into one recording.
 
     Parameters
     ----------
     paths : sequence of str or Path
-        One of them has the gyro, on whose stamps the others are interpolated.
+        One has the gyro; the others are interpolated to its stamps.
     options : ReadOptions, optional
-        What the user says about them; columns are named as they stand in their log, or as
+        User's statements about the logs. A column is named as in its log, or as
         ``log/column``.
 
     Returns
@@ -200,10 +200,10 @@ def read_joined(paths: Sequence[str | Path], options: ReadOptions | None = None)
     Raises
     ------
     ConfigError
-        There is no such file, an option names what is in none of them, or two of them have the
+        A file does not exist, an option names a column that no log has, or two logs have the
         same quantity.
     DataError
-        A log cannot be used, none has a gyro, or their clocks have no time in common.
+        A log cannot be used, no log has a gyro, or the clocks do not overlap.
     """
     asked = options or ReadOptions()
     logs = [read_raw(Path(path), asked.format) for path in paths]
@@ -214,14 +214,14 @@ def read_joined(paths: Sequence[str | Path], options: ReadOptions | None = None)
 
 
 def read_log(path: str | Path, options: ReadOptions | None = None) -> Recording:
-    """Read a log into body axes and SI.
+    """Read a log into body axes and SI units.
 
     Parameters
     ----------
     path : str or Path
         A file, or the folder of a known recording.
     options : ReadOptions, optional
-        What the user says about it.
+        User's statements about the log.
 
     Returns
     -------
@@ -230,7 +230,7 @@ def read_log(path: str | Path, options: ReadOptions | None = None) -> Recording:
     Raises
     ------
     ConfigError
-        There is no such file, or an option names what is not in it.
+        The file does not exist, or an option names a column that it does not have.
     DataError
         The log cannot be used; the message names file, row, quantity and remedy.
     """

@@ -1,4 +1,4 @@
-"""Readings of an odometer, a barometer and their like, from a table with named columns."""
+"""Measurements of an odometer, a barometer and similar, from a table with named columns."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from strapdown.formats.recording import RawLog
 __all__ = ["SYNONYMS", "UNITS", "read_aid_table"]
 
 Array = NDArray[np.float64]
-#: Unit of a table's column to the units that a file may have, with their factors to it.
+#: Unit of a table's column to the units accepted in a file, with their factors to it.
 UNITS: dict[str, Mapping[str, float]] = {
     "": {},
     "m": LENGTHS,
@@ -40,7 +40,7 @@ UNITS: dict[str, Mapping[str, float]] = {
     "rad/s": RATES,
     "Pa": PRESSURES,
 }
-#: Other words for a column, without blanks and underscores; those of opposite sign are not here.
+#: Synonyms of a column, without blanks and underscores. Those of opposite sign are excluded.
 SYNONYMS: dict[str, tuple[str, ...]] = {
     "speed": ("velocity", "vel", "v", "wheelspeed", "vehiclespeed", "odometerspeed", "odospeed"),
     "distance": ("odometer", "odo", "mileage", "way"),
@@ -62,35 +62,35 @@ def read_aid_table(
     names: Mapping[str, str] | None = None,
     repair: bool = False,
 ) -> pd.DataFrame:
-    """Read the readings of an aid.
+    """Read the measurements of an aiding sensor.
 
     Parameters
     ----------
     path : str or Path
-        Text table or Parquet, with names of columns, which may carry a unit: ``speed_km_h``,
+        Text table or Parquet with column names, which may carry a unit: ``speed_km_h``,
         ``Pressure [hPa]``, ``heading_sd_deg``.
     columns : dict of str to str
-        Column of the table that is wanted to its unit, a key of `UNITS`. One that ends in ``_sd``
-        is the standard deviation of the one before, and has to be positive where it stands.
+        Required column to its unit, a key of `UNITS`. A column that ends in ``_sd`` is the
+        standard deviation of the column before it, and must be positive where given.
     optional : sequence of str
-        Those of `columns` that need not be there.
+        Those of `columns` that may be missing.
     names : dict of str to str, optional
-        Column of the table to its name in the file, or its number counted from 1.
+        Column of the table to its name in the file, or its number, from 1.
     repair : bool
-        Leave out rows that cannot be used, and say how many, instead of refusing the file.
+        Drop and count rows that cannot be used, instead of refusing the file.
 
     Returns
     -------
     DataFrame
-        Indexed by ``time`` s, with those of `columns` that were found, in their units; ``attrs``
-        say its clock (`clocks`), its ``source`` and its ``findings``.
+        Indexed by ``time`` s, with the `columns` that were found, in their units; ``attrs`` has
+        the clock (`clocks`), ``source`` and ``findings``.
 
     Raises
     ------
     ConfigError
-        There is no such file, or `names` names what is not in it.
+        The file does not exist, or `names` names a column that it does not have.
     DataError
-        A column is missing, a unit is none of it, a value is no number, a standard deviation is
+        A column is missing, a unit does not fit, a value is not a number, a standard deviation is
         not positive, or time does not advance; the message names the row.
     """
     path = Path(path)
@@ -177,7 +177,7 @@ def _values(raw: RawLog, name: str, found: Found) -> Array:
 def _usable(
     raw: RawLog, time: Array, values: dict[str, Array], repair: bool, findings: list[Finding]
 ) -> NDArray[np.bool_]:
-    """Rows of numbers alone, later than every row before them."""
+    """Select rows of numbers that are later than every row before them."""
     keep = np.ones(time.size, dtype=bool)
     for name, block in {"time": time, **values}.items():
         bad = ~np.isfinite(block)

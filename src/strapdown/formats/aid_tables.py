@@ -1,4 +1,4 @@
-"""Files of what aids measured: a reader for each kind that takes a table."""
+"""Files of aiding measurements: one reader for each kind of table."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ Made = Callable[..., pd.DataFrame]
 
 
 def read_odometer(path: str | Path) -> pd.DataFrame:
-    """Read speeds of a wheel: columns ``time speed speed_sd``, s and m/s.
+    """Read wheel speeds: columns ``time speed speed_sd``, s and m/s.
 
-    A unit may stand in a header, as ``speed [km/h]`` or ``speed_km_per_h``.
+    A column name may state a unit, as ``speed [km/h]`` or ``speed_km_per_h``.
 
     Parameters
     ----------
@@ -46,15 +46,15 @@ def read_odometer(path: str | Path) -> pd.DataFrame:
     Raises
     ------
     ConfigError
-        There is no such file.
+        The file does not exist.
     DataError
-        It cannot be used; the message names file, row, quantity and remedy.
+        The file cannot be used; the message names file, row, quantity and remedy.
     """
     return _read(path, {"speed": "m/s", "speed_sd": "m/s"}, odometer_table)
 
 
 def read_body_velocity(path: str | Path) -> pd.DataFrame:
-    """Read velocities of an instrument: ``time vx vy vz vx_sd vy_sd vz_sd``; as `read_odometer`."""
+    """Read body velocities: ``time vx vy vz vx_sd vy_sd vz_sd``; as `read_odometer`."""
 
     def made(time: Array, *columns: Array, source: str) -> pd.DataFrame:
         values = np.column_stack(columns)
@@ -64,7 +64,7 @@ def read_body_velocity(path: str | Path) -> pd.DataFrame:
 
 
 def read_barometer(path: str | Path) -> pd.DataFrame:
-    """Read heights, or pressures, of a barometer; as `read_odometer`.
+    """Read heights or pressures of a barometer; as `read_odometer`.
 
     Columns ``time height height_sd``, s and m; or ``time pressure pressure_sd``, s and Pa.
     """
@@ -80,7 +80,7 @@ def read_heading(path: str | Path) -> pd.DataFrame:
     return _read(path, {"heading": "deg", "heading_sd": "deg"}, heading_table)
 
 
-#: Readers by the kind of the aid.
+#: Readers by the kind of measurement.
 AID_READERS: dict[str, Callable[[str | Path], pd.DataFrame]] = {
     "gnss": read_gnss,
     "odometer": read_odometer,
@@ -100,7 +100,7 @@ def _made(raw: RawLog, units: Mapping[str, str], made: Made) -> pd.DataFrame:
     try:
         return made(found["time"], *(found[name] for name in names), source=raw.name)
     except DataError as error:
-        # A table counts its rows; a person, those of the file.
+        # Translate rows of the table to rows of the file.
         row = error.finding.row
         raise DataError(
             error.finding, file=raw.name, row=None if row is None else raw.row(row - 1)

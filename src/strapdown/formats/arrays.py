@@ -1,4 +1,4 @@
-"""Named arrays, as binary files hold them, laid out as columns."""
+"""Named arrays from binary files, laid out as columns."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from strapdown.formats.recording import RawLog
 from strapdown.tables import SAMPLINGS
 
 RATES = ("sampling_rate", "sample_rate", "rate_hz", "fs", "freq", "frequency")
-# What a small file may unfold to; a longer log is honest about its size.
+# An array is refused if it declares more than SMALL and exceeds its stored bytes by this ratio.
 LARGEST_RATIO = 1000
 SMALL = 64 * 1024 * 1024  # bytes
 
 
 def refuse_lie(declared: int, stored: int, what: str, file: str) -> None:
-    """Refuse an array that claims far more than its file can hold.
+    """Refuse an array that declares far more data than its file can hold.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def raw_log(
     units: dict[str, str],
     meta: dict[str, Any],
 ) -> RawLog:
-    """Lay arrays out as columns of one length.
+    """Convert named arrays to columns of one length.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def raw_log(
     units : dict of str to str
         Where the file states them.
     meta : dict
-        ``sampling``, ``axes`` and a sampling rate are understood.
+        May hold ``sampling``, ``axes`` and a sampling rate.
 
     Returns
     -------
@@ -67,7 +67,7 @@ def raw_log(
     Raises
     ------
     DataError
-        There is no numeric array of two samples or more.
+        No numeric array has two samples or more.
     """
     columns: dict[str, NDArray[Any]] = {}
     for name, array in arrays.items():
@@ -95,7 +95,7 @@ def raw_log(
 
 
 def _left_out(columns: dict[str, NDArray[Any]], samples: int, file: str) -> list[Finding]:
-    """Name what has another length than the gyro; stamps of another length are no stamps."""
+    """List arrays whose length differs from the gyro's; refuse stamps of another length."""
     other = {n: c.size for n, c in columns.items() if c.size != samples}
     for name, size in other.items():
         if read_name(name).quantity == "time":
@@ -126,7 +126,7 @@ def _columns(name: str, array: NDArray[Any]) -> dict[str, NDArray[Any]]:
         return {}
     if array.ndim == 1:
         return {name: array}
-    # One row a sample; MATLAB often keeps one column a sample.
+    # One row per sample; MATLAB files often have one column per sample.
     rows = array.T if array.shape[0] < array.shape[1] else array
     if rows.shape[1] > 16:
         return {}
@@ -134,14 +134,14 @@ def _columns(name: str, array: NDArray[Any]) -> dict[str, NDArray[Any]]:
 
 
 def _samples(columns: dict[str, NDArray[Any]]) -> int:
-    """Length of the gyro's arrays, or else the most common length."""
+    """Return the length of the gyro's arrays, or else the most common length."""
     lengths = [c.size for n, c in columns.items() if str(read_name(n).quantity).startswith("gyro")]
     lengths = lengths or [c.size for c in columns.values()]
     return int(max(set(lengths), key=lengths.count))
 
 
 def _rate(meta: dict[str, Any]) -> float | None:
-    """A sampling rate that the file states, as a number or as text with its unit."""
+    """Return the stated sampling rate, given as a number or as text with its unit."""
     for key in RATES:
         text = _text(meta.get(key)) or ""
         match = re.fullmatch(r"\s*([\d.eE+-]+)\s*(Hz)?\s*", text, re.I)

@@ -1,13 +1,13 @@
-"""The layout of the ASL datasets: EuRoC MAV, TUM VI and what else is written like them.
+"""ASL dataset layout: EuRoC MAV, TUM VI and others in the same layout.
 
-A folder a sensor, each with ``data.csv``: stamps in ns first, then what a pair of frames and the
-frame of its components are called. ``imu0`` holds ``w_RS_S_x [rad s^-1]`` … and ``a_RS_S_x
-[m s^-2]`` …, rates and specific force of the sensor S in its own axes; these point where the sensor
-was mounted (x up in EuRoC). ``state_groundtruth_estimate0`` or ``mocap0`` holds the place of S in
-the reference frame R, ``p_RS_R_x [m]`` …, and ``q_RS_w []`` …, which turns S into R (Burri and
+One folder per sensor, each with ``data.csv``: stamps in ns first, then columns named by a pair of
+frames and the frame of the components. ``imu0`` holds ``w_RS_S_x [rad s^-1]`` … and ``a_RS_S_x
+[m s^-2]`` …, rates and specific force of the sensor S in its own axes, which depend on the mounting
+(x up in EuRoC). ``state_groundtruth_estimate0`` or ``mocap0`` holds the position of S in the
+reference frame R, ``p_RS_R_x [m]`` …, and ``q_RS_w []`` …, which rotates S into R (Burri and
 others, The EuRoC micro aerial vehicle datasets, Int. J. Robotics Research 35 (2016) 1157-1163;
-Schubert and others, The TUM VI benchmark, IROS 2018). z of R is up, and x points to no
-known direction.
+Schubert and others, The TUM VI benchmark, IROS 2018). z of R is up; the direction of x is not
+known.
 """
 
 from __future__ import annotations
@@ -36,35 +36,35 @@ TIME = "timestamp"
 RATES = {f"w_rs_s_{a}": f"gyro_{a}" for a in "xyz"}
 FORCES = {f"a_rs_s_{a}": f"accel_{a}" for a in "xyz"}
 TURN = {f"q_rs_{a}": f"q_{a}" for a in "wxyz"}
-# R, x forward, y left, z up, from north, east, down: half a turn about x.
+# R (x forward, y left, z up) from north, east, down: half a turn about x.
 Q_NR = np.array([0.0, 1.0, 0.0, 0.0])
-# Poses farther apart than this are not interpolated between.
+# No interpolation between poses farther apart than this.
 LONGEST_STEP = 0.1  # s
-# Specific force turned into R, on average over a log, may lean by this: a flight that speeds up and
-# does not slow down within the log leans by a few degrees, a z that is not up by 90 or 180.
+# Largest tilt of the mean specific force in R. A flight that accelerates and does not decelerate
+# within the log tilts it by a few degrees; a z that is not up, by 90 or 180.
 MOST_TILT = 15.0  # deg
 
 
 def detect(path: Path) -> bool:
-    """Tell by the header of the table, or of the table of the inertial sensor in a folder."""
+    """Detect by the header of the table, or of the inertial sensor's table in a folder."""
     if path.is_dir():
         return _imu_of(path) is not None
     return path.suffix.lower() == ".csv" and (_is_imu(path) or _is_truth(path))
 
 
 def read(path: Path) -> RawLog:
-    """Read rates and specific force; of a folder, with the attitude that stands beside them.
+    """Read rates and specific force; from a folder, with the attitude truth beside them.
 
     Parameters
     ----------
     path : Path
-        ``data.csv`` of a sensor or of a ground truth; or the folder ``mav0``, ``imu0``, or that
-        which holds ``mav0``.
+        ``data.csv`` of a sensor or of a ground truth; or the folder ``mav0``, ``imu0``, or the
+        parent of ``mav0``.
 
     Returns
     -------
     RawLog
-        Of a ground truth alone, stamps and the attitude.
+        For a ground truth alone, stamps and the attitude.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def read(path: Path) -> RawLog:
 
 
 def _imu_of(folder: Path) -> Path | None:
-    """The table of the inertial sensor, from any of the folders around it."""
+    """Find the table of the inertial sensor, from any of the folders around it."""
     tables = (folder / DATA, folder / IMU / DATA, folder / "mav0" / IMU / DATA)
     return next((t for t in tables if t.is_file() and _is_imu(t)), None)
 
@@ -114,7 +114,7 @@ def _stated(raw: RawLog, known: dict[str, str]) -> RawLog:
 
 
 def _truth_table(path: Path, name: str) -> RawLog:
-    """Stamps of a ground truth and its attitude, z of R taken for up and x for north."""
+    """Read stamps and attitude of a ground truth, taking z of R as up and x as north."""
     raw = _stated(csv.parse(path.read_bytes(), name, (path,)), TURN)
     by_quantity = {q: Column(c, None, "") for c, (q, _) in raw.stated.items()}
     q = np.column_stack([numbers(raw, by_quantity[k], k) for k in TURN.values()]).astype(np.float64)
@@ -139,7 +139,7 @@ def _folder(path: Path) -> RawLog:
     raw = dataclasses.replace(_imu_table(table, f"{table.parent.name}/{DATA}"), name=whole)
     around = table.parent.parent
     truth = next((t for n in TRUTHS if _is_truth(t := around / n / DATA)), None)
-    # A bundle names every file that was read by its place in the folder that was given.
+    # A bundle names every file by its path within the given folder.
     if truth is None or table.parent == path:
         return raw
     known = _truth_table(truth, f"{truth.parent.name}/{DATA}")
@@ -158,7 +158,7 @@ def _seconds(raw: RawLog, origin: RawLog) -> Array:
 
 
 def _at_samples(time: Array, known: Array, truth: RawLog) -> Array:
-    """Attitude at the samples, at a constant rate between poses; NaN where none is near."""
+    """Interpolate attitude to the samples at a constant rate; NaN where no pose is near."""
     from scipy.spatial.transform import Rotation, Slerp
 
     assert truth.truth is not None
@@ -178,7 +178,7 @@ def _at_samples(time: Array, known: Array, truth: RawLog) -> Array:
 
 
 def _with(raw: RawLog, q_ns: Array, known: RawLog) -> RawLog:
-    """The log with the attitude at its samples, where gravity agrees that its z is up."""
+    """Return the log with the attitude at its samples, if gravity confirms that z is up."""
     findings = [*raw.findings, *known.findings]
     at = np.asarray(np.isfinite(q_ns).all(axis=1))
     force = np.column_stack(

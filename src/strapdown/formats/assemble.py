@@ -1,4 +1,4 @@
-"""From the columns of a file to a recording in body axes and SI."""
+"""Assemble the columns of a file into a recording in body axes and SI units."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ Array = NDArray[np.float64]
 
 
 def assemble(raw: RawLog, options: ReadOptions) -> Recording:
-    """Turn raw columns into a recording.
+    """Convert raw columns to a recording.
 
     Parameters
     ----------
     raw : RawLog
     options : ReadOptions
-        What the user says goes before what the file says, and that before what names suggest.
+        The user's statements override those of the file, which override column names.
 
     Returns
     -------
@@ -56,7 +56,7 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     DataError
         A value, a stamp or a unit cannot be used; the message names file, row and remedy.
     ConfigError
-        An option names what is not there.
+        An option names a column that does not exist.
     """
     found = find_columns(raw, options)
     require_gyro(raw, found)
@@ -123,8 +123,8 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
 def _turned(
     values: dict[str, Array], triad: str, axes: Axes, factor: float, kept: NDArray[np.int64]
 ) -> Array:
-    """Take a triad out of `values`: its rows that are used, in body axes and SI."""
-    # A long log is a large part of the memory there is: in place, and nothing kept beside it.
+    """Take a triad out of `values`: used rows, in body axes and SI units."""
+    # In place and without a copy: a long log takes a large part of the memory.
     block = values.pop(triad)
     turned = block[:, axes.axis]
     del block
@@ -136,7 +136,7 @@ def _turned(
 def _readings_of_triad(
     found: dict[str, Column], triad: str, axes: Axes, unit: tuple[str, str], first: Array
 ) -> list[Reading]:
-    """What the columns of a triad were taken for, a reading each body axis."""
+    """List how the columns of a triad were read, one reading per body axis."""
     readings = []
     for j, (axis, sign) in enumerate(zip(axes.axis, axes.sign, strict=True)):
         column = found[f"{triad}_{AXES[axis]}"]
@@ -152,7 +152,7 @@ def _readings_of_triad(
     return readings
 
 
-# Time of a log: its unit, its stamps, and the clock that they belong to.
+# Time of a log: unit, stamps and clock.
 
 
 def stamps_of_log(
@@ -165,30 +165,30 @@ def stamps_of_log(
     said: dict[str, Inference],
     findings: list[Finding],
 ) -> Stamps:
-    """Stamps of the finite rows.
+    """Convert the stamps of the finite rows to seconds.
 
     Parameters
     ----------
     raw : RawLog
     found : dict of str to Column
     ticks : ndarray or None, (n,)
-        Stamps as they stand in the file.
+        Stamps as in the file.
     dated : bool
-        They were dates, and are ns now.
+        Whether they were dates, now converted to ns.
     options : ReadOptions
     finite : ndarray of bool, (n,)
         From `finite_rows`.
     said : dict of str to Inference
-        What the numbers say.
+        Inferences from the numbers.
     findings : list of Finding
-        What was concluded or repaired is added.
+        Inferences and repairs are appended.
 
     Raises
     ------
     DataError
-        There is no time, or it cannot be used.
+        Time is missing, or cannot be used.
     ConfigError
-        The rate that was stated is none.
+        The stated rate is invalid.
     """
     rows = np.flatnonzero(finite)
     rate = options.rate or raw.rate
@@ -238,7 +238,7 @@ def stamps_of_log(
 
 
 def time_reading(raw: RawLog, found: dict[str, Column], stamps: Stamps, sample: int) -> Reading:
-    """What the column of time was taken for, with its value at the first sample used."""
+    """Describe how the time column was read, with its value at the first sample used."""
     if "time" not in found:
         return Reading("(none)", "time", "s", stamps.why, 0.0)
     source = found["time"].source
@@ -248,7 +248,7 @@ def time_reading(raw: RawLog, found: dict[str, Column], stamps: Stamps, sample: 
 
 
 def clock_of_log(raw: RawLog, found: dict[str, Column], stamps: Stamps, dated: bool) -> Clock:
-    """What the stamps of a log count, and from when."""
+    """Return the clock of a log's stamps."""
     if "time" not in found:
         return Clock(RELATIVE)
     origin = float(stamps.origin.stamp) * TIME_UNITS[stamps.origin.unit]
@@ -257,18 +257,18 @@ def clock_of_log(raw: RawLog, found: dict[str, Column], stamps: Stamps, dated: b
     return Clock(name, origin)
 
 
-# How a row of rates was sampled.
+# Sampling of the rates: instantaneous or mean.
 
 
 def sampling_of_rates(raw: RawLog, options: ReadOptions, findings: list[Finding]) -> str:
-    """As stated by the user, else by the file, else at the stamps.
+    """Return the sampling stated by the user, else by the file, else instantaneous.
 
     Parameters
     ----------
     raw : RawLog
     options : ReadOptions
     findings : list of Finding
-        What was assumed is added.
+        Assumptions are appended.
 
     Returns
     -------
@@ -277,7 +277,7 @@ def sampling_of_rates(raw: RawLog, options: ReadOptions, findings: list[Finding]
     Raises
     ------
     ConfigError
-        There is no such kind.
+        The sampling is unknown.
     """
     asked = (options.sampling or raw.sampling or "").lower()
     if not asked:
@@ -297,26 +297,26 @@ def sampling_of_rates(raw: RawLog, options: ReadOptions, findings: list[Finding]
     return asked
 
 
-# What in a log's numbers can hardly be, or should be known.
+# Plausibility of a log's numbers.
 
 PLAUSIBILITY_AXES = "xyz"
 
-# Beyond this no rate is one, and squares of it leave the range of doubles soon.
+# Upper limit of any rate; squares of larger ones soon overflow a double.
 IMPOSSIBLE_RATE = 1e6  # rad/s
-# Nothing that is carried, driven or flown turns like this for a twentieth of a log.
+# No body that is carried, driven or flown turns this fast for a twentieth of a log.
 LASTING_RATE = 20.0  # rad/s, 3 turns a second
-# No gyro in a phone, a toy, a car or an aircraft reads this; a unit that is wrong does.
+# No gyro in a phone, a toy, a car or an aircraft reads this; a wrong unit does.
 ABSURD_RATE = 100.0  # rad/s, 16 turns a second
-# Full scales that gyros are made with, deg/s. A run of equal readings at one of them was cut off.
+# Common full scales of gyros, deg/s. A run of equal readings at a full scale is clipped.
 FULL_SCALES = (125.0, 250.0, 400.0, 450.0, 500.0, 1000.0, 2000.0, 4000.0)
 CUT_OFF_RUN = 3  # samples
 
-# A gap this long holds a motion that nothing tells of.
+# A gap from this length on hides motion.
 LONG_GAP = 1.0  # s
 
 
 def report_gaps(name: str, time: Array, gyro: Array, findings: list[Finding]) -> None:
-    """Say where time has holes, and how much may have been turned in the longest."""
+    """Report gaps in time, and the rotation that the longest may hide."""
     gaps = find_gaps(time)
     if not gaps:
         return
@@ -342,12 +342,12 @@ def report_gaps(name: str, time: Array, gyro: Array, findings: list[Finding]) ->
 def report_absurd(
     name: str, gyro: Array, row: Callable[[int], int], findings: list[Finding]
 ) -> None:
-    """Say where a rate is more than can be, or is cut off at the sensor's full scale.
+    """Report rates that are implausible, or clipped at the sensor's full scale.
 
     Raises
     ------
     DataError
-        A rate is beyond anything that turns.
+        A rate is beyond the limit of any rotating body.
     """
     largest = np.abs(gyro).max(axis=0)
     k = int(largest.argmax())
@@ -385,7 +385,7 @@ def report_absurd(
         )
     for k in range(3):
         reading = float(np.degrees(largest[k]))
-        # A 16-bit reading ends one step short of the full scale.
+        # The largest 16-bit reading is one step below the full scale.
         scale = next((s for s in FULL_SCALES if s * (1 - 1e-3) <= reading <= s * 1.0001), None)
         if scale is None:
             continue
@@ -404,7 +404,7 @@ def report_absurd(
             )
 
 
-# Rows of a log in which every value that is used is a number.
+# Rows of a log in which every used value is a number.
 
 
 def finite_rows(
@@ -415,20 +415,20 @@ def finite_rows(
     options: ReadOptions,
     findings: list[Finding],
 ) -> NDArray[np.bool_]:
-    """Rows in which every value that is used is a number.
+    """Select the rows in which every used value is a number.
 
     Parameters
     ----------
     raw : RawLog
     found : dict of str to Column
     ticks : ndarray or None, (n,)
-        Stamps as they stand in the file.
+        Stamps as in the file.
     values : dict of str to ndarray, (n, 3)
-        Of the triads that are used.
+        Values of the triads used.
     options : ReadOptions
-        Whether rows may be left out.
+        Whether rows may be dropped.
     findings : list of Finding
-        How many are left out is added.
+        The number of dropped rows is appended.
 
     Returns
     -------
@@ -437,7 +437,7 @@ def finite_rows(
     Raises
     ------
     DataError
-        A row cannot be used and may not be left out, or none is left.
+        A row cannot be used and may not be dropped, or no row is left.
     """
     blocks = dict(values)
     if ticks is not None:

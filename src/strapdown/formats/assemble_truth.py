@@ -1,4 +1,4 @@
-"""Attitude truth: that which comes with a log, and that of a file of its own."""
+"""Attitude truth, from the log itself or from a file of its own."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Turn = tuple[list[int], list[float]]
 
 AS_THEY_ARE: Turn = ([0, 1, 2], [1.0, 1.0, 1.0])
 
-# Optical systems write a quaternion of zeros where they lost their markers.
+# Optical systems write a zero quaternion while their markers are lost.
 LOST = 1e-6
 
 
@@ -36,41 +36,41 @@ def truth_of_log(
     readings: list[Reading],
     findings: list[Finding],
 ) -> tuple[pd.DataFrame | None, NDArray[np.bool_] | None]:
-    """Truth that comes with a log, turned to the body axes that the log is read in.
+    """Return the truth of a log, in the body axes that the log is read in.
 
     Parameters
     ----------
     raw : RawLog
     found : dict of str to Column
     time : ndarray, (n,), s
-        Stamps of the rows that are used.
+        Stamps of the rows used.
     kept : ndarray of int, (n,)
         Those rows.
     axes : tuple
         Sensor axis of each body axis, and its sign.
     readings, findings : list
-        What it was taken from, and what should be known, are appended.
+        Its source columns and findings are appended.
 
     Returns
     -------
     truth : DataFrame or None
     scored : ndarray of bool, or None
-        Which rows of `truth` count.
+        Rows of `truth` that count for errors.
 
     Raises
     ------
     ConfigError
-        The axes are a mirror image, for which there is no attitude.
+        The axes are a mirror image, for which no attitude exists.
     """
     if raw.truth is not None:
         q_ns, scored = raw.truth.q_ns[kept], raw.truth.scored[kept]
     else:
-        # Unless the file says what its axes are, an attitude in it has unknown frames.
+        # The frames of an attitude are unknown unless the file states its axes.
         q, names = _quaternions(raw, found) if raw.axes else (None, [])
         if q is None:
             _mention(raw, found, findings)
             return None, None
-        # Of a long log no copy is made that is not needed.
+        # Avoid copies of a long log.
         q = q if kept.size == len(q) else q[kept]
         if not _known(q).any():
             return None, None
@@ -91,21 +91,21 @@ def truth_of_log(
 
 
 def truth_of_file(raw: RawLog, options: ReadOptions, origin: Origin) -> pd.DataFrame | None:
-    """Truth of a file of its own, on the clock of a log.
+    """Return the truth of a separate file, on the clock of a log.
 
     Parameters
     ----------
     raw : RawLog
     options : ReadOptions
-        Whether to repair is used, and the axes of the log where the attitude is that of its
+        Of these, `repair` is used, and the axes of the log where the attitude is that of its
         sensor.
     origin : Origin
-        What the log's time counts from.
+        Origin of the log's time.
 
     Returns
     -------
     DataFrame or None
-        An Attitude table of the rows in which it is known; None where there is none.
+        An Attitude table of the rows with known attitude; None if there is none.
 
     Raises
     ------
@@ -150,7 +150,7 @@ def truth_of_file(raw: RawLog, options: ReadOptions, origin: Origin) -> pd.DataF
 
 
 def _of_body(raw: RawLog, q_ns: Array, text: str | None) -> Array:
-    """Attitude of the body whose axes a log is read in, from that of the sensor."""
+    """Convert the attitude of the sensor to that of the body axes of a log."""
     axes = parse_axes(text) if text else AS_THEY_ARE
     if axes == AS_THEY_ARE:
         return q_ns
@@ -167,7 +167,7 @@ def _known(q: Array) -> NDArray[np.bool_]:
 
 
 def _quaternions(raw: RawLog, found: dict[str, Column]) -> tuple[Array | None, list[str]]:
-    """Attitude of each row, NaN where unknown, and the columns it came from."""
+    """Return the attitude of each row, NaN where unknown, and its source columns."""
     if all(n in found for n in QUATERNIONS):
         parts = [numbers(raw, found[n], n) for n in QUATERNIONS]
         return np.column_stack(parts).astype(np.float64, copy=False), list(QUATERNIONS)
@@ -186,7 +186,7 @@ def _quaternions(raw: RawLog, found: dict[str, Column]) -> tuple[Array | None, l
 
 
 def _mention(raw: RawLog, found: dict[str, Column], findings: list[Finding]) -> None:
-    """An attitude of unknown frames, as a phone computes one, is no truth unless it is said."""
+    """Note that an attitude of unknown frames, as from a phone, is not used as truth."""
     if not raw.axes and any(set(names) <= set(found) for names in (QUATERNIONS, EULERS)):
         findings.append(
             Finding(
@@ -199,7 +199,7 @@ def _mention(raw: RawLog, found: dict[str, Column], findings: list[Finding]) -> 
 
 
 def _sensor_from_body(raw: RawLog, axes: Turn) -> Array:
-    """Quaternion ``q_sb`` from body axes to the axes in which the file has its truth."""
+    """Return the quaternion ``q_sb`` from body axes to the axes of the file's truth."""
     if mirrored(*axes):
         raise ConfigError("io.truth-axes-mirrored", file=raw.name, quantity="--axes")
     return rotation.quaternion_from_dcm(axes_matrix(*axes).T)

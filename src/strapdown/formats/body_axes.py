@@ -1,4 +1,4 @@
-"""Which axis of a sensor is which of the body's."""
+"""Mapping of sensor axes to body axes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Axes:
-    """Which sensor axis each body axis is, with its sign, and why."""
+    """Sensor axis of each body axis, with its sign and the reason."""
 
     axis: list[int]
     sign: list[float]
@@ -29,28 +29,28 @@ class Axes:
 
 
 def axes_matrix(axis: list[int], sign: list[float]) -> Array:
-    """Matrix ``C_bs`` from sensor axes to body axes."""
+    """Return the matrix ``C_bs`` from sensor axes to body axes."""
     return np.asarray(np.eye(3)[axis] * np.array(sign)[:, None])
 
 
 def mirrored(axis: list[int], sign: list[float]) -> bool:
-    """Tell whether axes are a mirror image of the sensor's."""
+    """Whether axes are a mirror image of the sensor's."""
     return bool(np.linalg.det(axes_matrix(axis, sign)) < 0)
 
 
 def body_axes(
     raw: RawLog, options: ReadOptions, said: dict[str, Inference], findings: list[Finding]
 ) -> Axes:
-    """Axes as stated by the user, else by the file, else as they are.
+    """Return the axes stated by the user, else by the file, else the sensor's own.
 
     Parameters
     ----------
     raw : RawLog
     options : ReadOptions
     said : dict of str to Inference
-        What the numbers say.
+        Inferences from the numbers.
     findings : list of Finding
-        What was assumed, or is doubtful, is added.
+        Assumptions and doubts are appended.
     """
     text = options.axes or raw.axes
     if text is None:

@@ -17,7 +17,7 @@ from strapdown.rotation.quaternions import Q_NED_ENU
 
 
 def detect(path: Path) -> bool:
-    """Tell whether this is an HDF5 file with the datasets of BROAD."""
+    """Whether this is an HDF5 file with the datasets of BROAD."""
     if path.suffix.lower() not in hdf5.SUFFIXES or not hdf5.detect(path):
         return False
     import h5py
@@ -30,7 +30,7 @@ def detect(path: Path) -> bool:
 
 
 def read(path: Path) -> RawLog:
-    """Read a trial: sensor, optical attitude, and the samples that count.
+    """Read a trial: sensor, optical attitude, and the samples that are scored.
 
     Parameters
     ----------
@@ -39,13 +39,13 @@ def read(path: Path) -> RawLog:
     Returns
     -------
     RawLog
-        Sensor axes taken as forward, left, up, for which the truth is turned alike, so that
-        no error angle depends on that.
+        Sensor axes are taken as forward, left, up. The truth is rotated alike, so that
+        error angles do not depend on this choice.
 
     Raises
     ------
     DataError
-        The file is damaged, or a dataset has another length than the gyro's.
+        The file is damaged, or a dataset differs in length from the gyro's.
     """
     arrays, _, meta = hdf5.read_arrays(path)
     shapes = {n: arrays.get(n, np.empty(0)).shape for n in ("imu_gyr", "imu_acc", "opt_quat")}
@@ -57,12 +57,12 @@ def read(path: Path) -> RawLog:
             "io.broad-shapes", file=path.name, values=shapes.values(), shape=movement.shape
         )
     sensors = {"imu_gyr": ("gyro", "rad/s"), "imu_acc": ("accel", "m/s2")}
-    # The magnetometer runs slower than the gyro in some exports; only one on its stamps is read.
+    # In some exports the magnetometer is slower than the gyro: read only if on the gyro's stamps.
     if arrays.get("imu_mag", np.empty(0)).shape == (samples, 3):
         sensors["imu_mag"] = ("mag", "uT")
     raw = raw_log(path, {k: arrays[k] for k in sensors}, {}, meta)
     q_enu = arrays["opt_quat"].astype(np.float64)
-    # Zeros stand where the markers were lost, as NaN does.
+    # Zeros, like NaN, mark lost markers.
     known = np.isfinite(q_enu).all(axis=1) & (np.abs(q_enu).max(axis=1) > LOST)
     q_ns = np.full((samples, 4), np.nan)
     q_ns[known] = rotation.compose(Q_NED_ENU, q_enu[known])

@@ -1,14 +1,14 @@
-"""What a table's time counts: seconds of a GPS week, seconds since 1970, or since it began.
+"""Clock of a table's time: seconds of a GPS week, seconds since 1970, or relative time.
 
-A table says it in ``attrs``:
+``attrs`` of a table hold:
 
 ``clock``
     ``gps-seconds-of-week``, ``unix`` (seconds since 1970-01-01 UTC without leap seconds), or
     ``relative`` (from an instant that the file does not state).
 ``clock_origin``
-    Seconds on that clock at the table's time zero; 0 where time stands as in the file.
+    Seconds on that clock at the table's time zero; 0 where time is as in the file.
 ``gps_week``
-    Week of the first row, counted from 1980-01-06; None where it is not known.
+    Week of the first row, counted from 1980-01-06; None if unknown.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ __all__ = [
 Array = NDArray[np.float64]
 GPS, UNIX, RELATIVE = "gps-seconds-of-week", "unix", "relative"
 WEEK = 604_800.0  # s
-#: 1980-01-06, from which GPS weeks count, in seconds since 1970.
+#: 1980-01-06, the origin of GPS weeks, in seconds since 1970.
 GPS_EPOCH = 315_964_800.0
-# Seconds since 1970 from which GPS time is so many seconds before UTC (IERS Bulletin C).
+# Seconds since 1970 from which on GPS time is this many seconds ahead of UTC (IERS Bulletin C).
 _LEAPS = (
     (362_793_600.0, 1),
     (394_329_600.0, 2),
@@ -65,13 +65,13 @@ _LEAPS = (
     (1_483_228_800.0, 18),
 )
 _WORDS = {GPS: {"sow", "tow", "gpssow", "gpstow", "gpst", "gps"}, UNIX: {"unix", "utc", "unixtime"}}
-# Clocks of 1970 begin there in 2001; a sensor that counts from its start has not run so long.
+# Lower limit of Unix time (2001); no sensor has counted that long since its start.
 _MODERN = 1e9  # s
 
 
 @dataclass(frozen=True)
 class Clock:
-    """What a table's time counts; see the module.
+    """Clock of a table's time; see the module.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class Clock:
 
 
 def clock_of(table: pd.DataFrame) -> Clock:
-    """What a table's ``attrs`` say of its clock.
+    """Return the clock stated in a table's ``attrs``.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def clock_of(table: pd.DataFrame) -> Clock:
 
 
 def with_clock(table: pd.DataFrame, clock: Clock) -> pd.DataFrame:
-    """Say it in the ``attrs`` of a table that was just made; the same table is returned.
+    """Write a clock to the ``attrs`` of a new table; return the same table.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def with_clock(table: pd.DataFrame, clock: Clock) -> pd.DataFrame:
 
 
 def clock_of_name(name: str, first: float, *, dated: bool = False) -> str:
-    """The clock that a column's name and its first stamp tell.
+    """Infer the clock from a column's name and its first stamp.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def clock_of_name(name: str, first: float, *, dated: bool = False) -> str:
     first : float, s
         Its first stamp.
     dated : bool
-        The stamps are dates.
+        Whether the stamps are dates.
 
     Returns
     -------
@@ -136,7 +136,7 @@ def clock_of_name(name: str, first: float, *, dated: bool = False) -> str:
 
 
 def leap_seconds(unix: Array) -> Array:
-    """By how much GPS time is ahead of UTC at instants.
+    """Return GPS time minus UTC at given instants.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def leap_seconds(unix: Array) -> Array:
 
 
 def gps_from_unix(unix: Array) -> Array:
-    """Seconds of GPS since 1980-01-06 of instants of UTC.
+    """Convert UTC to GPS seconds since 1980-01-06.
 
     Parameters
     ----------
@@ -160,19 +160,19 @@ def gps_from_unix(unix: Array) -> Array:
 
 
 def unix_from_gps(seconds: Array) -> Array:
-    """The other way.
+    """Convert GPS seconds to UTC, seconds since 1970.
 
     Parameters
     ----------
     seconds : ndarray, (n,), s
-        Of GPS since 1980-01-06.
+        GPS time since 1980-01-06.
     """
     guess = seconds + GPS_EPOCH
     return np.asarray(guess - leap_seconds(guess - leap_seconds(guess)))
 
 
 def unrolled(time: Array) -> tuple[Array, list[int]]:
-    """Undo the fall of seconds of week at the end of a week.
+    """Unwrap seconds of week across the end of a week.
 
     Parameters
     ----------
@@ -181,14 +181,14 @@ def unrolled(time: Array) -> tuple[Array, list[int]]:
     Returns
     -------
     time : ndarray, (n,), s
-        Counted on from the first row's week. Where no such fall is, the same array.
+        Counted on from the first row's week. The same array if there is no rollover.
     rows : list of int
-        The rows, counted from 0, that begin a week.
+        Rows, from 0, that begin a week.
 
     Notes
     -----
-    A fall is one of a week where it is of more than half a week, from within the last hour of
-    one to within the first hour of the next.
+    A rollover is a decrease of more than half a week, from the last hour of a week to the
+    first hour of the next.
     """
     steps = np.diff(time)
     falls = np.flatnonzero(
@@ -204,26 +204,26 @@ def unrolled(time: Array) -> tuple[Array, list[int]]:
 def on_clock_of(
     table: pd.DataFrame, imu: pd.DataFrame, source: str | None = None
 ) -> tuple[pd.DataFrame, Finding | None]:
-    """Count a table's time as that of the inertial sensors.
+    """Convert a table's time to that of the inertial sensors.
 
     Parameters
     ----------
     table, imu : DataFrame
-        Indexed by time; their ``attrs`` say their clocks, and nothing is known where they do not.
+        Indexed by time; ``attrs`` state their clocks, which are unknown otherwise.
     source : str, optional
-        Name of `table` for messages; that of its ``attrs`` where it is left out.
+        Name of `table` for messages; by default that in its ``attrs``.
 
     Returns
     -------
     table : DataFrame
-        The same where time already counts so, or where one of the clocks is not known.
+        The same table if its time is already on that clock, or if one of the clocks is unknown.
     finding : Finding or None
-        What was added.
+        The offset that was added.
 
     Raises
     ------
     DataError
-        One clock is of 1970, the other of a GPS week, and nothing says which week.
+        One clock counts from 1970, the other is a GPS week, and the week is not stated.
     """
     own, other = clock_of(table), clock_of(imu)
     file = source or table.attrs.get("source")

@@ -1,4 +1,4 @@
-"""What a column's name says: its quantity and its unit."""
+"""Quantity and unit from the name of a column."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ TRIADS = {
         "m",
     ],
 }
-# Names that say that a column holds the increments of each sample.
+# Names of columns that hold increments per sample.
 SUMMED = {
     "gyro": ["dtheta", "deltatheta", "dangle", "deltaangle", "angleincrement", "dang"],
     "accel": ["dv", "deltav", "dvel", "deltavel", "deltavelocity", "velocityincrement"],
@@ -84,7 +84,7 @@ TIMES = [
     "epoch",
     "stamp",
 ]
-# Names of clocks that say their unit.
+# Names of clocks that state their unit.
 CLOCKS = {
     "seconds": "s",
     "secs": "s",
@@ -116,11 +116,11 @@ QUANTITIES = [
     *EULERS,
 ]
 
-# The letter of gauss is that of gravity, too.
+# G is also gravity.
 _MAGNETIC = {"g": "gauss", "mg": "mG"}
 #: A column of an array: its name and its number.
 INDEXED = re.compile(r"(.*)\[(\d+)\]")
-# By word, the axis of the body and its sign.
+# Word to the axis of the body and its sign.
 _DIRECTIONS = {
     "forward": (0, 1.0),
     "back": (0, -1.0),
@@ -136,14 +136,14 @@ _BRACKETS = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$")
 
 @dataclass(frozen=True)
 class ColumnName:
-    """What a name says.
+    """Quantity and unit of a column name.
 
     Attributes
     ----------
     quantity : str or None
         One of `QUANTITIES`, or a triad's name where the column holds three numbers.
     unit : str or None
-        In this package's spelling.
+        In the spelling of this package.
     """
 
     quantity: str | None
@@ -151,7 +151,7 @@ class ColumnName:
 
 
 def read_name(name: str) -> ColumnName:
-    """Read quantity and unit from a column's name.
+    """Parse quantity and unit from a column's name.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def read_name(name: str) -> ColumnName:
     Returns
     -------
     ColumnName
-        With None for what the name does not say.
+        None for each part that the name does not state.
     """
     text, index = name.strip(), ""
     if match := INDEXED.fullmatch(text):
@@ -172,7 +172,7 @@ def read_name(name: str) -> ColumnName:
     if bracket:
         text = text[: bracket.start()]
     said = ColumnName(None, unit)
-    # Of group/sub/name the last part says most, unless the whole is a name itself.
+    # In group/sub/name the last part decides, unless the whole is a known name.
     parts = re.split(r"[/.]", text)
     for start in range(len(parts)):
         said = _read_words(" ".join(parts[start:]), unit)
@@ -199,7 +199,7 @@ def _read_words(text: str, unit: str | None) -> ColumnName:
 
 
 def _split_unit(words: list[str]) -> tuple[list[str], str | None]:
-    """Take a unit off the end, the longest first: ``m s2``, ``rad s``, ``s``."""
+    """Split a unit off the end, the longest first: ``m s2``, ``rad s``, ``s``."""
     for take in (3, 2, 1):
         if len(words) > take:
             spelled = "_".join(words[-take:])
@@ -227,7 +227,7 @@ def _quantity(word: str) -> str | None:
 
 
 def says_increment(name: str) -> bool:
-    """Whether a name says that its column holds the increments of each sample.
+    """Whether a name states that its column holds increments per sample.
 
     Parameters
     ----------
@@ -244,7 +244,7 @@ def says_increment(name: str) -> bool:
 
 
 def parse_column_option(items: list[str]) -> dict[str, str]:
-    """Read ``--columns`` as quantity to column.
+    """Parse ``--columns`` as quantity to column.
 
     Parameters
     ----------
@@ -258,7 +258,7 @@ def parse_column_option(items: list[str]) -> dict[str, str]:
     Raises
     ------
     ConfigError
-        The form is wrong or the quantity is unknown.
+        The syntax is wrong or the quantity is unknown.
     """
     known = [*QUANTITIES, *TRIADS]
     out: dict[str, str] = {}
@@ -279,13 +279,13 @@ def parse_column_option(items: list[str]) -> dict[str, str]:
 
 
 def parse_axes(text: str) -> tuple[list[int], list[float]]:
-    """Read which sensor axis points forward, right and down.
+    """Parse which sensor axis points forward, right and down.
 
     Parameters
     ----------
     text : str
-        Three of ``x y z`` with an optional sign, as in ``x,-y,-z``; or where the sensor's x, y
-        and z point: ``forward-left-up``, which is the same.
+        Three of ``x y z`` with an optional sign, as in ``x,-y,-z``; or the directions of the
+        sensor's x, y and z: ``forward-left-up``, which is equivalent.
 
     Returns
     -------
@@ -296,7 +296,7 @@ def parse_axes(text: str) -> tuple[list[int], list[float]]:
     Raises
     ------
     ConfigError
-        It is not a permutation of three axes with signs.
+        The text is not a signed permutation of three axes.
     """
     if said := _directions(text):
         return said
@@ -310,7 +310,7 @@ def parse_axes(text: str) -> tuple[list[int], list[float]]:
 
 
 def _directions(text: str) -> tuple[list[int], list[float]] | None:
-    """Where the sensor's x, y, z point, in words, as what forward, right and down are."""
+    """Convert directions of the sensor's x, y, z in words to sensor axes of the body axes."""
     words = re.split(r"[\s,\-]+", text.strip().lower())
     if len(words) != 3 or any(w not in _DIRECTIONS for w in words):
         return None

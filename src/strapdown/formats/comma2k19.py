@@ -1,10 +1,10 @@
 """Segments of comma2k19: a phone on the windscreen of a car, with its pose in ECEF.
 
-The layout of https://github.com/commaai/comma2k19 (Schafer, Santana, Haden, Biasini,
+Layout of https://github.com/commaai/comma2k19 (Schafer, Santana, Haden, Biasini,
 arXiv:1812.05752): ``processed_log/IMU/gyro/t`` and ``…/value``, ``global_pose/frame_times`` and so
-on, each a NumPy array without an ending; and the same with ``__`` for the slashes and ``.npy`` at
-the end. Stamps are seconds since the device started; axes forward, right, down; gyro in rad/s less
-the bias that Android estimates, accelerometer in m/s², magnetometer in µT. ``frame_orientations``
+on, each a NumPy array without a suffix; or the same with ``__`` for the slashes and the suffix
+``.npy``. Stamps are seconds since the device started; axes forward, right, down; gyro in rad/s
+minus Android's bias estimate, accelerometer in m/s², magnetometer in µT. ``frame_orientations``
 is the quaternion (w, x, y, z) from the device to ECEF: with it the velocity of the car points along
 the device's x axis.
 """
@@ -32,32 +32,32 @@ SENSORS = {
     "mag": (("magnetometer", "magnetic"), "uT"),
 }
 AXES = "x,y,z"
-# Poses farther apart than this are not interpolated between.
+# No interpolation between poses farther apart than this.
 LONGEST_STEP = 0.5  # s
 
 
 def detect(path: Path) -> bool:
-    """Tell whether a folder has the arrays of the gyro."""
+    """Whether a folder has the arrays of the gyro."""
     return path.is_dir() and _find(path, "IMU", "gyro", "t") is not None
 
 
 def read(path: Path) -> RawLog:
-    """Read gyro, accelerometer, magnetometer and, where it is there, the pose as truth.
+    """Read gyro, accelerometer, magnetometer and, if present, the pose as truth.
 
     Parameters
     ----------
     path : Path
-        The folder of a segment, its ``processed_log``, or that of the arrays.
+        The folder of a segment, its ``processed_log``, or the folder of the arrays.
 
     Returns
     -------
     RawLog
-        The truth is known at the sample of the gyro nearest to each frame of the camera.
+        The truth is at the gyro sample nearest to each camera frame.
 
     Raises
     ------
     DataError
-        An array is damaged or has another shape.
+        An array is damaged or has the wrong shape.
     """
     name = path.resolve().name
     logs, files = [], []
@@ -77,7 +77,7 @@ def read(path: Path) -> RawLog:
 
 
 def _find(path: Path, *parts: str) -> Path | None:
-    """The file of an array in either layout, under the folder or the one that holds the logs."""
+    """Find the file of an array in either layout, in the folder or its ``processed_log``."""
     for candidate in (
         path / ("__".join(parts) + ".npy"),
         path.joinpath(*parts),
@@ -112,7 +112,7 @@ def _log(name: str, kind: str, triad: str, unit: str, t: Path, value: Path) -> R
 
 
 def _truth(path: Path, name: str, raw: RawLog) -> tuple[TruthInSensorAxes | None, tuple[Path, ...]]:
-    """Attitude at the samples nearest to the frames of the camera."""
+    """Return the attitude at the samples nearest to the camera frames."""
     found = [
         next((f for pose in POSES if (f := _find(path, pose, f"frame_{part}"))), None)
         for part in ("times", "positions", "orientations")
@@ -134,7 +134,7 @@ def _truth(path: Path, name: str, raw: RawLog) -> tuple[TruthInSensorAxes | None
             quantity="attitude",
             shapes=shapes,
         )
-    # Squares of numbers that no unit quaternion holds need not be representable.
+    # Numbers far from a unit quaternion may overflow when squared.
     norm = np.linalg.norm(np.where(np.abs(q_ed) < 2.0, q_ed, np.nan), axis=1)
     distance = np.linalg.norm(np.clip(positions, -frames.FARTHEST, frames.FARTHEST), axis=1)
     on_earth = (distance >= frames.NEAREST) & (distance < frames.FARTHEST)
@@ -169,7 +169,7 @@ def _truth(path: Path, name: str, raw: RawLog) -> tuple[TruthInSensorAxes | None
 
 
 def _at_samples(time: Array, frames: Array, q: Array) -> tuple[NDArray[np.int64], Array]:
-    """Samples nearest to the frames, and attitude at them at a constant rate between frames."""
+    """Return the samples nearest to the frames, and their attitude at a constant rate."""
     usable = np.flatnonzero(np.isfinite(time) & (time >= frames[0]) & (time <= frames[-1]))
     if not usable.size:
         return usable, np.empty((0, 4))

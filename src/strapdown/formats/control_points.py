@@ -1,4 +1,4 @@
-"""Control points: where a body was at instants, in a level frame of one's own."""
+"""Control points: surveyed positions of a body at given times, in a local level frame."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def read_control_points(path: str | Path, names: Mapping[str, str] | None = None
     Parameters
     ----------
     path : str or Path
-        A text table or Parquet with columns ``time north east``, s and m, north and east of any
-        mark in any direction; or the log of a unit on a shoe that has them (`foot_mounted`).
+        A text table or Parquet with columns ``time north east``, s and m, from any origin and
+        in any direction; or the log of a foot-mounted unit that has them (`foot_mounted`).
     names : dict of str to str, optional
         Column of the table to its name in the file.
 
@@ -37,9 +37,9 @@ def read_control_points(path: str | Path, names: Mapping[str, str] | None = None
     Raises
     ------
     ConfigError
-        There is no such file.
+        The file does not exist.
     DataError
-        It cannot be used; or it has fewer than two points, which no heading fits.
+        The file cannot be used, or it has fewer than two points, which leave the heading open.
     """
     path = Path(path)
     if path.is_file() and foot_mounted.detect_points(path):

@@ -1,4 +1,4 @@
-"""What is said of a channel, as plain data: for files that keep it beside the numbers."""
+"""Metadata of a crash channel as plain data, for files that store it beside the samples."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MOST_REMARKS = 50
 
 
 def attributes_of(channel: CrashChannel) -> dict[str, Any]:
-    """Everything of a channel but its samples.
+    """Return everything of a channel except its samples.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ def attributes_of(channel: CrashChannel) -> dict[str, Any]:
     Returns
     -------
     dict
-        With the unit in SI, in which its values are written.
+        The unit is the SI unit in which the values are written.
     """
     return {
         "name": channel.name,
@@ -47,24 +47,24 @@ def attributes_of(channel: CrashChannel) -> dict[str, Any]:
 
 
 def check_attributes(said: object, file: str, row: int | None = None) -> dict[str, Any]:
-    """Check what a file says of a channel.
+    """Check the metadata of a channel from a file.
 
     Parameters
     ----------
     said : object
-        As it was read.
+        As read from the file.
     file : str
     row : int, optional
 
     Returns
     -------
     dict
-        As `attributes_of`; what is not there is empty, texts are cleaned.
+        As `attributes_of`; missing entries are empty, texts are cleaned.
 
     Raises
     ------
     DataError
-        It is of another form.
+        The metadata has the wrong structure.
     """
     if not isinstance(said, Mapping):
         raise _bad("a channel", "io.channel-no-table", file, row)

@@ -1,4 +1,4 @@
-"""Crash records as JSON: everything that a record holds, and nothing else."""
+"""Crash records as JSON: the complete record."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ def write_crash_json(path: str | Path, record: CrashRecord) -> None:
     ----------
     path : str or Path
     record : CrashRecord
-        Values are written in SI, each number in the fewest digits that give it back exactly; null
-        stands for a sample that is missing. Channels that share their stamps name one list.
+        Values are written in SI units with the fewest digits that reproduce each exactly; a
+        missing sample is null. Channels with the same stamps refer to one list.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def write_crash_json(path: str | Path, record: CrashRecord) -> None:
 
 
 def detect(path: Path) -> bool:
-    """Tell whether it is a record as JSON."""
+    """Whether the file is a crash record in JSON."""
     if not path.is_file():
         return False
     with path.open("rb") as stream:
@@ -84,7 +84,7 @@ def detect(path: Path) -> bool:
 
 
 def read(path: Path) -> CrashRecord:
-    """Read a record that was written as JSON.
+    """Read a record written as JSON.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def read(path: Path) -> CrashRecord:
     Raises
     ------
     DataError
-        It is cut, or of another form.
+        The file is truncated, or has another structure.
     """
     whole = _parsed(path)
     stamps = [

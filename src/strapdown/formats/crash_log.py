@@ -1,4 +1,4 @@
-"""Logs of attitude formats as crash records: arrays, phones, MATLAB, HDF5."""
+"""Logs of inertial sensors as crash records: arrays, phones, MATLAB, HDF5."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from strapdown.formats.crash_table import record_of
 
 __all__ = ["detect", "read"]
 
-# Formats of attitude logs whose columns may be those of a crash.
+# Log formats whose columns may be those of a crash.
 LOGS = (
     "sensor-logger",
     "phyphox",
@@ -24,7 +24,7 @@ LOGS = (
 
 
 def detect(path: Path) -> bool:
-    """Tell whether it is a log of another format that has columns: .npz, .h5, of a phone."""
+    """Whether the file is a log with columns in another format: .npz, .h5, of a phone."""
     from strapdown.formats import READERS
 
     return any(READERS[key].detect(path) for key in LOGS)
@@ -44,7 +44,7 @@ def read(path: Path) -> CrashRecord:
     Raises
     ------
     DataError
-        It is damaged, or of no such format.
+        The file is damaged, or of none of these formats.
     """
     from strapdown.formats import READERS
 

@@ -26,14 +26,14 @@ _TITLES = ("title", "type of the test", "laboratory test ref. number", "test nam
 
 
 def detect(path: Path) -> bool:
-    """Tell whether it is a header of a test, or a folder that holds one."""
+    """Whether the path is a test header, or a folder that holds one."""
     if path.is_dir():
         return any(p.suffix.lower() == ".mme" for p in path.iterdir())
     return path.suffix.lower() == ".mme"
 
 
 def read(path: Path) -> CrashRecord:
-    """Read a test; its channels read their samples when they are asked.
+    """Read a test; samples are read when a channel is used.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def read(path: Path) -> CrashRecord:
     Raises
     ------
     DataError
-        There is no header, or more than one; no channel; a header is damaged.
+        There is no header, or more than one; there is no channel; or a header is damaged.
     """
     head = _head(path)
     header = read_header(head)
@@ -105,14 +105,14 @@ def _head(path: Path) -> Path:
 
 
 def _folders(head: Path) -> list[Path]:
-    """Where channels may stand: in the folder Channel, or beside the header."""
+    """List the folders that may hold channels: Channel, and that of the header."""
     beside = head.parent
     named = sorted(p for p in beside.iterdir() if p.name.lower() == "channel" and p.is_dir())
     return [*named, beside]
 
 
 def _inside(path: Path, head: Path) -> bool:
-    """Whether a file is in the folder of the test, and no link to elsewhere."""
+    """Whether a file is in the folder of the test, not linked from elsewhere."""
     return path.resolve().is_relative_to(head.parent.resolve())
 
 
@@ -121,7 +121,7 @@ def _left_out(path: Path) -> Finding:
 
 
 def _index(head: Path, findings: list[Finding]) -> tuple[Path | None, dict[int, str]]:
-    """The index of channels, and the code of each number in it."""
+    """Read the channel index: its path, and the code of each channel number."""
     found = [
         p
         for folder in _folders(head)
@@ -165,7 +165,7 @@ def _index(head: Path, findings: list[Finding]) -> tuple[Path | None, dict[int, 
 
 
 def _numbered(head: Path, findings: list[Finding]) -> dict[int, Path]:
-    """Files of channels by their number."""
+    """Find the channel files by their number."""
     for folder in _folders(head):
         found = [p for p in sorted(folder.iterdir()) if _NUMBERED.search(p.name) and p.is_file()]
         same = [p for p in found if p.stem.lower() == head.stem.lower()]
@@ -204,7 +204,7 @@ def _facts(header: MmeHeader, findings: list[Finding]) -> dict[str, str]:
     }
     facts |= {name: header.text(key) for name, key in spoken.items()}
     if _objects(header) == 1:
-        # Quantities of the header are in SI.
+        # The header's quantities are in SI units.
         for name, key in (
             ("mass_kg", "mass test object 1"),
             ("speed_m_per_s", "velocity test object 1"),
@@ -212,7 +212,7 @@ def _facts(header: MmeHeader, findings: list[Finding]) -> dict[str, str]:
             try:
                 value = header.number(key)
             except DataError as error:
-                # What the report could say of the vehicle is no reason to refuse its record.
+                # Unusable data of the vehicle only affects the report: keep the record.
                 fault = error.finding
                 findings.append(
                     Finding(

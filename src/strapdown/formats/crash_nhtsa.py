@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 __all__ = ["detect", "read"]
 
-# Quantity by the unit in SI; moments and the rest are other.
+# SI unit to quantity; moments and others are "other".
 _QUANTITY = {
     "m/s2": "acceleration",
     "rad/s": "rate",
@@ -25,7 +25,7 @@ _QUANTITY = {
     "m": "displacement",
     "N": "force",
 }
-# In this package's spelling, where it has one.
+# In the spelling of this package, where it has one.
 _SPELLED = {"G'S": "g", "G": "g", "M/S2": "m/s2", "DPS": "deg/s", "DEG/SEC": "deg/s"} | {
     "RAD/S": "rad/s",
     "NWT": "N",
@@ -33,8 +33,8 @@ _SPELLED = {"G'S": "g", "G": "g", "M/S2": "m/s2", "DPS": "deg/s", "DEG/SEC": "de
     "MM": "mm",
     "KPH": "km/h",
 }
-# Seats and places of NHTSA Test Reference Guide, Version 5, Volume I, tables of codes, as far as
-# they are what the name suggests; others are shown as the code.
+# Seats and locations of the NHTSA Test Reference Guide, Version 5, Volume I, tables of codes, where
+# the meaning is plain; other codes are shown unchanged.
 _SEATS = {"01": "driver", "02": "front passenger", "03": "front centre passenger"} | {
     "04": "left rear passenger",
     "05": "centre rear passenger",
@@ -57,7 +57,7 @@ _STATUS = {"AM": "as measured", "CF": "channel failed", "NO": "no data"}
 
 
 def detect(path: Path) -> bool:
-    """Tell whether it is an EV5 header, or a folder that holds one."""
+    """Whether the path is an EV5 header, or a folder that holds one."""
     if path.is_dir():
         return any(p.suffix.lower() == ".ev5" for p in path.iterdir())
     if path.suffix.lower() == ".ev5":
@@ -67,17 +67,17 @@ def detect(path: Path) -> bool:
 
 
 def read(path: Path) -> CrashRecord:
-    """Read a test; its channels read their files when they are asked.
+    """Read a test; samples are read when a channel is used.
 
     Parameters
     ----------
     path : Path
-        The header, or the folder that holds it.
+        The header, or its folder.
 
     Returns
     -------
     CrashRecord
-        With the channels whose files are there.
+        With the channels whose files exist.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def _vehicle(vehicle: Vehicle) -> dict[str, str]:
 
 
 def _plain(value: float) -> str:
-    """A number as the header has it, without the dust of its factor to SI."""
+    """Format a number as in the header, without rounding errors of its factor to SI."""
     return "" if math.isnan(value) else f"{value:.10g}"
 
 

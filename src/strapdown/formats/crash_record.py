@@ -1,4 +1,4 @@
-"""What every reader of crash records returns: channels in SI, and what the file says of itself."""
+"""Common form of all crash records: channels in SI units, with the metadata of the file."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def _sample_row(sample: int) -> int:
     return sample + 1
 
 
-#: What a channel may be, and its unit in SI.
+#: Quantities of a channel, with their SI units.
 QUANTITIES: dict[str, str] = {
     "acceleration": "m/s2",
     "rate": "rad/s",
@@ -40,41 +40,41 @@ class CrashChannel:
     Attributes
     ----------
     name : str
-        By which a case names it, unique in its record: a column, ``93``, ``11HEAD0000H3ACXP``.
+        Unique in its record, used in a case file: a column, ``93``, ``11HEAD0000H3ACXP``.
     quantity : str
-        One of `QUANTITIES`; a velocity is a change of velocity from the first sample.
+        One of `QUANTITIES`; a velocity is the change of velocity since the first sample.
     axis : str
         ``x``, ``y``, ``z`` where it is known to lie along an axis that points forward, right or
-        down; with a minus where it points the other way; else empty. Of a log whose columns
-        name the sensor's own axes it is the sensor's.
+        down, with a minus if reversed; else empty. For a log whose columns name the sensor's own
+        axes, the sensor's axis.
     unit : str
-        As recorded, in this package's spelling where it is known; empty where nothing tells it.
+        As recorded, in the spelling of this package if known; empty if not stated.
     sampling : str or None
-        ``instantaneous`` or ``mean``, where it is known.
+        ``instantaneous`` or ``mean``, if known.
     place : str
-        Where the sensor sits, in words, as far as the record tells.
+        Position of the sensor, in words, as far as the record states it.
     body : str
-        What it is fixed to: ``vehicle``, or another body in words.
+        Body that it is fixed to: ``vehicle``, or another body in words.
     low_pass : str
-        What it has been filtered with, in words: ``CFC 180``, ``1650 Hz before the sampler``.
+        Filters applied, in words: ``CFC 180``, ``1650 Hz before the sampler``.
     remarks : tuple of str
-        What else the record says of it: status, redundancy, comment.
+        Further statements of the record: status, redundancy, comment.
     full_scale : float or None
-        In SI, where the record states it.
+        In SI units, if stated.
     bandwidth : float or None
-        Hz, of the low-pass before the sampler.
+        Bandwidth in Hz of the low-pass before the sampler.
     file : str
         Name of the file that holds its samples, for messages.
     row : callable
-        Row of that file in which a sample stands, counted from 1, by the sample's number.
+        Maps the number of a sample to its row in that file, counted from 1.
     clock : str
-        Name of the channel of quantity ``time`` that holds its stamps; empty where the stamps are
-        its own.
+        Name of the channel of quantity ``time`` that holds its stamps; empty if it has its
+        own.
     load : callable
-        Reads time (s, as recorded) and values (SI where the unit is known, else as recorded).
+        Reads time (s, as recorded) and values (SI if the unit is known, else as recorded).
     samples : callable or None
-        Reads the values alone, of a record whose stamps may have to be stated first. Those of a
-        clock are as recorded, whole numbers where it counts ticks.
+        Reads only the values, for a record whose stamps may have to be stated first. Those of a
+        clock are as recorded, integers where it counts ticks.
     """
 
     name: str
@@ -102,19 +102,19 @@ class CrashRecord:
     Attributes
     ----------
     path : Path
-        Of the file or folder that a case names.
+        The file or folder named in a case.
     format : str
         Key of the reader.
     title : str
     facts : dict of str to str
-        What the record says of the test, for a report: vehicle, date, laboratory. With the keys
-        ``mass_kg``, ``length_m``, ``width_m``, ``speed_m_per_s`` where it says those.
+        Facts of the test for a report: vehicle, date, laboratory. With the keys ``mass_kg``,
+        ``length_m``, ``width_m``, ``speed_m_per_s`` where stated.
     channels : tuple of CrashChannel
     files : tuple of Path
-        Every file that belongs to it.
+        All files of the record.
     findings : tuple of Finding
     remarks : tuple of str
-        What else stands in it for people: lines above a table, in which rate and axes may be.
+        Further text for people: lines above a table, which may state rate and axes.
     """
 
     path: Path
@@ -132,7 +132,7 @@ class CrashRecord:
         Raises
         ------
         DataError
-            There is none; the message names the nearest.
+            No channel has this name; the message suggests the most similar.
         """
         for channel in self.channels:
             if channel.name == name:

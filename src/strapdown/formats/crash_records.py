@@ -1,4 +1,4 @@
-"""Readers of crash records: one file a format, and the one table of them."""
+"""Readers of crash records: one module per format, and the registry of readers."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from strapdown.formats.crash_text import clean
 
 __all__ = ["CRASH_READERS", "CrashReader", "read_crash_record"]
 
-# Files of programs for tables, which hold more than a table.
+# Spreadsheet files, which hold more than a table.
 SPREADSHEETS = (".xlsx", ".xls", ".xlsm", ".ods", ".numbers")
-# Names of a folder that are looked through for one that is near.
+# Most names of a folder that are searched for a similar one.
 MOST_NAMES = 10_000
-# Faults of a row that is corrected in a copy: the record itself is evidence.
+# Faults of a row to be corrected in a copy: the record itself is evidence.
 ROW_FAULTS = frozenset(
     {
         "io.fields-expected",
@@ -34,20 +34,20 @@ ROW_FAULTS = frozenset(
         "io.time-no-date-since-no",
     }
 )
-# Faults whose remedies are options of the command that reads logs for their attitude.
+# Faults whose remedies are options of the command for attitude logs.
 OPTION_FAULTS = frozenset({"io.value-not-a-number"})
 
 
 @dataclass(frozen=True)
 class CrashReader:
-    """How one format is recognised and read."""
+    """How one format is recognized and read."""
 
     title: str
     detect: Callable[[Path], bool]
     read: Callable[[Path], CrashRecord]
 
 
-#: In the order in which they are tried: what says what it is first, tables of columns last.
+#: In the order of detection: self-describing formats first, tables of columns last.
 CRASH_READERS: dict[str, CrashReader] = {
     "nhtsa": CrashReader(
         "test of the NHTSA vehicle database: .EV5 or its folder",
@@ -78,26 +78,26 @@ def read_crash_record(
     *,
     format: str | None = None,  # noqa: A002
 ) -> CrashRecord:
-    """Read a crash record of any known format.
+    """Read a crash record, detecting its format.
 
     Parameters
     ----------
     path : str or Path
         A file, or the folder of a test.
     format : str, optional
-        A key of `CRASH_READERS`; if not given, it is recognised by its content.
+        A key of `CRASH_READERS`; if not given, detected from the content.
 
     Returns
     -------
     CrashRecord
-        Its channels read their samples when they are asked.
+        Samples are read when a channel is used.
 
     Raises
     ------
     ConfigError
-        There is no such file, or no such format.
+        The file does not exist, or the format is unknown.
     DataError
-        It is of no known format, or damaged; the message names file, row, quantity and remedy.
+        Not recognized, or damaged; the message names file, row, quantity and remedy.
     """
     file = Path(path)
     if format is not None and format not in CRASH_READERS:
@@ -124,7 +124,7 @@ def read_crash_record(
             reason=found,
         ) from error
     except (OSError, ValueError) as error:
-        # A name that no file can have, a file that may not be read, a link that leads in a ring.
+        # An invalid file name, a file without read permission, or a circular link.
         raise DataError(
             "io.crash-record-unreadable",
             file=clean(file.name),

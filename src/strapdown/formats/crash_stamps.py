@@ -1,4 +1,4 @@
-"""Stamps of a crash record in seconds: unit, direction, origin; a fault is named by its row."""
+"""Stamps of a crash record in seconds: unit, order, origin; faults name their row."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ DAY = 86_400.0  # s
 
 @dataclass(frozen=True, eq=False)
 class Clock:
-    """A column of stamps as it stands in a file.
+    """A column of stamps, as recorded.
 
     Attributes
     ----------
     name : str
-        Of the column.
+        Name of the column.
     stamps : ndarray, (n,)
-        Whole numbers or not, as recorded.
+        Integer or not, as recorded.
     unit : str
-        A key of `TIME_UNITS`, or empty where nothing states it.
+        A key of `TIME_UNITS`, or empty if not stated.
     file : str
     row : callable
-        Row of the file in which a stamp stands.
+        Maps the number of a stamp to its row in the file.
     """
 
     name: str
@@ -47,7 +47,7 @@ class Clock:
 
 
 def seconds_of(clock: Clock) -> tuple[Array, list[Finding]]:
-    """Turn stamps into increasing seconds.
+    """Convert stamps to increasing seconds.
 
     Parameters
     ----------
@@ -56,15 +56,15 @@ def seconds_of(clock: Clock) -> tuple[Array, list[Finding]]:
     Returns
     -------
     seconds : ndarray, (n,)
-        From the origin of the recorder; where that is more than 1e6 s away, as a clock of 1970 is,
-        from the last midnight of that clock before the first stamp: records of one clock that do
-        not begin together keep one time.
+        From the origin of the recorder. Where that is more than 1e6 s away (a clock of 1970),
+        from the last midnight of that clock before the first stamp, so that records of one
+        clock that start at different times keep a common time.
     findings : list of Finding
 
     Raises
     ------
     DataError
-        A stamp is missing, time does not advance, or the unit is neither stated nor evident.
+        A stamp is missing, time does not advance, or the unit is not stated and not evident.
     """
     findings: list[Finding] = []
     stamps = clock.stamps
@@ -112,14 +112,14 @@ def seconds_of(clock: Clock) -> tuple[Array, list[Finding]]:
 
 
 def last_midnight(stamp: float, factor: float) -> float:
-    """Stamp of the last whole day of a clock before a stamp.
+    """Return the stamp of the last midnight of a clock before a stamp.
 
     Parameters
     ----------
     stamp : float or int
-        In ticks; whole numbers stay whole.
+        In ticks; integers stay integers.
     factor : float, s
-        Of a tick.
+        Duration of a tick.
     """
     day = round(DAY / factor)
     return stamp // day * day

@@ -44,17 +44,18 @@ __all__ = [
 Array = NDArray[np.float64]
 T = TypeVar("T")
 
-# Of a column of text so many fields must be numbers to be one with a fault in it.
+# Fraction of numeric fields from which on a column of text is a damaged column of numbers.
 MOSTLY = 0.5
-# How even the steps of a column without a name must be, to be taken for a clock.
+# Relative evenness of the steps of an unnamed column, to be taken for a clock.
 EVEN = 0.01
-# A step of 10 ms of a crash of 50 ms gains less than this of it.
+# Limit of a velocity change in its first step, relative to its maximum; a step of 10 ms in a crash
+# of 50 ms gains less.
 SMALL = 0.2
 _OF_TRIAD = {"gyro": "rate", "accel": "acceleration", "mag": "other"}
 
 
 def detect(path: Path) -> bool:
-    """Tell whether it is a file; what is no table is refused when it is read."""
+    """Whether the path is a file; a file that is not a table is refused by `read`."""
     return path.is_file()
 
 
@@ -68,12 +69,12 @@ def read(path: Path) -> CrashRecord:
     Returns
     -------
     CrashRecord
-        A channel for each column of numbers, by the column's name.
+        One channel for each numeric column, under its name.
 
     Raises
     ------
     DataError
-        It is no table, or a damaged one.
+        The file is not a table, or is damaged.
     """
     raw, notes, title, remarks = read_text_table(path)
     return record_of(raw, path, "csv", notes=notes, title=title, remarks=remarks)
@@ -88,16 +89,16 @@ def record_of(
     title: str = "",
     remarks: tuple[str, ...] = (),
 ) -> CrashRecord:
-    """Make a record of the columns of a log.
+    """Make a record from the columns of a log.
 
     Parameters
     ----------
     raw : RawLog
     path : Path
     form : str
-        Key of its format.
+        Key of the format.
     notes : dict of str to dict, optional
-        What the file says of columns beside their names, as `attributes_of` gives it.
+        Metadata of columns stated in the file, as from `attributes_of`.
     title : str, optional
     remarks : tuple of str, optional
         Lines above the table.
@@ -109,7 +110,7 @@ def record_of(
     Raises
     ------
     DataError
-        No column holds numbers.
+        No column is numeric.
     """
     findings = list(raw.findings)
     kept: list[str] = []
@@ -182,7 +183,7 @@ def _said(raw: RawLog, source: str) -> ChannelName:
 
 
 def _noted(note: Mapping[str, Any]) -> ChannelName:
-    """A velocity that was written counts from where it did: nothing is taken off again."""
+    """Apply metadata; a velocity written as a change counts from zero: subtract no offset."""
     change = note["quantity"] == "velocity"
     return ChannelName(note["quantity"], note["axis"], note["unit"], change)
 
@@ -197,7 +198,7 @@ def _with_notes(channel: CrashChannel, note: Mapping[str, Any] | None) -> CrashC
 def _clock(
     raw: RawLog, said: dict[str, ChannelName], names: dict[str, str], findings: list[Finding]
 ) -> str:
-    """Column of the stamps, or empty where there is none."""
+    """Return the column of the stamps, or empty if there is none."""
     times = [s for s, n in said.items() if n.quantity == "time"]
     stated = [s for s in times if said[s].unit] or times
     if len(stated) > 1:
@@ -230,7 +231,7 @@ def _clock(
 
 
 def _advances(values: NDArray[Any]) -> bool:
-    """Whether these are evenly spaced stamps, and no count of samples."""
+    """Whether these are evenly spaced stamps, not a sample counter."""
     if values.dtype.kind not in "iuf" or values.size < 6:
         return False
     steps = np.diff(values.astype(np.float64))
@@ -276,7 +277,7 @@ def _channel(
 
 
 def _begins_from_rest(raw: RawLog, source: str, said: ChannelName, clock: str) -> bool:
-    """A velocity that is small one step after time zero was none at zero: it is a change."""
+    """Whether a velocity is small one step after time zero: then it is a change from zero."""
     if said.quantity != "velocity" or said.change or not clock:
         return False
     stamps, values = raw.columns[clock], raw.columns[source]
@@ -294,7 +295,7 @@ def _samples(
             return _ticks(raw, source)[0]
         values = _numbers(raw, source).astype(np.float64)
         if said.quantity == "velocity" and not said.change and values.size:
-            # Speed of the sensor, not a change: what it was at first is taken off.
+            # Velocity of the sensor, not a change: subtract the initial value.
             values = values - values[0]
         return values if factor is None else values * factor
 
@@ -311,7 +312,7 @@ def _ticks(raw: RawLog, source: str) -> tuple[NDArray[Any], bool]:
 
 
 def _retold(read: Callable[[], T]) -> T:
-    """What readers of logs say, without the options of their command."""
+    """Translate errors of log readers, without the options of their command."""
     try:
         return read()
     except DataError as error:
@@ -339,11 +340,11 @@ def _stamps(raw: RawLog, clock: str, stated: str) -> Callable[[], Array]:
     return read
 
 
-# What the name of a column says in a crash record: quantity, axis and unit.
+# Names of columns in a crash record: quantity, axis and unit.
 #
 # Recorders in vehicles name their columns in words (``Longitudinal Delta-V (MPH)``), loggers in
-# letters (``ax [g]``). Longitudinal is positive forward, lateral from left to right, vertical down,
-# as SAE J1698 and SAE J211 have it.
+# letters (``ax [g]``). Longitudinal is positive forward, lateral from left to right, vertical down
+# (SAE J1698, SAE J211).
 
 
 _BRACKETS = re.compile(r"[\[(]\s*([^\[\]]+?)\s*[\])]\s*$")
@@ -365,7 +366,7 @@ _AXIS = {
     "down": "z",
     "normal": "z",
 }
-# Axes that point the other way than ours.
+# Axes opposite to ours.
 _REVERSED = {"backward": "-x", "rearward": "-x", "left": "-y", "up": "-z"}
 _TURNS = {"roll": "x", "pitch": "y", "yaw": "z"}
 _WORDS = {
@@ -375,7 +376,7 @@ _WORDS = {
     "displacement": ("displacement", "crush"),
     "force": ("force", "load"),
 }
-# A gyro to the makers of phones, an acceleration in g to those of crash recorders.
+# For phone makers a gyro, for makers of crash recorders an acceleration in g.
 _EITHER = ("gx", "gy", "gz")
 _CRASH_NAMES_OF_TRIAD = {"accel": "acceleration", "gyro": "rate"}
 _TRIAD_NAMES = {name: triad for triad, names in TRIADS.items() for name in names if len(name) > 1}
@@ -383,20 +384,20 @@ _TRIAD_NAMES = {name: triad for triad, names in TRIADS.items() for name in names
 
 @dataclass(frozen=True)
 class ChannelName:
-    """What a name says.
+    """Content of a column name.
 
     Attributes
     ----------
     quantity : str
         A key of `crash_record.QUANTITIES`.
     axis : str
-        ``x y z``, with a minus where the name says so, or empty.
+        ``x y z``, with a minus if the name states it, or empty.
     unit : str
-        In this package's spelling, or as it stands there where it is not known; or empty.
+        In the spelling of this package, as in the name if unknown, or empty.
     change : bool
-        Of a velocity: the name says that it is a change since time zero.
+        For a velocity: the name states a change since time zero.
     contradiction : str
-        What in the name speaks against its unit, or empty.
+        Part of the name that contradicts the unit, or empty.
     """
 
     quantity: str
@@ -407,19 +408,19 @@ class ChannelName:
 
 
 def read_channel_name(name: str, unit: str = "") -> ChannelName:
-    """Read quantity, axis and unit from a column's name.
+    """Parse quantity, axis and unit from a column's name.
 
     Parameters
     ----------
     name : str
         As ``ax [g]``, ``Gyr_X (deg/s)``, ``Lateral Delta-V (km/h)``, ``Yaw rate``.
     unit : str
-        What a row of units under the header says of it.
+        Unit from a row of units under the header.
 
     Returns
     -------
     ChannelName
-        The unit decides what the quantity is; the words, where there is no unit.
+        The quantity follows from the unit; without a unit, from the words.
     """
     said = read_name(name)
     text = name.strip()
@@ -496,16 +497,16 @@ def _axis(words: list[str], quantity: str, triad: str | None) -> str:
     return found.pop() if len(found) == 1 else ""
 
 
-# Text tables as recorders export them: a title above the header, and a row of units under it.
+# Text tables exported by recorders: a title above the header, and a row of units under it.
 
 
-# A header stands within so many lines, or there is none.
+# Number of lines that are searched for a header.
 HIGHEST_HEADER = 200
-# So many rows under the first look like it.
+# Number of rows under the first that must look like it.
 ROWS = 3
-# Lines above a table that a person would read.
+# Most lines above a table that are kept for people.
 MOST_REMARKS = 24
-# Rows of plain numbers of some hundred bytes: more than this is no table of a crash.
+# Largest table of a crash, bytes: rows of numbers have some hundred bytes.
 LARGEST = 2_000_000_000
 _TITLE = "# title: "
 _NO_UNIT = ("", "-", "--", "none", "1")
@@ -514,7 +515,7 @@ _NO_UNIT = ("", "-", "--", "none", "1")
 def read_text_table(
     path: Path,
 ) -> tuple[RawLog, dict[str, dict[str, Any]], str, tuple[str, ...]]:
-    """Read a text table whose header need not be its first line.
+    """Read a text table whose header may be below the first line.
 
     Parameters
     ----------
@@ -523,13 +524,13 @@ def read_text_table(
     Returns
     -------
     RawLog
-        Its `units` are those of a row of units, where there is one.
+        `units` are those of the row of units, if there is one.
     dict of str to dict
-        What comments say of columns, as `crash_attributes.attributes_of` gives it.
+        Metadata of columns from comments, as from `crash_attributes.attributes_of`.
     str
         Title in a comment, or empty.
     tuple of str
-        The other lines above the table, in which recorders write rate, range and axes.
+        The other lines above the table, where recorders write rate, range and axes.
 
     Raises
     ------
@@ -547,7 +548,7 @@ def read_text_table(
     header, units_at, units = _header(lines)
     remarks = _remarks(lines, header)
     if header is not None:
-        # Blank lines are skipped, and rows keep their numbers.
+        # Blank lines are skipped; row numbers are kept.
         above = [line if csv.is_comment(line) else "" for line in lines[:header]]
         lines[:header] = above
         if units_at is not None:
@@ -578,7 +579,7 @@ def _remarks(lines: list[str], header: int | None) -> tuple[str, ...]:
 
 
 def _read_clocks(raw: RawLog) -> None:
-    """Times of day become nanoseconds since midnight."""
+    """Convert times of day to nanoseconds since midnight."""
     stated = dict(raw.stated)
     for name, values in raw.columns.items():
         if values.dtype.kind != "O":
@@ -591,7 +592,7 @@ def _read_clocks(raw: RawLog) -> None:
 
 
 def notes_of(lines: list[str], raw: RawLog) -> dict[str, dict[str, Any]]:
-    """What comments say of columns; what is not understood is told in the log's findings."""
+    """Parse comments on columns; those not understood are listed in the log's findings."""
     names = list(raw.columns)
     notes: dict[str, dict[str, Any]] = {}
     for row, line in enumerate(lines, start=1):
@@ -619,14 +620,14 @@ def notes_of(lines: list[str], raw: RawLog) -> dict[str, dict[str, Any]]:
 
 
 def _header(lines: list[str]) -> tuple[int | None, int | None, list[str]]:
-    """Where the header and the units stand, and the units; None where the first line is it."""
+    """Find the lines of header and units, and the units; None if the first line is the header."""
     said = [
         (at, csv.fields_of(line, csv.separator_of(line)))
         for at, line in enumerate(lines[:HIGHEST_HEADER])
         if line.strip() and not csv.is_comment(line)
     ]
-    # Rows of numbers alone; of a table that has a column of text, rows that are mostly numbers.
-    # "Channels: 3" above a table looks like one: what goes on as it begins goes first.
+    # Rows of numbers; in a table with a text column, rows that are mostly numbers. "Channels: 3"
+    # above a table looks like one, so consistency with the following rows is required first.
     for goes_on in (True, False):
         for whole in (True, False):
             for k, (_, fields) in enumerate(said):
@@ -654,7 +655,7 @@ def _above(
     if not whole or whole[-1] != said[-1]:
         return None, None, []
     at, fields = whole[-1]
-    # A cell may stand above and say only the unit: it is one where every cell does.
+    # A cell above the table may hold only a unit: a row of units has one in every cell.
     plain = [f.strip("[](){} ") for f in fields]
     known = [unit_of(p) is not None for p in plain if p.lower() not in _NO_UNIT]
     if len(whole) > 1 and whole[-2] == said[-2] and known and all(known):
@@ -663,10 +664,10 @@ def _above(
     return at, None, []
 
 
-# Crash records written as text tables: the unit in each heading, and the rest in comments.
+# Crash records written as text tables: units in the headings, the rest in comments.
 
 
-#: Before what a comment says of a column.
+#: Prefix of a comment on a column.
 NOTE = "# channel: "
 
 
@@ -676,10 +677,10 @@ def write_crash_csv(path: str | Path, record: CrashRecord) -> tuple[Path, ...]:
     Parameters
     ----------
     path : str or Path
-        Of the table. Channels with other stamps go into tables of their own, beside it: with
+        Path of the table. Channels with other stamps go into separate tables beside it, with
         ``_2``, ``_3`` after the name.
     record : CrashRecord
-        Values are written in SI, each number in the fewest digits that give it back exactly.
+        Values are written in SI units with the fewest digits that reproduce each exactly.
 
     Returns
     -------
@@ -689,7 +690,7 @@ def write_crash_csv(path: str | Path, record: CrashRecord) -> tuple[Path, ...]:
     Raises
     ------
     DataError
-        The record has no channel.
+        The record has no channels.
     """
     groups: dict[bytes, list[tuple[dict[str, Any], Array]]] = {}
     stamps: dict[bytes, Array] = {}

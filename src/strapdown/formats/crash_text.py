@@ -1,4 +1,4 @@
-"""Texts from files that nobody vouches for: what may stand in a name or a message."""
+"""Cleaning of untrusted texts from files, for names and messages."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ LONGEST_TEXT = 400
 
 
 def clean(text: str, longest: int = LONGEST_TEXT) -> str:
-    """Text on one line, without characters that steer a terminal or turn the direction of reading.
+    """Reduce a text to one line, without control or bidirectional formatting characters.
 
     Parameters
     ----------
     text : str
     longest : int
-        What is longer is cut, and ends with three dots.
+        Longer texts are cut and end with three dots.
 
     Returns
     -------
     str
-        Markup stays: it is for who writes a page to escape it.
+        Markup is kept; escaping is left to the code that writes a page.
     """
-    # Of a very long text no more than can be kept is looked at.
+    # Of a very long text only the part that can be kept is processed.
     kept = "".join(
         " " if c.isspace() else "\N{REPLACEMENT CHARACTER}" if _steers(c) else c
         for c in text[: 4 * longest]

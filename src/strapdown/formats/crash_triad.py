@@ -1,4 +1,4 @@
-"""One triad of a recorder out of the channels of a record, checked and in SI."""
+"""One triad of a recorder from the channels of a record, checked and in SI units."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ Array = NDArray[np.float64]
 
 _COLUMNS = {"acceleration": ACCEL, "rate": GYRO}
 _AXES = ("x", "y", "z")
-# A sample that is left out between others is a hole; rows of another axis are none.
+# A sample missing between others is a gap; rows of another axis are not.
 HOLE = 1.5
 
 
 @dataclass(frozen=True, eq=False)
 class _Axis:
-    """One axis: its channel, its sign, its samples."""
+    """One axis: channel, sign and samples."""
 
     axis: str
     sign: float
@@ -56,43 +56,43 @@ def triad_of_channels(
     rate_hz: float | None = None,
     sampling: str | None = None,
 ) -> pd.DataFrame:
-    """Take a triad out of a record.
+    """Extract a triad from a record.
 
     Parameters
     ----------
     record : CrashRecord
     channels : dict of {'x', 'y', 'z'} to str
-        Name of the channel along each axis of the triad, with a minus before it where it points
-        the other way. An axis that is left out is missing.
+        Name of the channel along each axis of the triad, with a leading minus if it points the
+        other way. Axes may be missing.
     quantity : {'acceleration', 'rate'}
-        A channel of velocity gives mean accelerations, too.
+        A channel of velocity yields mean accelerations, too.
     unit : str, optional
-        Where the record does not say it. One that contradicts the record is refused.
+        If the record does not state it. A unit that contradicts the record is refused.
     time : str, optional
-        Channel that holds the stamps, where the record has another, or none.
+        Channel that holds the stamps, if the record assigns another one or none.
     time_unit : str, optional
-        Of the stamps, where the record does not say it.
+        Unit of the stamps, if the record does not state it.
     rate_hz : float, optional, Hz
-        The samples are evenly spaced: stamps that are rounded or missing are made of it. It may
-        not contradict stamps that there are.
+        For evenly spaced samples: replaces rounded or missing stamps. It must not contradict
+        existing stamps.
     sampling : {'instantaneous', 'mean'}, optional
-        Where the record does not say it; instantaneous if nothing does.
+        If the record does not state it; instantaneous by default.
 
     Returns
     -------
     DataFrame
         The table of a `RecordedTriad`: index ``time``, s; columns ``accel_x accel_y accel_z``,
-        m/s², or ``gyro_x gyro_y gyro_z``, rad/s, of the axes that there are. Axes with stamps of
-        their own have NaN in the rows of others. ``attrs``: ``sampling``, ``source`` (the file),
-        ``unit`` (as recorded), and ``findings``, a tuple of what a person should know.
+        m/s², or ``gyro_x gyro_y gyro_z``, rad/s, for the available axes. Axes with their own
+        stamps have NaN in the rows of others. ``attrs``: ``sampling``, ``source`` (the file),
+        ``unit`` (as recorded), and ``findings``, a tuple.
 
     Raises
     ------
     ConfigError
-        What is asked is contradictory, or no unit, axis or quantity.
+        The arguments are contradictory, or a unit, axis or quantity is unknown.
     DataError
-        There is no such channel, it holds another quantity, its unit is neither stated nor evident,
-        a value is missing, or time does not advance: with the row.
+        A channel does not exist or holds another quantity, its unit is not stated and not
+        evident, a value is missing, or time does not advance; with the row.
     """
     if quantity not in _COLUMNS:
         raise ConfigError(
@@ -238,7 +238,7 @@ def _check_finite(channel: CrashChannel, stamps: Array, values: Array) -> None:
     if endless.size or not there.size:
         hole = int(endless[0]) if endless.size else 0
     elif there.size > 1:
-        # Rows of other sensors lie between those of a slow one; a sample left out is a hole.
+        # Rows of other sensors lie between those of a slow one; only a missing sample is a gap.
         steps, rows = np.diff(stamps[there]), np.diff(there)
         together = steps[rows == 1]
         holes = (rows > 1) & (steps > HOLE * np.median(together if together.size else steps))
@@ -304,10 +304,10 @@ def _table(parts: list[_Axis], factors: dict[str, float], columns: list[str]) ->
     return pd.DataFrame(data, index=pd.Index(stamps, name="time"))
 
 
-# Stamps and values of one channel, from what the record has and what a case states of it.
+# Stamps and values of one channel, from the record and the case.
 
 
-# How far a stated rate may be from that of the stamps.
+# Largest relative difference between a stated rate and that of the stamps.
 RATE_AGREES = 0.01
 
 
@@ -319,16 +319,16 @@ def triad_stamps(
     rate_hz: float | None,
     findings: list[Finding],
 ) -> tuple[Array, Array]:
-    """Stamps in s and values of a channel.
+    """Return stamps in s and values of a channel.
 
     Parameters
     ----------
     record : CrashRecord
     channel : CrashChannel
     time, time_unit, rate_hz
-        As of `triad_of_channels`.
+        As in `triad_of_channels`.
     findings : list of Finding
-        What was concluded is added.
+        Inferences are appended.
 
     Returns
     -------
@@ -337,16 +337,16 @@ def triad_stamps(
     Raises
     ------
     ConfigError
-        What is stated contradicts the record, or itself.
+        Arguments contradict the record or each other.
     DataError
-        Nothing tells the stamps, or time does not advance.
+        Stamps are not known, or time does not advance.
     """
     if rate_hz is not None and not (math.isfinite(rate_hz) and rate_hz > 0.0):
         raise ConfigError("io.crash-rate-not-positive", quantity="rate_hz", rate_hz=rate_hz)
     if time is None and time_unit is None and rate_hz is None:
         stamps, values = channel.load()
         _check_advances(channel, stamps)
-        # What was concluded on the way is told again.
+        # Repeat the findings of the inference.
         if channel.clock and (own := _clock_of(record, channel.clock, None)).unit == "":
             findings.extend(seconds_of(own)[1])
         return stamps, values
@@ -422,7 +422,7 @@ def _even(
     findings: list[Finding],
     values: Array,
 ) -> Array:
-    """Evenly spaced stamps, from the first recorded one where there is one."""
+    """Make evenly spaced stamps, from the first recorded one if there is one."""
     count = np.arange(values.size, dtype=np.float64)
     start, span = 0.0, 0.0
     if name:
@@ -459,7 +459,7 @@ def _even(
 
 
 def _ends(clock: Clock, ends: Array, rate_hz: float, count: int) -> Array:
-    """First and last stamp in s; of a clock without a unit, in the one that fits the rate."""
+    """Return first and last stamp in s; without a unit, in the one that fits the rate."""
     from strapdown.constants import TIME_UNITS
 
     if not np.isfinite(ends).all():
@@ -492,11 +492,11 @@ def _check_advances(channel: CrashChannel, stamps: Array) -> None:
         )
 
 
-# The unit of a triad: as the record says it, as the case states it, or as its numbers tell it.
+# The unit of a triad: from the record, from the case, or inferred from the numbers.
 
 
 _TRIAD = {"acceleration": "accel", "rate": "gyro"}
-# What is shown of numbers that tell no unit.
+# Units shown for numbers whose unit is ambiguous.
 _CHOICES = {"acceleration": ("g", "m/s2"), "rate": ("deg/s", "rad/s")}
 
 
@@ -508,19 +508,19 @@ def triad_factor(
     stated: str | None,
     findings: list[Finding],
 ) -> tuple[dict[str, float], str]:
-    """Factors that turn the values of each axis into SI.
+    """Return the factors from the values of each axis to SI units.
 
     Parameters
     ----------
     record : CrashRecord
     axes : dict of str to (CrashChannel, ndarray)
-        Values are SI where the channel's unit is known, else as recorded.
+        Values are SI if the channel's unit is known, else as recorded.
     time : ndarray, (n,), s
     quantity : {'acceleration', 'rate'}
     stated : str or None
-        By the case.
+        Unit stated in the case.
     findings : list of Finding
-        What was concluded is added.
+        Inferences are appended.
 
     Returns
     -------
@@ -531,9 +531,9 @@ def triad_factor(
     Raises
     ------
     ConfigError
-        What is stated is no unit of the quantity, or contradicts the record.
+        The stated unit does not fit the quantity, or contradicts the record.
     DataError
-        Nothing tells the unit.
+        The unit is not known.
     """
     own = {a: c.unit for a, (c, _) in axes.items() if _known(c)}
     velocity = {c.quantity == "velocity" for c, _ in axes.values()}
@@ -555,7 +555,7 @@ def triad_factor(
         return dict.fromkeys(axes, 1.0), " ".join(dict.fromkeys(own.values()))
     if not wanted:
         if len(set(own.values())) == 1:
-            # One axis says it for the triad: a header is often filled in once.
+            # One axis decides for the triad: a header is often filled in only once.
             wanted = next(iter(own.values()))
             without = ", ".join(axes[a][0].name for a in open_axes)
             other = axes[next(iter(own))][0].name
@@ -588,7 +588,7 @@ def triad_factor(
 
 
 def _known(channel: CrashChannel) -> bool:
-    """Whether the values are in SI already."""
+    """Whether the values are in SI units already."""
     return factor_of(channel.quantity, channel.unit) is not None
 
 
@@ -632,7 +632,7 @@ def _evident(
 
 
 def _choices(block: list[Array], quantity: str) -> list[Finding]:
-    """The units that it may have, with the largest value in each."""
+    """List the possible units, with the largest value in each."""
     largest = max(float(np.nanmax(np.abs(b), initial=0.0)) for b in block)
     units = _CHOICES.get(quantity, tuple(FACTORS[quantity])[:3])
     return [

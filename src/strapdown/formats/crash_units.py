@@ -1,4 +1,4 @@
-"""Units of crash records: what a text means, as a quantity and a factor to SI."""
+"""Units of crash records: text to quantity and factor to SI."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from strapdown.formats.unit_words import unit_of as plain_unit_of
 
 __all__ = ["FACTORS", "factor_of", "state_unit", "unit_of"]
 
-#: Quantity to its units, each with the factor to SI. The mile, foot, inch and pound are those of
-#: the international agreement of 1959: 0.3048 m a foot, 0.45359237 kg a pound.
+#: Units of each quantity, with the factor to SI. Mile, foot, inch and pound are those of the
+#: international agreement of 1959: 0.3048 m per foot, 0.45359237 kg per pound.
 FACTORS: dict[str, dict[str, float]] = {
     "acceleration": dict(ACCEL_UNITS),
     "rate": dict(GYRO_UNITS),
@@ -20,7 +20,7 @@ FACTORS: dict[str, dict[str, float]] = {
     "time": dict(TIME_UNITS),
 }
 _QUANTITY = {unit: quantity for quantity, units in FACTORS.items() for unit in units}
-# As crash laboratories and recorders write them, beside the spellings of other logs.
+# Spellings of crash laboratories and recorders, in addition to those of other logs.
 _SPELLINGS = {
     "m/s2": "m/(s*s) m/(s^2) m/s*s m/ss m/sec2 m/sec^2 m/s**2 meters/sec/sec",
     "g": "g's g`s g-force gn g_n",
@@ -47,7 +47,7 @@ _UNIT_OF = {
 
 
 def unit_of(text: str) -> tuple[str, str] | None:
-    """Read a unit as a file writes it.
+    """Parse a unit as written in a file.
 
     Parameters
     ----------
@@ -57,8 +57,8 @@ def unit_of(text: str) -> tuple[str, str] | None:
     Returns
     -------
     (str, str) or None
-        The quantity, a key of `FACTORS`, and the unit, a key of its table; None where it is none
-        of them.
+        The quantity, a key of `FACTORS`, and the unit, a key of its table; None if the unit is
+        unknown.
     """
     plain = text.lower().replace(" ", "").strip("[]\t")
     unit = _UNIT_OF.get(plain) or _UNIT_OF.get(plain.strip("()")) or plain_unit_of(plain)
@@ -66,12 +66,12 @@ def unit_of(text: str) -> tuple[str, str] | None:
 
 
 def factor_of(quantity: str, unit: str) -> float | None:
-    """Factor to SI, or None where the unit is not known to be one of the quantity."""
+    """Return the factor to SI, or None if the quantity does not have the unit."""
     return FACTORS.get(quantity, {}).get(unit)
 
 
 def state_unit(text: str, quantity: str, key: str = "unit") -> str:
-    """Check a unit that a case states.
+    """Check a unit stated in a case.
 
     Parameters
     ----------
@@ -79,17 +79,17 @@ def state_unit(text: str, quantity: str, key: str = "unit") -> str:
     quantity : str
         A key of `FACTORS`.
     key : str
-        Of the case, for the message.
+        Key of the case, for the message.
 
     Returns
     -------
     str
-        In this package's spelling.
+        In the spelling of this package.
 
     Raises
     ------
     ConfigError
-        It is no unit of that quantity.
+        The quantity does not have this unit.
     """
     known = FACTORS[quantity]
     if text in known:

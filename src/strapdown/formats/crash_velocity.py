@@ -1,4 +1,4 @@
-"""Mean accelerations from a table of cumulative changes of velocity."""
+"""Mean accelerations from a table of cumulative velocity changes."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ Array = NDArray[np.float64]
 
 __all__ = ["mean_acceleration", "mean_accelerations_of"]
 
-# A table that begins one step after time zero leaves out the row of zeros.
+# A table that begins one step after time zero omits the row of zeros.
 ONE_STEP = 1.5
 
 
 def mean_acceleration(channel: CrashChannel) -> tuple[Array, Array]:
-    """Mean acceleration over each interval of a velocity channel.
+    """Compute the mean acceleration over each interval of a velocity channel.
 
     Parameters
     ----------
@@ -27,15 +27,15 @@ def mean_acceleration(channel: CrashChannel) -> tuple[Array, Array]:
     Returns
     -------
     time : ndarray, (n,), s
-        End of each interval, as sampling ``mean`` has it.
+        End of each interval, as for sampling ``mean``.
     acceleration : ndarray, (n,), m/s²
-        Change of velocity over the interval, divided by its length: exact, whatever happened
-        within it.
+        Change of velocity over the interval divided by its length; exact for any motion within
+        it.
 
     Raises
     ------
     DataError
-        The channel holds something else, has fewer than two samples, or a value is missing.
+        The quantity is not velocity, there are fewer than two samples, or a value is missing.
     """
     if channel.quantity != "velocity":
         raise DataError(
@@ -59,7 +59,7 @@ def mean_acceleration(channel: CrashChannel) -> tuple[Array, Array]:
 
 
 def starts_at_zero(time: Array, channel: CrashChannel) -> bool:
-    """Whether the table begins one step after the time zero from which its changes count."""
+    """Whether the table begins one step after the time zero of its changes."""
     counted = any("time zero" in r for r in channel.remarks)
     return counted and time.size > 1 and 0.0 < time[0] <= ONE_STEP * (time[1] - time[0])
 
@@ -67,7 +67,7 @@ def starts_at_zero(time: Array, channel: CrashChannel) -> bool:
 def mean_accelerations_of(
     time: ArrayLike, velocity: ArrayLike, *, from_zero: bool = False
 ) -> tuple[Array, Array]:
-    """Mean acceleration over each interval.
+    """Compute the mean acceleration over each interval.
 
     Parameters
     ----------
@@ -75,8 +75,8 @@ def mean_accelerations_of(
         Increasing.
     velocity : array_like, (n,), m/s
     from_zero : bool
-        The velocity is a change since time zero, at which it was none: the interval from there to
-        the first stamp is one, too.
+        Whether the velocity is a change since time zero: the interval from there to the first
+        stamp then counts, too.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Text tables: commas, semicolons, tabs or blanks, with a header line or without."""
+"""Text tables: commas, semicolons, tabs or blanks, with or without a header line."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ COMMENTS = ("#", "%", "//")
 _META = re.compile(r"(?:[#%]|//)\s*(\w+)\s*:\s*(.+?)\s*$")
 _SEPARATOR = re.compile(r"sep=.?", re.I)
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?|[+-]?nan|[+-]?inf(inity)?", re.I)
-# Numbers with a decimal comma, apart by blanks.
+# Numbers with a decimal comma, separated by blanks.
 _COMMAS = re.compile(r"[+-]?\d+(,\d+)?([eE][+-]?\d+)?(\s+[+-]?\d+(,\d+)?([eE][+-]?\d+)?)+")
 _DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:.*")
 _HEX = re.compile(r"[+-]?0x[0-9a-f]+", re.I)
-# What of a text is looked at to learn how its table begins, in bytes.
+# Bytes of a text that are examined to learn how its table begins.
 HEAD = 1 << 16
-# Zeros, and breaks of lines that few programs write.
+# Null bytes and unusual line breaks.
 _ODD = (b"\0", b"\x0b", b"\x0c", b"\x1c", b"\x1d", b"\x1e")
 
 
 def detect(path: Path) -> bool:
-    """Tell whether the name is that of a text table."""
+    """Whether the file name is that of a text table."""
     return path.is_file() and path.suffix.lower() in SUFFIXES
 
 
@@ -50,19 +50,19 @@ def read(path: Path) -> RawLog:
     -------
     RawLog
         Columns that hold anything but numbers are left as text. Lines at the top that begin
-        with ``#``, ``%``, ``//`` or ``;`` are comments; ``# sampling: mean`` among them is
+        with ``#``, ``%``, ``//`` or ``;`` are comments; the comment ``# sampling: mean`` is
         understood.
 
     Raises
     ------
     DataError
-        The file is empty, holds a header alone, or is no text.
+        The file is empty, holds only a header, or is not text.
     """
     return parse(path.read_bytes(), path.name, (path,))
 
 
 def parse(data: bytes, name: str, files: tuple[Path, ...]) -> RawLog:
-    """Read the columns of a text table that is a file, or a member of an archive.
+    """Read the columns of a text table from a file or a member of an archive.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def parse(data: bytes, name: str, files: tuple[Path, ...]) -> RawLog:
     name : str
         For messages.
     files : tuple of Path
-        Where it stands.
+        File that holds it.
 
     Returns
     -------
@@ -85,9 +85,9 @@ def parse(data: bytes, name: str, files: tuple[Path, ...]) -> RawLog:
 
 
 def _at_once(data: bytes, name: str, files: tuple[Path, ...]) -> RawLog | None:
-    """Columns of a text whose every line is as the first, which is read ten times faster.
+    """Parse a text whose lines are all like the first; ten times faster.
 
-    None where anything is odd, and the lines have to be looked at one by one.
+    None if anything is irregular: the lines then have to be parsed one by one.
     """
     if not data.endswith(b"\n") or not data.isascii() or any(c in data for c in _ODD):
         return None
@@ -102,7 +102,7 @@ def _at_once(data: bytes, name: str, files: tuple[Path, ...]) -> RawLog | None:
     start = 0
     for _ in range(first - 1):
         start = data.index(b"\n", start) + 1
-    # In the names of columns alone a quote is nothing odd.
+    # Quotes are regular only in the names of columns.
     if data.find(b'"', start) >= 0:
         return None
     columns = columns_at_once(data, len(top.names), top.separator, start)
@@ -126,7 +126,7 @@ def _line_by_line(data: bytes, name: str, files: tuple[Path, ...]) -> RawLog:
 
 @dataclass(frozen=True)
 class _Top:
-    """What the top of a table says, and the lines under it."""
+    """Top of a table, and the lines under it."""
 
     names: list[str]
     units: dict[str, str]
@@ -135,7 +135,7 @@ class _Top:
 
 
 def _numbered(text: str) -> tuple[list[tuple[int, str]], list[str]]:
-    """Lines that hold something, by their row, and apart from them the comments at the top."""
+    """Split into non-blank lines with their row numbers, and the comments at the top."""
     numbered = [(row, line) for row, line in enumerate(text.splitlines(), 1) if line.strip()]
     comments = [line for _, line in itertools.takewhile(lambda n: is_comment(n[1]), numbered)]
     return numbered[len(comments) :], comments
@@ -178,12 +178,12 @@ def _log(
 
 
 def decoded(data: bytes, name: str) -> tuple[str, list[Finding]]:
-    """Text of a file, and what was found on the way to it.
+    """Decode the text of a file and collect findings.
 
     Raises
     ------
     DataError
-        It is no text.
+        The content is not text.
     """
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return data.decode("utf-16", "replace"), []
@@ -200,7 +200,7 @@ def decoded(data: bytes, name: str) -> tuple[str, list[Finding]]:
 def is_comment(line: str) -> bool:
     """Whether a line is a comment, or Excel's ``sep=;``.
 
-    A semicolon begins one where it does not separate fields.
+    A semicolon begins a comment where it does not separate fields.
     """
     text = line.strip()
     if text.startswith(COMMENTS) or _SEPARATOR.fullmatch(text):
@@ -209,21 +209,21 @@ def is_comment(line: str) -> bool:
 
 
 def is_data(field: str) -> bool:
-    """Whether a field is a number, a date, a time of day, or missing, and no name."""
+    """Whether a field is a number, a date, a time of day, or missing; not a name."""
     if field in NULLS or is_day_time(field):
         return True
     return any(p.fullmatch(field) for p in (_NUMBER, _DATE, _HEX))
 
 
 def _units(line: str, separator: str | None, width: int) -> list[str] | None:
-    """Units of a second header line, where every field of it is one."""
+    """Return the units of a second header line, if every field is one."""
     fields = [f.strip("[]() ") for f in fields_of(line, separator)][:width]
     known = [unit_of(f) is not None for f in fields if f]
     return fields if len(fields) == width and known and all(known) else None
 
 
 def _above(comments: list[str], fields: list[str], separator: str | None) -> list[str]:
-    """Names of columns without a header: the last comment, where it is one; else numbers."""
+    """Name the columns without a header: by the last comment if it fits, else by numbers."""
     text = comments[-1].strip().lstrip("#%/;").strip() if comments else ""
     names = fields_of(text, separator)
     if len(names) == len(fields) and not any(is_data(n) for n in names):
@@ -241,7 +241,7 @@ def _unique(names: list[str]) -> list[str]:
 
 
 def separator_of(line: str) -> str | None:
-    """The separator of a line; None stands for any run of blanks."""
+    """Return the separator of a line; None for any run of blanks."""
     for candidate in ("\t", ";", ","):
         if candidate in line:
             return None if candidate == "," and _COMMAS.fullmatch(line.strip()) else candidate
@@ -249,7 +249,7 @@ def separator_of(line: str) -> str | None:
 
 
 def fields_of(line: str, separator: str | None) -> list[str]:
-    """Fields of a line, without the blanks and quotes around them."""
+    """Split a line into fields, without the blanks and quotes around them."""
     if separator is not None and '"' in line:
         import csv
 
@@ -265,7 +265,7 @@ def _whole_lines(
     name: str,
     findings: list[Finding],
 ) -> tuple[list[int], list[str]]:
-    """Return rows and lines of one width; a last line that was cut is left out."""
+    """Return rows and lines of one width; drop a truncated last line."""
     rows, lines = [], []
     amid: list[tuple[int, str]] = []
     ended = text.endswith(("\n", "\r"))
@@ -317,7 +317,7 @@ def _count(line: str, separator: str | None) -> int:
 def _was_cut(
     line: str, before: list[tuple[int, str]], width: int, separator: str | None, ended: bool
 ) -> bool:
-    """Tell whether the last line stops in the middle of a field, or before the last one."""
+    """Whether the last line ends within a field, or before the last one."""
     fields = fields_of(line, separator)
     if len(fields) < width:
         return True
@@ -326,23 +326,23 @@ def _was_cut(
     ends = [fields_of(other, separator)[-1] for _, other in before]
     if not all(_NUMBER.fullmatch(e) for e in ends):
         return False
-    # Without a line end the last number may have lost digits; where all others have the same
-    # number of decimals, that shows.
+    # Without a line end the last number may have lost digits; it shows if all others have the same
+    # number of decimals.
     decimals = {len(e.partition(".")[2]) for e in ends}
     short = len(decimals) == 1 and len(fields[-1].partition(".")[2]) < decimals.pop()
     return not _NUMBER.fullmatch(fields[-1]) or short
 
 
 def _parse(lines: list[str], count: int, separator: str | None, name: str) -> Columns:
-    """Parse the lines under the header, each number to the double nearest to it."""
+    """Parse the lines under the header, each number to the nearest double."""
     decimal = "," if _comma_is_decimal(lines, separator) else "."
     if separator is None:
         lines = ["\t".join(line.split()) for line in lines]
-    # Arrow reads 0xFFF0 as a number; what a sensor meant by it is not known.
+    # Arrow reads 0xFFF0 as a number, but its meaning for a sensor is unknown.
     odd = next((line for line in lines if "0x" in line or "0X" in line), "")
     hexadecimal = [k for k, f in enumerate(fields_of(odd, separator)) if _HEX.fullmatch(f)]
     body = "\n".join(lines).encode()
-    # Between blanks a quote is a letter.
+    # With blanks as separators, a quote is an ordinary character.
     quote: str | Literal[False] = '"' if separator else False
     between = separator or "\t"
     try:
@@ -360,7 +360,7 @@ def _comma_is_decimal(lines: list[str], separator: str | None) -> bool:
 
 
 def write(path: Path, columns: dict[str, NDArray[Any]], comments: dict[str, str]) -> None:
-    """Write columns as text, each number in the fewest digits that give it back exactly.
+    """Write columns as text, with the fewest digits that reproduce each number exactly.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Columns of numbers out of lines of text, all at once."""
+"""Fast parsing of text lines into numeric columns."""
 
 from __future__ import annotations
 
@@ -12,34 +12,34 @@ from numpy.typing import NDArray
 __all__ = ["NULLS", "Columns", "columns_at_once", "parsed", "single_blanks"]
 
 Columns = list[NDArray[Any]]
-#: What programs write for a value that is not there.
+#: Texts of missing values.
 NULLS = ("", "nan", "NaN", "NAN", "-nan", "NA", "N/A", "NULL", "null", "None")
-#: From this many bytes on the first of them tell what is a number.
+#: From this many bytes on, the first lines decide which columns are numeric.
 LONG = 1 << 22
 
 
 def columns_at_once(
     data: bytes, count: int, separator: str | None, start: int = 0
 ) -> Columns | None:
-    """Columns of lines of one width.
+    """Parse columns of lines of equal width.
 
     Parameters
     ----------
     data : bytes
-        ASCII, from `start` on without quotes; the last line has its end.
+        ASCII, without quotes from `start` on; the last line ends with a line break.
     count : int
-        Columns.
+        Number of columns.
     separator : str or None
-        Between fields; None for any run of blanks.
+        Separator of fields; None for any run of blanks.
     start : int
-        Letters before the first of these lines.
+        Characters before the first of these lines.
 
     Returns
     -------
     list of ndarray, or None
-        As `parsed`. None where a line has another width, is empty, or holds what may be no number.
+        As `parsed`. None if a line has another width, is empty, or may hold non-numbers.
     """
-    # A comma may be a decimal sign, and an x that of a hexadecimal number.
+    # A comma may be a decimal sign, and an x part of a hexadecimal number.
     odd = (b"x", b"X", *(() if separator == "," else (b",",)))
     if count < 2 or any(data.find(c, start) >= 0 for c in odd):
         return None
@@ -47,12 +47,12 @@ def columns_at_once(
         data, start = data[start:].replace(b"\r\n", b"\n"), 0
         if b"\r" in data:
             return None
-    # No copy: a text may be half of the memory there is.
+    # No copy: a text may take half of the memory.
     columns = _parsed_or_none(memoryview(data)[start:], count, separator or " ")
     if columns is not None and all(_full(c) for c in columns):
         return columns
     body = data[start:]
-    # A value that is missing may be two blanks beside each other, or a line without any.
+    # A missing value may be two adjacent blanks, or a line without any.
     if separator is None:
         body = single_blanks(body)
         columns = _parsed_or_none(body, count, " ")
@@ -75,20 +75,20 @@ def _full(column: NDArray[Any]) -> bool:
 
 
 def single_blanks(text: bytes) -> bytes:
-    """Lines with one blank between fields, and none before the first or after the last.
+    """Reduce runs of blanks to one between fields, with none at the ends of a line.
 
     Parameters
     ----------
     text : bytes
-        Fields apart by blanks and tabs.
+        Fields separated by blanks and tabs.
 
     Returns
     -------
     bytes
-        The same object where it was so.
+        The same object if unchanged.
     """
     text = text.replace(b"\t", b" ")
-    # Runs of up to 300 blanks in four passes; longer ones in as many as they need.
+    # Four passes reduce runs of up to 300 blanks; longer ones take more passes.
     for run in (16, 4, 3, 2):
         text = text.replace(b" " * run, b" ")
     while b"  " in text:
@@ -105,29 +105,29 @@ def parsed(
     quote: str | Literal[False] = '"',
     text: Sequence[int] = (),
 ) -> Columns:
-    """Parse lines, each number to the double nearest to it.
+    """Parse lines, each number to the nearest double.
 
     Parameters
     ----------
     body : bytes or memoryview
         UTF-8, without a header.
     count : int
-        Columns.
+        Number of columns.
     delimiter, decimal : str
     quote : str or False
-        Around fields that hold the delimiter.
+        Quote around fields that hold the delimiter.
     text : sequence of int
-        Columns that are left as they stand.
+        Columns to keep as text.
 
     Returns
     -------
     list of ndarray, (n,)
-        Numbers as numbers with NaN for what is missing, dates as dates, the rest as text.
+        Numbers with NaN for missing values, dates as dates, the rest as text.
 
     Raises
     ------
     pyarrow.ArrowInvalid
-        A line has another number of fields.
+        A line has the wrong number of fields.
     """
     import pyarrow as pa
 
@@ -137,7 +137,7 @@ def parsed(
     asked = {str(k): pa.string() for k in text}
     table = None
     if len(body) > LONG:
-        # Where a type is not stated, all of the text is kept until it is known.
+        # Where a type is not stated, Arrow keeps all of the text until it is known.
         with suppress(pa.ArrowInvalid):
             top = bytes(body[:LONG])
             seen = read(top[: top.rfind(b"\n") + 1], asked).schema
@@ -146,7 +146,7 @@ def parsed(
     if table is None:
         table = read(body, asked)
     columns = []
-    # One after the other, so that no more than one stands there twice.
+    # Column by column, so that at most one is in memory twice.
     for _ in range(count):
         columns.append(_array(table.column(0)))
         table = table.remove_column(0)
@@ -183,7 +183,7 @@ def _table(
 
 
 def _array(column: Any) -> NDArray[Any]:
-    """Numbers as numbers with NaN for what is missing, dates as dates, the rest as text."""
+    """Convert to numbers with NaN for missing values, to dates, or to text."""
     kind = str(column.type)
     if kind in ("int64", "double"):
         values: NDArray[Any] = column.to_numpy()

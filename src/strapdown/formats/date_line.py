@@ -1,4 +1,4 @@
-"""A line on the map, cut where it crosses the date line."""
+"""Splitting of a line on a map where it crosses the date line."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ def cut_at_date_line(points: Array) -> list[Array]:
     Parameters
     ----------
     points : ndarray, (n, m)
-        Two or more; longitude in deg first, then anything that is interpolated with it. From
-        point to point the line goes the shorter way around.
+        Two or more; longitude in deg first, then any values to interpolate with it. Between
+        points the line takes the shorter way around.
 
     Returns
     -------
     list of ndarray, (k, m)
-        Parts with longitudes within -180 to 180 deg, of two points or more; where the line
-        crosses, one part ends at 180 or -180 deg and the next begins at the other.
+        Parts with longitudes within -180 to 180 deg, of two points or more; at a crossing one
+        part ends at 180 or -180 deg and the next begins at the other.
     """
     lon = np.degrees(np.unwrap(np.radians(points[:, 0])))
-    # What is within a turn already keeps its digits.
+    # Longitudes within a turn already are kept to the last digit.
     turns = np.round((lon - points[:, 0]) / 360.0)
     line = points.copy()
     line[:, 0] += 360.0 * turns
     whole = _with_crossings(line)
     middle = 0.5 * (whole[:-1, 0] + whole[1:, 0])
     cells = np.floor((middle + 180.0) / 360.0).astype(np.int64)
-    # A stretch along the date line itself stays with what was before it.
+    # A section along the date line itself stays with the part before it.
     for k in np.flatnonzero(np.remainder(middle, 360.0) == 180.0):
         cells[k] = cells[k - 1] if k else cells[k]
     parts = []
@@ -48,11 +48,11 @@ def cut_at_date_line(points: Array) -> list[Array]:
 
 
 def _with_crossings(line: Array) -> Array:
-    """The line with a point more wherever it crosses 180 deg, plus any number of turns."""
+    """Insert a point wherever the line crosses 180 deg, plus any number of turns."""
     rows = [line[:1]]
     for a, b in pairwise(line):
         low, high = sorted((a[0], b[0]))
-        # The one odd multiple of 180 deg inside of a step of less than a half turn.
+        # The only odd multiple of 180 deg within a step of less than half a turn.
         edge = 360.0 * np.ceil((low - 180.0) / 360.0) + 180.0
         if low < edge < high:
             crossing = a + (edge - a[0]) / (b[0] - a[0]) * (b - a)

@@ -1,4 +1,4 @@
-"""Times of day as stamps: 13:05:58.200, with a date before it or without."""
+"""Times of day as stamps: 13:05:58.200, with or without a date before it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _TIME = re.compile(
     r"(?:\d{1,2}[./-]\d{1,2}[./-]\d{2,4}[ T]+)?(\d{1,2}):([0-5]\d):([0-5]\d)(?:[.,:](\d{1,9}))?"
 )
 _DAY = 86_400 * 10**9
-# What falls by more than half a day has passed midnight.
+# A decrease of more than half a day is midnight.
 _HALF_DAY = _DAY // 2
 
 
@@ -24,7 +24,7 @@ def is_day_time(field: str) -> bool:
 
 
 def day_nanoseconds(texts: NDArray[Any]) -> NDArray[np.int64] | None:
-    """Nanoseconds since the midnight before the first, of a column of times of day.
+    """Convert times of day to nanoseconds since the midnight before the first.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def day_nanoseconds(texts: NDArray[Any]) -> NDArray[np.int64] | None:
     Returns
     -------
     ndarray of int, (n,), or None
-        None where one of them is none. After midnight it goes on; dates are not read.
+        None if one is not a time of day. Counting continues past midnight; dates are ignored.
     """
     found = [None if t is None else _TIME.fullmatch(str(t).strip()) for t in texts]
     if not found or any(m is None or int(m[1]) > 23 for m in found):

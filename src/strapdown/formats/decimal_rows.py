@@ -1,4 +1,4 @@
-"""Rows of numbers as text with fixed decimals: faster than the shortest form that is exact."""
+"""Fast writing of rows of numbers with fixed decimals."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 __all__ = ["write_decimals"]
 
 Array = NDArray[np.float64]
-# Rows that are turned to text at once.
+# Rows converted to text at once.
 PIECE = 1 << 15
 
 
@@ -31,12 +31,12 @@ def write_decimals(
     columns : sequence of ndarray, (n,)
         Finite numbers.
     decimals : sequence of int
-        Of each column, 0 to 15. A number is off by half a unit of its last decimal at most, and
-        by what a double holds of it.
+        Decimals of each column, 0 to 15. The error of a number is at most half a unit of its
+        last decimal, plus the precision of a double.
     separator : str
-        One letter of ASCII.
+        One ASCII character.
     head : str
-        Written before; with its line feeds.
+        Header text, with its line feeds.
     """
     from strapdown._kernels.decimal_text import WIDTH, decimal_text
 

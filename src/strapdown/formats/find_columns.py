@@ -1,4 +1,4 @@
-"""Which column of a file is which quantity."""
+"""Assignment of the columns of a file to quantities."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ AXES = "xyz"
 
 @dataclass(frozen=True)
 class Column:
-    """A column of the file that a quantity was found in."""
+    """The column of a file that holds a quantity."""
 
     source: str
     unit: str | None
@@ -35,7 +35,7 @@ def find_columns(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
     ----------
     raw : RawLog
     options : ReadOptions
-        Its `columns` go before what the file states, and that before what names suggest.
+        Its `columns` override what the file states, which overrides column names.
 
     Returns
     -------
@@ -45,7 +45,7 @@ def find_columns(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
     Raises
     ------
     ConfigError
-        Two columns could be one quantity, or an option names what is not there.
+        Two columns fit one quantity, or an option names a column that does not exist.
     """
     found = {
         quantity: Column(source, unit, "stated by the file")
@@ -78,7 +78,7 @@ def find_columns(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
 
 
 def require_gyro(raw: RawLog, found: dict[str, Column]) -> None:
-    """Refuse a log without three rates, and say what it has.
+    """Refuse a log without three rates; the message lists its columns.
 
     Raises
     ------
@@ -100,11 +100,11 @@ def require_gyro(raw: RawLog, found: dict[str, Column]) -> None:
 
 
 def _refuse_nameless(raw: RawLog) -> NoReturn:
-    """Show what stands in columns without names, by which a person can tell them apart."""
+    """Refuse columns without names, and show values by which the user can identify them."""
     example = "time=1,gyro_x=2,gyro_y=3,gyro_z=4"
     if len(raw.columns) >= 7:
         example += ",accel_x=5,accel_y=6,accel_z=7"
-    # Increments of KF-GINS are the usual layout of seven.
+    # Seven columns are usually increments of KF-GINS.
     raise DataError(
         "io.nameless-seven-columns" if len(raw.columns) == 7 else "io.nameless-columns",
         file=raw.name,
@@ -121,7 +121,7 @@ def _by_name(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
         quantity = read_name(name).quantity
         if quantity is None or quantity in TRIADS:
             continue
-        # Of an array of four, nothing says that the first three are x, y and z.
+        # An array of four need not begin with x, y and z.
         if (part := INDEXED.fullmatch(name)) and _width(raw, part.group(1)) != 3:
             continue
         candidates.setdefault(quantity, []).append(name)
@@ -131,10 +131,10 @@ def _by_name(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
         if quantity in asked:
             continue
         if len(names) > 1 and quantity == "time":
-            # A clock that says its unit goes before one that does not.
+            # A clock that states its unit is preferred.
             names = [n for n in names if _unit_of(raw, n)] or names
         if len(names) > 1:
-            # Rates go before the increments that stand beside them.
+            # Rates are preferred to increments.
             names = [n for n in names if not says_increment(n)] or names
         if len(names) > 1:
             raise ConfigError(
@@ -161,7 +161,7 @@ def _members(quantity: str) -> list[str]:
 
 
 def _asked(raw: RawLog, quantity: str, source: str) -> list[tuple[str, str]]:
-    """Resolve one ``quantity=source`` of the user to columns that exist."""
+    """Resolve one ``quantity=source`` of the user to existing columns."""
     names = list(raw.columns)
     if quantity in TRIADS:
         if members := _three_of(raw, quantity, source):
@@ -185,7 +185,7 @@ def _width(raw: RawLog, array: str) -> int:
 
 
 def _three_of(raw: RawLog, quantity: str, source: str) -> list[str]:
-    """Columns of an array of three, of three in a wider array, or of three names in x, y, z."""
+    """Resolve an array of three, three columns of a wider array, or three names in x, y, z."""
     base, _, index = source.partition("[")
     width = _width(raw, base)
     if width > 3 and not index:
@@ -212,7 +212,7 @@ def _three_of(raw: RawLog, quantity: str, source: str) -> list[str]:
 
 
 def _is_axis(name: str, prefix: str, axis: str) -> bool:
-    """Tell whether a name is the prefix and one axis, units and case apart."""
+    """Whether a name is the prefix and one axis, ignoring units and case."""
     said = read_name(name).quantity
     plain = name.lower()
     if not plain.startswith(prefix.lower()):

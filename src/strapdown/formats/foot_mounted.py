@@ -1,9 +1,9 @@
-"""MATLAB files of a unit on a shoe, with the places that were trodden on.
+"""MATLAB files of a foot-mounted unit, with surveyed control points.
 
-The layout of https://github.com/mtahakoroglu/LLIO-aided-iPyShoe: ``imu_data`` (n, 6), specific
-force in m/s² and rates in rad/s along forward, right, down; ``timestamps`` s. Where control points
-were surveyed: ``GCP`` (m, 2), north and east in m from a mark and a direction of one's own, and
-``strideIndex``, the sample, counted from zero, in which the foot stood on each.
+Layout of https://github.com/mtahakoroglu/LLIO-aided-iPyShoe: ``imu_data`` (n, 6), specific force in
+m/s² and rates in rad/s along forward, right, down; ``timestamps`` s. With control points: ``GCP``
+(m, 2), north and east in m from an arbitrary origin and direction, and ``strideIndex``, the sample,
+counted from zero, at which the foot was on each point.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ COLUMNS = [*(f"accel_{a}" for a in "xyz"), *(f"gyro_{a}" for a in "xyz")]
 
 
 def detect(path: Path) -> bool:
-    """Tell by the names of the arrays."""
+    """Detect by the names of the arrays."""
     return set(LOG) <= _names(path)
 
 
 def detect_points(path: Path) -> bool:
-    """Tell by the names of the arrays."""
+    """Detect by the names of the arrays."""
     return {*LOG, *POINTS} <= _names(path)
 
 
@@ -42,7 +42,7 @@ def _names(path: Path) -> set[str]:
 
     try:
         return {name for name, _, _ in whosmat(path)}
-    except Exception:  # what is damaged is told by the reader of MATLAB files
+    except Exception:  # damage is reported by the reader of MATLAB files
         return set()
 
 
@@ -88,7 +88,7 @@ def read(path: Path) -> RawLog:
     Raises
     ------
     DataError
-        The file is damaged, or its arrays have other shapes.
+        The file is damaged, or its arrays have the wrong shapes.
     """
     time, imu = _log(path)
     stated: dict[str, tuple[str, str | None]] = {"time": ("time", "s")}
@@ -113,14 +113,14 @@ def read_points(path: Path) -> tuple[Array, Array]:
     Returns
     -------
     time : ndarray, (m,), s
-        When the foot stood on each.
+        Times at which the foot was on each point.
     places : ndarray, (m, 2), m
         North and east.
 
     Raises
     ------
     DataError
-        As `read`; or a point has no sample, or there are not as many of both.
+        As `read`; or the numbers of points and samples differ, or a sample does not exist.
     """
     time, _ = _log(path)
     arrays = _arrays(path, *POINTS)

@@ -1,4 +1,4 @@
-"""Places and velocities as tables may call them: of fixes and of trajectories alike."""
+"""Column names of positions and velocities in tables of fixes and of trajectories."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def _velocities(letter: str, word: str) -> tuple[str, ...]:
     return tuple(h + e for h in _HEADS for e in (letter, word)) + tuple(word + h for h in _HEADS)
 
 
-#: Degrees, metres over the ellipsoid, and metres a second; a velocity up is one down, negative.
+#: Degrees, meters over the ellipsoid, meters per second; velocity up is negative velocity down.
 GEODETIC_QUANTITIES: dict[str, Quantity] = {
     "lat": Quantity(("lat", "latitude"), ANGLES),
     "lon": Quantity(("lon", "lng", "long", "longitude"), ANGLES),

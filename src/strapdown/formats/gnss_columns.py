@@ -1,4 +1,4 @@
-"""Fixes of a table whose columns have names: text, Parquet."""
+"""GNSS fixes from tables with column names: text, Parquet."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ _SD_HEADS = ("sd", "std", "stddev", "stdev", "sigma", "s")
 
 
 def _sds(*words: str) -> tuple[str, ...]:
-    """Names of a standard deviation: the word for it before or after what it is of."""
+    """List names of a standard deviation, with the word for it before or after the quantity."""
     return tuple(h + w for h in _SD_HEADS for w in words) + tuple(
         w + h for h in _SD_HEADS[:-1] for w in words
     )
 
 
-#: What a table of fixes may hold, as it may be called.
+#: Quantities of a table of fixes, with their possible names.
 QUANTITIES: dict[str, Quantity] = {
     "time": Quantity(
         (*TIMES, *CLOCKS, "gpssecondsofweek", "secondsofweek", "utc", "datetime", "date"),
@@ -83,12 +83,12 @@ _NEEDED = ("time", *GEODETIC)
 
 
 def detect(path: Path) -> bool:
-    """Tell by the ending."""
+    """Detect by the suffix."""
     return csv.detect(path) or parquet.detect(path)
 
 
 def read(path: Path, options: GnssOptions) -> Fixes:
-    """Read the fixes of a table by the names of its columns.
+    """Read the fixes of a table by its column names.
 
     Parameters
     ----------
@@ -98,21 +98,21 @@ def read(path: Path, options: GnssOptions) -> Fixes:
     Returns
     -------
     Fixes
-        Names may carry a unit, as ``lat_deg``, ``vN [km/h]``, ``sdU_m``; without one those of a
-        Gnss table are taken. A column ``Q`` has the codes of RTKLIB, ``quality`` those of NMEA.
+        Names may carry a unit, as ``lat_deg``, ``vN [km/h]``, ``sdU_m``; the default units are
+        those of a Gnss table. A column ``Q`` has the codes of RTKLIB, ``quality`` those of NMEA.
 
     Raises
     ------
     DataError
-        Time or the place is missing, two columns could be one quantity, a unit is none, or the
-        only height is over the sea.
+        Time or the position is missing, two columns fit one quantity, a unit is unknown, or the
+        only height is above the geoid.
     """
     raw = parquet.read(path) if parquet.detect(path) else csv.read(path)
     return fixes_of_columns(raw, options)
 
 
 def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
-    """Fixes of columns by their names; see `read`."""
+    """Convert named columns to fixes; see `read`."""
     found = find_quantities(raw.columns, QUANTITIES, options.columns, raw.name, raw.units)
     over_sea = "alt" not in found and "alt_msl" in found
     missing = [q for q in _NEEDED if q not in found and not (q == "alt" and over_sea)]
@@ -189,7 +189,7 @@ def _height(found: dict[str, Found], values: Callable[[str], Array], raw: RawLog
 
 
 def _velocity(raw: RawLog, velocity: Array | None) -> Array | None:
-    """The same; a speed with a course is no velocity, for nothing says how fast it climbs."""
+    """Return the velocity; note that speed with course is not used: the vertical part is open."""
     words = [w for name in raw.columns for w in re.split(r"[^a-z]+", name.lower())]
     if velocity is None and {"speed", "sog"} & set(words) and {"course", "cog"} & set(words):
         raw.findings.append(

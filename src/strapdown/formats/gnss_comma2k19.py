@@ -1,17 +1,17 @@
-"""Fixes of the receiver of a comma2k19 segment, dated on the clock of its inertial sensors.
+"""Fixes of the receiver of a comma2k19 segment, on the clock of its inertial sensors.
 
-The layout of https://github.com/commaai/comma2k19 (README, "Log Format"): in
-``processed_log/GNSS`` ``live_gnss_ublox`` and ``live_gnss_qcom``, each of an array ``t``, seconds
+Layout of https://github.com/commaai/comma2k19 (README, "Log Format"): in
+``processed_log/GNSS`` ``live_gnss_ublox`` and ``live_gnss_qcom``, each with an array ``t``, seconds
 since the device started, and an array ``value`` of six columns: latitude and longitude in deg,
-speed in m/s, UTC, altitude in m, bearing in deg; and the same with ``__`` for the slashes and
-``.npy`` at the end. UTC counts from 1970, by the README in seconds, in the segments in
-milliseconds. The altitude is over the ellipsoid: in the segment of the README's example the pose
-of the camera is 1.1 m below it, and the geoid is 32 m below the ellipsoid there.
+speed in m/s, UTC, altitude in m, bearing in deg; or the same with ``__`` for the slashes and the
+suffix ``.npy``. UTC counts from 1970, in seconds by the README, in milliseconds in the segments.
+The altitude is above the ellipsoid: in the segment of the README's example the pose of the camera
+is 1.1 m below it, and the geoid is 32 m below the ellipsoid there.
 
-``t`` is when a fix was written, by the clock that the inertial sensors count by, too, and UTC is
-when it was measured. No fix is written before it is measured, so that the least of ``t`` less UTC
-is what is nearest to the difference of both clocks: a fix is dated by its UTC and this difference.
-What all of them are late by stays in it.
+``t`` is when a fix was written, on the clock of the inertial sensors, and UTC is when it was
+measured. No fix is written before it is measured, so the smallest ``t`` minus UTC is the best
+estimate of the difference of the clocks: a fix is dated by its UTC plus this difference, which
+includes the latency common to all fixes.
 """
 
 from __future__ import annotations
@@ -30,21 +30,21 @@ __all__ = ["belongs", "detect", "files_of", "read"]
 
 Array = NDArray[np.float64]
 
-#: The first that is there is taken: ten fixes a second, and one in two seconds.
+#: The first one present is used: ten fixes per second, and one in two seconds.
 RECEIVERS = ("live_gnss_ublox", "live_gnss_qcom")
 COLUMNS = 6
-#: From here on a number of UTC is in ms: as seconds it would be of the year 5138.
+#: From this value on UTC is in ms: as seconds it would be in the year 5138.
 IN_MS = 1e11
 AGAIN = "get the segment again from its source"
 
 
 def detect(path: Path) -> bool:
-    """Tell whether a folder has the arrays of a receiver."""
+    """Whether a folder has the arrays of a receiver."""
     return bool(files_of(path))
 
 
 def belongs(path: Path) -> bool:
-    """Tell whether a file is one of the arrays of a receiver."""
+    """Whether a file is one of the arrays of a receiver."""
     parts = (path.resolve().parent.name, *path.stem.split("__"))
     return path.name.split("__")[-1] in ("t", "value", "t.npy", "value.npy") and any(
         receiver in parts for receiver in RECEIVERS
@@ -52,13 +52,13 @@ def belongs(path: Path) -> bool:
 
 
 def files_of(path: Path) -> tuple[Path, ...]:
-    """Stamps and values of the receiver of a folder; nothing where there is none.
+    """Find the stamps and values of the receiver of a folder; empty if there is none.
 
     Parameters
     ----------
     path : Path
-        The folder of a segment, its ``processed_log``, ``GNSS`` in it, that of one receiver, or
-        that of the arrays.
+        The folder of a segment, its ``processed_log``, ``GNSS`` in it, the folder of one
+        receiver, or the folder of the arrays.
     """
     if not path.is_dir():
         return ()
@@ -87,13 +87,13 @@ def read(path: Path, options: GnssOptions) -> Fixes:
     Returns
     -------
     Fixes
-        Without standard deviations. Speed and bearing are a velocity north and east; down is not
-        measured.
+        Without standard deviations. Speed and bearing are converted to velocity north and
+        east; down is not measured.
 
     Raises
     ------
     DataError
-        An array is damaged or has another shape.
+        An array is damaged or has the wrong shape.
     """
     t_file, value_file = files_of(path)
     name = path.resolve().name
@@ -131,7 +131,7 @@ def read(path: Path, options: GnssOptions) -> Fixes:
 
 
 def _dated(t: Array, utc: Array, name: str, findings: list[Finding]) -> Array:
-    """When each fix was measured, on the clock of the stamps."""
+    """Compute when each fix was measured, on the clock of the stamps."""
     if not (np.isfinite(utc).all() and np.isfinite(t).all() and (np.diff(utc) > 0.0).all()):
         findings.append(
             Finding("io.not-every-fix-utc-later", file=name, quantity="time", severity="note")

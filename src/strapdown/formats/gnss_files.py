@@ -1,4 +1,4 @@
-"""Fixes of satellite receivers from files: one reader a format, and the one table of them."""
+"""GNSS fixes from files: one reader per format, and the registry of readers."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ __all__ = ["GNSS_READERS", "GnssOptions", "GnssReader", "files_of_fixes", "read_
 
 @dataclass(frozen=True)
 class GnssReader:
-    """How one format of fixes is recognised and read."""
+    """How one format of fixes is recognized and read."""
 
     title: str
     detect: Callable[[Path], bool]
     read: Callable[[Path, GnssOptions], Fixes]
 
 
-#: In the order in which they are tried.
+#: In the order of detection.
 GNSS_READERS: dict[str, GnssReader] = {
     "comma2k19": GnssReader(
         "receiver of a comma2k19 segment, its folder", gnss_comma2k19.detect, gnss_comma2k19.read
@@ -59,7 +59,7 @@ GNSS_READERS: dict[str, GnssReader] = {
 
 
 def files_of_fixes(path: str | Path) -> tuple[Path, ...]:
-    """The files that fixes are read from: one, or several of a folder.
+    """List the files that fixes are read from: one, or several of a folder.
 
     Parameters
     ----------
@@ -72,25 +72,24 @@ def files_of_fixes(path: str | Path) -> tuple[Path, ...]:
 
 
 def read_gnss(path: str | Path, options: GnssOptions | None = None) -> pd.DataFrame:
-    """Read the fixes of a satellite receiver.
+    """Read the fixes of a GNSS receiver.
 
     Parameters
     ----------
     path : str or Path
     options : GnssOptions, optional
-        What the user says about it.
+        User's statements about the file.
 
     Returns
     -------
     DataFrame
-        A Gnss table, time as it stands in the file: ``attrs`` say its clock (`clocks`), its
-        ``source`` and its ``findings``. A velocity that is not there has an infinite standard
-        deviation.
+        A Gnss table with the time of the file; ``attrs`` has the clock (`clocks`), ``source``
+        and ``findings``. A missing velocity has an infinite standard deviation.
 
     Raises
     ------
     ConfigError
-        There is no such file, no such format, or `options` name what is not in it.
+        The file or format does not exist, or `options` names a column that it does not have.
     DataError
         The file cannot be used; the message names file, row, quantity and remedy.
     """

@@ -1,4 +1,4 @@
-"""What the readers of fixes have in common: their options, and what every fix is checked for."""
+"""Common part of the readers of GNSS fixes: options, and checks of every fix."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ __all__ = ["Fixes", "GnssOptions", "table_of_fixes"]
 Array = NDArray[np.float64]
 Sd = float | tuple[float, float, float]
 
-#: What receivers reach, m.
+#: Typical accuracies of receivers, m and m/s.
 POSITION_SDS = "0.02 suits RTK, 1 a code receiver with corrections, 5 one without"
 VELOCITY_SDS = "0.05 suits RTK, 0.3 a code receiver by Doppler, 1 one that differences places"
 
 
 @dataclass(frozen=True)
 class GnssOptions:
-    """What the user says about a file of fixes; whatever is None is taken from the file.
+    """User's statements about a file of fixes; None means as in the file.
 
     Attributes
     ----------
@@ -35,15 +35,15 @@ class GnssOptions:
         A key of `gnss_files.GNSS_READERS`.
     columns : dict of str to str
         Quantity (``time``, ``lat`` …, as in a Gnss table) to the name of its column, or its
-        number counted from 1.
+        number, from 1.
     position_sd, velocity_sd : float or tuple of float, optional, m and m/s
-        Standard deviations north, east, down, or one for all three: of each fix, in place of
+        Standard deviations north, east, down, or one for all three, for each fix; they replace
         those of the file.
     unstated_position_sd, unstated_velocity_sd : float, optional, m and m/s
-        Taken where the file states none; `attrs` of the table then have ``position_sd_taken``,
+        Used where the file states none; `attrs` of the table then has ``position_sd_taken``,
         ``velocity_sd_taken``.
     repair : bool
-        Leave out rows that cannot be used, and say how many, instead of refusing the file.
+        Drop and count rows that cannot be used, instead of refusing the file.
     """
 
     format: str | None = None
@@ -70,14 +70,14 @@ class GnssOptions:
 
 @dataclass
 class Fixes:
-    """Fixes as a file has them, in the units of a Gnss table; NaN where nothing stands.
+    """Fixes from a file, in the units of a Gnss table; NaN where missing.
 
     Attributes
     ----------
     name : str
     time : ndarray, (n,), s
     place : ndarray, (n, 3)
-        Latitude and longitude in deg, height over the ellipsoid in m.
+        Latitude and longitude in deg, height above the ellipsoid in m.
     rows : ndarray of int, (n,)
         Row of the file, counted from 1.
     clock : Clock
@@ -86,7 +86,7 @@ class Fixes:
     quality : ndarray, (n,), or None
         As field 6 of NMEA 0183 GGA.
     zero_is_unknown : bool
-        A standard deviation of zero stands for one that is not known.
+        A standard deviation of zero means unknown.
     findings : list of Finding
     """
 
@@ -104,7 +104,7 @@ class Fixes:
 
 
 def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
-    """Make a Gnss table of fixes, or say what is wrong with them.
+    """Convert fixes to a Gnss table, or report their fault.
 
     Parameters
     ----------
@@ -114,13 +114,13 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        A Gnss table; ``attrs`` say its clock (`clocks`) and its `findings`.
+        A Gnss table; ``attrs`` has its clock (`clocks`) and its `findings`.
 
     Raises
     ------
     DataError
-        A stamp or a place is no number, time does not advance, a standard deviation is zero,
-        negative, or nowhere stated, or as `gnss_table`.
+        A stamp or position is not a number, time does not advance, a standard deviation is
+        zero, negative or not stated, or as `gnss_table`.
     """
     count = fixes.time.size
     asked, taken = options.position_sd, {}
@@ -157,15 +157,15 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
 
 
 def first_of(rows: NDArray[np.int64]) -> int | None:
-    """The first of rows that follow one another; None where some between are left out."""
+    """Return the first of consecutive rows; None if some between were dropped."""
     return int(rows[0]) if int(rows[-1]) - int(rows[0]) == len(rows) - 1 else None
 
 
-# --- time and place ---------------------------------------------------------------------
+# --- time and position ------------------------------------------------------------------
 
 
 def _time(fixes: Fixes, options: GnssOptions) -> tuple[Array, NDArray[np.bool_]]:
-    """Stamps that go on over the end of a week, and the rows that are later than all before."""
+    """Unwrap stamps across the end of a week; select rows later than all before."""
     time = fixes.time
     bad = np.flatnonzero(~np.isfinite(time))
     if bad.size and not options.repair:
@@ -213,7 +213,7 @@ def _time(fixes: Fixes, options: GnssOptions) -> tuple[Array, NDArray[np.bool_]]
 
 
 def _placed(fixes: Fixes, quality: Array, options: GnssOptions) -> NDArray[np.bool_]:
-    """Rows with a place; those of quality 0 may be without."""
+    """Select the rows with a position; fixes of quality 0 may lack it."""
     there = np.asarray(np.isfinite(fixes.place).all(axis=1))
     bad = np.flatnonzero(~there & (quality != 0.0))
     if bad.size and not options.repair:
@@ -248,7 +248,7 @@ def _say_left_out(fixes: Fixes, keep: NDArray[np.bool_], code: str) -> None:
 
 
 def _velocity(fixes: Fixes, asked: Sd | None, count: int) -> tuple[Array, Array]:
-    """Velocity, and its standard deviation: infinite where none was measured."""
+    """Return velocity and its standard deviation: infinite where not measured."""
     if fixes.velocity is None:
         return np.zeros((count, 3)), np.full((count, 3), np.inf)
     sd = _sd(fixes, "velocity", asked, count)

@@ -1,8 +1,8 @@
-"""Fixes as KF-GINS has them: seven columns without a header, or thirteen with velocity.
+"""Fixes of KF-GINS: seven columns without a header, or thirteen with velocity.
 
-Each line: GPS seconds of week; latitude, longitude in deg, height over the ellipsoid in m, of the
-antenna; standard deviations north, east, down in m; and where there are thirteen columns velocity
-north, east, down and its standard deviations in m/s.
+Each line: GPS seconds of week; latitude, longitude in deg, height above the ellipsoid in m, of the
+antenna; standard deviations north, east, down in m; and, with thirteen columns, velocity north,
+east, down and its standard deviations in m/s.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ WITH_VELOCITY = (*NAMES, "VN", "VE", "VD", "VN_sd", "VE_sd", "VD_sd")
 
 
 def detect(path: Path) -> bool:
-    """Tell by rows of seven or thirteen numbers without a header."""
+    """Detect by rows of seven or thirteen numbers without a header."""
     if not path.is_file() or path.suffix.lower() not in csv.SUFFIXES:
         return False
     with path.open("rb") as stream:
@@ -53,7 +53,7 @@ def read(path: Path, options: GnssOptions) -> Fixes:
     Raises
     ------
     DataError
-        It has other columns, a value is no number, or the numbers are those of inertial sensors.
+        The number of columns differs, a value is not a number, or the data are inertial.
     """
     if kf_gins.detect(path):
         raise DataError("io.these-increments-inertial-sensors-not", file=path.name)
@@ -70,7 +70,7 @@ def read(path: Path, options: GnssOptions) -> Fixes:
 
 
 def fixes_of(raw: RawLog, names: tuple[str, ...]) -> Fixes:
-    """Fixes of columns in a known order."""
+    """Convert columns in a known order to fixes."""
     values = {
         name: np.asarray(numbers(raw, Column(column, None, ""), name), dtype=np.float64)
         for name, column in zip(names, raw.columns, strict=True)

@@ -1,12 +1,12 @@
 """GnssLogger of Android, and ``device_imu.csv`` of the Google Smartphone Decimeter Challenge.
 
-One line a sample, the kind first: ``UncalGyro,1663164669189,65972053803181,…``. What the fields are
-is in LOGGING_FORMAT.md of https://github.com/google/gps-measurement-tools: ``utcTimeMillis`` (that
-of the phone's clock), ``elapsedRealtimeNanos`` since the phone was started, three values in rad/s,
-m/s² or µT about the axes of the phone, and three biases that Android estimates and that are not
-taken off. ``device_imu.csv`` is the same table with a header (kaggle.com/competitions/
-smartphone-decimeter-2022/data). ``Fix`` is a place, height over the ellipsoid of WGS 84 (Android,
-Location.getAltitude).
+One line per sample, the kind first: ``UncalGyro,1663164669189,65972053803181,…``. The fields are
+defined in LOGGING_FORMAT.md of https://github.com/google/gps-measurement-tools: ``utcTimeMillis``
+(the phone's clock), ``elapsedRealtimeNanos`` since the phone was started, three values in rad/s,
+m/s² or µT about the axes of the phone, and three biases estimated by Android, which are not
+subtracted. ``device_imu.csv`` is the same table with a header (kaggle.com/competitions/
+smartphone-decimeter-2022/data). ``Fix`` is a position, with height above the ellipsoid of WGS 84
+(Android, Location.getAltitude).
 """
 
 from __future__ import annotations
@@ -54,27 +54,27 @@ FIX_FIELDS = {
     "bearing": ("BearingDegrees",),
     "bearing_sd": ("BearingAccuracyDegrees",),
 }
-# Of places: those of the receiver before those that are fused with the phone's other sensors.
+# Providers of positions, in order of preference: the receiver before sensor fusion.
 PROVIDERS = ("gps", "gt", "flp", "fused")
-# The radius that holds 68 % of a circular normal distribution, in standard deviations (Android,
+# Radius of 68 % of a circular normal distribution, in standard deviations (Android,
 # Location.getAccuracy): 1 - exp(-r²/2) = 0.68.
 RADIUS = float(np.sqrt(-2.0 * np.log(0.32)))
-# Heights of receivers are known about half as well as places, where nothing says how well.
+# Standard deviation of an unstated vertical accuracy, relative to the horizontal one.
 UNSTATED_VERTICAL = 2.0
-# The two clocks of a phone may drift, and its clock of the day be set, by this within a log.
+# Largest drift of the phone's two clocks, or setting of its wall clock, within a log.
 MOST_DRIFT = 0.05  # s
 HEAD = 1 << 16  # bytes
 
 
 def detect(path: Path) -> bool:
-    """Tell by the header of the table, or by the comments that say the fields of each kind."""
+    """Detect by the header of the table, or by the comments that define the fields."""
     return _has(path, lambda line: line.startswith(HEADER)) or _has(
         path, lambda line: _is_description(line, ("UncalGyro", "Gyro"))
     )
 
 
 def detect_fixes(path: Path) -> bool:
-    """Tell by the comment that says the fields of a fix, or by a header with the same names."""
+    """Detect by the comment that defines the fields of a fix, or by a header with those names."""
     return _has(path, lambda line: _is_description(line, (FIX,)) or _is_fix_header(line))
 
 
@@ -97,7 +97,7 @@ def _is_fix_header(line: str) -> bool:
 
 
 def read(path: Path) -> RawLog:
-    """Read gyro, accelerometer and magnetometer, and join them on the stamps of the gyro.
+    """Read gyro, accelerometer and magnetometer, joined on the stamps of the gyro.
 
     Parameters
     ----------
@@ -106,13 +106,13 @@ def read(path: Path) -> RawLog:
     Returns
     -------
     RawLog
-        Stamps in ns since 1970: those since the start of the phone, which advance evenly, with
-        the median of what its clock of the day is ahead.
+        Stamps in ns since 1970: the evenly advancing time since the phone's start, plus the
+        median offset of its wall clock.
 
     Raises
     ------
     DataError
-        A line is damaged, or there is no gyro.
+        A line is damaged, or the log has no gyro.
     """
     findings: list[Finding] = []
     lines = _lines(path)
@@ -156,17 +156,17 @@ def read_fixes(path: Path, options: GnssOptions) -> Fixes:
     ----------
     path : Path
     options : GnssOptions
-        Not used here.
+        Not used.
 
     Returns
     -------
     Fixes
-        Stamps in s since 1970, on the clock of the sensors where the log has them.
+        Stamps in s since 1970, on the clock of the sensors if the log has it.
 
     Raises
     ------
     DataError
-        There is no fix, or a line is damaged.
+        The log has no fix, or a line is damaged.
     """
     findings: list[Finding] = []
     lines = _lines(path)
@@ -212,7 +212,7 @@ def read_fixes(path: Path, options: GnssOptions) -> Fixes:
                 unstated_vertical=UNSTATED_VERTICAL,
             )
         )
-    # Of a velocity whose speed or bearing is not stated, nothing is used; down nothing is known.
+    # Velocity needs both speed and bearing; the vertical velocity is never known.
     speed, speed_sd = values("speed"), values("speed_sd")
     bearing, bearing_sd = np.radians(values("bearing")), np.radians(values("bearing_sd"))
     down = np.full(speed.size, np.nan)
@@ -236,7 +236,7 @@ def read_fixes(path: Path, options: GnssOptions) -> Fixes:
 
 
 def _lines(path: Path) -> dict[str, list[tuple[int, str]]]:
-    """Lines by their kind, each with its row; a last line that was cut is left out."""
+    """Group lines by their kind, each with its row; drop a truncated last line."""
     text, _ = csv.decoded(path.read_bytes(), path.name)
     found: dict[str, list[tuple[int, str]]] = {}
     wanted = {k for kinds, _ in KINDS.values() for k in kinds} | {FIX}
@@ -255,7 +255,7 @@ def _lines(path: Path) -> dict[str, list[tuple[int, str]]]:
 def _table(
     path: Path, lines: list[tuple[int, str]], names: Iterable[str]
 ) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
-    """Fields of lines of one kind by their names; what stands behind the named ones is not read."""
+    """Return the fields of lines of one kind by name; fields after the named ones are ignored."""
     known = list(names)
     width = lines[0][1].count(",") + 1
     odd = next(((row, ln) for row, ln in lines if ln.count(",") + 1 != width), None)
@@ -286,7 +286,7 @@ def _whole(stamps: NDArray[Any], path: Path, rows: NDArray[np.int64]) -> NDArray
 
 
 def _ahead(path: Path, lines: dict[str, list[tuple[int, str]]], findings: list[Finding]) -> int:
-    """How far the clock of the day is ahead of that since the start of the phone, in ns."""
+    """Compute how far the wall clock is ahead of the time since the phone's start, in ns."""
     kind = next((k for k in ("Gyro", "UncalGyro") if lines.get(k)), None)
     if kind is None:
         return 0

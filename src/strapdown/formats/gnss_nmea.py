@@ -1,9 +1,9 @@
-"""Fixes of a receiver's sentences (NMEA 0183): GGA, with RMC, VTG, ZDA and GST of its instant.
+"""Fixes from NMEA 0183 sentences: GGA, with RMC, VTG, ZDA and GST of the same instant.
 
-Sentences of one instant follow each other. GGA has the place, its quality and the height over the
-geoid with that of the geoid; RMC and ZDA the date; GST the standard deviations of latitude,
-longitude and height; RMC or VTG speed and true course over ground, a velocity north and east.
-None says how fast it climbs.
+Sentences of one instant are consecutive. GGA has the position, its quality, the height above the
+geoid and the geoid undulation; RMC and ZDA the date; GST the standard deviations of latitude,
+longitude and height; RMC or VTG speed and true course over ground, for the velocity north and east.
+The vertical velocity is not stated.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _NAN3 = (np.nan, np.nan, np.nan)
 
 
 def detect(path: Path) -> bool:
-    """Tell by a sentence among the first lines."""
+    """Detect by a sentence among the first lines."""
     if not path.is_file():
         return False
     with path.open("rb") as stream:
@@ -41,7 +41,7 @@ def detect(path: Path) -> bool:
 
 @dataclass
 class _Epoch:
-    """What the sentences of one time of day say."""
+    """Sentences of one time of day."""
 
     row: int
     time: float
@@ -53,7 +53,7 @@ class _Epoch:
 
 
 def read(path: Path, options: GnssOptions) -> Fixes:
-    """Read the fixes of sentences.
+    """Read the fixes of NMEA sentences.
 
     Parameters
     ----------
@@ -63,13 +63,13 @@ def read(path: Path, options: GnssOptions) -> Fixes:
     Returns
     -------
     Fixes
-        On the clock of 1970 where a date is in it, otherwise in seconds of the first day.
-        Sentences whose checksum is wrong are left out, and counted.
+        In seconds since 1970 if a date is stated, otherwise in seconds of the first day.
+        Sentences with a wrong checksum are dropped and counted.
 
     Raises
     ------
     DataError
-        It holds no GGA, a field of one is no number, or a GGA is without the height of the geoid.
+        The file has no GGA, a field is not a number, or a GGA lacks the geoid undulation.
     """
     text, findings = csv.decoded(path.read_bytes(), path.name)
     epochs: list[_Epoch] = []
@@ -144,7 +144,7 @@ def _take(epochs: list[_Epoch], kind: str, fields: list[str], row: int, file: st
             ) from None
 
     if kind == "VTG":
-        # It has no time: it goes with what came before it, where that has no velocity yet.
+        # Without a time: belongs to the epoch before it, if that has no velocity yet.
         if epochs and np.isnan(epochs[-1].velocity[0]):
             epochs[-1].velocity = _over_ground(number(4, "speed"), number(0, "course"))
         return
@@ -183,7 +183,7 @@ def _take(epochs: list[_Epoch], kind: str, fields: list[str], row: int, file: st
 
 
 def _over_ground(knots: float, course_deg: float) -> tuple[float, float, float]:
-    """Velocity north and east, m/s; where it stands, it has no course."""
+    """Compute velocity north and east, m/s; a stationary receiver has no course."""
     speed, course = _KNOT * knots, np.radians(course_deg)
     if speed == 0.0:
         return (0.0, 0.0, np.nan)
@@ -204,7 +204,7 @@ def _day(year: int, month: int, day: int) -> float | None:
 
 
 def _times(fixed: list[_Epoch]) -> tuple[np.ndarray, Clock]:
-    """Seconds since 1970 where a date stands somewhere; midnight is counted over."""
+    """Return seconds since 1970 if a date is stated, unwrapped at midnight, and the clock."""
     time = np.array([e.time for e in fixed])
     days = np.cumsum(np.concatenate([[0.0], np.diff(time) < -0.5 * _DAY]))
     dated = next((k for k, e in enumerate(fixed) if e.day is not None), None)

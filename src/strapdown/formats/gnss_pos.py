@@ -1,9 +1,9 @@
-"""Fixes that RTKLIB has solved (``.pos``).
+"""Fixes from solutions of RTKLIB (``.pos``).
 
-Lines of ``%`` at the top say how the file was made; the last of them names the columns, and its
-first word the time system. Time is a date or a GPS week with its seconds; the place is in degrees,
-in degrees, minutes and seconds, or Cartesian. A standard deviation of two axes, as ``sdne``, is the
-root of the size of their covariance, with its sign. Layout: RTKLIB 2.4.3 manual, appendix B.1.
+Lines of ``%`` at the top describe the file; the last names the columns, and its first word
+is the time system. Time is a date, or a GPS week with its seconds; the position is in degrees, in
+degrees, minutes and seconds, or Cartesian. ``sdne`` and similar are the square root of the
+magnitude of a covariance, with its sign. Layout: RTKLIB 2.4.3 manual, appendix B.1.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ __all__ = ["QUALITY", "detect", "read"]
 Array = NDArray[np.float64]
 SUFFIX = ".pos"
 #: RTKLIB's Q (1 fix, 2 float, 3 SBAS, 4 DGPS, 5 single, 6 PPP, 7 dead reckoning) to field 6 of
-#: NMEA 0183 GGA, as RTKLIB itself writes it; SBAS is differential.
+#: NMEA 0183 GGA, as RTKLIB writes it; SBAS is differential.
 QUALITY = {0: 0, 1: 4, 2: 5, 3: 2, 4: 2, 5: 1, 6: 3, 7: 6}
-# What is added to make a time system that of UTC, in s; GPST needs nothing.
+# Offset that converts a time system to UTC, in s; GPST needs no conversion.
 _TO_UTC = {"UTC": 0.0, "JST": -9.0 * 3600.0}
 _HEAD = re.compile(r"%\s*(GPST|UTC|JST)\b[\s,;\t]*(.*)", re.I)
 _DAYS_OF_1980 = 3657  # from 1970-01-01 to 1980-01-06
@@ -40,7 +40,7 @@ _AGAIN = "write it again with RTKLIB, as lat/lon/height over the ellipsoid"
 
 
 def detect(path: Path) -> bool:
-    """Tell by the name, or by the line that names the columns."""
+    """Detect by the name, or by the line that names the columns."""
     if not path.is_file():
         return False
     if path.suffix.lower() == SUFFIX:
@@ -58,7 +58,7 @@ def _header(line: str) -> re.Match[str] | None:
 
 @dataclass(frozen=True)
 class _Layout:
-    """What the header says."""
+    """Content of the header."""
 
     system: str
     names: list[str]
@@ -67,7 +67,7 @@ class _Layout:
 
 
 def read(path: Path, options: GnssOptions) -> Fixes:
-    """Read the fixes of a solution of RTKLIB.
+    """Read the fixes of an RTKLIB solution.
 
     Parameters
     ----------
@@ -77,14 +77,14 @@ def read(path: Path, options: GnssOptions) -> Fixes:
     Returns
     -------
     Fixes
-        Time in seconds of the GPS week of the first row: UTC is brought to it
-        with its leap seconds, JST with nine hours more.
+        Time in seconds of the GPS week of the first row: UTC is converted with its leap
+        seconds, JST with nine more hours.
 
     Raises
     ------
     DataError
-        No line names the columns, it is a baseline and no place, heights are over the geoid or
-        the datum is another, or a row is damaged.
+        No line names the columns, the solution is a baseline, heights are above the geoid, the
+        datum is another, or a row is damaged.
     """
     text, findings = _decoded(path)
     lines = text.splitlines()
@@ -165,7 +165,7 @@ def _layout(lines: list[str], file: str, findings: list[Finding]) -> _Layout:
 def _columns(
     lines: list[str], layout: _Layout, ended: bool, file: str, findings: list[Finding]
 ) -> tuple[dict[str, Array], NDArray[np.int64]]:
-    """Numbers by name; a date is six of them, degrees with minutes and seconds three."""
+    """Return numbers by name; a date has six, degrees with minutes and seconds three."""
     held = [(k, line) for k, line in enumerate(lines, 1) if line.strip() and line[0] != "%"]
     if not held:
         raise DataError("io.header-no-solution-under", file=file, row=layout.row)
@@ -193,7 +193,7 @@ def _columns(
             )
     rows = np.array([row for row, _ in plain], dtype=np.int64)
     text = "".join(f"{' '.join(line.split())}\n" for _, line in plain)
-    # Of whole numbers a zero has no sign, and of degrees it says the hemisphere.
+    # An integer zero loses its sign, and the sign of the degrees is the hemisphere.
     body = text.replace(" -0 ", " -0.0 ").encode()
     columns = columns_at_once(body, len(names), None) if body.isascii() else None
     if columns is None or any(c.dtype.kind not in "iuf" for c in columns):
@@ -220,7 +220,7 @@ def _refuse_words(plain: list[tuple[int, str]], names: list[str], file: str) -> 
 def _time(
     columns: dict[str, Array], layout: _Layout, file: str, rows: NDArray[np.int64]
 ) -> tuple[Array, int]:
-    """Seconds of the GPS week of the first row, and that week."""
+    """Return seconds of the GPS week of the first row, and that week."""
     if "week" in columns:
         weeks, seconds = columns["week"], columns["tow"]
     else:
@@ -232,7 +232,7 @@ def _time(
         seconds = seconds + 60.0 * columns["minute"] + columns["second"]
     if layout.system in _TO_UTC:
         utc = WEEK * weeks + seconds + 86400.0 * _DAYS_OF_1980 + _TO_UTC[layout.system]
-        # Whole seconds: nothing is rounded where they are added.
+        # Whole seconds: their sum is exact.
         seconds = seconds + _TO_UTC[layout.system] + leap_seconds(utc)
     bad = np.flatnonzero(~np.isfinite(weeks + seconds) | (weeks < 0.0))
     if bad.size:
@@ -243,7 +243,7 @@ def _time(
     return np.asarray(WEEK * (weeks - first) + seconds), int(first)
 
 
-# --- places and velocities --------------------------------------------------------------
+# --- positions and velocities -----------------------------------------------------------
 
 
 def _stack(named: dict[str, Array], names: list[str]) -> Array | None:
@@ -292,7 +292,7 @@ def _ecef(named: dict[str, Array]) -> _Four:
 def _turned_sd(
     named: dict[str, Array], own: list[str], pairs: list[str], to_level: Array
 ) -> Array | None:
-    """Standard deviations north, east, down of a covariance along the axes of the Earth."""
+    """Rotate a covariance from Earth axes; return standard deviations north, east, down."""
     sd, between = _stack(named, own), _stack(named, pairs)
     if sd is None:
         return None
@@ -305,6 +305,6 @@ def _turned_sd(
             P[:, i, j] = P[:, j, i] = signed[:, column]
     C = rotation.dcm_from_quaternion(to_level)
     turned = np.einsum("nij,njk,nik->ni", C, P, C)
-    # Zeros in any of the three are unknown along the Earth's axes, and so along all others.
+    # A zero in any of the three means unknown, and therefore unknown in all rotated axes.
     turned[(sd == 0.0).any(axis=1)] = 0.0
     return np.asarray(np.sqrt(np.maximum(turned, 0.0)))

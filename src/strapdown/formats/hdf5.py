@@ -1,4 +1,4 @@
-"""HDF5 files, and MATLAB's v7.3, which is one."""
+"""HDF5 files, including MATLAB v7.3."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 def detect(path: Path) -> bool:
-    """Tell whether the content is HDF5; MATLAB puts 512 bytes of its own before it."""
+    """Whether the content is HDF5; MATLAB prepends 512 bytes."""
     if not path.is_file() or path.suffix.lower() not in SUFFIXES:
         return False
     with path.open("rb") as stream:
@@ -44,7 +44,7 @@ def read(path: Path) -> RawLog:
     Raises
     ------
     DataError
-        It is no HDF5 file, is damaged, or claims more than it holds.
+        The file is not HDF5, is damaged, or declares more data than it holds.
     """
     arrays, units, meta = read_arrays(path)
     return raw_log(path, arrays, units, meta)
@@ -53,13 +53,13 @@ def read(path: Path) -> RawLog:
 def read_arrays(
     path: Path, only: Collection[str] | None = None
 ) -> tuple[dict[str, NDArray[Any]], dict[str, str], dict[str, Any]]:
-    """Read arrays, their ``unit`` attributes, and what the file says of itself.
+    """Read arrays, their ``unit`` attributes, and the attributes of the file.
 
     Parameters
     ----------
     path : Path
     only : collection of str, optional
-        Names of the datasets that are read; all, if not given.
+        Names of the datasets to read; all if not given.
 
     Returns
     -------
@@ -116,7 +116,7 @@ def _dataset(item: h5py.Dataset, name: str, file: str) -> NDArray[Any]:
 def write(
     path: Path, arrays: dict[str, NDArray[Any]], units: dict[str, str], meta: dict[str, str]
 ) -> None:
-    """Write arrays with their units; the same arrays give the same bytes.
+    """Write arrays with their units; equal input gives identical bytes.
 
     Parameters
     ----------

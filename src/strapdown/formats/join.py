@@ -1,4 +1,4 @@
-"""Logs of single sensors, each with its own stamps, joined on the stamps of the gyro."""
+"""Joining of single-sensor logs, each with its own stamps, on the stamps of the gyro."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ __all__ = ["at_stamps", "clock_of", "in_seconds", "join", "known_only", "with_co
 Array = NDArray[np.float64]
 AXES = "xyz"
 TRIADS = ("accel", "mag")
-# A sensor that has values for less of the gyro's samples than this is left out; of more, the
+# A sensor that covers a smaller fraction of the gyro's samples is dropped; if it covers more, the
 # gyro's samples outside it are.
 COVERED = 0.9
 
 
 @dataclass(frozen=True)
 class Clock:
-    """Stamps as they stand in a log, and their unit where it is known."""
+    """Stamps as in a log, and their unit if known."""
 
     ticks: NDArray[Any]
     unit: str | None
@@ -44,33 +44,33 @@ def join(
     *,
     rows_of_member: bool = False,
 ) -> RawLog:
-    """Bring an accelerometer and a magnetometer to the stamps of the gyro.
+    """Interpolate accelerometer and magnetometer to the stamps of the gyro.
 
-    Values between two samples lie on the straight line between them; nothing is extrapolated.
+    Interpolation is linear; there is no extrapolation.
 
     Parameters
     ----------
     logs : sequence of RawLog
-        One of them has the gyro. Their clocks count from the same moment, in whatever unit.
+        One has the gyro. Their clocks have a common origin; units may differ.
     name : str
-        Of the whole, for messages.
+        Name of the result, for messages.
     files : tuple of Path, optional
-        Every file that was read; if not given, those of the logs.
+        Every file that was read; by default those of the logs.
     rows_of_member : bool
-        Call the whole by the gyro's log, which stands in a folder or an archive, because rows
+        Name the result after the gyro's log, a member of a folder or an archive, because rows
         are counted in that.
 
     Returns
     -------
     RawLog
-        The rows of the gyro's log, less those for which another sensor has no value; columns
-        are called ``log/column``. What was interpolated, over how far, and what was left out
-        stands in its findings.
+        The rows of the gyro's log, without those for which another sensor has no value; columns
+        are named ``log/column``. The findings list interpolations with their distances, and
+        dropped rows.
 
     Raises
     ------
     DataError
-        No log has a gyro; clocks have no time in common; a value is no number; axes differ.
+        No log has a gyro; clocks do not overlap; a value is not a number; axes differ.
     ConfigError
         Two logs have the same quantity.
     """
@@ -134,17 +134,17 @@ def join(
 
 
 def known_only(stated: dict[str, tuple[str, str | None]]) -> dict[str, tuple[str, str | None]]:
-    """Leave out the quantities that nothing is made of here."""
+    """Keep only the quantities that are used here."""
     return {source: said for source, said in stated.items() if said[0] in QUANTITIES}
 
 
 def clock_of(log: RawLog, found: dict[str, Column]) -> Clock:
-    """Stamps of a log.
+    """Return the stamps of a log.
 
     Raises
     ------
     DataError
-        There are none, or they are no numbers.
+        The log has no stamps, or they are not numbers.
     """
     if "time" not in found:
         raise DataError(
@@ -158,7 +158,7 @@ def clock_of(log: RawLog, found: dict[str, Column]) -> Clock:
 
 
 def in_seconds(clock: Clock, origin: Clock) -> Array:
-    """Seconds since the first stamp of another clock; whole ticks are subtracted exactly."""
+    """Convert to seconds since the first stamp of another clock; ticks subtract exactly."""
     first = origin.ticks[np.argmax(np.isfinite(origin.ticks.astype(np.float64)))]
     ours, theirs = TIME_UNITS[clock.unit or "s"], TIME_UNITS[origin.unit or "s"]
     if clock.unit == origin.unit:
@@ -167,12 +167,12 @@ def in_seconds(clock: Clock, origin: Clock) -> Array:
 
 
 def at_stamps(time: Array, own: Array, values: Array) -> tuple[Array, NDArray[np.bool_], float]:
-    """Values on the straight line between the samples on each side of a stamp.
+    """Interpolate samples linearly to stamps.
 
     Parameters
     ----------
     time : ndarray, (n,)
-        Where values are wanted.
+        Stamps of the output.
     own : ndarray, (m,)
         Increasing stamps of the samples.
     values : ndarray, (m, 3)
@@ -183,7 +183,7 @@ def at_stamps(time: Array, own: Array, values: Array) -> tuple[Array, NDArray[np
         NaN before the first sample and after the last.
     inside : ndarray of bool, (n,)
     distance : float
-        The largest from a stamp inside to the sample nearest to it.
+        Largest distance from a stamp inside to its nearest sample.
     """
     inside = (time >= own[0]) & (time <= own[-1])
     out = np.column_stack(
@@ -222,7 +222,7 @@ def _onto(
     triad: str,
     findings: list[Finding],
 ) -> tuple[Array | None, NDArray[np.bool_]]:
-    """A triad at the stamps of the gyro, and where it has values."""
+    """Return a triad at the stamps of the gyro, and where it has values."""
     values = np.column_stack(
         [numbers(log, theirs[f"{triad}_{a}"], f"{triad}_{a}").astype(np.float64) for a in AXES]
     )
@@ -287,14 +287,14 @@ def _onto(
                 length=longest.length,
             )
         )
-    # A stamp of the gyro that is no number is refused, or repaired, with the gyro's own.
+    # A gyro stamp that is not a number is refused or repaired together with the gyro.
     return np.where(known[:, None], out, 0.0), inside | ~known
 
 
 def _in_order(
     stamps: Array, values: Array, name: str, triad: str, findings: list[Finding]
 ) -> tuple[Array, Array]:
-    """Samples with increasing stamps, without those that are no numbers."""
+    """Keep samples with increasing stamps, without those that are not numbers."""
     use = np.isfinite(stamps) & np.isfinite(values).all(axis=1)
     order = np.flatnonzero(use)[np.argsort(stamps[use], kind="stable")]
     order = order[np.diff(stamps[order], prepend=-np.inf) > 0]
@@ -329,19 +329,19 @@ def _short(log: RawLog) -> str:
 
 
 def _wide(ticks: Any) -> Any:
-    """Whole numbers of the widest kind, so that a difference does not overflow."""
+    """Convert integers to the widest type, so that differences do not overflow."""
     array = np.asarray(ticks)
     return array.astype(np.int64) if array.dtype.kind in "iub" else array.astype(np.float64)
 
 
 def with_columns(logs: Sequence[RawLog], options: ReadOptions) -> list[RawLog]:
-    """Logs with the columns that the user named, as if the logs stated them.
+    """Return logs with the columns that the user named, as if the logs stated them.
 
     Parameters
     ----------
     logs : sequence of RawLog
     options : ReadOptions
-        A column is named as it stands in its log, or as ``log/column``.
+        A column is named as in its log, or as ``log/column``.
 
     Returns
     -------
@@ -350,7 +350,7 @@ def with_columns(logs: Sequence[RawLog], options: ReadOptions) -> list[RawLog]:
     Raises
     ------
     ConfigError
-        A column that is in no log was named.
+        A named column is in no log.
     """
     asked: list[dict[str, str]] = [{} for _ in logs]
     for quantity, source in options.columns.items():

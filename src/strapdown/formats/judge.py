@@ -1,4 +1,4 @@
-"""What the numbers say against, or instead of, what a log and its user state."""
+"""Checks of the statements of a log and its user against the numbers."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from strapdown.formats.summed import SUMS, sum_of
 
 Array = NDArray[np.float64]
 UNITS = {"gyro": GYRO_UNITS, "accel": ACCEL_UNITS, "mag": MAG_UNITS}
-# Of numbers that may be raw counts; the sensor is that of most boards (InvenSense, MPU-6000 and
-# MPU-6050 Product Specification, revision 3.4, sections 6.1 and 6.2).
+# Sensor suggested for raw counts, that of most boards (InvenSense, MPU-6000 and MPU-6050 Product
+# Specification, revision 3.4, sections 6.1 and 6.2).
 _COUNTS = {"gyro": "io.example-gyro-counts", "accel": "io.example-accel-counts"}
 # Axes with each axis of the sensor up.
 _EXAMPLES = {"z": "x,-y,-z", "y": "-z,x,-y", "-y": "z,x,y", "x": "y,z,-x", "-x": "y,-z,x"}
-# What is shown of the numbers of a unit that nothing tells.
+# Values shown for a unit that the numbers leave open.
 _CHOICES = {"gyro": ("rad/s", "deg/s"), "accel": ("m/s2", "g"), "mag": ("uT", "gauss")}
 
 
 def inferred_unit(
     triad: str, said: dict[str, Inference], values: Array, file: str, findings: list[Finding]
 ) -> tuple[str, str]:
-    """The unit of a triad that nothing states, from its numbers.
+    """Infer the unit of a triad, which is not stated, from its numbers.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def inferred_unit(
     values : ndarray, (n, 3)
     file : str
     findings : list of Finding
-        What was concluded is added.
+        Inferences are appended.
 
     Returns
     -------
@@ -45,7 +45,7 @@ def inferred_unit(
     Raises
     ------
     DataError
-        The numbers do not tell it to 0.99, or they are increments.
+        The probability does not reach 0.99, or the numbers are increments.
     """
     unit = said.get(f"{triad}_unit")
     form = said.get(f"{triad}_form")
@@ -71,9 +71,9 @@ def _likely(unit: Inference | None) -> str | None:
 
 
 def _undecided(triad: str, unit: Inference | None, values: Array) -> Finding:
-    """The unit that the user has to state, with what each of the likely ones makes of the values.
+    """Make the error for a unit that the user must state, with the values in likely units.
 
-    Raw counts are whole numbers; a magnetometer has no option that states its unit.
+    Raw counts are integers. The unit of a magnetometer has no option.
     """
     largest = float(np.nanmax(np.abs(np.where(np.isfinite(values), values, np.nan)), initial=0.0))
     counts = None
@@ -94,7 +94,7 @@ def _undecided(triad: str, unit: Inference | None, values: Array) -> Finding:
 
 
 def what_numbers_say(unit: Inference | None) -> dict[str, Any]:
-    """Return the data of a sentence on a unit that the numbers leave open."""
+    """Return the data for the message on a unit that the numbers leave open."""
     if unit is None:
         return {}
     return {"threshold": THRESHOLD, "evidence": unit.evidence, "shares": unit.shares()}
@@ -121,23 +121,23 @@ def report_contradictions(
     file: str,
     findings: list[Finding],
 ) -> None:
-    """Say where the numbers speak against what a file or a name states.
+    """Report where the numbers contradict a file or a name.
 
     Parameters
     ----------
     said : dict of str to Inference
     units : dict of str to str
-        Triad to the unit that it is read with.
+        Triad to the unit that it is read in.
     asked : set of str
-        Triads whose unit the user stated or the numbers gave: of these nothing is said.
+        Triads whose unit the user stated or the numbers gave; these are not checked.
     mirrored : bool
-        The user said that the sensor's axes are left-handed.
+        The user stated left-handed sensor axes.
     file : str
     findings : list of Finding
     """
     for triad, unit in units.items():
         other = said.get(f"{triad}_unit")
-        # The numbers of a gyro speak only where gravity was seen to turn with it.
+        # A gyro's numbers are evidence only if gravity rotated with it.
         heard = triad != "gyro" or _settled(said, "gyro_axes")
         form = said.get(f"{triad}_form")
         if triad in asked or not heard or other is None or not other.settled:
@@ -194,7 +194,7 @@ def _settled(said: dict[str, Inference], quantity: str) -> bool:
 
 
 def axes_against_gravity(said: dict[str, Inference]) -> Finding | None:
-    """Say that axes which are taken for forward, right, down are not, by gravity.
+    """Check by gravity whether axes taken as forward, right, down are correct.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ def axes_against_gravity(said: dict[str, Inference]) -> Finding | None:
     Returns
     -------
     Finding or None
-        None where gravity agrees, or does not tell.
+        None if gravity agrees, or is inconclusive.
     """
     up = said.get("up_axis")
     if up is None or up.value is None or up.value == "-z" or up.confidence < 0.5:
@@ -223,13 +223,13 @@ def axes_against_gravity(said: dict[str, Inference]) -> Finding | None:
 def report_upside_down(
     said: dict[str, Inference], axis: str, file: str, findings: list[Finding]
 ) -> None:
-    """Say that the stated axes have the sensor upside down.
+    """Report that the stated axes have the sensor upside down.
 
     Parameters
     ----------
     said : dict of str to Inference
     axis : str
-        The sensor axis that is stated to point down.
+        The sensor axis stated to point down.
     file : str
     findings : list of Finding
     """

@@ -1,4 +1,4 @@
-"""Increments of inertial sensors as KF-GINS has them: seven columns without a header.
+"""Increments of inertial sensors in KF-GINS format: seven columns without a header.
 
 Each line: GPS seconds of week, three increments of angle in rad, three of velocity in m/s, axes
 forward, right, down; an increment belongs to the interval that ends at its stamp.
@@ -23,14 +23,14 @@ COLUMNS = ["time", *(f"dtheta_{a}" for a in "xyz"), *(f"dv_{a}" for a in "xyz")]
 SUFFIXES = (*csv.SUFFIXES, ".imu")
 _KINDS = [("time", "s"), *((f"gyro_{a}", "rad") for a in "xyz")]
 _KINDS += [(f"accel_{a}", "m/s") for a in "xyz"]
-# Force that a vehicle which drives, flies or stands feels on the median of its samples.
+# Norm of the median specific force of a vehicle on the road, in flight or stationary.
 _GRAVITY = (9.6, 10.0)  # m/s²
 _STEPS = (1e-4, 0.5)  # s
 _TURNS = 2.0 * np.pi  # rad/s
 
 
 def detect(path: Path) -> bool:
-    """Tell by the numbers at the top: a clock, and gravity among sums over its steps."""
+    """Detect by the first numbers: a clock, and gravity in the increments."""
     if not path.is_file() or path.suffix.lower() not in SUFFIXES:
         return False
     with path.open("rb") as stream:
@@ -40,7 +40,7 @@ def detect(path: Path) -> bool:
     whole = head[: head.rfind(b"\n") + 1]
     lines = [line for line in whole.splitlines() if line.strip()]
     lines = [line for line in lines if not line.lstrip().startswith((b"#", b"%"))]
-    # One bad line is the file's fault, and not its layout's.
+    # One bad line is a fault of the file, not another layout.
     block = [row for line in lines if (row := _numbers(line)) is not None]
     if len(block) < 3 or len(block) < 0.9 * len(lines) or _numbers(lines[0]) is None:
         return False
@@ -75,13 +75,13 @@ def read(path: Path) -> RawLog:
     Returns
     -------
     RawLog
-        Columns `COLUMNS`, in s, rad, m/s. Axes forward, right, down where gravity is on the third,
-        downward; otherwise they are not stated.
+        Columns `COLUMNS`, in s, rad, m/s. Axes forward, right, down if gravity is on the third
+        axis, downward; otherwise not stated.
 
     Raises
     ------
     DataError
-        It is no text, a row has another width, or the numbers of all rows are no increments.
+        The file is not text, a row has another width, or the numbers are not increments.
     """
     raw = csv.read(path)
     names = list(raw.columns)
@@ -111,7 +111,7 @@ def read(path: Path) -> RawLog:
 
 
 def _axes(columns: dict[str, NDArray[np.float64]], raw: RawLog) -> str | None:
-    """Forward, right, down, where gravity agrees; what was taken is said."""
+    """Return forward, right, down if gravity agrees; note the assumption."""
     step = float(np.median(np.diff(columns["time"]))) if columns["time"].size > 1 else 0.0
     if not step > 0.0:
         return None

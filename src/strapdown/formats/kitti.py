@@ -1,13 +1,13 @@
-"""Folders ``oxts`` of the raw recordings of KITTI: an OXTS RT 3003, and its own solution.
+"""Folders ``oxts`` of KITTI raw recordings: an OXTS RT 3003 with its own solution.
 
-``timestamps.txt`` holds a date a line, ``data/0000000000.txt`` and so on thirty numbers each
+``timestamps.txt`` has one date per line, ``data/0000000000.txt`` and so on have thirty numbers each
 (Geiger and others, Vision meets robotics: the KITTI dataset, Int. J. Robotics Research 32 (2013)
 1231-1237; dataformat.txt of its development kit): latitude and longitude in deg, height in m; roll,
 pitch and yaw in rad; velocity north, east, forward, left, up; acceleration with gravity about x, y,
-z and forward, left, up; rates likewise; accuracies of place and velocity in m and m/s; then states
-of the receiver. x points forward, y left, z up. Roll is positive with the left side up, pitch with
-the front down, and yaw counts from east to north: Rz(yaw) Ry(pitch) Rx(roll) turns x, y, z to east,
-north, up. Rows of the folder are counted from 1.
+z and forward, left, up; rates likewise; accuracies of position and velocity in m and m/s; then
+states of the receiver. x points forward, y left, z up. Roll is positive with the left side up,
+pitch with the front down, and yaw counts from east to north: Rz(yaw) Ry(pitch) Rx(roll) rotates
+x, y, z to east, north, up. Rows of the folder are counted from 1.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _NAME = re.compile(r"\d{10}\.txt")
 
 
 def detect(path: Path) -> bool:
-    """Tell by ``timestamps.txt`` and a first file of thirty numbers."""
+    """Detect by ``timestamps.txt`` and a first file of thirty numbers."""
     folder = _oxts(path)
     first = None if folder is None else folder / "data" / f"{0:010d}.txt"
     if first is None or not first.is_file():
@@ -47,12 +47,12 @@ def detect(path: Path) -> bool:
 
 
 def read(path: Path) -> RawLog:
-    """Read rates and specific force, and the attitude of the unit's own solution as truth.
+    """Read rates and specific force, with the attitude of the unit's own solution as truth.
 
     Parameters
     ----------
     path : Path
-        The folder ``oxts``, or that of the drive, which holds it.
+        The folder ``oxts``, or its parent, the folder of the drive.
 
     Returns
     -------
@@ -91,19 +91,19 @@ def read(path: Path) -> RawLog:
 
 
 def read_fixes(path: Path, options: GnssOptions) -> Fixes:
-    """Read places and velocities of the unit's own solution as fixes.
+    """Read positions and velocities of the unit's own solution as fixes.
 
     Parameters
     ----------
     path : Path
         As `read`.
     options : GnssOptions
-        Not used here.
+        Not used.
 
     Returns
     -------
     Fixes
-        Every one with the accuracy that the unit states, north and east as down.
+        Each with the accuracy that the unit states; down as north and east.
 
     Raises
     ------
@@ -162,7 +162,7 @@ def read_trajectory(path: Path) -> pd.DataFrame:
 
 
 def files_of(path: Path) -> tuple[Path, ...]:
-    """Files that fixes or a trajectory are read from.
+    """List the files that fixes or a trajectory are read from.
 
     Parameters
     ----------
@@ -179,7 +179,7 @@ def _oxts(path: Path) -> Path | None:
 
 
 def _files(path: Path) -> tuple[Path, ...]:
-    """The stamps, and what belongs to them in order."""
+    """List the file of the stamps, and the data files in order."""
     folder = _oxts(path)
     if folder is None:
         raise DataError("io.no-timestamps-txt", file=path.resolve().name)
@@ -188,7 +188,7 @@ def _files(path: Path) -> tuple[Path, ...]:
 
 
 def _values(path: Path) -> tuple[NDArray[np.int64], Array, tuple[Path, ...]]:
-    """Stamps in ns since 1970, the thirty numbers of each, and the files."""
+    """Return stamps in ns since 1970, the thirty numbers of each, and the files."""
     stamps, *files = _files(path)
     lines = [n for n in stamps.read_text(encoding="ascii", errors="replace").splitlines() if n]
     dates = pd.to_datetime(pd.Series(lines), format="ISO8601", errors="coerce")
@@ -197,7 +197,7 @@ def _values(path: Path) -> tuple[NDArray[np.int64], Array, tuple[Path, ...]]:
         raise DataError(
             "io.no-date", file=f"oxts/{stamps.name}", row=row + 1, quantity="time", lines=lines[row]
         )
-    # Of some recordings a few files are missing: each belongs to the stamp of its number.
+    # In some recordings files are missing: each belongs to the stamp of its number.
     numbers = np.array([int(f.stem) for f in files])
     if not files or numbers[-1] >= len(lines):
         raise DataError(
@@ -229,7 +229,7 @@ def _numbers(file: Path) -> Array:
 
 
 def _euler(values: Array) -> Array:
-    """Roll, pitch and heading of forward, right, down to north, east, down, in deg."""
+    """Compute roll, pitch, heading (forward-right-down to north-east-down), deg."""
     roll, pitch, yaw = np.degrees(values[:, EULER]).T
     return np.column_stack([roll, -pitch, (90.0 - yaw + 180.0) % 360.0 - 180.0])
 

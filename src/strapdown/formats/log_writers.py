@@ -1,7 +1,7 @@
-"""Logs as files: one function a format, and the one table of them.
+"""Writers of logs: one function per format, and the registry of writers.
 
-Every format carries the same: stamps, rates, specific force where there is one, the kind of
-sampling, the axes and, where it is known, the true attitude.
+Every format has the same content: stamps, rates, specific force if available, the kind of
+sampling, the axes and, if known, the true attitude.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def _write_mat(path: Path, imu: pd.DataFrame, truth: pd.DataFrame | None) -> Non
 
 LogWriter = Callable[[Path, pd.DataFrame, pd.DataFrame | None], None]
 
-#: Suffix to the function that writes it. The truth, if given, has one row a sample.
+#: Suffix to writer. The truth, if given, has one row per sample.
 LOG_WRITERS: dict[str, LogWriter] = {
     "csv": _write_csv,
     "npz": _write_npz,
@@ -83,12 +83,12 @@ LOG_WRITERS: dict[str, LogWriter] = {
 
 
 def log_formats(names: Sequence[str]) -> tuple[str, ...]:
-    """Look up the formats that a person names.
+    """Look up formats by name.
 
     Parameters
     ----------
     names : sequence of str
-        Of `LOG_WRITERS`; ``all`` stands for each.
+        Keys of `LOG_WRITERS`; ``all`` selects every format.
 
     Returns
     -------
@@ -97,7 +97,7 @@ def log_formats(names: Sequence[str]) -> tuple[str, ...]:
     Raises
     ------
     ConfigError
-        There is no such format.
+        A format does not exist.
     """
     for name in names:
         if name not in (*LOG_WRITERS, "all"):

@@ -1,4 +1,4 @@
-"""MATLAB files up to v7; v7.3 is HDF5 and read as that."""
+"""MATLAB files up to v7; v7.3 is read as HDF5."""
 
 from __future__ import annotations
 
@@ -14,13 +14,12 @@ from strapdown.formats import hdf5
 from strapdown.formats.arrays import raw_log, refuse_lie
 from strapdown.formats.recording import RawLog
 
-# The text that opens a file. SciPy writes the date and the platform into it; the same arrays
-# shall give the same bytes.
+# Header text of a file. SciPy would write date and platform; equal input must give identical bytes.
 _HEADER = b"MATLAB 5.0 MAT-file, written by strapdown"
 
 
 def detect(path: Path) -> bool:
-    """Tell whether the name is MATLAB's and the content is not HDF5."""
+    """Whether the name is that of a MATLAB file and the content is not HDF5."""
     return path.is_file() and path.suffix.lower() == ".mat" and not hdf5.detect(path)
 
 
@@ -38,7 +37,7 @@ def read(path: Path) -> RawLog:
     Raises
     ------
     DataError
-        It is no MATLAB file, is damaged, or claims more than it holds.
+        The file is not a MATLAB file, is damaged, or declares more data than it holds.
     """
     arrays, meta = read_arrays(path)
     return raw_log(path, arrays, {}, meta)
@@ -83,7 +82,7 @@ def read_arrays(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
 
 
 def _unfolded(name: str, value: Any) -> dict[str, NDArray[Any]]:
-    """A value under its name; the fields of a structure under name.field."""
+    """Return a value under its name; fields of a structure under name.field."""
     if not isinstance(value, np.ndarray) or value.dtype.names is None or value.size != 1:
         return {name: np.asarray(value)}
     found: dict[str, NDArray[Any]] = {}
@@ -93,7 +92,7 @@ def _unfolded(name: str, value: Any) -> dict[str, NDArray[Any]]:
 
 
 def write(path: Path, arrays: dict[str, NDArray[Any]], meta: dict[str, str]) -> None:
-    """Write arrays; the same arrays give the same bytes.
+    """Write arrays; equal input gives identical bytes.
 
     Parameters
     ----------
@@ -105,7 +104,7 @@ def write(path: Path, arrays: dict[str, NDArray[Any]], meta: dict[str, str]) -> 
     from scipy.io import savemat
 
     buffer = io.BytesIO()
-    stream: Any = buffer  # its stubs know names of files alone
+    stream: Any = buffer  # SciPy's stubs only accept file names
     savemat(stream, {**arrays, **meta}, oned_as="column")
     data = bytearray(buffer.getvalue())
     data[:116] = _HEADER.ljust(116)

@@ -1,4 +1,4 @@
-"""Files of a folder, or members of a zip archive, read alike."""
+"""Uniform access to the files of a folder or the members of a zip archive."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from strapdown.formats.arrays import refuse_lie
 
 __all__ = ["Member", "is_container", "members_of", "peek"]
 
-HEAD = 4096  # bytes, of which the first line is told
+HEAD = 4096  # bytes in which the first line is searched
 
 
 @dataclass(frozen=True)
@@ -22,9 +22,9 @@ class Member:
     Attributes
     ----------
     name : str
-        Path inside, with slashes.
+        Path inside the folder or archive, with slashes.
     label : str
-        For messages: what was given and the name.
+        Given path and name, for messages.
     file : Path
         The file on disk that holds it.
     archived : bool
@@ -37,26 +37,26 @@ class Member:
 
     @property
     def stem(self) -> str:
-        """Last part of the name without its ending."""
+        """Last part of the name without its suffix."""
         return PurePosixPath(self.name).stem
 
     @property
     def suffix(self) -> str:
-        """Ending of the name, in small letters."""
+        """Suffix of the name, in lower case."""
         return PurePosixPath(self.name).suffix.lower()
 
     def read(self) -> bytes:
-        """Whole content.
+        """Read the whole content.
 
         Raises
         ------
         DataError
-            It cannot be read, or claims more than is stored.
+            The file cannot be read, or declares more data than is stored.
         """
         return self._bytes(-1)
 
     def first_line(self) -> str:
-        """First line that is not blank, or as much of it as `HEAD` bytes hold.
+        """Return the first non-blank line, up to `HEAD` bytes.
 
         Raises
         ------
@@ -87,7 +87,7 @@ class Member:
 
 
 def is_container(path: Path) -> bool:
-    """Tell whether this is a folder or is called a zip archive."""
+    """Whether this is a folder, or has the name of a zip archive."""
     return path.is_dir() or (path.is_file() and path.suffix.lower() == ".zip")
 
 
@@ -101,7 +101,7 @@ def members_of(path: Path) -> list[Member]:
     Returns
     -------
     list of Member
-        In the order of their names; what a Mac adds to archives is left out.
+        Sorted by name; files that macOS adds to archives are left out.
 
     Raises
     ------
@@ -131,7 +131,7 @@ def members_of(path: Path) -> list[Member]:
 
 
 def peek(path: Path) -> list[Member]:
-    """Members, or none where it is no container or cannot be read; for telling formats apart."""
+    """List members for format detection; none if not a container or unreadable."""
     try:
         return members_of(path) if is_container(path) else []
     except (DataError, OSError):
@@ -139,7 +139,7 @@ def peek(path: Path) -> list[Member]:
 
 
 def first_line(member: Member) -> str:
-    """First line of a member, or nothing where it cannot be read; for telling formats apart."""
+    """Return the first line of a member for format detection; empty if unreadable."""
     try:
         return member.first_line()
     except DataError:
@@ -147,5 +147,5 @@ def first_line(member: Member) -> str:
 
 
 def file_member(path: Path) -> Member:
-    """A file on its own as a member."""
+    """Wrap a single file as a member."""
     return Member(path.name, path.name, path, False)

@@ -1,12 +1,12 @@
-"""Channel codes of ISO MME: sixteen characters, each field in words.
+"""Channel codes of ISO MME: sixteen characters, decoded field by field.
 
 The fields are test object (1), position (1), main location (4), fine locations 1, 2 and 3 (2 each),
 physical dimension (2), direction (1) and filter class (1). Codes and meanings are those of RED B
-1.6.2 of ISO/TS 13499 (2020). What is not in the tables is shown as it stands and never guessed.
+1.6.2 of ISO/TS 13499 (2020). Codes that are not in the tables are shown unchanged, never guessed.
 
 Directions X, Y and Z follow SAE J211 and SAE J1733: X forward, Y from left to right, Z down, and
-turns by the right hand; which are our axes. Directions 1, 2 and 3 are those that RED B keeps for
-signs that differ from SAE J211: of these no axis is known.
+right-handed rotations, as our axes. RED B reserves directions 1, 2 and 3 for signs that differ from
+SAE J211: their axis is not known.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ POSITIONS = {
     "9": "third row right",
     **{letter: f"seat {letter}" for letter in "ABCDEFGHIJKLMNOPQRSTUVWXYZ"},
 }
-#: Physical dimension: its words, and what it is as a quantity of a crash record.
+#: Physical dimension: in words, and as a quantity of a crash record.
 DIMENSIONS: dict[str, tuple[str, str]] = {
     "00": ("dimension not defined", "other"),
     "AA": ("angular acceleration", "other"),
@@ -122,9 +122,9 @@ FILTERS: dict[str, str] = {
     "V": "from film or video",
     "X": "no filter class",
 }
-#: The letter of a channel that has no class.
+#: Letter of a channel without a filter class.
 NO_CLASS = "X"
-# Parts that keep their place in a body that does not bend: what else there is moves of itself.
+# Parts fixed to the body as long as it is rigid; all others move on their own.
 _FIXED = (
     "VEHC APIL BPIL CPIL DPIL CRME SECM SILB TUNN ROOF ROFR FORA FRAM FOWE CEUN CTUN ABSE SERM "
     "SUDO WARC TRCM CCBE DASH SIME"
@@ -134,25 +134,25 @@ _VEHICLES = "123456789"
 
 @dataclass(frozen=True)
 class MmeCode:
-    """A channel code in words.
+    """A decoded channel code.
 
     Attributes
     ----------
     code : str
-        As it stands, in capitals.
+        As given, in capitals.
     test_object, position, location, dimension, direction, filter : str
-        In words; a field that is not in the tables is its code in quotes.
+        In words; a code that is not in the tables is quoted.
     fine : tuple of str
-        Fine locations in words, without those that are not used.
+        Fine locations in words, without unused ones.
     quantity : str
         A key of `crash_record.QUANTITIES`.
     axis : str
         ``x y z`` for the directions X, Y, Z; else empty.
     body : str
-        What the sensor is fixed to, where the object is vehicle 1 and alone: ``vehicle``,
-        ``front left occupant's head``, ``engine of the vehicle``.
+        Body that the sensor is fixed to, if the object is vehicle 1 and the only one:
+        ``vehicle``, ``front left occupant's head``, ``engine of the vehicle``.
     unknown : tuple of str
-        Fields that are not in the tables, as ``main location 'QQQQ'``.
+        Fields not in the tables, as ``main location 'QQQQ'``.
     """
 
     code: str
@@ -175,18 +175,18 @@ class MmeCode:
 
 
 def decode_mme(code: str, *, objects: int = 1) -> MmeCode | None:
-    """Read a channel code.
+    """Decode a channel code.
 
     Parameters
     ----------
     code : str
     objects : int
-        Test objects of the test: with more than one, the body says which.
+        Number of test objects: with more than one, the body names the object.
 
     Returns
     -------
     MmeCode or None
-        None where it does not have sixteen letters and figures.
+        None unless the code has sixteen letters and digits.
     """
     text = code.strip().upper()
     if len(text) != LENGTH or not (text.isascii() and text.isalnum()):
@@ -247,12 +247,11 @@ def _body(text: str, test_object: str, position: str, location: str, objects: in
     return f"{location} of the {whole}" if vehicle and objects == 1 else f"{location}, {whole}"
 
 
-# Fine locations of ISO MME channel codes in words, as far as they tell of a crash.
-#
-# Codes and meanings are those of RED B 1.6.2 of ISO/TS 13499 (2020), in our words.
+# Fine locations of ISO MME channel codes in our words, as far as they matter for a crash, from RED
+# B 1.6.2 of ISO/TS 13499 (2020).
 
 
-#: In any of the three, with one meaning.
+#: Same meaning in each of the three fields.
 FINE: dict[str, str] = {
     "00": "",
     "BO": "bottom",
@@ -274,7 +273,7 @@ FINE: dict[str, str] = {
     "RD": "redundant",
     **{f"{k:02d}": f"no. {k}" for k in range(1, 100)},
 }
-#: In the first.
+#: First field.
 FINE_1: dict[str, str] = {
     "AV": "mean",
     "SU": "sum",
@@ -297,7 +296,7 @@ FINE_1: dict[str, str] = {
     "IP": "in position",
     "OP": "out of position",
 }
-#: In the second.
+#: Second field.
 FINE_2: dict[str, str] = {
     "AV": "mean",
     "SU": "sum",
@@ -316,7 +315,7 @@ FINE_2: dict[str, str] = {
     "3C": "3 ms value, cumulative",
     "3S": "3 ms value, single peak",
 }
-#: In the third: dummies.
+#: Third field: dummies.
 FINE_3: dict[str, str] = {
     "PO": "after the test",
     "BR": "BioRID",
@@ -351,13 +350,12 @@ FINE_3: dict[str, str] = {
 }
 
 
-# Places of ISO MME channel codes: the main location in words.
+# Main locations of ISO MME channel codes in our words, from RED B 1.6.2 of ISO/TS 13499 (2020).
 #
-# Codes and meanings are those of RED B 1.6.2 of ISO/TS 13499 (2020), in our words. Codes that begin
-# with 1 or 2 belong to a customer or a laboratory, and mean what these say.
+# Codes that begin with 1 or 2 belong to a customer or a laboratory, which defines them.
 
 
-#: Of a person or a dummy.
+#: Persons and dummies.
 BODY_PARTS: dict[str, str] = {
     "ACHI": "Achilles tendon",
     "ACRO": "acromion",
@@ -419,7 +417,7 @@ BODY_PARTS: dict[str, str] = {
     "SUMA": "submarining",
 }
 
-#: Of a vehicle.
+#: Vehicles.
 VEHICLE_PARTS: dict[str, str] = {
     "ABSE": "airbag sensor",
     "AIRB": "airbag",
@@ -526,7 +524,7 @@ VEHICLE_PARTS: dict[str, str] = {
     "WIND": "window",
 }
 
-#: Results, and no places.
+#: Results, not locations.
 CRITERIA: dict[str, str] = {
     "HICR": "head injury criterion",
     "BRIC": "brain injury criterion BrIC",
@@ -562,7 +560,7 @@ CRITERIA: dict[str, str] = {
     "AACP": "mean acceleration during compression",
 }
 
-#: Of barriers, rigs and simulations.
+#: Barriers, rigs and simulations.
 OTHER_PLACES: dict[str, str] = {
     "0000": "place not defined",
     "ACTU": "actuator",

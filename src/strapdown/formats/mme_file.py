@@ -1,4 +1,4 @@
-"""Channel files of ISO MME: the header with its code, and the stamps of the samples."""
+"""Channel files of ISO MME: header with the channel code, samples and stamps."""
 
 from __future__ import annotations
 
@@ -48,9 +48,9 @@ class MmeFile:
     path : Path
     header : MmeHeader
     code : str
-        As it stands there, or in the index; empty where neither has one.
+        As given in the file or the index; empty if neither has one.
     known : MmeCode or None
-        The code in words, where it is one.
+        The decoded code, if valid.
     """
 
     path: Path
@@ -66,9 +66,9 @@ def read_mme_file(path: Path, indexed: str, objects: int) -> MmeFile:
     ----------
     path : Path
     indexed : str
-        Code that the index has of it; empty where it is not there.
+        Code from the index; empty if the index lacks it.
     objects : int
-        Test objects of the test.
+        Number of test objects.
 
     Returns
     -------
@@ -85,7 +85,7 @@ def read_mme_file(path: Path, indexed: str, objects: int) -> MmeFile:
 
 
 def clock_of(file: MmeFile, others: Mapping[str, tuple[str, MmeFile]]) -> str:
-    """Code of the channel that holds its stamps; empty where they are even.
+    """Return the code of the channel that holds the stamps; empty if they are even.
 
     Raises
     ------
@@ -113,7 +113,7 @@ def clock_of(file: MmeFile, others: Mapping[str, tuple[str, MmeFile]]) -> str:
 def stamps_of(
     file: MmeFile, clock: str, others: Mapping[str, tuple[str, MmeFile]]
 ) -> Callable[[int], Array]:
-    """Read the stamps of so many samples, from a channel of stamps or from the header."""
+    """Read that many stamps, from a channel of stamps or from the header."""
     header = file.header
     if clock:
         held = others[clock.upper()][1]
@@ -174,10 +174,10 @@ def stamps_of(
     return even
 
 
-# One channel of an ISO MME test: its header in words, and its samples when they are asked.
+# One channel of an ISO MME test: decoded header, and samples read on demand.
 
 
-#: What the writer of this package says in comments, and no field of the standard does.
+#: Prefixes of comments in which our writer states data that the standard has no field for.
 SAMPLING_NOTE = "sampling "
 AXIS_NOTE = "axis "
 CHANGE_NOTE = "change of velocity since time zero of the recorder"
@@ -198,7 +198,7 @@ _REMARKS = (
 
 
 def channel_of(file: MmeFile, name: str, others: Mapping[str, tuple[str, MmeFile]]) -> CrashChannel:
-    """Make a channel of a record of it.
+    """Make a channel of a crash record from a channel file.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ def channel_of(file: MmeFile, name: str, others: Mapping[str, tuple[str, MmeFile
     name : str
         Unique in the record.
     others : dict of str to (str, MmeFile)
-        Channels of the test by their code in capitals, each with its name: a channel may hold the
+        Channels of the test by their code in capitals, each with its name; one may hold the
         stamps of another.
 
     Returns
@@ -216,7 +216,7 @@ def channel_of(file: MmeFile, name: str, others: Mapping[str, tuple[str, MmeFile
     Raises
     ------
     DataError
-        A field of the header is no number.
+        A field of the header is not a number.
     """
     header, known = file.header, file.known
     text = header.text("unit")
@@ -236,7 +236,7 @@ def channel_of(file: MmeFile, name: str, others: Mapping[str, tuple[str, MmeFile
         values = samples()
         return values if quantity == "time" else read_stamps(values.size), values
 
-    # Stamps that the header does not tell may be stated by a case.
+    # Stamps that the header lacks may be stated in a case.
     open_stamps = (
         bool(clock) or quantity == "time" or _plain_number(header, "sampling interval") is None
     )
@@ -264,15 +264,15 @@ def channel_of(file: MmeFile, name: str, others: Mapping[str, tuple[str, MmeFile
 
 
 def _unit(file: MmeFile, text: str) -> tuple[str, str, float | None, str]:
-    """Quantity, unit, factor, and what of the code speaks against the unit."""
+    """Return quantity, unit, factor, and the part of the code that contradicts the unit."""
     said = file.known.quantity if file.known else "other"
     found = unit_of(text) if text else None
     if found is None:
-        # Of a quantity whose unit is not stated or not known the values are as recorded.
+        # Without a known unit the values are as recorded.
         return said, clean(text, LONGEST_NAME), None, ""
     quantity, unit = found
     if said in ("other", quantity):
-        # A dimension that is known and none of ours, such as an angle, is not made one.
+        # A dimension that is known but not among ours, such as an angle, is not converted.
         plain = file.known is not None and file.code[12:14].upper() in DIMENSIONS
         if said == "other" and plain and file.code[12:14] != "00":
             return "other", unit, None, ""
@@ -293,7 +293,7 @@ def _place(file: MmeFile) -> str:
 
 
 def _plain_number(header: MmeHeader, key: str) -> float | None:
-    """A number of the header that may also be a word there."""
+    """Return a number of the header whose field may also hold a word."""
     try:
         return header.number(key)
     except DataError:
@@ -340,18 +340,18 @@ def _remarks(file: MmeFile, against: str, notes: list[str]) -> tuple[str, ...]:
 
 
 def is_bad(file: MmeFile) -> bool:
-    """Whether the laboratory gives another status than a good one."""
+    """Whether the laboratory states a status other than good."""
     status = file.header.text("data status").lower()
     return bool(status) and status not in _GOOD
 
 
-# Files of ISO MME as text: lines of ``key :value``, and samples under them.
+# Text files of ISO MME: lines of ``key :value``, followed by samples.
 
 
-# Headers have some thousand characters; samples some ten each.
+# Limits: headers have some thousand characters, samples some ten each.
 LONGEST_HEADER = 262_144
 LARGEST = 1_000_000_000
-# Powers of ten and whole numbers that doubles hold exactly.
+# Limits of powers of ten and integers that doubles hold exactly.
 EXACT_POWER = 22
 EXACT_WHOLE = 2**53
 _KEY = re.compile(r"([^:]*[^:\s])\s*:(.*)")
@@ -369,8 +369,8 @@ class MmeHeader:
     file : str
         For messages.
     values : dict of str to (str, int)
-        Key in small letters, with single blanks, to its value and its line; the first where a key
-        stands more than once.
+        Key in lower case with single blanks to its value and line; the first of repeated
+        keys.
     more : dict of str to list of str
         All values of each key.
     end : int
@@ -383,26 +383,26 @@ class MmeHeader:
     end: int
 
     def text(self, key: str) -> str:
-        """Value of a key on one line; empty where it is not stated."""
+        """Return the value of a key on one line; empty if not stated."""
         value = self.values.get(key, ("", 0))[0]
         return "" if value.lower() in ("novalue", "none", "-") else clean(value)
 
     def all(self, key: str) -> list[str]:
-        """Each stated value of a key."""
+        """Return each stated value of a key."""
         texts = [clean(v) for v in self.more.get(key, [])]
         return [t for t in texts if t and t.lower() not in ("novalue", "none", "-")]
 
     def line(self, key: str) -> int | None:
-        """Line of a key."""
+        """Return the line number of a key."""
         return self.values[key][1] if key in self.values else None
 
     def number(self, key: str) -> float | None:
-        """Value of a key as a number, with or without a unit after it.
+        """Return the value of a key as a number, with or without a unit after it.
 
         Raises
         ------
         DataError
-            It is stated, and no number.
+            The value is not a number.
         """
         text = self.text(key)
         if not text:
@@ -416,12 +416,12 @@ class MmeHeader:
 
 
 def text_of(path: Path, longest: int = LARGEST) -> str:
-    """Text of a file of the test, in UTF-8 or Windows-1252.
+    """Read a text file of the test, in UTF-8 or Windows-1252.
 
     Raises
     ------
     DataError
-        It is no text, or far too large.
+        The file is not text, or far too large.
     """
     if path.stat().st_size > LARGEST:
         raise DataError("io.bytes-more-than-channel", file=path.name, st_size=path.stat().st_size)
@@ -449,7 +449,7 @@ def read_header(path: Path) -> MmeHeader:
     Raises
     ------
     DataError
-        It is empty, no text, or a line is neither ``key :value`` nor the first sample.
+        The file is empty, not text, or a line is neither ``key :value`` nor the first sample.
     """
     values: dict[str, tuple[str, int]] = {}
     more: dict[str, list[str]] = {}
@@ -480,7 +480,7 @@ def read_header(path: Path) -> MmeHeader:
 
 
 def is_sample(text: str) -> bool:
-    """Whether a line is a sample and no `key :value`."""
+    """Whether a line is a sample, not `key :value`."""
     return bool(_NUMBER.fullmatch(text)) or text.lower() in _MISSING
 
 
@@ -492,13 +492,13 @@ def read_number(text: str) -> float | None:
 
 
 def read_samples(path: Path, header: MmeHeader, quantity: str) -> Array:
-    """Samples of a channel, one a line; NaN for NOVALUE.
+    """Read the samples of a channel, one per line; NaN for NOVALUE.
 
     Parameters
     ----------
     path : Path
     header : MmeHeader
-        Of that file.
+        Header of that file.
     quantity : str
         For messages.
 
@@ -509,7 +509,7 @@ def read_samples(path: Path, header: MmeHeader, quantity: str) -> Array:
     Raises
     ------
     DataError
-        A line is no number, or their count is not that of the header.
+        A line is not a number, or the number of samples differs from the header.
     """
     lines = _lines(text_of(path))[header.end :]
     while lines and not lines[-1].strip():
@@ -530,7 +530,7 @@ def read_samples(path: Path, header: MmeHeader, quantity: str) -> Array:
             "io.header-no-samples-under", file=path.name, row=header.end, quantity=quantity
         )
     if not _UNUSUAL.search("\n".join(lines)):
-        # Most files have points alone and nothing missing.
+        # Most files use decimal points and have no missing samples.
         try:
             return np.array(lines, dtype=np.float64)
         except ValueError:
@@ -552,20 +552,20 @@ def read_samples(path: Path, header: MmeHeader, quantity: str) -> Array:
 
 
 def even_stamps(first: str, interval: str, count: int) -> Array:
-    """Stamps of even sampling, each the double nearest to the decimal number.
+    """Compute stamps of even sampling, each the double nearest to the decimal number.
 
     Parameters
     ----------
     first, interval : str
-        Decimal numbers, s, as the header has them.
+        Decimal numbers, s, as in the header.
     count : int
 
     Returns
     -------
     ndarray, (count,), s
-        Where the decimals fit into whole numbers below 2^53 over a power of ten up to 10^22, which
-        doubles hold exactly, the quotient of the two is rounded once, as IEEE 754 has it; a sum of
-        doubles would be off by one in the last place, and a stamp of -0.0499 not be -0.0499.
+        If the decimals are integers below 2^53 divided by a power of ten up to 10^22, both of
+        which doubles hold exactly, the quotient is rounded once (IEEE 754). A sum of doubles
+        would be off in the last digit: -0.0499 would not be reproduced.
     """
     start, step = _decimal(first), _decimal(interval)
     k = np.arange(count, dtype=np.int64)
@@ -584,5 +584,5 @@ def _decimal(text: str) -> Decimal:
 
 
 def _lines(text: str) -> list[str]:
-    # Not splitlines: it would end a line at characters that stand in comments.
+    # Not splitlines: it would split at characters that occur in comments.
     return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")

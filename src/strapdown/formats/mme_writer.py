@@ -1,6 +1,6 @@
-"""Crash records written in ISO MME (ISO/TS 13499): one test object, readable by any of its tools.
+"""Writer of crash records in ISO MME (ISO/TS 13499): one test object, readable by any of its tools.
 
-Nothing in it tells when or where it was written: fields that want a date say NOVALUE.
+Files do not state when or where they were written: date fields are NOVALUE.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ _DIMENSIONS = {
     "other": "00",
 }
 _UNITS = {**QUANTITIES, "acceleration": "m/(s*s)"}
-# RED B keeps figures for signs that differ from those of SAE J211.
+# RED B reserves digits for signs that differ from those of SAE J211.
 _DIRECTIONS = {"x": "X", "y": "Y", "z": "Z", "-x": "1", "-y": "2", "-z": "3"}
-# Places by a word in them, as far as the word says no more than the code.
+# Locations by a word that occurs in them, if the word is as specific as the code.
 _PLACES = {
     "engine": "ENGN",
     "head": "HEAD",
@@ -69,25 +69,25 @@ def write_mme(
     Parameters
     ----------
     folder : str or Path
-        Where it goes: ``NAME.mme``, ``Channel/NAME.chn`` and ``Channel/NAME.001`` and so on.
+        Output folder: ``NAME.mme``, ``Channel/NAME.chn`` and ``Channel/NAME.001`` and so on.
     record : CrashRecord
-        Values are written in SI, each in the fewest digits that give it back exactly; stamps, too:
-        as first stamp and interval where these give each of them back, else as a channel of stamps.
+        Values are written in SI units with the fewest digits that reproduce each exactly. Stamps
+        are written as first stamp and interval if exact, else as a channel of stamps.
     name : str, optional
-        Of the files; that of the record if not given.
+        Base name of the files; by default that of the record.
 
     Returns
     -------
     dict of str to str
-        Name of each channel to its channel code. A name that is a code stays; others stand in
-        `Laboratory channel code`.
+        Name of each channel to its channel code. A name that is a code is kept; others are
+        written to `Laboratory channel code`.
 
     Raises
     ------
     DataError
-        The record has no channel, more than 999, or a value that is infinite.
+        The record has no channels, more than 999, or an infinite value.
     """
-    # A column of stamps goes with the channels that it stamps.
+    # A column of stamps is written together with the channels that use it.
     channels = [c for c in record.channels if c.quantity != "time"]
     if not channels or len(channels) > MOST_CHANNELS:
         raise DataError(
@@ -125,7 +125,7 @@ def write_mme(
 
 
 def _codes(channels: list[CrashChannel]) -> dict[str, str]:
-    """A code for each channel, all different; names that are codes stay."""
+    """Assign a unique code to each channel; names that are codes are kept."""
     codes = {c.name: c.name for c in channels if _is_code(c.name)}
     taken = {code.upper() for code in codes.values()}
     for channel in channels:
@@ -172,7 +172,7 @@ def _check(channel: CrashChannel, time: Array, values: Array) -> None:
 
 
 def _even(time: Array) -> tuple[str, str] | None:
-    """First stamp and interval that give every stamp back exactly, where there are any."""
+    """Return first stamp and interval if they reproduce every stamp exactly."""
     first = _number(float(time[0]))
     if time.size == 1:
         return first, "1.0"
@@ -202,7 +202,7 @@ def _head(
         notes.append(BODY_NOTE + clean(channel.body))
     if channel.low_pass and channel.low_pass != letter_says:
         notes.append(FILTER_NOTE + clean(channel.low_pass))
-    # What is in SI now counts from where it did: nothing is to be taken off again.
+    # A velocity is noted as a change, so that a reader does not subtract its first value.
     remarks = [r for r in channel.remarks if r != CHANGE_NOTE]
     notes += [CHANGE_NOTE] if channel.quantity == "velocity" else []
     notes += [clean(r) for r in remarks]
@@ -292,5 +292,5 @@ def _lines(head: Mapping[str, str]) -> bytes:
 
 
 def _number(value: float) -> str:
-    """The fewest digits that give it back exactly."""
+    """Format a number with the fewest digits that reproduce it exactly."""
     return repr(float(value))

@@ -1,4 +1,4 @@
-"""Folders of an MPU-6050 recorded buffer by buffer into MATLAB files.
+"""Folders of MPU-6050 recordings, stored by buffers in MATLAB files.
 
 The layout of https://github.com/sunsided/sensor-fusion: ``mpu6050_gyroscope.mat`` with
 ``gyroBuffer`` (time in s, then deg/s) and ``mpu6050_accelerometer.mat`` with ``accelBuffer``
@@ -19,20 +19,20 @@ from strapdown.formats.recording import RawLog
 
 GYRO_FILE = "mpu6050_gyroscope.mat"
 ACCEL_FILE = "mpu6050_accelerometer.mat"
-# Lying with z up the board reads +1 g on z, and with its x mark up it reads -1 g on x: forward
-# is -x. The triads as read are right-handed: of the eight choices of sign for the gyro, (+, +, +)
-# predicts the direction of gravity that the accelerometer measures best in each of the three
-# recorded turns, and by far in the one about y (a test holds this). Right is therefore +y.
+# Lying with z up the board reads +1 g on z, and with its x mark up -1 g on x: forward is -x.
+# The triads as read are right-handed: of the eight choices of sign for the gyro, (+, +, +) predicts
+# the measured direction of gravity best in each of the three recorded rotations, by far in the one
+# about y (verified by a test). Right is therefore +y.
 AXES = "-x,y,-z"
 
 
 def detect(path: Path) -> bool:
-    """Tell whether this is such a folder."""
+    """Whether this is such a folder."""
     return path.is_dir() and (path / GYRO_FILE).is_file()
 
 
 def read(path: Path) -> RawLog:
-    """Read gyro, and accelerometer where there is one.
+    """Read the gyro, and the accelerometer if there is one.
 
     Parameters
     ----------
@@ -42,8 +42,8 @@ def read(path: Path) -> RawLog:
     Returns
     -------
     RawLog
-        Where the accelerometer has stamps of its own, its values are interpolated to those of
-        the gyro. The unused tail of a buffer is left out.
+        An accelerometer with its own stamps is interpolated to those of the gyro. The unused
+        tail of a buffer is dropped.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def read(path: Path) -> RawLog:
 def _accel_columns(
     accel: NDArray[Any], time: NDArray[Any], findings: list[Finding]
 ) -> dict[str, NDArray[Any]]:
-    """The accelerometer at the stamps of the gyro; NaN where it has a hole of its own."""
+    """Interpolate the accelerometer to the stamps of the gyro; NaN in its gaps."""
     if not np.array_equal(accel[:, 0], time):
         order = np.argsort(accel[:, 0], kind="stable")
         accel = np.column_stack(

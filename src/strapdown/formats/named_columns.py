@@ -1,4 +1,4 @@
-"""Tables whose columns have names that are fixed, with or without a unit."""
+"""Tables with fixed column names, with or without units."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["columns_of", "read_reference_path"]
 
 Array = NDArray[np.float64]
 
-#: What a unit is, and its factor to the one that the tables have.
+#: Accepted units, each with its table unit and the factor to it.
 UNITS: dict[str, tuple[str, float]] = {
     "s": ("s", 1.0),
     "ms": ("s", 1e-3),
@@ -40,25 +40,25 @@ _ENDINGS |= {"_hpa": "hPa", "_kpa": "kPa", "_pa": "Pa", "_m": "m", "_s": "s"}
 
 
 def read_reference_path(path: str | Path) -> pd.DataFrame:
-    """Read the path of a point, as cameras or a survey give it.
+    """Read the path of a point from cameras or a survey.
 
     Parameters
     ----------
     path : str or Path
-        A table with the columns ``time north east down``, and, where it is not exact,
-        ``north_sd east_sd down_sd``; s and m, if no column says ``[ms]`` or ``[mm]``.
+        A table with the columns ``time north east down`` and, if not exact, ``north_sd east_sd
+        down_sd``; s and m, unless a column states ``[ms]`` or ``[mm]``.
 
     Returns
     -------
     DataFrame
-        Indexed by time in s, in m.
+        Indexed by time in s, positions in m.
 
     Raises
     ------
     ConfigError
-        There is no such file.
+        The file does not exist.
     DataError
-        A column is missing or not understood, a value is no number, or time does not advance.
+        A column is missing or unknown, a value is not a number, or time does not advance.
     """
     raw = read_raw(Path(path))
     units = {"time": "s"} | dict.fromkeys([*NED, *POSITION_SD], "m")
@@ -77,15 +77,15 @@ def read_reference_path(path: str | Path) -> pd.DataFrame:
 
 
 def columns_of(raw: RawLog, units: Mapping[str, str], wanted: Sequence[str]) -> dict[str, Array]:
-    """Return columns by their name, in the units of the tables.
+    """Return columns by name, in the units of the tables.
 
     Parameters
     ----------
     raw : RawLog
     units : mapping of str to str
-        Unit of each column that there may be.
+        Unit of each possible column.
     wanted : sequence of str
-        Those that there must be.
+        Required columns.
 
     Returns
     -------
@@ -94,7 +94,7 @@ def columns_of(raw: RawLog, units: Mapping[str, str], wanted: Sequence[str]) -> 
     Raises
     ------
     DataError
-        A column is missing, of an unknown unit, or holds what is no number.
+        A column is missing, has an unknown unit, or holds a value that is not a number.
     """
     by_lower = {name.lower(): name for name in units}
     found: dict[str, Array] = {}

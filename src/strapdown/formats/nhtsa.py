@@ -1,8 +1,8 @@
 """Crash tests of the NHTSA vehicle database: the EV5 header and its channels in ASCII.
 
 The order of the fields is that of the NHTSA Test Reference Guide, Version 5, Volume I: Vehicle
-Tests (November 2014). Axes are those of SAE J211: X forward, Y to the right, Z down, which is
-ours; a hit from the front gives negative X, and a nod of the head turns about -Y.
+Tests (November 2014). Axes are those of SAE J211, as ours: X forward, Y to the right, Z down. A
+frontal impact gives negative X, and a nod of the head is a rotation about -Y.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ MM = 1e-3
 
 @dataclass(frozen=True)
 class Vehicle:
-    """A vehicle of a test, in SI; NaN where the header does not say.
+    """A vehicle of a test, in SI units; NaN where not stated.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class CrashTest:
     occupants, restraints, barrier : tuple of tuple of str
         Rows of these sections, field by field.
     findings : tuple of Finding
-        Among others which channels the folder does not hold.
+        Includes the channels whose files are missing.
     """
 
     path: Path
@@ -102,7 +102,7 @@ class CrashTest:
         Raises
         ------
         DataError
-            There is none.
+            The channel does not exist.
         """
         for channel in self.channels:
             if channel.number == number:
@@ -124,8 +124,8 @@ def read_nhtsa(path: str | Path) -> CrashTest:
     Parameters
     ----------
     path : str or Path
-        The header, ``v10146.EV5``, or the folder that holds it; the channels, ``v10146.001`` and
-        so on, stand beside it and are read when their `Channel.table` is first asked for.
+        The header, ``v10146.EV5``, or its folder. The channels, ``v10146.001`` and so on, are
+        beside it and are read when `Channel.table` is first used.
 
     Returns
     -------
@@ -134,8 +134,8 @@ def read_nhtsa(path: str | Path) -> CrashTest:
     Raises
     ------
     DataError
-        The header is missing, empty, cut, or not in the form of EV5; its count of curves is not
-        that of its rows.
+        The header is missing, empty, truncated, or not in EV5 format; or its number of curves
+        differs from its rows.
     """
     file = header_of(Path(path))
     rows = sections(file)
@@ -176,12 +176,12 @@ def read_nhtsa(path: str | Path) -> CrashTest:
 
 
 def header_of(path: Path) -> Path:
-    """Return the header of a test, given as itself or as its folder.
+    """Find the header of a test, given as file or folder.
 
     Raises
     ------
     DataError
-        The folder holds none, or more than one.
+        The folder holds no header, or more than one.
     """
     if not path.is_dir():
         return path
@@ -316,7 +316,7 @@ def _findings(channels: tuple[Channel, ...], file: Path) -> list[Finding]:
 
 
 def _ranges(numbers: list[int]) -> str:
-    """Numbers as ranges: 7-46, 53-92."""
+    """Format numbers as ranges: 7-46, 53-92."""
     parts: list[list[int]] = []
     for n in sorted(numbers):
         if parts and n == parts[-1][1] + 1:
@@ -326,21 +326,21 @@ def _ranges(numbers: list[int]) -> str:
     return ", ".join(f"{a}" if a == b else f"{a}-{b}" for a, b in parts)
 
 
-# The header of a crash test of the NHTSA database, row by row: sections, fields, numbers.
+# Header of a crash test of the NHTSA database: sections, rows, fields, numbers.
 
 
 SECTIONS = ("EV5", "TEST", "VEHICLE", "BARRIER", "OCCUPANT", "RESTRAINT", "INSTRUMENTATION", "END")
-# Headers are text of some hundred bytes a channel, of which no test has a hundred thousand.
+# Size limit: some hundred bytes per channel, and less than a hundred thousand channels.
 LARGEST_HEADER = 50_000_000
 
 
 def sections(file: Path) -> dict[str, list[tuple[list[str], int]]]:
-    """Rows of each section, field by field, with their line numbers.
+    """Split a header into sections: rows of fields, with their line numbers.
 
     Raises
     ------
     DataError
-        The file is missing, empty, far too large, cut, or in another form.
+        The file is missing, empty, far too large, truncated, or in another format.
     """
     if not file.is_file():
         raise DataError("io.no-such-file", file=str(file))
@@ -382,7 +382,7 @@ def sections(file: Path) -> dict[str, list[tuple[list[str], int]]]:
 def only(
     rows: dict[str, list[tuple[list[str], int]]], section: str, file: Path
 ) -> tuple[list[str], int]:
-    """Return the row of a section that has one, with its line; refuse another count."""
+    """Return the only row of a section, with its line; refuse any other number of rows."""
     if len(rows[section]) != 1:
         raise DataError(
             "io.rows-section-needed",
@@ -395,7 +395,7 @@ def only(
 
 
 def to_number(text: str, file: Path, line: int, what: str) -> float:
-    """Return a field as a number, NaN where it is not stated; refuse what is none."""
+    """Convert a field to a number, NaN if not stated; refuse other text."""
     if text in ("", "NA", "UN"):
         return math.nan
     try:
@@ -408,7 +408,7 @@ def to_number(text: str, file: Path, line: int, what: str) -> float:
 
 
 def to_whole(text: str, file: Path, line: int, what: str) -> int:
-    """Return a field as a whole number; refuse what is none, or not stated."""
+    """Convert a field to an integer; refuse other text or an empty field."""
     value = to_number(text, file, line, what)
     if not math.isfinite(value) or value != int(value):
         raise bad_number(text, file, line, what)
@@ -416,12 +416,12 @@ def to_whole(text: str, file: Path, line: int, what: str) -> int:
 
 
 def bad_number(text: str, file: Path, line: int, what: str) -> DataError:
-    """What is said of a field that should be a number."""
+    """Make the error for a field that is not a number."""
     return DataError("io.no-number-4", file=file.name, row=line, quantity=what, text=text)
 
 
 def row_error(file: Path, line: int, section: str, found: int, needed: int) -> DataError:
-    """What is said of a row with too few or too many fields."""
+    """Make the error for a row with too few or too many fields."""
     return DataError(
         "io.fields-between-bars-row",
         file=file.name,
@@ -433,12 +433,12 @@ def row_error(file: Path, line: int, section: str, found: int, needed: int) -> D
     )
 
 
-# One channel of a crash test of the NHTSA database: what its header row says, and its samples.
+# One channel of a crash test of the NHTSA database: its header row and its samples.
 
 
 KMH = 1.0 / 3.6
-#: Units as the database writes them: what they are in SI, and the factor. Only units whose
-#: meaning is beyond doubt; another one is refused when its channel is read.
+#: Units of the database, with the SI unit and the factor. Only unambiguous units are listed;
+#: others are refused when their channel is read.
 UNITS: dict[str, tuple[str, float]] = {
     "G'S": ("m/s2", ACCEL_UNITS["g"]),
     "G": ("m/s2", ACCEL_UNITS["g"]),
@@ -454,15 +454,15 @@ UNITS: dict[str, tuple[str, float]] = {
     "KPH": ("m/s", KMH),
 }
 TIMES: dict[str, float] = {"SEC": 1.0, "MSEC": 1e-3}
-# Stamps have six decimals: two steps may so differ by 1 µs.
+# Stamps have six decimals: two steps may differ by 1 µs.
 STAMP_ROUNDING = 1.1e-6  # s
-# A row of two numbers is shorter; a file that is far larger is not what its header says.
+# Limit of a row of two numbers; a far larger file does not match its header.
 LONGEST_ROW = 64  # bytes
 
 
 @dataclass(frozen=True)
 class Channel:
-    """A channel as its header row describes it; `table` reads its samples when first asked.
+    """A channel as described by its header row; `table` reads its samples on first use.
 
     Attributes
     ----------
@@ -476,21 +476,21 @@ class Channel:
     occupant : str
         Code of the seat (01 driver, 02 front passenger), or NA.
     location : str
-        Code of the place: HDCG head, FLLR floor left rear, ENGN engine.
+        Code of the location: HDCG head, FLLR floor left rear, ENGN engine.
     axis : str
         XL, YL, ZL local to the part; XG, YG, ZG of the vehicle.
     time_unit, unit : str
         As recorded.
     prefilter_hz : float, Hz
-        Of the analogue filter before sampling; NaN where not stated.
+        Of the analog filter before sampling; NaN if not stated.
     maker, calibrated : str
     rating : float
-        Full scale, in the recorded unit; NaN where not stated.
+        Full scale, in the recorded unit; NaN if not stated.
     used_percent : float, %
-        Of the rating, as the laboratory stated it.
+        Fraction of the rating, as stated by the laboratory.
     initial_velocity : float, m/s
         Of the part along the axis before the impact, with the sign of the file: positive for
-        a vehicle that drives forward; NaN where not stated.
+        a vehicle that drives forward; NaN if not stated.
     first, last : int
         Numbers of the first and last sample, counted from the impact.
     interval : float, s
@@ -500,7 +500,7 @@ class Channel:
         P, not R for redundant.
     comment : str
     path : Path or None
-        File of the samples; None where the folder has none.
+        File of the samples; None if the folder lacks it.
     """
 
     vehicle: int
@@ -537,7 +537,7 @@ class Channel:
 
     @property
     def samples(self) -> int:
-        """Samples that the header promises."""
+        """Number of samples according to the header."""
         return self.last - self.first + 1
 
     @property
@@ -558,16 +558,16 @@ class Channel:
 
     @cached_property
     def table(self) -> pd.DataFrame:
-        """Samples in SI: index ``time`` in s from the impact, column ``value``.
+        """Samples in SI units: index ``time`` in s from the impact, column ``value``.
 
-        Accelerations are as recorded: the channels are zeroed before the impact, so gravity at
-        rest is not in them.
+        Accelerations are as recorded: the channels are zeroed before the impact, so they exclude
+        gravity of the state before it.
 
         Raises
         ------
         DataError
-            There is no file; it is empty, cut, or not what the header says; a value is no
-            finite number; time does not advance; the unit is not known.
+            The file is missing, empty, truncated, or differs from the header; a value is not a
+            finite number; time does not advance; or the unit is unknown.
         """
         time, values = self.recorded
         assert self.path is not None
@@ -585,7 +585,7 @@ class Channel:
         Raises
         ------
         DataError
-            As `table`, but of the unit.
+            As `table`, except for the unit.
         """
         if self.path is None:
             raise DataError(

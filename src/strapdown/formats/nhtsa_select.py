@@ -1,4 +1,4 @@
-"""Channels of a crash test by place and axis, and six of them as an Imu table."""
+"""Selection of crash test channels by location and axis, and of six as an Imu table."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ def accelerations(
     occupant: str | None = None,
     vehicle: int | None = None,
 ) -> tuple[Channel, ...]:
-    """Select accelerometers whose samples are there.
+    """Select accelerometers whose samples are available.
 
     Parameters
     ----------
     test : CrashTest
     location : str, optional
-        Code of the place, or its beginning: ``FLLR``, ``FL``.
+        Code of the location, or its beginning: ``FLLR``, ``FL``.
     axis : str, optional
         ``X``, ``Y``, ``Z``, or the code with its frame, ``XG``.
     occupant : str, optional
@@ -37,12 +37,12 @@ def accelerations(
     Returns
     -------
     tuple of Channel
-        In the order of the header; failed ones too, as their `status` says.
+        In the order of the header; including failed ones, see their `status`.
 
     Raises
     ------
     DataError
-        There is none.
+        No channel fits.
     """
     found = tuple(
         c
@@ -77,7 +77,7 @@ def imu_of(
     rest_force: tuple[float, float, float] = (0.0, 0.0, -STANDARD_GRAVITY),
     until: float = 0.0,
 ) -> pd.DataFrame:
-    """Put six channels of one body together as an Imu table.
+    """Combine six channels of one body into an Imu table.
 
     Parameters
     ----------
@@ -85,11 +85,11 @@ def imu_of(
     accel, gyro : triple of int
         Numbers of the channels along X, Y and Z.
     rest_force : triple, m/s², optional
-        Specific force of the body before the impact, in its axes. The channels are zeroed
-        there, so it is put back after their own mean before `until` is taken off. It says how
-        the body stood; the default is upright.
+        Specific force of the body before the impact, in its axes. The channels are zeroed there,
+        so it is added after subtracting their own mean before `until`. It sets the attitude of
+        the body; the default is upright.
     until : float, s
-        End of the stretch that is at rest or at constant velocity.
+        End of the initial interval, in which the body is stationary or at constant velocity.
 
     Returns
     -------
@@ -99,8 +99,8 @@ def imu_of(
     Raises
     ------
     DataError
-        A channel is no accelerometer or no angular rate, the stamps differ, or there are fewer
-        than two samples before `until`.
+        A channel is not an accelerometer or an angular rate sensor, the stamps differ, or there
+        are fewer than two samples before `until`.
     """
     values = []
     for numbers, unit in ((gyro, "rad/s"), (accel, "m/s2")):

@@ -1,4 +1,4 @@
-"""Single NumPy arrays, in files or in archives; nothing in them is ever executed."""
+"""Single NumPy arrays, from files or archives; their content is never executed."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ def load(path: Path, label: str) -> NDArray[Any]:
     Raises
     ------
     DataError
-        It is damaged, claims more than it holds, or holds Python objects.
+        The array is damaged, declares more data than it holds, or holds Python objects.
     """
     try:
         with path.open("rb") as stream:
             return read_array(stream, path.stat().st_size, None, label)
     except DataError:
         raise
-    except Exception as error:  # a damaged header can break the parser that NumPy uses for it
+    except Exception as error:  # a damaged header can break NumPy's parser
         raise DataError(
             "io.npy-unreadable", file=label, error=error or type(error).__name__
         ) from None
@@ -47,9 +47,9 @@ def read_array(stream: BinaryIO | Any, size: int, name: str | None, file: str) -
     ----------
     stream : file object
     size : int, bytes
-        What is stored, header included.
+        Stored size, including the header.
     name : str or None
-        Of the array, for messages.
+        Name of the array, for messages.
     file : str
 
     Returns
@@ -59,7 +59,7 @@ def read_array(stream: BinaryIO | Any, size: int, name: str | None, file: str) -
     Raises
     ------
     DataError
-        It claims another size than is stored, or holds Python objects.
+        The declared size differs from the stored one, or the array holds Python objects.
     ValueError
         The header is damaged.
     """

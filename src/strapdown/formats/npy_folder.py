@@ -1,4 +1,4 @@
-"""Folders of NumPy arrays, one quantity a file: ``time.npy``, ``gyro_rad_s.npy``, ``accel.npy``."""
+"""Folders of NumPy arrays, one per quantity: ``time.npy``, ``gyro_rad_s.npy``, ``accel.npy``."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from strapdown.formats.recording import RawLog
 
 
 def detect(path: Path) -> bool:
-    """Tell by the names of its arrays whether a folder has a gyro among them."""
+    """Whether a folder has an array with the name of a gyro."""
     return any(str(read_name(p.stem).quantity).startswith("gyro") for p in _arrays(path))
 
 
 def read(path: Path) -> RawLog:
-    """Read every array of the folder, each under its file's name.
+    """Read every array of the folder, each under its file name.
 
     Parameters
     ----------
@@ -29,13 +29,13 @@ def read(path: Path) -> RawLog:
     Returns
     -------
     RawLog
-        Arrays of another length than the gyro's are left out, and named.
+        Arrays that differ in length from the gyro's are dropped and listed.
 
     Raises
     ------
     DataError
-        An array is damaged, claims more than it holds, or holds Python objects; or the stamps
-        have another length than the gyro.
+        An array is damaged, declares more data than it holds, or holds Python objects; or the
+        stamps differ in length from the gyro.
     """
     name = path.resolve().name
     arrays: dict[str, NDArray[Any]] = {}

@@ -1,4 +1,4 @@
-"""NumPy archives."""
+"""NumPy archives (``.npz``)."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from strapdown.formats.recording import RawLog
 
 
 def detect(path: Path) -> bool:
-    """Tell whether the name is that of a NumPy archive."""
+    """Whether the name is that of a NumPy archive."""
     return path.is_file() and path.suffix.lower() == ".npz"
 
 
 def read(path: Path) -> RawLog:
-    """Read the arrays of a NumPy archive; nothing in it is ever executed.
+    """Read the arrays of a NumPy archive; its content is never executed.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def read(path: Path) -> RawLog:
     Raises
     ------
     DataError
-        It is no archive, is damaged, claims more than it holds, or holds Python objects.
+        The file is not an archive, is damaged, declares too much data, or holds Python objects.
     """
     found = arrays_of(path)
     arrays = {name: array for name, array in found.items() if array.ndim}
@@ -62,7 +62,7 @@ def arrays_of(path: Path) -> dict[str, NDArray[Any]]:
                     found[info.filename[:-4]] = _member(archive, info, path.name)
     except DataError:
         raise
-    except Exception as error:  # a damaged archive can break any of the decoders it goes through
+    except Exception as error:  # a damaged archive can break any of the decoders involved
         raise DataError(
             "io.npz-unreadable", file=path.name, error=error or type(error).__name__
         ) from None
@@ -77,7 +77,7 @@ def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo, file: str) -> NDArr
 
 
 def write(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
-    """Write arrays; the same arrays give the same bytes.
+    """Write arrays; equal input gives identical bytes.
 
     Parameters
     ----------

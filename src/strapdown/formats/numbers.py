@@ -1,4 +1,4 @@
-"""Values of a column as numbers, or a message that names the row in which one is not."""
+"""Conversion of columns to numbers; errors name the row."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from strapdown.formats.recording import RawLog
 
 
 def numbers(raw: RawLog, column: Column, quantity: str) -> NDArray[Any]:
-    """Values of a column.
+    """Return the values of a column as numbers.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def numbers(raw: RawLog, column: Column, quantity: str) -> NDArray[Any]:
     Returns
     -------
     ndarray, (n,)
-        Integers or floats, as in the file; NaN for what is missing.
+        Integers or floats, as in the file; NaN for missing values.
 
     Raises
     ------
@@ -53,12 +53,12 @@ def numbers(raw: RawLog, column: Column, quantity: str) -> NDArray[Any]:
 
 
 def ticks_of(raw: RawLog, column: Column) -> tuple[NDArray[Any], bool]:
-    """Stamps as numbers; dates and times of day as nanoseconds since 1970, and True.
+    """Return stamps as numbers; dates and times of day as nanoseconds since 1970, and True.
 
     Raises
     ------
     DataError
-        A stamp is neither, or is not like those before it.
+        A stamp is neither, or of another kind than those before it.
     """
     values = raw.columns[column.source]
     if values.dtype.kind == "M":

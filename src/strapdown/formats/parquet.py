@@ -1,4 +1,4 @@
-"""Parquet tables: columns, lists of three, structures; units where fields state them."""
+"""Parquet tables: columns, lists of three, structures; units where stated in fields."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ UNITS = (b"unit", b"units")
 
 
 def detect(path: Path) -> bool:
-    """Tell by its first bytes, or by its name."""
+    """Detect by the first bytes, or by the name."""
     if not path.is_file():
         return False
     with path.open("rb") as stream:
@@ -35,14 +35,14 @@ def read(path: Path) -> RawLog:
     Returns
     -------
     RawLog
-        Columns of structures are called ``structure.field``, those of lists of one length
+        Columns of structures are named ``structure.field``, those of lists of equal length
         ``list[0]``, ``list[1]`` …; missing values are NaN. The metadata ``unit`` or ``units``
-        of a field and ``sampling``, ``axes`` and a rate among those of the table are understood.
+        of a field, and ``sampling``, ``axes`` and a rate of the table, are understood.
 
     Raises
     ------
     DataError
-        It is damaged, or claims far more than it holds.
+        The file is damaged, or declares far more data than it holds.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -57,14 +57,14 @@ def read(path: Path) -> RawLog:
         meta = {_text(k): _text(v) for k, v in (table.schema.metadata or {}).items()}
         units = _units(table)
         arrays = {}
-        # One after the other, so that no more than one stands there twice.
+        # Column by column, so that at most one is in memory twice.
         for name in table.column_names:
             arrays[name] = _array(table.column(0))
             table = table.remove_column(0)
         pa.default_memory_pool().release_unused()
     except DataError:
         raise
-    except Exception as error:  # a damaged file can break any of the decoders it goes through
+    except Exception as error:  # a damaged file can break any of the decoders involved
         raise DataError(
             "io.table-cannot-read",
             file=path.name,
@@ -83,7 +83,7 @@ def _units(table: Any) -> dict[str, str]:
 
 
 def _array(column: Any) -> NDArray[Any] | None:
-    """Numbers, dates, or rows of numbers; None for what is neither."""
+    """Convert to numbers, dates, or rows of numbers; None for anything else."""
     import pyarrow as pa
 
     kind = column.type
@@ -100,13 +100,13 @@ def _array(column: Any) -> NDArray[Any] | None:
         return dates
     if pa.types.is_integer(kind) or pa.types.is_floating(kind):
         values: NDArray[Any] = column.to_numpy()
-        # What Arrow has allocated stays with it when it is freed.
+        # Arrow keeps memory that it has allocated, even when freed.
         return values if values.flags.owndata else values.copy()
     return None
 
 
 def _rows(column: Any) -> NDArray[Any] | None:
-    """Lists of one length as rows of an array; a missing list is a row of NaN."""
+    """Convert lists of equal length to rows of an array; a missing list is a row of NaN."""
     import pyarrow as pa
 
     if not (

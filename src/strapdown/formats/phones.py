@@ -1,4 +1,4 @@
-"""What logs of phones have in common: axes, and acceleration that was taken apart."""
+"""Common part of phone logs: axes, and sums of linear acceleration and gravity."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from strapdown.formats.join import Clock, at_stamps, in_seconds
 from strapdown.formats.numbers import numbers
 from strapdown.formats.recording import RawLog
 
-# The phone's own axes point right, to the top edge, and out of the screen. It is taken to lie on
+# The phone's own axes point right, to the top edge, and out of the screen. It is assumed to lie on
 # its back with the top edge forward: forward is y, right is x, down is -z.
 AXES = "y,x,-z"
 XYZ = "xyz"
@@ -33,7 +33,7 @@ def sensor_log(
     rows: NDArray[np.int64] | None = None,
     findings: list[Finding] | None = None,
 ) -> RawLog:
-    """The log of one sensor of a phone.
+    """Make the log of one sensor of a phone.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def sensor_log(
     triad : str
         ``gyro``, ``accel`` or ``mag``.
     unit : str or None
-        None where it is not known.
+        None if unknown.
     time : (str, str)
         Column of the stamps and their unit.
     xyz : (str, str, str)
@@ -69,22 +69,22 @@ def sensor_log(
 
 
 def force_of(linear: RawLog, gravity: RawLog) -> RawLog:
-    """Specific force from acceleration without gravity and gravity, each in the phone's own sense.
+    """Add linear acceleration and gravity, each with the phone's sign, to specific force.
 
     Parameters
     ----------
     linear, gravity : RawLog
-        As `sensor_log` makes them, of the triad ``accel``, in one unit.
+        From `sensor_log`, of the triad ``accel``, in one unit.
 
     Returns
     -------
     RawLog
-        The sum, at the stamps of `linear` at which there is a gravity.
+        The sum, at the stamps of `linear` that gravity covers.
 
     Raises
     ------
     DataError
-        The two have no time in common, or a value is no number.
+        The two do not overlap in time, or a value is not a number.
     """
     clocks, values = [], []
     for log in (linear, gravity):

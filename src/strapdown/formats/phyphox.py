@@ -1,10 +1,10 @@
-"""phyphox (RWTH Aachen): its CSV export, as a file or as a zip or folder with one CSV a sensor.
+"""phyphox (RWTH Aachen): CSV export as a file, or as a zip or folder with one CSV per sensor.
 
-Columns say quantity and unit, as in ``"Time (s)","Gyroscope x (rad/s)"``; separator and decimal
-sign are as chosen at the export. ``meta/time.csv`` has the starts and pauses. Units and the
+Column names state quantity and unit, as in ``"Time (s)","Gyroscope x (rad/s)"``; separator and
+decimal sign are as chosen at the export. ``meta/time.csv`` has the starts and pauses. Units and the
 meaning of the sensors are those of https://github.com/phyphox/phyphox-docs,
-docs/file-format/input.md: gyroscope in rad/s, accelerometer in m/s² with gravity (9.81 at rest),
-linear acceleration without it, magnetic field in µT; axes are Android's.
+docs/file-format/input.md: gyroscope in rad/s, accelerometer in m/s² with gravity (9.81 when
+stationary), linear acceleration without it, magnetic field in µT; axes are Android's.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _EVENTS = "meta/time.csv"
 
 
 def detect(path: Path) -> bool:
-    """Tell by a header that names stamps and a sensor as phyphox does."""
+    """Detect by a header with stamps and a sensor named as in phyphox."""
     members = peek(path)
     if path.is_file() and path.suffix.lower() in csv.SUFFIXES:
         members = [file_member(path)]
@@ -40,7 +40,7 @@ def detect(path: Path) -> bool:
 
 
 def read(path: Path) -> RawLog:
-    """Read gyro, specific force and magnetic field, and join them on the stamps of the gyro.
+    """Read gyro, specific force and magnetic field, joined on the stamps of the gyro.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def _log(member: Member) -> RawLog:
 
 
 def _mention_linear(logs: list[RawLog]) -> list[RawLog]:
-    """Say of tables that hold none of the three that they are not used."""
+    """Note that tables without any of the three sensors are not used."""
     wanted = {f"{triad}_{a}" for triad in _TRIADS for a in XYZ}
     for log in logs:
         if not any(q in wanted for q, _ in log.stated.values()):
@@ -108,7 +108,7 @@ def _mention_linear(logs: list[RawLog]) -> list[RawLog]:
 
 
 def _pauses(member: Member) -> list[Finding]:
-    """Pauses of the recording, in which its clock stood still."""
+    """Report pauses of the recording, during which its clock was stopped."""
     try:
         table = csv.parse(member.read(), member.label, (member.file,)).columns
         events = [str(e).strip('"') for e in table["event"]]

@@ -1,12 +1,12 @@
-"""Increments of a strapdown unit as the PSINS toolbox keeps them (``.imu``).
+"""Increments of a strapdown unit from the PSINS toolbox (``.imu``).
 
-Its log of a SIMU: ``%`` comments, three lines of header, then six counts a sample:
+Its log of a SIMU: ``%`` comments, three lines of header, then six counts per sample:
 
     pitch, roll, yaw (deg), VE, VN, VU (m/s)        yaw counter-clockwise from north
     lat, lon (deg), h (m), t0 (s), step (ms), g (m/s²)
     scale of each gyro (arcsec), of each accelerometer (µg·s)
 
-and its plain matrices: increments in rad and m/s, and the time in the last of seven columns.
+and its plain matrices: increments in rad and m/s, with the time in the last of seven columns.
 Axes right, forward, up; an increment belongs to the interval that ends at its stamp.
 """
 
@@ -31,19 +31,19 @@ AXES = "y,x,-z"
 GYROS = [f"dtheta_{a}" for a in "xyz"]
 ACCELS = [f"dv_{a}" for a in "xyz"]
 _ARCSEC = math.pi / 180.0 / 3600.0
-# The header's lines: their name, and the code of the note on what they hold.
+# Header lines: name, and code of the note on their content.
 _HEADER = (
     ("attitude and velocity", "io.psins-attitude-line"),
     ("position and clock", "io.psins-position-line"),
     ("scale factors", "io.psins-scales-line"),
 )
-# A unit that is carried or stands still feels gravity to so much, on the median of its samples.
+# Norm of the median specific force of a carried or stationary unit.
 _GRAVITY = (9.6, 10.0)  # m/s²
 _STEPS = (1e-5, 1.0)  # s
 
 
 def detect(path: Path) -> bool:
-    """Tell whether the name is that of increments of PSINS."""
+    """Whether the file name is that of PSINS increments."""
     return path.is_file() and path.suffix.lower() == SUFFIX
 
 
@@ -58,15 +58,15 @@ def read(path: Path) -> RawLog:
     -------
     RawLog
         Columns ``dtheta_x`` … in rad and ``dv_x`` … in m/s, with ``time`` at the end of each
-        interval: of a SIMU log by the scale factors and the clock of its header, whose place
-        and attitude are kept as `StatedStart`; of a plain matrix of seven columns where the
-        last is a steady clock and the norm of the velocity increments over a step is that of
-        gravity. Any other text is read as a table is.
+        interval. A SIMU log is converted with the scale factors and clock of its header, whose
+        position and attitude are kept as `StatedStart`. A plain matrix of seven columns is
+        accepted if the last is a steady clock and the norm of the velocity increments over a
+        step is that of gravity. Any other text is read as a table.
 
     Raises
     ------
     DataError
-        It is no text, the header is bad, a row has another width or holds no whole number.
+        The file is not text, the header is invalid, or a row has another width or no integer.
     """
     data = path.read_bytes()
     text, findings = csv.decoded(data, path.name)
@@ -117,7 +117,7 @@ def _simu(path: Path, lines: Lines, ended: bool, findings: list[Finding]) -> Raw
 
 
 def _header(file: str, lines: Lines, which: int) -> list[float]:
-    """Six numbers of one line of the header."""
+    """Parse the six numbers of a header line."""
     name, _ = _HEADER[which]
     if len(lines) <= which:
         raise DataError("io.psins-header-cut", file=file, which=which + 1, name=name)
@@ -142,7 +142,7 @@ def _number(text: str) -> float:
 
 
 def _refuse(file: str, row: int, which: int, quantity: str, code: str, **data: Any) -> None:
-    """Refuse a value of a line of the header, and say what that line holds."""
+    """Refuse a value of a header line; the message describes the line."""
     holds = Finding(_HEADER[which][1], severity="note")
     raise DataError(code, file=file, row=row, quantity=quantity, holds=holds, **data)
 
@@ -158,7 +158,7 @@ def _start(
         _refuse(file, rows[1], 1, "longitude", "io.psins-longitude", value=lon)
     if abs(pitch) > 90.0:
         _refuse(file, rows[0], 0, "pitch", "io.psins-pitch", value=pitch)
-    # Turned about up, then right, then forward: with yaw reversed the 3-2-1 angles of
+    # Rotations about up, then right, then forward: with yaw reversed the 3-2-1 angles of
     # forward-right-down.
     return StatedStart(lat, lon, alt, (roll, pitch, 0.0 - yaw), (north, east, 0.0 - up))
 
@@ -166,7 +166,7 @@ def _start(
 def _counts(
     file: str, lines: Lines, ended: bool, findings: list[Finding]
 ) -> tuple[Array, NDArray[np.int64]]:
-    """Whole numbers of all samples, and the rows that they stand in."""
+    """Return the integers of all samples, and their rows in the file."""
     block, rows = _block(file, lines, 6, ended, findings)
     bad = np.argwhere(block != np.round(block))
     if bad.size:
@@ -186,7 +186,7 @@ def _counts(
 
 
 def _matrix(path: Path, lines: Lines, ended: bool, findings: list[Finding]) -> RawLog | None:
-    """Increments in rad and m/s with their time, where the numbers are such; else None."""
+    """Return increments in rad and m/s with their time, if plausible; else None."""
     if len(lines) < 3 or any(len(line.split()) != 7 for _, line in lines[:3]):
         return None
     if not all(math.isfinite(_number(f)) for _, line in lines[:3] for f in line.split()):
@@ -221,7 +221,7 @@ def _matrix(path: Path, lines: Lines, ended: bool, findings: list[Finding]) -> R
 def _block(
     file: str, lines: Lines, width: int, ended: bool, findings: list[Finding]
 ) -> tuple[Array, NDArray[np.int64]]:
-    """Numbers of all rows; a last row that may have lost digits is left out."""
+    """Return the numbers of all rows; drop a last row that may have lost digits."""
     if lines and (not ended or len(lines[-1][1].split()) < width):
         findings.append(
             Finding("io.last-line-does-not-end", severity="note", file=file, row=lines[-1][0])

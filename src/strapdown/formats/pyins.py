@@ -1,8 +1,8 @@
-"""Arrays that python-ins is simulated with (``.npz``): rates, fixes and truth in one archive.
+"""Simulation arrays of python-ins (``.npz``): rates, fixes and truth in one archive.
 
 ``time`` s and ``imu`` (n, 6): rates in rad/s and specific force in m/s², forward, right, down, at
 their stamps. ``truth`` (n, 9): latitude, longitude in deg, height in m, velocity north, east, down
-in m/s, roll, pitch, heading in deg. ``fix_time`` s and ``fix`` (m, 3): places as in the truth.
+in m/s, roll, pitch, heading in deg. ``fix_time`` s and ``fix`` (m, 3): positions as in the truth.
 """
 
 from __future__ import annotations
@@ -38,17 +38,17 @@ def _holds(path: Path, *names: str) -> bool:
 
 
 def detect(path: Path) -> bool:
-    """Tell by the names of the arrays."""
+    """Detect by the names of the arrays."""
     return _holds(path, "time", "imu")
 
 
 def detect_fixes(path: Path) -> bool:
-    """Tell by the names of the arrays."""
+    """Detect by the names of the arrays."""
     return _holds(path, "fix_time", "fix")
 
 
 def detect_truth(path: Path) -> bool:
-    """Tell by the names of the arrays."""
+    """Detect by the names of the arrays."""
     return _holds(path, "time", "truth")
 
 
@@ -69,7 +69,7 @@ def _arrays(path: Path, time: str, values: str, width: int) -> tuple[Array, Arra
 
 
 def read(path: Path) -> RawLog:
-    """Read the rates.
+    """Read the angular rates and specific force.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def read(path: Path) -> RawLog:
     Raises
     ------
     DataError
-        The archive is damaged, or its arrays have other shapes.
+        The archive is damaged, or its arrays have the wrong shapes.
     """
     time, imu = _arrays(path, "time", "imu", len(COLUMNS))
     stated = {"time": ("time", "s")}
@@ -98,7 +98,7 @@ def read(path: Path) -> RawLog:
 
 
 def read_fixes(path: Path, options: GnssOptions) -> Fixes:
-    """Read the fixes, of which the archive states no standard deviation.
+    """Read the fixes; the archive does not state standard deviations.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Which column of a table is which quantity, by words and units in its name."""
+"""Assignment of table columns to quantities, by words and units in their names."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ SPEEDS = {"m/s": 1.0, "km/h": 1.0 / 3.6, "kn": 1852.0 / 3600.0, "cm/s": 0.01, "m
 SPEEDS |= {"mph": 0.44704}
 PRESSURES = {"Pa": 1.0, "hPa": 100.0, "kPa": 1000.0, "mbar": 100.0, "bar": 1e5}
 RATES = {"rad/s": 1.0, "deg/s": float(np.radians(1.0))}
-#: Units as people write them, the parts of a name joined by underscores.
+#: Spellings of units, with the parts of a name joined by underscores.
 SPELLINGS = {
     **{s: u for s, u in UNITS_OF_LOGS.items() if u in TIME_UNITS or u in ANGLES or u in RATES},
     **{u: u for u in LENGTHS},
@@ -58,11 +58,11 @@ class Quantity:
     Attributes
     ----------
     words : tuple of str
-        Names without blanks, underscores and units, in small letters.
+        Names without blanks, underscores and units, in lower case.
     units : dict of str to float
-        Its units, each with its factor to that of the table; empty where it has none.
+        Its units, each with its factor to that of the table; empty if dimensionless.
     negative : tuple of str
-        Further words, of its opposite: ``velup`` of a velocity down.
+        Further words, for the opposite sign: ``velup`` for a velocity down.
     """
 
     words: tuple[str, ...]
@@ -77,11 +77,11 @@ class Found:
     Attributes
     ----------
     source : str
-        Its name in the file.
+        Column name in the file.
     factor : float
-        What turns its numbers into the table's unit and sign.
+        Factor to the table's unit and sign.
     stated : bool
-        Its name says the unit; otherwise the table's own was taken.
+        Whether the name states the unit; otherwise the table's own is assumed.
     """
 
     source: str
@@ -102,17 +102,17 @@ def find_quantities(
     Parameters
     ----------
     names : iterable of str
-        As they stand in the file.
+        As in the file.
     known : dict of str to Quantity
     asked : dict of str to str
-        Quantity to the name of its column, or its number counted from 1; goes before what the
-        names suggest.
+        Quantity to the name of its column, or its number, from 1; overrides what the names
+        suggest.
     file : str
         For messages.
     units : dict of str to str, optional
-        Column to unit, where the file states it apart from the name.
+        Column to unit, if stated apart from the name.
     of : str
-        What the quantities are of, for messages.
+        Object that the quantities describe, for messages.
 
     Returns
     -------
@@ -122,9 +122,9 @@ def find_quantities(
     Raises
     ------
     ConfigError
-        A column that was asked for is not there, or its quantity is none.
+        A requested column does not exist, or its quantity is unknown.
     DataError
-        Two columns could be one quantity, or a unit is none of its quantity.
+        Two columns fit one quantity, or a unit does not fit its quantity.
     """
     columns = list(names)
     wanted: dict[str, str] = {}
@@ -174,13 +174,13 @@ def find_quantities(
 
 
 def read_words(name: str, known: Mapping[str, Quantity]) -> tuple[str, str | None]:
-    """The word of a name without blanks, and its unit as it is spelled, or None.
+    """Split a name into its word without blanks, and its unit as spelled, or None.
 
     Parameters
     ----------
     name : str
     known : dict of str to Quantity
-        A whole name that is a word of one has no unit: ``h``, ``s``.
+        A name that is a word as a whole has no unit: ``h``, ``s``.
     """
     text = name.strip()
     bracket = _BRACKETS.search(text)
@@ -203,7 +203,7 @@ def _factor(
     quantity: str, known: Quantity, unit: str | None, word: str, name: str, file: str
 ) -> float:
     if unit is None:
-        # A clock that is called millis says its unit.
+        # The word millis of a clock states its unit.
         return known.units[CLOCKS[word]] if word in CLOCKS and CLOCKS[word] in known.units else 1.0
     spelled = SPELLINGS.get(unit) or unit_of(unit) or unit
     if spelled not in known.units:

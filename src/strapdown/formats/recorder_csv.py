@@ -1,4 +1,4 @@
-"""Records as recorders export them: one text table a part, the unit in each heading."""
+"""Recorder exports: one text table per triad or path, with units in the headings."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ def write_recorder_csv(path: Path, table: pd.DataFrame) -> None:
     path : Path
     table : DataFrame
         Index ``time``, s; columns ``accel_x accel_y accel_z``, m/s², or ``gyro_x gyro_y gyro_z``,
-        rad/s. Accelerations and stamps come back to the last bit; rates, written in deg/s, within
-        rounding.
+        rad/s. Accelerations and stamps are reproduced to the last bit; rates, written in deg/s,
+        within rounding.
     """
     turns = set(GYRO) <= set(table.columns)
     values = table[GYRO if turns else ACCEL].to_numpy(dtype=np.float64)
@@ -46,7 +46,7 @@ def write_path_csv(path: Path, table: pd.DataFrame) -> None:
     ----------
     path : Path
     table : DataFrame
-        Index ``time``, s; columns ``north east down`` and, where it has them, ``north_sd east_sd
+        Index ``time``, s; columns ``north east down`` and, if available, ``north_sd east_sd
         down_sd``, m, ``VN VE VD``, m/s, and ``roll pitch heading``, deg.
     """
     columns = {TIME: table.index.to_numpy(dtype=np.float64)}

@@ -1,4 +1,4 @@
-"""What comes out of a reader: raw columns first, then a recording in body axes and SI."""
+"""Output of the readers: raw columns, and recordings in body axes and SI units."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ __all__ = ["Origin", "RawLog", "ReadOptions", "Recording", "StatedStart", "Truth
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """What the user says about a log; whatever is None is taken from the log itself.
+    """User's statements about a log; None means as in the log.
 
     Attributes
     ----------
     columns : dict of str to str
         Quantity (``time``, ``gyro_x`` …, or ``gyro``, ``accel`` for a group of three) to the
-        name of the column in the file, or its number counted from 1.
+        name of the column in the file, or its number, from 1.
     gyro_unit, accel_unit, time_unit : str, optional
         Keys of `constants.GYRO_UNITS`, `ACCEL_UNITS`, `TIME_UNITS`; or of `GYRO_SUMS`,
-        `ACCEL_SUMS` for increments of each sample.
+        `ACCEL_SUMS` for increments per sample.
     axes : str, optional
         Which sensor axis points forward, right, down: ``x,-y,-z`` for a sensor whose axes
         point forward, left, up.
@@ -39,9 +39,9 @@ class ReadOptions:
     rate : float, optional, Hz
         For a log without a time column.
     repair : bool
-        Leave out rows that cannot be used, and say how many, instead of refusing the log.
+        Drop and count rows that cannot be used, instead of refusing the log.
     format : str, optional
-        A key of `formats.READERS`; recognised by the file itself where it is left out.
+        A key of `formats.READERS`; detected from the file if not given.
     """
 
     columns: dict[str, str] = field(default_factory=dict)
@@ -57,14 +57,14 @@ class ReadOptions:
 
 @dataclass(frozen=True)
 class TruthInSensorAxes:
-    """Attitude truth that came with a log, before its axes are turned to body axes.
+    """Attitude truth of a log, in sensor axes.
 
     Attributes
     ----------
     q_ns : ndarray, (n, 4)
         Sensor axes to local level north-east-down at each sample, NaN where unknown.
     scored : ndarray of bool, (n,)
-        The samples that count for errors.
+        Samples that count for errors.
     """
 
     q_ns: Array
@@ -73,7 +73,7 @@ class TruthInSensorAxes:
 
 @dataclass(frozen=True)
 class StatedStart:
-    """Where and how a log says that it begins; kept for people, and used by no reader.
+    """Initial state stated in a log; shown to people, not used by any reader.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ class StatedStart:
 
 @dataclass
 class RawLog:
-    """The columns of a file as they stand in it.
+    """Raw columns of a file.
 
     Attributes
     ----------
@@ -103,24 +103,23 @@ class RawLog:
     files : tuple of Path
         Every file that was read.
     columns : dict of str to ndarray
-        One-dimensional; not numbers where the file holds text.
+        One-dimensional; not numeric where the file holds text.
     rows : ndarray of int, or None
-        Row of the file in which each sample stands, counted from 1; None where sample k stands
-        in row k + 1.
+        Row of each sample in the file, counted from 1; None if sample k is in row k + 1.
     stated : dict of str to (str, str or None)
-        For a known recording: column to (quantity, unit); None where it does not say the unit.
+        For a known recording: column to (quantity, unit); unit None if not stated.
     units : dict of str to str
-        Column to unit, where the file states it apart from the name.
+        Column to unit, if stated apart from the name.
     rate : float or None
-        Sampling rate in Hz, where the file states it apart from stamps.
+        Sampling rate in Hz, if stated apart from stamps.
     sampling, axes : str or None
-        Where the file states them.
+        If the file states them.
     truth : TruthInSensorAxes or None
     findings : list of Finding
     start : StatedStart or None
-        Where the file states one.
+        If the file states one.
     clock : str or None
-        What its stamps count (`clocks`), where the format says it.
+        Clock of its stamps (`clocks`), if the format defines it.
     """
 
     name: str
@@ -138,13 +137,13 @@ class RawLog:
     clock: str | None = None
 
     def row(self, sample: int) -> int:
-        """Row of the file, counted from 1, in which a sample stands."""
+        """Row of a sample in the file, counted from 1."""
         return sample + 1 if self.rows is None else int(self.rows[sample])
 
 
 @dataclass(frozen=True)
 class Origin:
-    """The raw stamp that became time zero; zero itself where time was left as it is.
+    """The raw stamp at time zero; zero itself if time was not shifted.
 
     Attributes
     ----------
@@ -158,26 +157,26 @@ class Origin:
 
 @dataclass(frozen=True)
 class Recording:
-    """A log that is ready for use.
+    """A log in body axes and SI units.
 
     Attributes
     ----------
     name : str
     files : tuple of Path
     origin : Origin
-        Where its time counts from.
+        Origin of its time.
     imu : DataFrame
         Imu table: body axes forward-right-down, SI.
     truth : DataFrame or None
-        Attitude table, at those stamps of `imu` at which it is known.
+        Attitude table, at the stamps of `imu` with known attitude.
     scored : ndarray of bool or None
-        Which rows of `truth` count for errors.
+        Rows of `truth` that count for errors.
     readings : tuple of Reading
-        What every column was taken for.
+        How each column was read.
     findings : tuple of Finding
-        What a person should know about it.
+        Findings for the user.
     start : StatedStart or None
-        What the file says of its place and attitude at the start.
+        Position and attitude at the start, if the file states them.
     """
 
     name: str

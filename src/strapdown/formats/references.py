@@ -20,7 +20,7 @@ from strapdown.formats.recording import Origin, ReadOptions
 
 __all__ = ["read_reference_words", "read_truth"]
 
-# What tells a sentence from the header of a table that has a column named roll.
+# Distinguishes a sentence from the header of a table with a column named roll.
 SENTENCE = re.compile(
     r"same[ -](?:place[ -])?as|\smoved\s|turns?\s+about|^\S+\s*:?\s+roll[ =]+[-+\d.]", re.I
 )
@@ -32,19 +32,19 @@ def read_reference_words(path: Path) -> list[str] | None:
     Parameters
     ----------
     path : Path
-        ``.toml`` with ``references = ["end same as start", ...]``; a text file of one sentence
-        to a line (``#`` for comments); or a CSV with the columns ``time_s, kind, since_s,
-        roll_deg, pitch_deg, heading_deg, turns, axis, sd_deg``, those that a kind needs.
+        ``.toml`` with ``references = ["end same as start", ...]``; a text file with one sentence
+        per line (``#`` for comments); or a CSV with the columns ``time_s, kind, since_s,
+        roll_deg, pitch_deg, heading_deg, turns, axis, sd_deg``, as needed by the kinds.
 
     Returns
     -------
     list of str or None
-        None where the file is no list of reference points; it may be an attitude truth.
+        None if the file is not a list of reference points; it may be an attitude truth.
 
     Raises
     ------
     DataError
-        It is a list, and something in it is missing or malformed.
+        An entry of the list is missing or malformed.
     """
     if path.suffix.lower() == ".toml":
         return _understood(list(enumerate(_from_toml(path), start=1)), path, "sentence")
@@ -66,7 +66,7 @@ def read_reference_words(path: Path) -> list[str] | None:
 
 
 def _understood(numbered: list[tuple[int, str]], path: Path, what: str) -> list[str]:
-    """Return the sentences, or say which of them is not understood."""
+    """Return the sentences; refuse the first that is not understood."""
     if not numbered:
         raise DataError("io.empty-list-reference-points", file=path.name)
     for number, text in numbered:
@@ -148,17 +148,17 @@ def read_truth(
     options : ReadOptions, optional
         Whether to repair.
     origin : Origin, optional
-        What the time of the log counts from; zero if not given.
+        Origin of the log's time; zero if not given.
 
     Returns
     -------
     DataFrame
-        An Attitude table of the rows in which it is known.
+        An Attitude table of the rows with known attitude.
 
     Raises
     ------
     DataError
-        There is no attitude in it, or it cannot be read.
+        The file has no attitude, or cannot be read.
     """
     truth = truth_of_file(read_raw(path), options or ReadOptions(), origin or Origin(0, "s"))
     if truth is None or not np.isfinite(truth.to_numpy()).all():

@@ -1,10 +1,10 @@
-"""RoNIN: HDF5 files of a phone that was carried, beside another on the chest.
+"""RoNIN: HDF5 files of a carried phone, with another phone on the chest.
 
 ``synced/time`` in s, ``synced/gyro`` in rad/s, ``synced/acce`` in m/s² and ``synced/magnet`` in µT
 are of the carried phone, at 200 Hz, in its own axes (Herath, Yan and Furukawa, RoNIN, ICRA 2020;
 source/preprocessing/compile_dataset_h5.py and gen_dataset_v2.py of
-https://github.com/Sachini/ronin). ``pose/tango_ori`` is the attitude of the phone on the chest and
-says nothing of this one; ``synced/game_rv`` is what the carried phone itself makes of its sensors.
+https://github.com/Sachini/ronin). ``pose/tango_ori`` is the attitude of the phone on the chest, not
+of the carried one; ``synced/game_rv`` is the attitude that the carried phone computes itself.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ CHEST = "pose/tango_ori"
 
 
 def detect(path: Path) -> bool:
-    """Tell by the names of its datasets."""
+    """Detect by the names of its datasets."""
     if not hdf5.detect(path):
         return False
     import h5py
@@ -36,7 +36,7 @@ def detect(path: Path) -> bool:
 
 
 def read(path: Path) -> RawLog:
-    """Read rates, specific force and, where it is there, the magnetic field.
+    """Read rates, specific force and, if present, the magnetic field.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def read(path: Path) -> RawLog:
     Raises
     ------
     DataError
-        It is damaged, or an array has another shape.
+        The file is damaged, or an array has the wrong shape.
     """
     import h5py
 

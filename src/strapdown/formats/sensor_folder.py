@@ -1,4 +1,4 @@
-"""Folders and zip archives of one text table a sensor, as ``gyro.csv`` and ``accel.csv``."""
+"""Folders and zip archives with one text table per sensor, as ``gyro.csv`` and ``accel.csv``."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ _AXIS = re.compile(r"([xyz])(?:[\s_-]*axis)?(?:\s*[\[(].*)?", re.I)
 
 
 def detect(path: Path) -> bool:
-    """Tell by the names of its tables whether one is a gyro's; an archive is always taken."""
+    """Whether a folder has a table named after a gyro; any archive is accepted."""
     if path.is_file():
         return path.suffix.lower() == ".zip"
     return any(_triad(m) == "gyro" for m in peek(path))
 
 
 def read(path: Path) -> RawLog:
-    """Read each sensor's table, and join them on the stamps of the gyro.
+    """Read each sensor's table, joined on the stamps of the gyro.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def read(path: Path) -> RawLog:
     Returns
     -------
     RawLog
-        Columns that are called x, y, z belong to the sensor that their table is named after.
+        Columns named x, y, z belong to the sensor after which their table is named.
 
     Raises
     ------

@@ -1,17 +1,17 @@
 """Sensor Logger (Kelvin Choi; iOS and Android): zip, folder, single CSV, or JSON.
 
-The layout, units and axes are those of its documentation,
+Layout, units and axes are those of its documentation,
 https://github.com/tszheichoi/awesome-sensor-logger: README.md (files, stamps, JSON, metadata),
-UNITS.md, COORDINATES.md and CROSSPLATFORM.md. What matters here:
+UNITS.md, COORDINATES.md and CROSSPLATFORM.md. In short:
 
 - ``time`` counts nanoseconds since 1970, ``seconds_elapsed`` seconds since the start; axes are
-  written in the order z, y, x; each sensor has stamps of its own.
-- ``Accelerometer`` is without gravity. ``TotalAcceleration``, with it, is written on Android
-  alone; elsewhere it is the sum of ``Accelerometer`` and ``Gravity``.
+  written in the order z, y, x; each sensor has its own stamps.
+- ``Accelerometer`` excludes gravity. ``TotalAcceleration``, which includes it, is written only on
+  Android; elsewhere it is the sum of ``Accelerometer`` and ``Gravity``.
 - On iOS these have the opposite sign: gravity of a phone lying on its back is -z, on Android +z.
   With "Standardise Units & Frames" (1.29 and later; ``standardisation`` in Metadata) iOS follows
   Android.
-- ``AccelerometerUncalibrated`` is with gravity; on iOS in g unless standardised, else in m/s².
+- ``AccelerometerUncalibrated`` includes gravity; on iOS in g unless standardized, else in m/s².
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _COPY = re.compile(r"[\s_-]*(\(\d+\)|\d+)$")
 
 @dataclass(frozen=True)
 class Sensor:
-    """Samples of one sensor as the recording holds them."""
+    """Samples of one sensor, as recorded."""
 
     name: str
     file: Path
@@ -54,7 +54,7 @@ class Sensor:
 
 
 def detect(path: Path) -> bool:
-    """Tell by the header of a sensor's file, or by the first record of a JSON file."""
+    """Detect by the header of a sensor's file, or by the first record of a JSON file."""
     if path.is_file() and path.suffix.lower() == ".json":
         with path.open("rb") as stream:
             head = stream.read(4096).decode("utf-8-sig", "replace")
@@ -66,7 +66,7 @@ def detect(path: Path) -> bool:
 
 
 def read(path: Path) -> RawLog:
-    """Read gyro, specific force and magnetic field, and join them on the stamps of the gyro.
+    """Read gyro, specific force and magnetic field, joined on the stamps of the gyro.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def read(path: Path) -> RawLog:
         )
     findings: list[Finding] = []
     logs = [_gyro(sensors, findings), *_force(sensors, meta, name, findings)]
-    # The uncalibrated field has the phone's own in it.
+    # The uncalibrated field includes that of the phone.
     if MAG in sensors:
         logs.append(_log(sensors[MAG], "mag", "uT"))
     raw = join(logs, name, files, rows_of_member=path.suffix.lower() != ".json")
@@ -180,7 +180,7 @@ def _from_json(path: Path) -> tuple[dict[str, Sensor], dict[str, str]]:
 def _values(
     path: Path, records: list[dict[str, Any]], where: list[int], kind: str, name: str
 ) -> NDArray[Any]:
-    """Values of one field, which are written as text; stamps stay whole numbers."""
+    """Return the values of one field, written as text; stamps stay integers."""
     out: list[float] = []
     for k in where:
         value = records[k].get(name)
@@ -233,7 +233,7 @@ def _gyro(sensors: dict[str, Sensor], findings: list[Finding]) -> RawLog:
 def _force(
     sensors: dict[str, Sensor], meta: dict[str, str], name: str, findings: list[Finding]
 ) -> list[RawLog]:
-    """Specific force, from whichever files there are; its sign by the platform."""
+    """Return specific force from the available files; its sign depends on the platform."""
     total, linear, gravity, raw = ACCELS
     platform = meta.get("platform", "").strip().lower()
     # Only Android writes acceleration with gravity.

@@ -1,12 +1,11 @@
-"""SensorLog of iPhones, iPads and Apple Watches: one wide table, iOS words with their units.
+"""SensorLog of iPhones, iPads and Apple Watches: one wide table, iOS names with units.
 
 Names are ``motionRotationRateX(rad/s)``, ``accelerometerAccelerationX(G)``,
-``motionUserAccelerationX(G)``, ``motionGravityX(G)``, ``gyroRotationX(rad/s)``, as the application
-writes them. Every row has the latest value of every sensor, and each sensor its own stamps
-(``motionTimestamp_sinceReboot(s)``, ``accelerometerTimestamp_sinceReboot(s)``), so that a value may
-stand in several rows. Core Motion reports acceleration and gravity with the sign opposite to
-specific force: lying on its back a phone has gravity -z (Apple, CMDeviceMotion and
-CMAccelerometerData).
+``motionUserAccelerationX(G)``, ``motionGravityX(G)``, ``gyroRotationX(rad/s)``, as written by the
+application. Every row has the latest value of every sensor, and each sensor its own stamps
+(``motionTimestamp_sinceReboot(s)``, ``accelerometerTimestamp_sinceReboot(s)``), so a value may be
+repeated in several rows. Core Motion reports acceleration and gravity with the sign opposite to
+specific force: a phone on its back has gravity -z (Apple, CMDeviceMotion and CMAccelerometerData).
 """
 
 from __future__ import annotations
@@ -41,7 +40,7 @@ WALL_CLOCK = "loggingTime(txt)"
 
 
 def detect(path: Path) -> bool:
-    """Tell by the names of a gyro's columns, with their unit."""
+    """Detect by the names of a gyro's columns, with their unit."""
     if not csv.detect(path):
         return False
     line = first_line(file_member(path))
@@ -50,7 +49,7 @@ def detect(path: Path) -> bool:
 
 
 def read(path: Path) -> RawLog:
-    """Read rates and specific force, and join them on the stamps of the gyro.
+    """Read rates and specific force, joined on the stamps of the gyro.
 
     Parameters
     ----------
@@ -59,8 +58,8 @@ def read(path: Path) -> RawLog:
     Returns
     -------
     RawLog
-        Rates of the fused motion, from which the phone has taken its bias, or else of the gyro;
-        specific force is user acceleration and gravity, or else the accelerometer.
+        Rates of the fused motion, which the phone has corrected for its bias, or else of the
+        gyro; specific force from user acceleration and gravity, or else the accelerometer.
 
     Raises
     ------
@@ -90,7 +89,7 @@ def _three(kind: str, unit: str) -> tuple[str, str, str]:
 
 
 def _log(raw: RawLog, kind: str, triad: str, unit: str, findings: list[Finding]) -> RawLog:
-    """The samples of one sensor, each once."""
+    """Return the samples of one sensor, without repetitions."""
     names = _three(kind, RADIANS if triad == "gyro" else GS)
     time = _clock(raw, kind)
     stamps = raw.columns[time]
@@ -123,7 +122,7 @@ def _log(raw: RawLog, kind: str, triad: str, unit: str, findings: list[Finding])
 
 
 def _clock(raw: RawLog, kind: str) -> str:
-    """The stamps of a sensor; or else those of the motion, or the times of day of the rows."""
+    """Return the stamps of a sensor, else those of the motion, else times of day of the rows."""
     for name in (STAMPS[kind], STAMPS[MOTION], STAMPS[GYRO], WALL_CLOCK):
         if name in raw.columns:
             return name
@@ -137,7 +136,7 @@ def _clock(raw: RawLog, kind: str) -> str:
 
 
 def _changes(stamps: NDArray[Any]) -> NDArray[np.bool_]:
-    """Rows whose stamp is not that of the row before."""
+    """Select rows whose stamp differs from that of the row before."""
     own = np.ones(stamps.size, dtype=bool)
     own[1:] = stamps[1:] != stamps[:-1]
     return own

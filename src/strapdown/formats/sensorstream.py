@@ -1,8 +1,8 @@
-"""Sensorstream IMU+GPS (Android, Axel Lorenz): its CSV files, and its UDP lines kept in a file.
+"""Sensorstream IMU+GPS (Android, Axel Lorenz): its CSV files, or its UDP lines saved to a file.
 
-A line is a stamp in seconds and blocks in any subset: ``timestamp, id, v1, v2, v3, id, …``. A
-block has three values but for pressure and battery temperature, which have one. There is no
-header; a blank may follow each comma.
+A line is a stamp in seconds and any subset of blocks: ``timestamp, id, v1, v2, v3, id, …``. A block
+has three values, or one for pressure and battery temperature. There is no header; a blank may
+follow each comma.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ WIDTHS = {1: 3, 3: 3, 4: 3, 5: 3, 6: 3, 7: 3, 81: 3, 82: 3, 83: 3, 84: 3, 85: 1,
 NAMES = {3: "accelerometer", 4: "gyroscope", 5: "magnetic field", 82: "linear", 83: "gravity"}
 TRIADS = {3: ("accel", "m/s2"), 4: ("gyro", "rad/s"), 5: ("mag", "uT")}
 _ID = re.compile(r"\d+")
-_LOOKED_AT = 20  # lines, by which the format is told
+_LOOKED_AT = 20  # lines examined to detect the format
 
 Blocks = dict[int, tuple[float, ...]]
 
 
 def detect(path: Path) -> bool:
-    """Tell by the first lines of a text file whether each is a stamp and blocks."""
+    """Whether each of the first lines of a text file is a stamp and blocks."""
     if not path.is_file() or path.suffix.lower() not in SUFFIXES:
         return False
     with path.open("rb") as stream:
@@ -41,7 +41,7 @@ def detect(path: Path) -> bool:
     except DataError:
         return False
     lines = [line for line in text.splitlines()[:_LOOKED_AT] if line.strip()]
-    # A line at the end of what was read may be cut.
+    # The last line of the examined part may be truncated.
     lines = lines[:-1] if len(lines) > 1 else lines
     ids = set()
     for line in lines:
@@ -53,7 +53,7 @@ def detect(path: Path) -> bool:
 
 
 def read(path: Path) -> RawLog:
-    """Read the blocks of each sensor, and join them on the stamps of the gyro.
+    """Read the blocks of each sensor, joined on the stamps of the gyro.
 
     Parameters
     ----------
@@ -62,13 +62,13 @@ def read(path: Path) -> RawLog:
     Returns
     -------
     RawLog
-        A line without a gyro is no sample of it; an accelerometer or a magnetic field that is
-        not in the lines of the gyro is interpolated to their stamps.
+        Lines without a gyro are not samples; accelerometer or magnetic field from other lines
+        are interpolated to the stamps of the gyro.
 
     Raises
     ------
     DataError
-        A line is not of the format, or no line has a gyro.
+        A line has another format, or no line has a gyro.
     """
     text, findings = decoded(path.read_bytes(), path.name)
     numbered = [(row, line) for row, line in enumerate(text.splitlines(), 1) if line.strip()]
@@ -133,7 +133,7 @@ def _log(
 
 
 def blocks_of(line: str) -> tuple[float, Blocks] | None:
-    """Stamp and blocks of a line; None where it has another form."""
+    """Split a line into stamp and blocks; None if it has another form."""
     fields = [f.strip() for f in line.split(",")]
     if fields and not fields[-1]:
         fields.pop()

@@ -1,4 +1,4 @@
-"""Time stamps of a log: their unit, their faults, and what can be done about them."""
+"""Time stamps of a log: units, faults and repairs."""
 
 from __future__ import annotations
 
@@ -18,27 +18,26 @@ from strapdown.formats.recording import Origin
 
 Array = NDArray[np.float64]
 
-# Steps at which inertial sensors are logged.
+# Range of steps of inertial sensors.
 PLAUSIBLE_STEP = (1e-5, 0.25)  # s
-# Stamps later than this are counted from the first: a double holds a clock of 1970 to no
-# better than 0.2 µs.
+# Later stamps are counted from the first: a double resolves a clock of 1970 to only 0.2 µs.
 EPOCH = 1e6  # s
 
 
 @dataclass(frozen=True)
 class Stamps:
-    """Seconds, and what was found on the way to them.
+    """Stamps in seconds, with findings.
 
     Attributes
     ----------
     seconds : ndarray, (n,)
     unit : str
     why : str
-        What the unit was concluded from.
+        Reason for the unit.
     keep : ndarray of bool, (n,)
-        Rows that are left when those with faulty stamps are dropped.
+        Rows that remain when those with faulty stamps are dropped.
     origin : Origin
-        The raw stamp that is time zero.
+        The raw stamp at time zero.
     findings : list of Finding
     """
 
@@ -68,20 +67,20 @@ def read_stamps(
     raw : ndarray, (n,)
         Finite numbers.
     unit : str or None
-        Where it is known.
+        If known.
     why : str
-        How it is known.
+        Source of the unit.
     file : str
         For messages.
     row : callable
-        Row of the file in which a stamp stands.
+        Maps the number of a stamp to its row in the file.
     repair : bool
-        Drop repeated and reversed stamps and undo the wrapping of a counter.
+        Drop repeated and reversed stamps, and unwrap a counter.
     origin : Origin, optional
-        Count from here, as another log does; if not given, from zero, or from the first stamp
-        where zero is far away.
+        Count from here, as another log does; by default from zero, or from the first stamp if
+        zero is far away.
     only_seconds : bool
-        Take no other unit than seconds from the numbers alone.
+        Infer no unit other than seconds from the numbers.
 
     Returns
     -------
@@ -90,10 +89,10 @@ def read_stamps(
     Raises
     ------
     DataError
-        The unit is neither stated nor evident, or time does not advance.
+        The unit is not stated and not evident, or time does not advance.
     """
     findings: list[Finding] = []
-    # Small and unsigned integers would overflow where stamps go back.
+    # Small and unsigned integers would overflow for negative steps.
     stamps = raw.astype(np.int64) if raw.dtype.kind in "iub" else raw.astype(np.float64)
     if unit in (None, "s"):
         whole, weeks = unrolled(stamps.astype(np.float64, copy=False))
@@ -108,7 +107,7 @@ def read_stamps(
                     severity="note",
                 )
             )
-    ticks = (stamps - stamps[0]).astype(np.float64)  # exact, before a factor can round them
+    ticks = (stamps - stamps[0]).astype(np.float64)  # exact, before a factor rounds it
     if not repair:
         _refuse_backward(stamps, ticks, file, row)
     keep, ticks = _repaired(stamps, ticks, file, findings)
@@ -146,7 +145,7 @@ def read_stamps(
 
 
 def _since(stamp: float, unit: str, origin: Origin) -> float:
-    """Seconds from an origin to a stamp; exact where both count whole ticks of one unit."""
+    """Return seconds from an origin to a stamp; exact if both count whole ticks of one unit."""
     if unit == origin.unit:
         return (stamp - origin.stamp) * TIME_UNITS[unit]
     return stamp * TIME_UNITS[unit] - origin.stamp * TIME_UNITS[origin.unit]

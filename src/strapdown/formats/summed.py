@@ -1,4 +1,4 @@
-"""Columns of a sensor that sums: increments of angle and velocity, made means over their steps."""
+"""Increments of angle and velocity, converted to means over their steps."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ __all__ = ["OPEN", "SUMS", "intervals", "sampling_of_sums", "sum_of"]
 Array = NDArray[np.float64]
 #: Units of increments, by triad.
 SUMS: dict[str, dict[str, float]] = {"gyro": GYRO_SUMS, "accel": ACCEL_SUMS, "mag": {}}
-#: What a name that says increments and no unit leaves open.
+#: Unit choices for a name that states increments without a unit.
 OPEN = {triad: " or ".join(units) for triad, units in SUMS.items()}
-# The unit of the increments of a rate in another.
+# Unit of the increments for each unit of rate.
 _SUM_OF = {"rad/s": "rad", "deg/s": "deg", "m/s2": "m/s", "g": "g*s"}
 
 
 def sum_of(unit: str | None, triad: str) -> str:
-    """The unit of the increments of a rate: that of one, or the choice where none is known."""
+    """Return the unit of the increments of a rate, or the choice if the unit is unknown."""
     return _SUM_OF.get(unit or "", OPEN[triad])
 
 
 def intervals(time: Array, kept: NDArray[np.int64]) -> Array:
-    """How long each sample was summed.
+    """Compute the integration time of each sample.
 
     Parameters
     ----------
     time : ndarray, (n,), s
-        Stamps of the samples that are used; at least two.
+        Stamps of the samples used; at least two.
     kept : ndarray of int, (n,)
-        Their places in the log. After one that was left out an increment is still that of its
-        own step, and not of the hole.
+        Their indices in the log. After a dropped sample an increment still belongs to its own
+        step, not to the gap.
 
     Returns
     -------
@@ -49,24 +49,24 @@ def intervals(time: Array, kept: NDArray[np.int64]) -> Array:
 def sampling_of_sums(
     summed: set[str], triads: set[str], asked: str | None, file: str, findings: list[Finding]
 ) -> str:
-    """How the rows of increments are sampled: they are means, whatever the file says.
+    """Return the sampling of increments: always means, regardless of the file.
 
     Parameters
     ----------
     summed : set of str
         Triads that hold increments; not empty.
     triads : set of str
-        Those that are used.
+        Triads used.
     asked : str or None
-        What the user says.
+        Sampling stated by the user.
     file : str
     findings : list of Finding
-        What was done is added.
+        The conversion is appended.
 
     Raises
     ------
     ConfigError
-        The user says that they are values at their stamps.
+        The user states instantaneous values.
     """
     names = [t for t in ("gyro", "accel") if t in summed]
     if asked and asked.lower() != "mean":

@@ -1,4 +1,4 @@
-"""Errors of a table told by the rows of the file that it was read from."""
+"""Translation of errors from table rows to file rows."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ __all__ = ["told_by_file_rows"]
 
 @contextmanager
 def told_by_file_rows(name: str, row_of: Callable[[int], int | None]) -> Iterator[None]:
-    """Tell errors of a table by the rows of its file.
+    """Re-raise errors of a table with the row of its file.
 
     Parameters
     ----------
     name : str
-        Of the file.
+        File name.
     row_of : callable
-        Row of the file by that of the table, from 0.
+        Maps a row of the table, from 0, to a row of the file.
 
     Raises
     ------
     DataError
-        As within, with the row of the file.
+        As raised within, with the row of the file.
     """
     try:
         yield

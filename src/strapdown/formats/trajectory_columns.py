@@ -1,4 +1,4 @@
-"""Which column of a text table is which quantity of a trajectory, and in which unit."""
+"""Assignment of the columns of a text table to the quantities of a trajectory, with units."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from strapdown.formats.quantity_columns import ANGLES, Found, Quantity, find_qua
 
 __all__ = ["QUANTITIES", "find_trajectory_columns"]
 
-#: What a table of a trajectory holds, as it may be called.
+#: Quantities of a trajectory table, with their possible names.
 QUANTITIES: dict[str, Quantity] = {
     "time": Quantity((*TIMES, *CLOCKS), TIME_UNITS),
     **GEODETIC_QUANTITIES,
@@ -28,10 +28,10 @@ def find_trajectory_columns(
     Parameters
     ----------
     names : iterable of str
-        As they stand in the file.
+        As in the file.
     asked : mapping of str to str
-        Quantity (one of `QUANTITIES`) to the name of its column, or its number counted from 1;
-        goes before what the names suggest.
+        Quantity (one of `QUANTITIES`) to the name of its column, or its number, from 1;
+        overrides what the names suggest.
     file : str
         For messages.
 
@@ -43,9 +43,9 @@ def find_trajectory_columns(
     Raises
     ------
     ConfigError
-        A column that was asked for is not there, or its quantity is none.
+        A requested column does not exist, or its quantity is unknown.
     DataError
-        A quantity is missing, two columns could be one, or a unit is none of its quantity.
+        A quantity is missing, two columns fit one quantity, or a unit does not fit.
     """
     columns = list(names)
     found = find_quantities(columns, QUANTITIES, asked, file, of="a trajectory")

@@ -1,4 +1,4 @@
-"""Trajectories and their differences as text tables, with the unit in each name."""
+"""Trajectories and their differences as text tables, with units in the column names."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from strapdown.tables import (
 
 __all__ = ["DECIMALS", "named_columns", "one_line", "told_of", "write_csv", "write_error_csv"]
 
-#: Of time, latitude, longitude, height, velocity and attitude, where digits are fixed.
+#: Decimals of time, latitude, longitude, height, velocity and attitude, for fixed digits.
 DECIMALS = (9, 11, 11, 6, 8, 8, 8, 9, 9, 9)
 
 _SUFFIX = {
@@ -35,18 +35,18 @@ _SUFFIX = {
 
 
 def one_line(text: str) -> str:
-    """A name without breaks, which end a comment, and what else neither text nor XML can hold."""
+    """Remove line breaks, which end a comment, and characters invalid in text or XML."""
     return "".join(c for c in " ".join(text.split()) if c.isprintable())
 
 
 def named_columns(table: pd.DataFrame, columns: list[str]) -> dict[str, NDArray[np.float64]]:
-    """Time and columns of a table under names with their units."""
+    """Return time and columns of a table under names with their units."""
     named = {"time_s": table.index.to_numpy(dtype=np.float64)}
     return named | {c + _SUFFIX[c]: table[c].to_numpy(dtype=np.float64) for c in columns}
 
 
 def told_of(name: str, options: TrajectoryFileOptions) -> dict[str, str]:
-    """What a file says of the trajectory in it: name, ellipsoid, axes, epoch."""
+    """Return the statements of a file on its trajectory: name, ellipsoid, axes, epoch."""
     told = {
         "trajectory": one_line(name),
         "ellipsoid": options.ellipsoid.name,
@@ -72,9 +72,9 @@ def write_csv(
     trajectory : DataFrame
     name : str
     options : TrajectoryFileOptions, optional
-        The ellipsoid and the epoch stand in the comments at the top. Of its `digits`, ``exact``
-        writes each number in the fewest that give it back, and ``fixed`` rounds to `DECIMALS`:
-        a micrometre, 10 nm/s, 1e-9 deg of attitude, 1 ns; twice as fast.
+        Ellipsoid and epoch are written to the comments at the top. Of its `digits`, ``exact``
+        writes the fewest that reproduce each number, and ``fixed`` rounds to `DECIMALS`: a
+        micrometer, 10 nm/s, 1e-9 deg of attitude, 1 ns; twice as fast.
 
     Raises
     ------
@@ -105,7 +105,7 @@ def write_error_csv(path: Path, table: pd.DataFrame, *, name: str = "error") -> 
     ----------
     path : Path
     table : DataFrame
-        Errors or standard deviations; with ``phi_N phi_E phi_D`` where it has them.
+        Errors or standard deviations; with ``phi_N phi_E phi_D`` if available.
     name : str
 
     Raises

@@ -39,8 +39,8 @@ def write_geojson(
         A Trajectory table of one row or more, on WGS 84.
     name : str
     options : TrajectoryFileOptions, optional
-        With `epoch`, dates stand beside the times. Of more than `most_points` rows those are
-        kept that keep the course best (`trajectory_thinning.thin`).
+        With `epoch`, dates are added to the times. More than `most_points` rows are thinned to
+        those that preserve the path best (`trajectory_thinning.thin`).
 
     Raises
     ------
@@ -51,10 +51,10 @@ def write_geojson(
 
     Notes
     -----
-    Positions are ``[longitude, latitude, height over the ellipsoid]``. A path over the date line is
-    a MultiLineString, cut there (3.1.9). The path's property ``time_s`` has one time a position,
-    in lists as the coordinates are, for RFC 7946 wants none in a position. Longitudes and
-    latitudes have nine decimals (0.1 mm), heights four.
+    Positions are ``[longitude, latitude, height above the ellipsoid]``. A path across the date line
+    is a MultiLineString, cut there (3.1.9). The path's property ``time_s`` has one time per
+    position, in lists like the coordinates, because RFC 7946 discourages times in positions.
+    Longitudes and latitudes have nine decimals (0.1 mm), heights four.
     """
     chosen = options or TrajectoryFileOptions()
     chosen.require_wgs84("GeoJSON")
@@ -78,7 +78,7 @@ def write_geojson(
 
 
 def _position(point: Array) -> list[float]:
-    # No minus before a zero.
+    # Avoid negative zeros.
     return [round(v, d) + 0.0 for v, d in zip(point.tolist(), (9, 9, 4), strict=True)]
 
 

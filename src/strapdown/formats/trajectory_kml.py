@@ -1,4 +1,4 @@
-"""Trajectories as KML, for Google Earth and its like."""
+"""Trajectories as KML, for Google Earth and similar programs."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _HEAD = (
     '<?xml version="1.0" encoding="UTF-8"?>\n'
     '<kml xmlns="http://www.opengis.net/kml/2.2" xmlns:gx="http://www.google.com/kml/ext/2.2">'
 )
-# Colours are opacity, blue, green, red.
+# Colors are opacity, blue, green, red.
 _STYLE = '<Style id="path"><LineStyle><color>ff2d6fd9</color><width>3</width></LineStyle></Style>'
 
 
@@ -45,9 +45,9 @@ def write_kml(
         A Trajectory table of one row or more, on WGS 84.
     name : str
     options : TrajectoryFileOptions, optional
-        With `epoch`, a track with dates (``gx:Track``, Google's extension) stands beside the
-        path. Of more than `most_points` rows those are kept that keep the course best
-        (`trajectory_thinning.thin`).
+        With `epoch`, a track with dates (``gx:Track``, Google's extension) is written in
+        addition to the path. More than `most_points` rows are thinned to those that preserve
+        the path best (`trajectory_thinning.thin`).
 
     Raises
     ------
@@ -58,10 +58,10 @@ def write_kml(
 
     Notes
     -----
-    Heights of ``altitudeMode`` *absolute* count from the EGM96 geoid (OGC 07-147r2), and a
-    trajectory's from the ellipsoid. The difference of 110 m at most is taken off where it is given
-    as `geoid_undulation`; otherwise the file says that it is not. Longitudes and latitudes have
-    nine decimals (0.1 mm), heights four.
+    Heights of ``altitudeMode`` *absolute* are above the EGM96 geoid (OGC 07-147r2), those of a
+    trajectory above the ellipsoid. The difference, at most 110 m, is subtracted if given as
+    `geoid_undulation`; otherwise the file states that it is not. Longitudes and latitudes have nine
+    decimals (0.1 mm), heights four.
     """
     chosen = options or TrajectoryFileOptions()
     chosen.require_wgs84("KML")
@@ -109,7 +109,7 @@ def _description(thinned: Thinned, options: TrajectoryFileOptions) -> str:
 
 
 def _coordinates(point: Array, separator: str) -> str:
-    # No minus before a zero.
+    # Avoid negative zeros.
     lon, lat, alt = (round(v, d) + 0.0 for v, d in zip(point.tolist(), (9, 9, 4), strict=True))
     return separator.join((_plain(lon, 9), _plain(lat, 9), _plain(alt, 4)))
 

@@ -1,6 +1,6 @@
-"""Trajectories as KF-GINS has them (``.nav``): eleven columns without a header.
+"""Trajectories in KF-GINS format (``.nav``): eleven columns without a header.
 
-Each line: GPS week, seconds of week; latitude, longitude in deg, height over the ellipsoid in m;
+Each line: GPS week, seconds of week; latitude, longitude in deg, height above the ellipsoid in m;
 velocity north, east, down in m/s; roll, pitch, heading in deg, heading from 0 to 360.
 """
 
@@ -28,12 +28,12 @@ __all__ = ["detect", "read", "write_nav"]
 Array = NDArray[np.float64]
 NAMES = ("week", "time", *TRAJECTORY)
 SUFFIX = ".nav"
-# Of the numbers in turn: 10 ns; 1e-11 deg is a micrometre; 1e-8 m and m/s; 1e-9 deg.
+# Decimals of the columns: 10 ns; 1e-11 deg is a micrometer; 1e-8 m and m/s; 1e-9 deg.
 DECIMALS = (0, 8, 11, 11, 8, 8, 8, 8, 9, 9, 9)
 
 
 def detect(path: Path) -> bool:
-    """Tell by the name, or by rows of eleven numbers without a header."""
+    """Detect by the name, or by rows of eleven numbers without a header."""
     if not path.is_file():
         return False
     if path.suffix.lower() == SUFFIX:
@@ -64,13 +64,13 @@ def read(path: Path) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        A Trajectory table, time in seconds of the week of the first row; a week of 0 is one that
-        is not known.
+        A Trajectory table, time in seconds of the week of the first row; week 0 means that the
+        week is not known.
 
     Raises
     ------
     DataError
-        A row has another width or holds no number, or as `trajectory_table`.
+        A row has another width or a value that is not a number, or as `trajectory_table`.
     """
     raw = csv.read(path)
     if len(raw.columns) != len(NAMES):
@@ -110,15 +110,15 @@ def write_nav(
     name: str = "trajectory",
     options: TrajectoryFileOptions | None = None,
 ) -> None:
-    """Write a trajectory as KF-GINS and what scores it read it.
+    """Write a trajectory for KF-GINS and its evaluation tools.
 
     Parameters
     ----------
     path : Path
     trajectory : DataFrame
-        A Trajectory table. Its ``attrs`` may say the GPS week (`clocks`); without one it is 0.
+        A Trajectory table. Its ``attrs`` may state the GPS week (`clocks`); otherwise it is 0.
     name : str
-        Not written: the format has no place for it.
+        Not written: the format has no field for it.
     options : TrajectoryFileOptions, optional
         Not used.
 
@@ -129,7 +129,7 @@ def write_nav(
 
     Notes
     -----
-    Numbers are rounded to `DECIMALS`: places to a micrometre, times to 10 ns.
+    Numbers are rounded to `DECIMALS`: positions to a micrometer, times to 10 ns.
     """
     check_trajectory(trajectory)
     time = index_of(trajectory)

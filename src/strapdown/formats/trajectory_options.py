@@ -1,4 +1,4 @@
-"""What can be chosen about a trajectory's file."""
+"""Options of trajectory files."""
 
 from __future__ import annotations
 
@@ -23,29 +23,29 @@ DIGITS = ("exact", "fixed")
 
 @dataclass(frozen=True)
 class TrajectoryFileOptions:
-    """What can be chosen about a trajectory's file; each format takes what concerns it.
+    """Options of trajectory files; each format uses those that apply to it.
 
     Attributes
     ----------
     ellipsoid : Ellipsoid
-        To which the places refer. KML and GeoJSON know WGS 84 alone.
+        Reference of the positions. KML and GeoJSON only support WGS 84.
     epoch : datetime, optional
-        With its time zone: the instant at which the trajectory's time is zero. Without it no
-        dates are written.
+        With time zone: the instant of the trajectory's time zero. Without it no dates are
+        written.
     geoid_undulation : float, optional, m
-        Height of the geoid over the ellipsoid, taken off the heights of a KML file.
+        Height of the geoid above the ellipsoid, subtracted from the heights of a KML file.
     most_points : int
-        A KML or GeoJSON file has no more than this; a longer trajectory is thinned.
+        Most points of a KML or GeoJSON file; a longer trajectory is thinned.
     tum_frame : {'enu', 'ned', 'ecef'}
         Axes of a TUM file.
     digits : {'exact', 'fixed'}
-        Of a CSV: the fewest that give each number back, or a fixed number of decimals, which is
+        For CSV: the fewest that reproduce each number, or a fixed number of decimals, which is
         faster.
 
     Raises
     ------
     ConfigError
-        A choice is none.
+        An option is out of its range.
     """
 
     ellipsoid: Ellipsoid = WGS84
@@ -62,7 +62,7 @@ class TrajectoryFileOptions:
             raise ConfigError("io.no-datetime", quantity="epoch", epoch=self.epoch)
         if self.epoch is not None and self.epoch.utcoffset() is None:
             raise ConfigError("io.no-time-zone", quantity="epoch", isoformat=self.epoch.isoformat())
-        # The geoid is nowhere farther than 110 m from the ellipsoid.
+        # The geoid is within 110 m of the ellipsoid.
         if self.geoid_undulation is not None and not abs(self.geoid_undulation) < 200.0:
             raise ConfigError(
                 "io.geoid-ellipsoid-none",
@@ -93,12 +93,12 @@ class TrajectoryFileOptions:
             )
 
     def require_wgs84(self, form: str) -> None:
-        """Refuse places that a format would take for others.
+        """Refuse positions that a format would misinterpret.
 
         Raises
         ------
         ConfigError
-            The ellipsoid is another.
+            The ellipsoid is not WGS 84.
         """
         if self.ellipsoid != WGS84:
             raise ConfigError(
@@ -109,14 +109,14 @@ class TrajectoryFileOptions:
             )
 
     def date(self, time: float) -> str:
-        """Date and time of day in UTC of an instant, to the microsecond.
+        """Return date and time of day of an instant in UTC, to the microsecond.
 
         Raises
         ------
         ConfigError
             No epoch was given.
         DataError
-            There is no such date.
+            The date is out of range.
         """
         if self.epoch is None:
             raise ConfigError("io.without-epoch-no-dates", quantity="epoch")

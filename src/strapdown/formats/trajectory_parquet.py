@@ -1,4 +1,4 @@
-"""Trajectories as Parquet: the columns of the CSV, every number to the last bit."""
+"""Trajectories as Parquet: the columns of the CSV, all numbers to the last bit."""
 
 from __future__ import annotations
 
@@ -29,11 +29,10 @@ def write_parquet(
     ----------
     path : Path
     trajectory : DataFrame
-        Further columns of numbers, as standard deviations, are written under their own names.
+        Further numeric columns, such as standard deviations, are written under their own names.
     name : str
     options : TrajectoryFileOptions, optional
-        The ellipsoid and the epoch stand in the file's metadata, as what the comments of the CSV
-        say.
+        Ellipsoid and epoch are written to the file's metadata, like the comments of the CSV.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Do a trajectory's places, velocities and headings tell of one motion."""
+"""Consistency of a trajectory's positions, velocities and headings."""
 
 from __future__ import annotations
 
@@ -17,39 +17,39 @@ Array = NDArray[np.float64]
 
 __all__ = ["judge_trajectory"]
 
-# A sphere will do to tell factors of 57.
+# A spherical Earth suffices to detect factors of 57.
 EARTH = 6.371e6  # m
-# A vehicle that stays within this tells nothing.
+# Least motion for a conclusion.
 LEAST_MOTION = 5.0  # m, root mean square
 MOVING = 1.0  # m/s
-# Misfit of places and integrated velocity, as a share of the motion: what is no agreement, and what
-# another reading must reach to be believed.
+# Misfit of positions and integrated velocity, as a fraction of the motion: above which they
+# disagree, and below which another reading is accepted.
 DISAGREE, AGREE = 0.5, 0.1
 
 
 def judge_trajectory(
     table: pd.DataFrame, *, angles_stated: bool, euler_stated: bool
 ) -> list[Finding]:
-    """Compare places with the integral of velocity, and heading with the course.
+    """Compare positions with the integral of velocity, and heading with the course.
 
     Parameters
     ----------
     table : DataFrame
         A Trajectory table.
     angles_stated, euler_stated : bool
-        The file says the unit of latitude and longitude, and of the attitude; radians are then
-        not looked for.
+        Whether the file states the unit of latitude and longitude, and of the attitude; radians
+        are then not considered.
 
     Returns
     -------
     list of Finding
-        Places and velocities that disagree without a reason that is seen.
+        Positions and velocities that disagree without an apparent reason.
 
     Raises
     ------
     DataError
-        They disagree, and agree if latitude and longitude are exchanged, or taken as radians;
-        or heading disagrees with the course and agrees if taken as radians.
+        They disagree but agree with latitude and longitude exchanged, or taken as radians; or
+        heading disagrees with the course but agrees if taken as radians.
     """
     file = table.attrs.get("source")
     if len(table) < 3:
@@ -110,7 +110,7 @@ def _refuse_radians_of_attitude(euler: Array, velocity: Array, file: str | None)
 
     heading = euler[fast, 2]
     plain, radians = apart(heading), apart(np.degrees(heading))
-    # Nothing drives 20 deg beside its heading and, by accident, along 57 times its heading.
+    # No vehicle moves 20 deg off its heading and, by coincidence, along 57 times its heading.
     if plain > 20.0 and radians < 5.0:
         raise DataError(
             "io.heading-in-radians",

@@ -1,4 +1,4 @@
-"""Trajectories from files."""
+"""Readers of trajectory files."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ __all__ = ["TRAJECTORY_READERS", "TrajectoryReader", "files_of_trajectory", "rea
 
 @dataclass(frozen=True)
 class TrajectoryReader:
-    """How a format without names of columns is recognised and read."""
+    """How a format without column names is recognized and read."""
 
     title: str
     detect: Callable[[Path], bool]
     read: Callable[[Path], pd.DataFrame]
 
 
-#: Tried before a table is read by the names of its columns.
+#: Tried before a table is read by its column names.
 TRAJECTORY_READERS: dict[str, TrajectoryReader] = {
     "kf-gins": TrajectoryReader(
         "KF-GINS, eleven columns (.nav)", trajectory_nav.detect, trajectory_nav.read
@@ -52,7 +52,7 @@ _ELLIPSOID = re.compile(r"[#%]\s*ellipsoid\s*:\s*(\S+)\s*$", re.M)
 
 
 def files_of_trajectory(path: str | Path) -> tuple[Path, ...]:
-    """The files that a trajectory is read from: one, or several of a folder.
+    """List the files that a trajectory is read from: one, or several of a folder.
 
     Parameters
     ----------
@@ -68,30 +68,30 @@ def read_trajectory(path: str | Path, columns: Mapping[str, str] | None = None) 
     Parameters
     ----------
     path : str or Path
-        ``.csv``, ``.txt``, ``.tsv``, ``.dat`` or ``.parquet`` with names of columns, or one of
+        ``.csv``, ``.txt``, ``.tsv``, ``.dat`` or ``.parquet`` with column names, or one of
         `TRAJECTORY_READERS`.
     columns : mapping of str to str, optional
         Quantity (``time``, ``lat``, ``lon``, ``alt``, ``VN``, ``VE``, ``VD``, ``roll``, ``pitch``,
-        ``heading``) to the name of its column, or its number from 1, where the names do not say it.
+        ``heading``) to the name of its column, or its number, from 1, if not evident.
 
     Returns
     -------
     DataFrame
         A Trajectory table. Names may carry a unit: ``lat_deg``, ``Latitude (rad)``, ``vel_north
-        [m/s]``, ``time_ms``; without one degrees, metres and seconds are taken. A velocity up is
-        turned. Dates count in seconds from 1970. ``attrs``: ``source``, the name of the file;
-        ``ellipsoid``, where a comment states it, or None; its clock (`clocks`); ``findings``, a
-        tuple of Finding.
+        [m/s]``, ``time_ms``; the defaults are degrees, meters and seconds. A velocity up is
+        negated. Dates are converted to seconds since 1970. ``attrs``: ``source``, the name of the
+        file; ``ellipsoid``, if a comment states it, or None; its clock (`clocks`); ``findings``,
+        a tuple of Finding.
 
     Raises
     ------
     ConfigError
-        There is no such file, or `columns` names what is not there.
+        The file does not exist, or `columns` names a column that it does not have.
     DataError
-        The file is empty or no text table, a column is missing or has no numbers, a value is not
-        finite, time does not advance, a latitude is beyond the pole; or places and velocities show
-        that latitude and longitude are exchanged or in radians, or that the attitude is in
-        radians.
+        The file is empty or not a text table, a column is missing or has no numbers, a value is
+        not finite, time does not advance, a latitude is beyond the pole; or positions and
+        velocities show that latitude and longitude are exchanged or in radians, or that the
+        attitude is in radians.
     """
     path = Path(path)
     if not path.exists():

@@ -1,4 +1,4 @@
-"""Fewer points for a map, and how far from the line the others lie."""
+"""Thinning of a trajectory for a map, with the largest deviation."""
 
 from __future__ import annotations
 
@@ -18,24 +18,23 @@ Array = NDArray[np.float64]
 
 __all__ = ["Thinned", "thin"]
 
-# A split looks at no more rows than this, so that a track of any shape takes time in proportion
-# to its length.
+# Limit of rows examined per split, so that the time is proportional to the length of a track.
 LONGEST_PIECE = 4096
 
 
 @dataclass(frozen=True)
 class Thinned:
-    """The rows that stand for a trajectory on a map.
+    """Rows that represent a trajectory on a map.
 
     Attributes
     ----------
     rows : ndarray of int
-        In order, both ends among them.
+        In order, including both ends.
     samples : int
-        Rows of the trajectory.
+        Number of rows of the trajectory.
     deviation_m : float, m
-        How far a place that was left out lies at most from the straight line between its
-        neighbours, taken at its own time.
+        Largest distance of a dropped position from the straight line between its neighbors, at
+        its own time.
     """
 
     rows: NDArray[np.intp]
@@ -44,7 +43,7 @@ class Thinned:
 
     @property
     def sentence(self) -> str:
-        """What was left out, for a person."""
+        """Summary of the dropped rows, for reports."""
         if len(self.rows) == self.samples:
             return f"All {self.samples} points."
         return (
@@ -54,14 +53,14 @@ class Thinned:
 
 
 def thin(trajectory: pd.DataFrame, most: int, ellipsoid: Ellipsoid = WGS84) -> Thinned:
-    """Choose the rows that keep a trajectory's course best.
+    """Choose the rows that preserve a trajectory's path best.
 
     Parameters
     ----------
     trajectory : DataFrame
         A Trajectory table.
     most : int
-        Number of rows to keep; all are kept where there are no more.
+        Number of rows to keep; all if there are not more.
     ellipsoid : Ellipsoid
 
     Returns
@@ -70,10 +69,10 @@ def thin(trajectory: pd.DataFrame, most: int, ellipsoid: Ellipsoid = WGS84) -> T
 
     Notes
     -----
-    Douglas and Peucker's splitting (Cartographica 10 (1973) 112-122), the farthest row first,
-    until so many rows are kept, with the distance taken at equal times (Meratnia and de By,
-    EDBT 2004, doi:10.1007/978-3-540-24741-8_44), so that a stop stays a stop. Along the axes of
-    the Earth. A trajectory of many rows begins split into even pieces.
+    Splitting by Douglas and Peucker (Cartographica 10 (1973) 112-122), the farthest row first,
+    until the requested number is reached, with the distance at equal times (Meratnia and de By,
+    EDBT 2004, doi:10.1007/978-3-540-24741-8_44), which preserves stops. Distances are along the
+    axes of the Earth. A long trajectory is first split into even parts.
     """
     n = len(trajectory)
     if n <= most:
@@ -100,7 +99,7 @@ def thin(trajectory: pd.DataFrame, most: int, ellipsoid: Ellipsoid = WGS84) -> T
 
 
 def _farthest(time: Array, place: Array, first: int, last: int) -> tuple[float, int]:
-    """Distance and row of the place that lies farthest from the line at its time."""
+    """Find the position farthest from the line at its time; return distance and row."""
     inner = slice(first + 1, last)
     share = (time[inner] - time[first]) / (time[last] - time[first])
     line = place[first] + share[:, None] * (place[last] - place[first])

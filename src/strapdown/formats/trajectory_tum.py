@@ -1,4 +1,4 @@
-"""Trajectories in the format of the TUM RGB-D benchmark, as evo and its like read it."""
+"""Trajectories in the format of the TUM RGB-D benchmark, for evo and similar tools."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _Q_FRD_FLU = (0.0, 1.0, 0.0, 0.0)
 def poses(
     trajectory: pd.DataFrame, options: TrajectoryFileOptions | None = None
 ) -> tuple[Array, Array]:
-    """Positions and attitudes in one right-handed Cartesian frame.
+    """Compute positions and attitudes in one right-handed Cartesian frame.
 
     Parameters
     ----------
@@ -40,12 +40,13 @@ def poses(
     Returns
     -------
     position : ndarray, (n, 3), m
-        ``enu`` and ``ned``: in the plane that touches the ellipsoid under the first place, from
-        there; the Earth falls away below it by ``d²/2R``. ``ecef``: from the Earth's centre.
+        ``enu`` and ``ned``: from the first position, along the plane tangent to the ellipsoid
+        below it; the Earth curves away from that plane by ``d²/2R``. ``ecef``: from the Earth's
+        center.
     q_wb : ndarray, (n, 4)
-        Body to world, scalar first, of one sign along the way. World and body axes are in
-        `TUM_FRAMES`. The local level turns as the vehicle moves over the Earth, and the world
-        does not: both are told apart here.
+        Body to world, scalar first, with continuous sign. World and body axes are in
+        `TUM_FRAMES`. The local level rotates as the vehicle moves over the Earth, while the
+        world does not: the attitude accounts for it.
     """
     chosen = options or TrajectoryFileOptions()
     place = places_of(trajectory)
@@ -62,10 +63,10 @@ def poses(
             q_wb = rotation.compose(q_wb, _Q_FRD_FLU)
         position = rotation.rotate(q_we, position - position[0])
         q_wb = rotation.compose(q_we, q_wb)
-    # q and -q are one attitude; readers that interpolate want neighbours alike.
+    # q and -q are the same attitude; readers that interpolate need equal signs of neighbors.
     along = (q_wb[1:] * q_wb[:-1]).sum(axis=1)
     sign = np.cumprod(np.r_[math.copysign(1.0, q_wb[0, 0]), np.where(along < 0.0, -1.0, 1.0)])
-    # No minus before a zero.
+    # Avoid negative zeros.
     return position + 0.0, q_wb * sign[:, None] + 0.0
 
 
@@ -85,7 +86,7 @@ def write_tum(
         A Trajectory table of one row or more.
     name : str
     options : TrajectoryFileOptions, optional
-        Axes and ellipsoid; the comments at the top say them, and where the origin is.
+        Axes and ellipsoid; written to the comments at the top, together with the origin.
 
     Raises
     ------
@@ -94,7 +95,7 @@ def write_tum(
 
     Notes
     -----
-    The quaternion is scalar last, body to world; velocities have no place in this format.
+    The quaternion is scalar last, body to world. The format does not include velocities.
     """
     chosen = options or TrajectoryFileOptions()
     check_trajectory(trajectory)

@@ -1,4 +1,4 @@
-"""Trajectories as files: one function a format, and the one table of them."""
+"""Writers of trajectories: one function per format, and the registry of writers."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ __all__ = [
 
 
 class TrajectoryWriter(Protocol):
-    """Writes a Trajectory table; the same table and options give the same bytes."""
+    """Writes a Trajectory table; equal input gives identical bytes."""
 
     def __call__(
         self,
@@ -42,12 +42,12 @@ class TrajectoryWriter(Protocol):
         path : Path
         trajectory : DataFrame
         name : str
-            For people who open the file.
+            Title for people who open the file.
         options : TrajectoryFileOptions, optional
         """
 
 
-#: Suffix to the function that writes it.
+#: Suffix to writer.
 TRAJECTORY_WRITERS: dict[str, TrajectoryWriter] = {
     "csv": write_csv,
     "tum": write_tum,
@@ -65,23 +65,23 @@ def write_trajectory(
     name: str | None = None,
     options: TrajectoryFileOptions | None = None,
 ) -> None:
-    """Write a trajectory in the form that the file's ending names.
+    """Write a trajectory in the format given by the file's suffix.
 
     Parameters
     ----------
     path : str or Path
-        Ends in one of `TRAJECTORY_WRITERS`. A file that is there is replaced, once the new one
-        is whole.
+        Suffix one of `TRAJECTORY_WRITERS`. An existing file is replaced once the new one is
+        complete.
     trajectory : DataFrame
         A Trajectory table.
     name : str, optional
-        For people who open the file; that of the file without it.
+        Title for people who open the file; by default the file name.
     options : TrajectoryFileOptions, optional
 
     Raises
     ------
     ConfigError
-        The ending is unknown, the folder is not there or may not be written to, or as the writer.
+        The suffix is unknown, the folder is missing or not writable, or as the writer.
     DataError
         As the writer.
     """

@@ -1,4 +1,4 @@
-"""Units of gyro, accelerometer and magnetometer: stated, named, or told by the numbers."""
+"""Units of gyro, accelerometer and magnetometer: stated, named, or inferred."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def told_by_numbers(
     ticks: NDArray[Any] | None,
     dated: bool,
 ) -> dict[str, Inference]:
-    """What the numbers say; of a gyro alone whose unit is stated, nothing is asked.
+    """Run the inference on the numbers; skipped for a gyro alone with a stated unit.
 
     Parameters
     ----------
@@ -42,9 +42,9 @@ def told_by_numbers(
     values : dict of str to ndarray, (n, 3)
         From `values_of_triads`.
     ticks : ndarray or None, (n,)
-        Stamps as they stand in the file.
+        Stamps as in the file.
     dated : bool
-        They were dates, and are ns now.
+        Whether they were dates, now converted to ns.
 
     Returns
     -------
@@ -76,7 +76,7 @@ def units_of_triads(
     said: dict[str, Inference],
     findings: list[Finding],
 ) -> dict[str, tuple[str, str]]:
-    """The unit of each triad that can be used, with its reason.
+    """Return the unit of each usable triad, with the reason.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def units_of_triads(
     said : dict of str to Inference
         From `told_by_numbers`.
     findings : list of Finding
-        What is left out, inferred or contradicted is added.
+        Dropped triads, inferences and contradictions are appended.
 
     Returns
     -------
@@ -96,7 +96,7 @@ def units_of_triads(
     Raises
     ------
     DataError
-        That of the gyro is not known.
+        The unit of the gyro is not known.
     """
     units: dict[str, tuple[str, str]] = {}
     asked: set[str] = set()
@@ -119,7 +119,7 @@ def units_of_triads(
 
 
 def _refuse_open(raw: RawLog, found: dict[str, Column], triad: str) -> None:
-    """Refuse a unit that the file leaves open: of f and -f the numbers cannot tell which.
+    """Refuse a unit that the file leaves open: the numbers cannot decide between f and -f.
 
     Raises
     ------
@@ -136,7 +136,7 @@ def _refuse_open(raw: RawLog, found: dict[str, Column], triad: str) -> None:
 
 
 def _asked_unit(triad: str, options: ReadOptions) -> str | None:
-    """The unit that the user states."""
+    """Return the unit stated by the user."""
     return {"gyro": options.gyro_unit, "accel": options.accel_unit}.get(triad)
 
 
@@ -149,7 +149,7 @@ def _stated_unit(
     columns = [found[f"{triad}_{a}"] for a in AXES]
     units = {c.unit for c in columns}
     known = set(UNITS[triad])
-    # Degrees in a name are often meant a second: only a name that says increments is believed.
+    # Degrees often mean degrees per second: only a name that states increments is trusted.
     if all(says_increment(c.source) for c in columns):
         known |= set(SUMS[triad])
     unit = columns[0].unit
@@ -159,23 +159,23 @@ def _stated_unit(
     return None
 
 
-# Values of gyro, accelerometer and magnetometer as they stand in a file.
+# Values of gyro, accelerometer and magnetometer as in a file.
 
-# Left out where they cannot be used, for the gyro alone makes an attitude.
+# Unusable triads are dropped, except the gyro, which suffices for an attitude.
 OPTIONAL = ("accel", "mag")
 
 
 def values_of_triads(
     raw: RawLog, found: dict[str, Column], findings: list[Finding]
 ) -> dict[str, Array]:
-    """Values of each triad that can be used, as they stand in the file.
+    """Return the raw values of each usable triad.
 
     Parameters
     ----------
     raw : RawLog
     found : dict of str to Column
     findings : list of Finding
-        What is left out is added.
+        Dropped triads are appended.
 
     Returns
     -------
@@ -184,7 +184,7 @@ def values_of_triads(
     Raises
     ------
     DataError
-        Those of the gyro cannot be used.
+        The values of the gyro cannot be used.
     """
     values = {"gyro": _triad(raw, found, "gyro")}
     for triad in OPTIONAL:
@@ -219,7 +219,7 @@ def _triad(raw: RawLog, found: dict[str, Column], triad: str) -> Array:
 
 
 def left_out(raw: RawLog, triad: str, error: DataError) -> Finding:
-    """Say of a triad that it is not used, and why."""
+    """Make the finding that a triad is not used, with the reason."""
     return Finding(
         "io.left-out-unusable",
         file=raw.name,

@@ -1,4 +1,4 @@
-"""Units as people write them, and multiples of them, in which raw counts stand."""
+"""Spellings of units, and units of raw counts."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from strapdown.errors import ConfigError
 
 __all__ = ["UNIT_OF", "factor_of", "parse_unit", "unit_of"]
 
-# Each spelling to the word that stands for it here.
+# Each spelling to its canonical word.
 _SPELLINGS = {
     "rad/s": "rad/s rad_s rads rad_per_s rad/sec radps rad·s-1 rad*s^-1 rad.s-1",
     "mrad/s": "mrad/s mrad_s",
@@ -44,7 +44,7 @@ _SPELLINGS = {
     "rad": "rad radian radians",
 }
 UNIT_OF = {spelling: unit for unit, text in _SPELLINGS.items() for spelling in text.split()}
-# Powers of a second, whatever stands between the factors: rad s^-1, m·s⁻².
+# Powers of a second, with any separator of the factors: rad s^-1, m·s⁻².
 _POWERS = {
     "rads-1": "rad/s",
     "mrads-1": "mrad/s",
@@ -55,13 +55,13 @@ _POWERS = {
 }
 _RAISED = str.maketrans({"⁻": "-", "−": "-", "¹": "1", "²": "2"})
 _NUMBER = r"\d+(?:\.\d*)?(?:[eE][+-]?\d+)?"
-# So many counts a unit, as in deg/s/131; or so many units a count, as in 1/131 deg/s.
+# Counts per unit, as in deg/s/131; or units per count, as in 1/131 deg/s.
 _PARTS = re.compile(rf"(?P<unit>.*\D)/\s*(?P<counts>{_NUMBER})")
 _TIMES = re.compile(rf"(?P<up>{_NUMBER})(?:\s*/\s*(?P<down>{_NUMBER}))?\s*[ *·]\s*(?P<unit>\D.*)")
 
 
 def unit_of(text: str) -> str | None:
-    """The unit that a text spells.
+    """Parse the spelling of a unit.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def unit_of(text: str) -> str | None:
     Returns
     -------
     str or None
-        In this package's spelling.
+        In the spelling of this package.
     """
     word = re.sub(r"\s+", "", text.strip().strip("[]()").lower())
     if word in UNIT_OF:
@@ -86,19 +86,19 @@ def parse_unit(text: str, kind: str) -> str:
     ----------
     text : str
         A unit; for a gyro or an accelerometer also one of raw counts, as ``deg/s/131`` or
-        ``g/16384`` (so many counts a unit), or ``1/131 deg/s`` or ``0.061 deg/s`` (so many units
-        a count).
+        ``g/16384`` (counts per unit), or ``1/131 deg/s`` or ``0.061 deg/s`` (units per
+        count).
     kind : {'gyro', 'accel', 'mag', 'time'}
 
     Returns
     -------
     str
-        In this package's spelling; `factor_of` tells what it is worth.
+        In the spelling of this package; `factor_of` has its factor.
 
     Raises
     ------
     ConfigError
-        It is no unit of that kind.
+        The text is not a unit of that kind.
     """
     known = {
         "gyro": {**GYRO_UNITS, **GYRO_SUMS},
@@ -125,12 +125,12 @@ def parse_unit(text: str, kind: str) -> str:
 
 
 def factor_of(unit: str, known: Mapping[str, float]) -> float:
-    """What turns numbers of a unit into SI.
+    """Return the factor from a unit to SI.
 
     Parameters
     ----------
     unit : str
-        As `parse_unit` returns it.
+        As returned by `parse_unit`.
     known : mapping of str to float
         Factors of plain units.
 
@@ -145,7 +145,7 @@ def factor_of(unit: str, known: Mapping[str, float]) -> float:
 
 
 def _word(text: str) -> str:
-    """The unit that a text spells, or itself; of an accelerometer also with the sign of iOS."""
+    """Return the unit of a text, or the text; for accelerometers also with the sign of iOS."""
     bare = text.strip()
     if bare.startswith("-") and (unit := unit_of(bare[1:])):
         return f"-{unit}"
@@ -153,7 +153,7 @@ def _word(text: str) -> str:
 
 
 def _taken_apart(text: str) -> tuple[float | None, str]:
-    """How much of which unit a count is; None where the text has no such form."""
+    """Parse how much of which unit a count is; None if the text has no such form."""
     bare = text.strip()
     if match := _PARTS.fullmatch(bare):
         up, down, unit = 1.0, float(match["counts"]), match["unit"]

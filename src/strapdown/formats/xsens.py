@@ -1,11 +1,11 @@
-"""Text exports of Xsens MT Manager: MTi, MTx, MTw Awinda; and of Xsens DOT.
+"""Text exports of Xsens MT Manager (MTi, MTx, MTw Awinda) and of Xsens DOT.
 
 Lines of ``//`` at the top, among them ``// Update Rate: 100.0Hz``; then names as ``PacketCounter
-SampleTimeFine Acc_X … Gyr_X … Mag_X …``. Acceleration, gravity in it, is in m/s², rates in rad/s of
-an MTi or MTw and deg/s of a DOT, the magnetic field in units of that at the factory (MTw Awinda
-User Manual, table of exported data). ``SampleTimeFine`` counts 0.1 ms in an MTi (MTi User Manual,
-section "Time stamp (Sample Time Fine)") and 1 µs in a DOT (Xsens DOT User Manual, section 4.2.5);
-it has 32 bits, and ``PacketCounter`` 16 or 32.
+SampleTimeFine Acc_X … Gyr_X … Mag_X …``. Acceleration (with gravity) is in m/s², rates in rad/s
+for an MTi or MTw and deg/s for a DOT, the magnetic field in units of that at the factory (MTw
+Awinda User Manual, table of exported data). ``SampleTimeFine`` counts 0.1 ms in an MTi (MTi User
+Manual, section "Time stamp (Sample Time Fine)") and 1 µs in a DOT (Xsens DOT User Manual, section
+4.2.5); it has 32 bits, and ``PacketCounter`` 16 or 32.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ from strapdown.formats.recording import RawLog
 COUNTER, STAMP = "PacketCounter", "SampleTimeFine"
 TRIADS = {"Gyr": ("gyro", "rad/s"), "Acc": ("accel", "m/s2")}
 _RATE = re.compile(r"//\s*Update Rate:\s*([\d.]+)\s*Hz", re.I)
-# Ticks of the two clocks, in µs, and what is told of the rate may be off by this share.
+# Ticks of the two clocks, in µs, and relative tolerance of the stated rate.
 TICKS = (100, 1)
 LEAST_AGREEMENT = 0.2
-# Rates that a sensor of this maker is read at.
+# Range of sampling rates of this maker's sensors.
 RATES = (1.0, 2000.0)  # Hz
 HEAD = 4096  # bytes
 
 
 def detect(path: Path) -> bool:
-    """Tell by the comments at the top and the names under them."""
+    """Detect by the comments at the top and the names under them."""
     if not csv.detect(path):
         return False
     with path.open("rb") as stream:
@@ -48,7 +48,7 @@ def detect(path: Path) -> bool:
 
 
 def read(path: Path) -> RawLog:
-    """Read rates and specific force, and make stamps of the counters.
+    """Read rates and specific force, with stamps from the counters.
 
     Parameters
     ----------
@@ -57,13 +57,13 @@ def read(path: Path) -> RawLog:
     Returns
     -------
     RawLog
-        Stamps in µs of ``SampleTimeFine``; without it, of ``PacketCounter`` and the rate at the
-        top.
+        Stamps in µs of ``SampleTimeFine``; without it, of ``PacketCounter`` and the stated
+        rate.
 
     Raises
     ------
     DataError
-        The file is damaged, or nothing says what a tick of the clock is.
+        The file is damaged, or the tick of the clock is not known.
     """
     data = path.read_bytes()
     raw = csv.parse(data, path.name, (path,))
@@ -86,7 +86,7 @@ def read(path: Path) -> RawLog:
         columns[source] = stamps
         stated[source] = ("time", "us")
     if source is None or (source == STAMP and np.array_equal(stamps, raw.columns[STAMP])):
-        # A DOT, which counts µs, writes deg/s; the numbers are asked.
+        # A DOT, which counts µs, writes deg/s; the unit is inferred from the numbers.
         stated |= {f"Gyr_{axis}": (f"gyro_{axis.lower()}", None) for axis in "XYZ"}
     return dataclasses.replace(raw, columns=columns, stated=stated, rate=rate, findings=findings)
 
@@ -94,7 +94,7 @@ def read(path: Path) -> RawLog:
 def _stamps(
     raw: RawLog, rate: float | None, findings: list[Finding]
 ) -> tuple[str | None, NDArray[Any]]:
-    """Stamps in µs, and the column that they were made of."""
+    """Return stamps in µs, and the column that they come from."""
     if STAMP in raw.columns:
         ticks = _unwrapped(raw, STAMP, (32,), findings)
         tick = _tick(raw, ticks, rate)
@@ -129,7 +129,7 @@ def _stamps(
 def _unwrapped(
     raw: RawLog, name: str, widths: tuple[int, ...], findings: list[Finding]
 ) -> NDArray[Any]:
-    """A counter without the falls by its whole range."""
+    """Unwrap a counter that overflows."""
     count = numbers(raw, Column(name, None, ""), "time")
     if count.dtype.kind not in "iu":
         return count
@@ -157,12 +157,12 @@ def _unwrapped(
 
 
 def _tick(raw: RawLog, ticks: NDArray[Any], rate: float | None) -> int:
-    """What a tick is, in µs: that in which steps have the rate at the top, or a possible one.
+    """Determine the tick in µs: the one that matches the stated rate, or a plausible one.
 
     Raises
     ------
     DataError
-        Both are possible, or none is.
+        Both are plausible, or none is.
     """
     step = float(np.median(np.diff(ticks))) if ticks.size > 1 else 0.0
     if not step > 0.0:

@@ -1,8 +1,7 @@
-"""The tables that flow between stages: their columns, their units, and who checks them.
+"""Tables passed between processing stages: columns, units, checks.
 
-Each is a pandas DataFrame with fixed columns. A table that was made by the functions here is
-valid; a table from elsewhere is checked by ``check_*`` before it is used. Inputs are never
-changed in place.
+Each is a pandas DataFrame with fixed columns. A table made by the functions here is valid; a
+table from elsewhere is checked by ``check_*`` before use. Inputs are never modified in place.
 
 ======================  =====================  ===================================================
 table                   index                  columns
@@ -16,8 +15,8 @@ Imu                     ``time`` s             ``gyro_x..z`` rad/s, and where th
 Increments              ``time`` s, its end    ``dt`` s, ``theta_x..z`` rad, ``dtheta_x..z`` rad
                                                (change of the rate over the step times `dt`)
 MotionIncrements        ``time`` s, its end    ``dt`` s, ``phi_x..z`` rad (rotation vector),
-                                               ``dv_x..z`` m/s, ``dr_x..z`` m (what specific force
-                                               gave, in the body axes at the start of the step)
+                                               ``dv_x..z`` m/s, ``dr_x..z`` m (specific force
+                                               integrated, body axes at the start of the step)
 Trajectory              ``time`` s             ``lat lon`` deg, ``alt`` m (ellipsoidal), ``VN VE
                                                VD`` m/s, ``roll pitch heading`` deg
 TrajectoryError         ``time`` s             ``north east down`` m, ``VN VE VD`` m/s, ``roll pitch

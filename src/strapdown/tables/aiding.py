@@ -1,4 +1,4 @@
-"""Barometer tables: heights of a sensor by the pressure of the air."""
+"""Tables of aiding sensors: barometer, body velocity, heading, odometer."""
 
 from __future__ import annotations
 
@@ -26,22 +26,22 @@ Array = NDArray[np.float64]
 
 BAROMETER = ["height", "height_sd"]
 
-# US Standard Atmosphere (1976), up to 11 km that of ISO 2533: at the height of the sea 288.15 K and
-# 1013.25 hPa, 6.5 K less a km of geopotential height; the gas constant of air, the gravity of that
-# height, the radius by which geopotential height is made of height.
+# US Standard Atmosphere (1976), identical to ISO 2533 up to 11 km: 288.15 K and 1013.25 hPa at sea
+# level, lapse rate 6.5 K/km of geopotential height; gas constant of air, standard gravity, and the
+# Earth radius that relates geopotential and geometric height.
 TEMPERATURE, PRESSURE, LAPSE = 288.15, 101325.0, 0.0065
 GAS, GRAVITY, RADIUS = 287.05287, 9.80665, 6_356_766.0
 EXPONENT = GAS * LAPSE / GRAVITY
-# Of that layer, m, and the pressure at its top, Pa.
+# Top of that layer, m, and the pressure there, Pa.
 TOP, LEAST_PRESSURE = 11_000.0, 22_632.0
-# No pressure of open air is higher: 1085 hPa was measured; and mines and tanks beside.
+# Upper limit of open air (1085 hPa has been measured), with room for mines and tanks, Pa.
 MOST_PRESSURE = 120_000.0
-# Heights of a barometer are within, m.
+# Limits of barometric height, m.
 LOWEST, HIGHEST = -2_000.0, 50_000.0
 
 
 def standard_height(pressure_pa: ArrayLike) -> Array:
-    """Return the height at which the standard atmosphere has a pressure.
+    """Compute the height at which the standard atmosphere has a pressure.
 
     Parameters
     ----------
@@ -51,8 +51,8 @@ def standard_height(pressure_pa: ArrayLike) -> Array:
     Returns
     -------
     ndarray, (n,), m
-        Geometric, over the sea. ``H = T0 / L (1 - (p / p0)^(R L / g))``, ``h = r H / (r - H)``:
-        US Standard Atmosphere (1976), Eqs. (33a), (19).
+        Geometric, above mean sea level. ``H = T0 / L (1 - (p / p0)^(R L / g))``,
+        ``h = r H / (r - H)``: US Standard Atmosphere (1976), Eqs. (33a), (19).
     """
     ratio = np.asarray(pressure_pa, dtype=np.float64) / PRESSURE
     geopotential = TEMPERATURE / LAPSE * (1.0 - ratio**EXPONENT)
@@ -60,7 +60,7 @@ def standard_height(pressure_pa: ArrayLike) -> Array:
 
 
 def standard_slope(pressure_pa: ArrayLike) -> Array:
-    """Return how that height falls with pressure, (n,), m/Pa; negative."""
+    """Compute the derivative of that height by pressure, (n,), m/Pa; negative."""
     p = np.asarray(pressure_pa, dtype=np.float64)
     geopotential = TEMPERATURE / LAPSE * (1.0 - (p / PRESSURE) ** EXPONENT)
     slope = -(TEMPERATURE - LAPSE * geopotential) * GAS / (GRAVITY * p)
@@ -77,9 +77,9 @@ def barometer_table(
     time : array_like, (n,), s
         On the clock of the inertial sensors.
     height : array_like, (n,), m
-        Upward; over anything that stays the same, as the sea or the place of the start.
+        Positive up, above any constant reference such as sea level or the start.
     height_sd : array_like, (n,) or float, m
-        Of the noise of each; infinite where nothing was measured.
+        Standard deviation of the noise of each height; infinite where not measured.
     source : str, optional
         Name for messages.
 
@@ -101,7 +101,7 @@ def barometer_table(
 def barometer_from_pressure(
     time: ArrayLike, pressure_pa: ArrayLike, pressure_sd_pa: ArrayLike, source: str | None = None
 ) -> pd.DataFrame:
-    """Make a Barometer table of pressures, by the standard atmosphere.
+    """Make a Barometer table from pressures, by the standard atmosphere.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def barometer_from_pressure(
     Raises
     ------
     DataError
-        A pressure is not that of open air below 11 km; what is in hPa or kPa is told so.
+        A pressure is not that of open air below 11 km; the message names hPa or kPa if that fits.
     """
     p = as_array(pressure_pa, None, "pressure_pa", source)
     check_rows(p[:, None], ["pressure_pa"], source)
@@ -154,7 +154,7 @@ def check_barometer(table: pd.DataFrame) -> None:
     ------
     DataError
         A column is missing, a value is not finite, time does not advance, a standard deviation is
-        not above zero, or a height is none.
+        not above zero, or a height is outside -2000 m to 50 000 m.
     """
     height = checked_values(table, ["height"], ["height_sd"])[:, 0]
     beyond = np.flatnonzero((height < LOWEST) | (height > HIGHEST))
@@ -171,12 +171,12 @@ def check_barometer(table: pd.DataFrame) -> None:
         )
 
 
-# BodyVelocity tables: a velocity measured along the axes of an instrument, as by Doppler.
+# BodyVelocity tables: velocity along the axes of an instrument, for example a Doppler sensor.
 
 
 BODY_VELOCITY = ["vx", "vy", "vz", "vx_sd", "vy_sd", "vz_sd"]
 
-# What measures its velocity by Doppler or a camera is slower, m/s.
+# Upper limit of a velocity by Doppler or camera, m/s.
 FASTEST = 400.0
 
 
@@ -237,15 +237,15 @@ def check_body_velocity(table: pd.DataFrame) -> None:
         )
 
 
-# Heading tables: where a compass or the baseline of two antennas points.
+# Heading tables: from a compass or the baseline of two antennas.
 
 
 HEADING = ["heading", "heading_sd"]
 
 TURN = 2.0 * math.pi
-# Part of a full turn in rad that a record fills, and that two rows leap, where it is in rad.
+# To detect headings in rad: fraction of a turn that the record covers, and that two rows jump.
 FILLED, LEAPT = 0.97, 0.9
-# A standard deviation of a heading is below, deg: an even distribution has 104.
+# Upper limit of a standard deviation of heading, deg: a uniform distribution has 104.
 MOST_SD = 110.0
 
 
@@ -261,7 +261,7 @@ def heading_table(
     heading : array_like, (n,), deg
         Clockwise from north, -360 to 360.
     heading_sd : array_like, (n,) or float, deg
-        Of the noise of each; infinite where nothing was measured.
+        Standard deviation of the noise of each heading; infinite where not measured.
     source : str, optional
         Name for messages.
 
@@ -291,8 +291,8 @@ def check_heading(table: pd.DataFrame) -> None:
     ------
     DataError
         A column is missing, a value is not finite, time does not advance, a standard deviation is
-        not above zero or finite beyond 110 deg, a heading is beyond a turn, or all are within a
-        turn in rad, and leap by one.
+        not above zero or finite beyond 110 deg, a heading is beyond a turn, or all headings are
+        within a turn in rad and jump by one.
     """
     heading = checked_values(table, ["heading"], ["heading_sd"])[:, 0]
     sd = values_of(table, ["heading_sd"])[:, 0]
@@ -333,12 +333,12 @@ def check_heading(table: pd.DataFrame) -> None:
         )
 
 
-# Odometer tables: how fast a wheel rolls.
+# Odometer tables: speed of a wheel.
 
 
 ODOMETER = ["speed", "speed_sd"]
 
-# No wheel of a road vehicle or train rolls faster, m/s: what does is in km/h.
+# Upper limit of wheel speed for road vehicles and trains, m/s; beyond, it is likely in km/h.
 ODOMETER_FASTEST = 100.0
 
 
@@ -354,7 +354,7 @@ def odometer_table(
     speed : array_like, (n,), m/s
         Along the wheel, forward positive.
     speed_sd : array_like, (n,) or float, m/s
-        Of the noise of each, without the scale factor; infinite where nothing was measured.
+        Standard deviation of the noise, without the scale factor; infinite where not measured.
     source : str, optional
         Name for messages.
 
@@ -376,34 +376,34 @@ def odometer_table(
 def odometer_from_distance(
     time: ArrayLike, distance: ArrayLike, quantum: float, source: str | None = None
 ) -> pd.DataFrame:
-    """Make an Odometer table of a counter.
+    """Make an Odometer table from a distance counter.
 
-    Between two rows the wheel has rolled at a mean speed, which is that of the middle of the step
-    but for ``dt² / 24`` times the derivative of its acceleration. Two counts are each wrong by up
-    to half a `quantum`, evenly: the speed by ``quantum / (√6 dt)``; what one step has too much, the
-    next has not, so that to take them for independent is to believe them too little.
+    The mean speed between two rows is that at the middle of the step, up to ``dt² / 24`` times the
+    derivative of the acceleration. Each count is off by up to half a `quantum`, uniformly, which
+    makes the standard deviation of the speed ``quantum / (√6 dt)``. Errors of consecutive steps are
+    negatively correlated, so treating them as independent is conservative.
 
     Parameters
     ----------
     time : array_like, (n,), s
     distance : array_like, (n,), m
-        Since any instant; backwards it falls.
+        Since any instant; decreasing backwards.
     quantum : float, m
-        Of one count: circumference over pulses a turn.
+        Length of one count: circumference divided by pulses per turn.
     source : str, optional
         Name for messages.
 
     Returns
     -------
     DataFrame
-        Of the n - 1 middles.
+        At the n - 1 midpoints.
 
     Raises
     ------
     ConfigError
-        The quantum is no length.
+        The quantum is not a positive length.
     DataError
-        Shapes disagree; time does not advance; a counter was set back, or overflowed; or as
+        Shapes disagree; time does not advance; the counter was reset or overflowed; or as
         `check_odometer`.
     """
     if not is_number(quantum) or not 0.0 < quantum < math.inf:

@@ -1,4 +1,4 @@
-"""Attitude tables."""
+"""Attitude and References tables."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def attitude_table(time: ArrayLike, q_nb: ArrayLike, source: str | None = None) 
     Returns
     -------
     DataFrame
-        Quaternion, and roll, pitch, heading in degrees.
+        Quaternion, and roll, pitch, heading in deg.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def check_attitude(table: pd.DataFrame) -> None:
     rotation.conjugate(values[:, : len(QUATERNION)])
 
 
-# References tables: instants at which the attitude is known.
+# References tables: instants of known attitude.
 
 
 REFERENCE_KINDS = ("known", "tilt", "same", "turns")
@@ -91,7 +91,7 @@ def references_table(rows: Sequence[dict[str, object]], source: str | None = Non
         in deg; ``tilt`` adds ``roll`` and ``pitch`` only, the direction of gravity; ``same``
         adds ``since`` (s), the instant whose attitude it shares; ``turns``
         adds ``since``, ``turns`` (whole or not; positive right-handed) and ``axis`` (``x``,
-        ``y``, ``z`` of the body, forward-right-down). ``sd`` in deg is how well it is known.
+        ``y``, ``z`` of the body, forward-right-down). ``sd`` in deg is the standard deviation.
     source : str, optional
         Name for messages.
 

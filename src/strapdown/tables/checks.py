@@ -1,4 +1,4 @@
-"""What every table is checked for: shapes, columns, finite numbers, advancing time."""
+"""Checks common to all tables: shapes, columns, finite numbers, advancing time."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from strapdown.errors import DataError
 
 Array = NDArray[np.float64]
 
-#: Rows of a short table.
+#: Rows up to which a table counts as short.
 FEW = 8
 
 
 def as_array(values: ArrayLike, columns: int | None, name: str, source: str | None = None) -> Array:
-    """Numbers of shape (n,), or (n, columns)."""
+    """Convert to numbers of shape (n,), or (n, columns)."""
     try:
         array = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):
@@ -36,7 +36,7 @@ def as_array(values: ArrayLike, columns: int | None, name: str, source: str | No
 
 
 def check_same_length(source: str | None, **arrays: Array) -> None:
-    """One row a sample in each."""
+    """Check that all arrays have the same number of rows."""
     if len({len(a) for a in arrays.values()}) > 1:
         lengths = [f"{name} {len(a)}" for name, a in arrays.items()]
         raise DataError("tables.arrays-different-lengths", file=source, lengths=lengths)
@@ -48,7 +48,7 @@ def joined(
     source: str | None,
     **blocks: tuple[ArrayLike, int | None],
 ) -> pd.DataFrame:
-    """Blocks side by side, each of shape (n,) or (n, columns), over one index of stamps."""
+    """Join blocks, each of shape (n,) or (n, columns), over one index of stamps."""
     stamps = as_array(time, None, "time", source)
     arrays = {
         name: as_array(values, width, name, source) for name, (values, width) in blocks.items()
@@ -65,13 +65,13 @@ def joined(
 
 
 def each_row(values: ArrayLike, time: ArrayLike, width: int | None = None) -> ArrayLike:
-    """Values of shape (n,), or (n, width), also where one row of them stands for all."""
+    """Expand to shape (n,), or (n, width), where one row is given for all."""
     one = () if width is None else (width,)
     return np.full((np.size(time), *one), values) if np.shape(values) == one else values
 
 
 def checked_values(table: pd.DataFrame, columns: Sequence[str], sd: Sequence[str] = ()) -> Array:
-    """Columns as floats, after a check of columns, stamps, values and standard deviations.
+    """Return columns as floats, after checking columns, stamps, values, standard deviations.
 
     Raises
     ------
@@ -90,7 +90,7 @@ def checked_values(table: pd.DataFrame, columns: Sequence[str], sd: Sequence[str
 
 
 def check_latitude(lat: Array, lon: Array, source: str | None) -> None:
-    """Latitudes are within the poles."""
+    """Check that latitudes are within 90 deg."""
     beyond = np.flatnonzero(np.abs(lat) > 90.0)
     if beyond.size:
         row = int(beyond[0])
@@ -106,9 +106,9 @@ def check_latitude(lat: Array, lon: Array, source: str | None) -> None:
 
 
 def check_rows(values: Array, columns: Sequence[str], source: str | None) -> None:
-    """Every value is finite; else the first that is not is named."""
-    # A sum is finite only where everything in it is; it needs no memory, and is several times
-    # faster than to look at each.
+    """Check that every value is finite; the message names the first that is not."""
+    # A sum is finite only if every term is. It needs no memory and is several times faster than
+    # a check of each value.
     with np.errstate(invalid="ignore", over="ignore"):
         total = values.sum()
     if np.isfinite(total):
@@ -129,7 +129,7 @@ def check_rows(values: Array, columns: Sequence[str], source: str | None) -> Non
 
 
 def check_positive_sd(table: pd.DataFrame, columns: Sequence[str], source: str | None) -> None:
-    """Standard deviations are above zero: infinite ones are of rows that say nothing."""
+    """Check that standard deviations are above zero; infinite means not measured."""
     values = values_of(table, columns)
     bad = ~(values > 0.0)
     if bad.any():
@@ -144,7 +144,7 @@ def check_positive_sd(table: pd.DataFrame, columns: Sequence[str], source: str |
 
 
 def check_time(time: Array, source: str | None) -> None:
-    """Stamps are finite and advance."""
+    """Check that stamps are finite and advance."""
     check_rows(time[:, None], ["time"], source)
     steps = np.diff(time)
     if steps.size and not steps.min() > 0.0:
@@ -160,7 +160,7 @@ def check_time(time: Array, source: str | None) -> None:
 
 
 def check_columns(table: pd.DataFrame, columns: Sequence[str], source: str | None) -> None:
-    """Every column is there."""
+    """Check that every column is present."""
     missing = [c for c in columns if c not in table.columns]
     if missing:
         raise DataError(
@@ -173,12 +173,12 @@ def check_columns(table: pd.DataFrame, columns: Sequence[str], source: str | Non
 
 
 def source_of(table: object) -> str | None:
-    """Name of a table's source for messages.
+    """Return the name of a table's source for messages.
 
     Raises
     ------
     DataError
-        It is no table.
+        The object is not a DataFrame.
     """
     if not isinstance(table, pd.DataFrame):
         raise DataError("tables.table-needed-kind", quantity="table", name=type(table).__name__)
@@ -192,33 +192,33 @@ def is_number(value: object) -> bool:
 
 
 def values_of(table: pd.DataFrame, columns: Sequence[str]) -> Array:
-    """Columns as one contiguous array of floats."""
+    """Return columns as one contiguous array of floats."""
     own, wanted = list(table.columns), list(columns)
     if own != wanted and len(table) <= FEW and set(wanted) <= set(own):
-        # Of a row that just came, choosing among names would cost more than all that follows.
+        # For a single row of a stream, selecting columns by name would dominate the cost.
         whole = table.to_numpy()
         if whole.dtype == np.float64:
             return np.ascontiguousarray(whole[:, [own.index(name) for name in wanted]])
     if own != wanted and len(set(own)) == len(own):
-        # Column by column: choosing them at once costs more than it copies, on most tables.
+        # Column by column: selecting them at once is slower on most tables.
         out = np.empty((len(table), len(wanted)))
         for k, name in enumerate(wanted):
             out[:, k] = table[name].to_numpy(dtype=np.float64)
         return out
-    # A selection copies; a table made by the functions here needs none.
+    # A selection copies; a table made by the functions here needs no copy.
     there = table if own == wanted else table[wanted]
     return np.ascontiguousarray(there.to_numpy(dtype=np.float64))
 
 
 def index_of(table: pd.DataFrame) -> Array:
-    """Stamps as floats."""
+    """Return the stamps as floats."""
     return np.asarray(table.index.to_numpy(), dtype=np.float64)
 
 
 def check_steps(table: pd.DataFrame, source: str | None) -> None:
-    """Steps are positive, and none begins before the one before it has ended."""
+    """Check that steps are positive and do not overlap."""
     time, dt = index_of(table), values_of(table, ["dt"])[:, 0]
-    # Stamps of epoch size carry no more than this.
+    # Resolution of stamps of epoch size.
     slack = 8.0 * float(np.spacing(np.abs(time).max(initial=1.0)))
     overlap = np.flatnonzero((dt <= 0.0) | np.r_[False, time[1:] - dt[1:] < time[:-1] - slack])
     if overlap.size:
@@ -233,7 +233,7 @@ def check_steps(table: pd.DataFrame, source: str | None) -> None:
         )
 
 
-# Names of the columns.
+# Column names.
 
 
 GYRO = ["gyro_x", "gyro_y", "gyro_z"]
@@ -254,21 +254,21 @@ VELOCITY_SD = ["VN_sd", "VE_sd", "VD_sd"]
 REFERENCE = ["time", "kind", "since", *EULER, "turns", "axis", "sd"]
 
 
-# Holes in a record.
+# Gaps in a record.
 
 
 @dataclass(frozen=True)
 class Gap:
-    """A hole in a record.
+    """A gap in a record.
 
     Attributes
     ----------
     start, end : float, s
-        The stamps on its two sides.
+        The stamps on either side.
     usual : float, s
-        The step that the record usually keeps.
+        The usual step of the record.
     sample : int
-        Position of the sample after the gap, counted from 0.
+        Index of the sample after the gap, from 0.
     """
 
     start: float
@@ -283,13 +283,13 @@ class Gap:
 
 
 def find_gaps(time: ArrayLike) -> list[Gap]:
-    """Find the steps that are far longer than a record's own habit.
+    """Find the steps that are far longer than the usual step of a record.
 
     Parameters
     ----------
     time : array_like, (n,), s
-        Increasing stamps. Bursts, as of a phone that sends over a network, are a habit: a
-        gap is a step of more than three times the step that 95 % of the steps do not exceed.
+        Increasing stamps. A gap is a step of more than three times the step that 95 % of the
+        steps do not exceed, so that regular bursts, as of a phone over a network, are not gaps.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Gnss tables: fixes of a satellite receiver, with what it says of their precision."""
+"""Gnss tables: fixes of a GNSS receiver with their stated standard deviations."""
 
 from __future__ import annotations
 
@@ -32,16 +32,16 @@ GNSS = [*GEODETIC, *VELOCITY, *POSITION_SD, *VELOCITY_SD, "quality"]
 # Quality indicators of NMEA 0183 GGA: 0 no fix, 1 autonomous, 2 differential, 3 precise, 4 and 5
 # carrier phase, 6 estimated, 7 and 8 manual and simulated.
 QUALITIES = range(9)
-# A step from fix to fix tells a speed where it is this many times longer than its places are
-# uncertain, and faster than a walk.
+# A step between fixes defines a speed where it exceeds the position uncertainty by this factor and
+# is faster than a walk.
 CLEAR = 5.0
 LEAST_SPEED = 3.0  # m/s
 LEAST_STEPS = 4
-# The velocity is not that of the places beyond the one misfit, and another reading is right
-# below the other; both relative to the speed.
+# Relative misfit above which velocities disagree with the positions, and below which another unit
+# or order is taken to be right.
 UNLIKE, ALIKE = 0.3, 0.15
 
-# What the places are, and not the velocities.
+# Findings about the positions, not the velocities.
 _OF_PLACES = ("tables.places-in-degrees-and-minutes", "tables.places-swapped")
 
 
@@ -65,13 +65,13 @@ def gnss_table(
     velocity : array_like, (n, 3), m/s
         Of the antenna relative to the Earth: north, east, down.
     position_sd : array_like, (n, 3) or (3,), m
-        Standard deviations north, east, down, with what stays the same from fix to fix; infinite
-        where it was not measured, whatever number stands there.
+        Standard deviations north, east, down, with errors that persist between fixes; infinite
+        where not measured, whatever number the column holds.
     velocity_sd : array_like, (n, 3) or (3,), m/s
-        The same of the velocity.
+        The same for the velocity.
     quality : array_like, (n,), optional
         0 no fix, 1 autonomous, 2 differential, 4 and 5 carrier phase: as field 6 of NMEA 0183
-        GGA. Where it is left out, 1.
+        GGA. 1 if not given.
     source : str, optional
         Name for messages.
 
@@ -108,8 +108,8 @@ def check_gnss(table: pd.DataFrame) -> None:
     DataError
         A column is missing, a value is not finite, time does not advance, a latitude is beyond
         90 deg, a standard deviation is negative or not a number, a quality is unknown, or the
-        velocity is not that of the places but would be in km/h or knots, with north and east, or
-        latitude and longitude, exchanged.
+        velocity disagrees with the positions but would agree in km/h or knots, with north and
+        east exchanged, or with latitude and longitude exchanged.
     """
     source = source_of(table)
     check_columns(table, GNSS, source)
@@ -149,14 +149,14 @@ def _check_sd(table: pd.DataFrame, source: str | None) -> None:
 
 
 def _check_velocity_fits(table: pd.DataFrame, source: str | None) -> None:
-    """Refuse velocities that are those of the places in another unit or order."""
+    """Refuse velocities that match the positions only in another unit or order."""
     good = values_of(table, ["quality"])[:, 0] > 0.0
     good &= np.isfinite(values_of(table, [*POSITION_SD[:2], *VELOCITY_SD[:2]])).all(axis=1)
     if good.sum() <= LEAST_STEPS:
         return
     time = index_of(table)[good]
     place, velocity = values_of(table, GEODETIC)[good], values_of(table, VELOCITY)[good, :2]
-    # Steps as far apart as makes them clear; what is slow is not judged.
+    # Steps long enough for a clear displacement; slow motion is not checked.
     sd = values_of(table, POSITION_SD[:2])[good].max()
     apart = max(1, len(time) // (2 * LEAST_STEPS))
     lasted = (time[apart:] - time[:-apart])[:, None]
@@ -197,6 +197,6 @@ def _check_velocity_fits(table: pd.DataFrame, source: str | None) -> None:
 
 
 def _mean_between(velocity: Array, time: Array, apart: int) -> Array:
-    """Mean velocity between rows so far apart."""
+    """Average the velocity between rows that many apart."""
     way = running_integral(time, velocity)
     return np.asarray((way[apart:] - way[:-apart]) / (time[apart:] - time[:-apart])[:, None])

@@ -1,4 +1,4 @@
-"""Imu tables: rates and specific force."""
+"""Imu tables and integrated increments: angular rate and specific force."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def imu_table(
     gyro : array_like, (n, 3), rad/s
         Rate of the body relative to inertial space, in body axes (forward, right, down).
     accel : array_like, (n, 3), m/s², optional
-        Specific force in body axes: about (0, 0, -9.8) at rest and level.
+        Specific force in body axes: about (0, 0, -9.8) when stationary and level.
     mag : array_like, (n, 3), µT, optional
         Magnetic field in body axes.
     sampling : {'instantaneous', 'mean'}
@@ -84,7 +84,7 @@ def imu_table(
         values,
         index=pd.Index(stamps, name="time"),
         columns=columns,
-        # What was put together here belongs to nobody else.
+        # Arrays stacked above are not shared: no copy needed.
         copy=accel is None and mag is None,
     )
     table.attrs = {"sampling": sampling, "source": source, "axes": "forward-right-down"}
@@ -103,7 +103,7 @@ def check_imu(table: pd.DataFrame) -> None:
     ------
     DataError
         A column is missing, a value is not finite, time does not advance, there are fewer
-        than two samples, or ``attrs["sampling"]`` does not say how the rows were sampled.
+        than two samples, or ``attrs["sampling"]`` is unknown.
     """
     source = source_of(table)
     check_columns(table, GYRO, source)
@@ -131,7 +131,7 @@ def check_imu(table: pd.DataFrame) -> None:
     check_rows(values_of(table, columns), columns, source)
 
 
-# Increments tables: the rate alone, step by step, before any algorithm.
+# Increments tables: integrated angular rate per step, before any algorithm.
 
 
 INCREMENTS = ["dt", *THETA, *DTHETA]
@@ -151,7 +151,7 @@ def increments_table(
     theta : array_like, (n, 3), rad
         Integral of the body rate over the step.
     dtheta : array_like, (n, 3), rad, optional
-        Change of the body rate over the step times `dt`; zero, where it is not known.
+        Change of the body rate over the step times `dt`; zero if not given.
 
     Returns
     -------
@@ -160,7 +160,7 @@ def increments_table(
     Raises
     ------
     DataError
-        Shapes disagree, a value is not finite, or a step has no positive length.
+        Shapes disagree, a value is not finite, or a step is not positive.
     """
     change = np.zeros_like(theta, dtype=np.float64) if dtheta is None else dtheta
     table = joined(time, INCREMENTS, None, dt=(dt, None), theta=(theta, 3), dtheta=(change, 3))
@@ -185,7 +185,7 @@ def check_increments(table: pd.DataFrame) -> None:
     check_steps(table, source_of(table))
 
 
-# MotionIncrements tables: how a body turned and moved over each step, ready for navigation.
+# MotionIncrements tables: rotation and velocity increments per step, ready for navigation.
 
 
 MOTION = ["dt", *PHI, *DV, *DR]
@@ -211,12 +211,12 @@ def motion_increments_table(
     dt : array_like, (n,), s
         Length of each step.
     phi : array_like, (n, 3), rad
-        Rotation vector of ``C`` at the end of the step: the turn with its coning.
+        Rotation vector of ``C`` at the end of the step, with coning.
     dv : array_like, (n, 3), m/s
-        ``int C f dt`` over the step, in the body axes of its start: the velocity that specific
-        force gave, with rotation and sculling.
+        ``int C f dt`` over the step, in the body axes of its start: velocity increment of
+        specific force, with rotation and sculling.
     dr : array_like, (n, 3), m
-        ``int int C f dt dt`` over the step, in the same axes: the distance that it gave, with
+        ``int int C f dt dt`` over the step, in the same axes: position increment, with
         scrolling.
     source : str, optional
         Name for messages.

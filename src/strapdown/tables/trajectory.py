@@ -1,4 +1,4 @@
-"""Trajectory tables: place, velocity and attitude."""
+"""Trajectory tables: position, velocity and attitude."""
 
 from __future__ import annotations
 
@@ -62,17 +62,17 @@ def trajectory_table(
 
 
 def places_of(trajectory: pd.DataFrame) -> Array:
-    """Latitude and longitude in deg and height in m, of a longitude that went on over a turn too.
+    """Return latitude and longitude in deg and height in m, longitudes within a turn.
 
     Parameters
     ----------
     trajectory : DataFrame
-        A Trajectory table: its longitude may go on where a vehicle goes round.
+        A Trajectory table. Its longitude may be unwrapped where a vehicle circles the Earth.
 
     Returns
     -------
     ndarray, (n, 3)
-        Longitudes of more than a full turn are brought within half a turn; others keep their
+        Longitudes beyond a full turn are wrapped to within half a turn; others keep their
         digits.
     """
     place = trajectory[GEODETIC].to_numpy(dtype=np.float64, copy=True)
@@ -98,7 +98,7 @@ def check_trajectory(table: pd.DataFrame) -> None:
     check_latitude(lat, lon, source_of(table))
 
 
-# Tables of a trajectory's error, or of its standard deviation.
+# Tables of trajectory errors, or of their standard deviations.
 
 
 TRAJECTORY_ERROR = [*NED, *VELOCITY, *EULER]
@@ -121,14 +121,14 @@ def trajectory_error_table(
     velocity : array_like, (n, 3), m/s
         North, east, down.
     euler : array_like, (n, 3), deg
-        Of roll, pitch, heading.
+        Roll, pitch, heading.
     source : str, optional
         Name for messages.
 
     Returns
     -------
     DataFrame
-        An error is estimate minus truth.
+        Errors are estimate minus truth.
 
     Raises
     ------
@@ -147,7 +147,7 @@ def check_trajectory_error(table: pd.DataFrame) -> None:
     Parameters
     ----------
     table : DataFrame
-        Further columns are let be.
+        Further columns are ignored.
 
     Raises
     ------
@@ -163,7 +163,7 @@ def check_trajectory_sd(table: pd.DataFrame) -> None:
     Parameters
     ----------
     table : DataFrame
-        Further columns are let be.
+        Further columns are ignored.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What a log's numbers say of its units, axes and clock: one file a question."""
+"""Inference of a log's units, axes and clock from its numbers: one module per question."""
 
 from strapdown.formats.inference.conclusion import THRESHOLD, Inference
 from strapdown.formats.inference.infer import Signals, infer, infer_signals

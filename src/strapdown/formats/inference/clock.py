@@ -1,4 +1,4 @@
-"""The unit of time stamps, their rate, and their faults."""
+"""Inference of the unit of time stamps, their rate, and their faults."""
 
 from __future__ import annotations
 
@@ -13,33 +13,33 @@ from strapdown.formats.inference.conclusion import Inference, conclude, evidence
 
 Array = NDArray[np.float64]
 
-# Rates at which inertial sensors are logged, as log10 of a density over log10 of the rate in Hz:
-# phones, boards and navigation units keep 10 to 1000 Hz, crash recorders 10 to 20 kHz; nobody
-# logs a rotation every ten seconds.
+# Prior of logging rates: log10 of a density over log10 of the rate in Hz. Phones, boards and
+# navigation units keep 10 to 1000 Hz, crash recorders 10 to 20 kHz; a rotation is not logged every
+# ten seconds.
 _RATE = np.log10([1e-3, 0.01, 0.1, 1.0, 5.0, 20.0, 1e3, 2e3, 5e3, 1e4, 5e4, 1e6])
 _RATE_DENSITY = np.array([-9.0, -7.0, -4.5, -1.5, -0.5, 0.0, 0.0, -0.8, -1.4, -1.6, -4.0, -8.0])
-# How often a clock counts in each, where nothing says so; minutes are for tables by hand.
+# Prior of the unit of unlabeled clocks; minutes occur in tables written by hand.
 _PRIOR = {"s": 0.5, "ms": 0.25, "us": 0.15, "ns": 0.1, "min": 1e-6}
-# How often stamps in each have fractions.
+# Probability of fractional stamps in each unit.
 _FRACTIONAL = {"s": 1.0, "ms": 0.6, "us": 0.1, "ns": 0.02, "min": 1.0}
-# A first stamp that is an instant of these years by chance is rare; clocks of 1970 are not.
+# A first stamp within these years is rarely a coincidence; clocks of 1970 are common.
 _EPOCH = (946_684_800.0, 2_366_841_600.0)  # 2000 to 2045
 _EPOCH_RATIO = 30.0
 COUNTER_BITS = (16, 24, 31, 32)
 
 
 def time_unit_probabilities(stamps: NDArray[Any]) -> dict[str, float]:
-    """Probability of each unit of time, from the mean step and the first stamp.
+    """Compute the probability of each unit of time, from the mean step and the first stamp.
 
     Parameters
     ----------
     stamps : ndarray, (n,)
-        Finite, as they stand in the log.
+        Finite, as in the log.
 
     Returns
     -------
     dict of str to float
-        Keys of `constants.TIME_UNITS`, the most probable first; empty where time does not
+        Keys of `constants.TIME_UNITS`, the most probable first; empty if time does not
         advance.
     """
     step = mean_step(stamps)
@@ -60,12 +60,12 @@ def time_unit_probabilities(stamps: NDArray[Any]) -> dict[str, float]:
 
 
 def infer_time_unit(stamps: NDArray[Any]) -> Inference:
-    """Conclude the unit of time from the stamps alone.
+    """Infer the unit of time from the stamps alone.
 
     Parameters
     ----------
     stamps : ndarray, (n,)
-        Finite, as they stand in the log.
+        Finite, as in the log.
     """
     found = time_unit_probabilities(stamps)
     if not found:
@@ -78,7 +78,7 @@ def infer_time_unit(stamps: NDArray[Any]) -> Inference:
 
 
 def time_evidence(stamps: NDArray[Any], step: float, unit: str) -> tuple[Finding, ...]:
-    """What the stamps say for a unit."""
+    """List the evidence of the stamps for a unit."""
     factor = TIME_UNITS[unit]
     told = [evidence("io.evidence-mean-step", step=step, rate_hz=1.0 / (step * factor))]
     if _EPOCH[0] <= float(stamps[0]) * factor <= _EPOCH[1]:
@@ -88,7 +88,7 @@ def time_evidence(stamps: NDArray[Any], step: float, unit: str) -> tuple[Finding
 
 
 def mean_step(stamps: NDArray[Any]) -> float:
-    """Mean of the forward steps within 50 times their median; the clock may be set between."""
+    """Average the forward steps within 50 times their median; the clock may be set between."""
     if stamps.size < 2:
         return 0.0
     exact = stamps.astype(np.int64) if stamps.dtype.kind in "iub" else stamps
@@ -96,7 +96,7 @@ def mean_step(stamps: NDArray[Any]) -> float:
     forward = steps[steps > 0]
     if not forward.size:
         return 0.0
-    # Bursts have a median far below the mean; the 90 % quantile is within both habits.
+    # Bursts have a median far below the mean; the 90 % quantile covers both.
     usual = forward[forward <= 50.0 * np.quantile(forward, 0.9)]
     # Rows of one burst that share a stamp count, too.
     repeats = int((steps == 0).sum())
@@ -104,7 +104,7 @@ def mean_step(stamps: NDArray[Any]) -> float:
 
 
 def infer_rate(stamps: NDArray[Any], unit: str) -> Inference:
-    """Nominal sampling rate in Hz, with how regular it is.
+    """Infer the nominal sampling rate in Hz, with its regularity.
 
     Parameters
     ----------
@@ -127,13 +127,13 @@ def infer_rate(stamps: NDArray[Any], unit: str) -> Inference:
         evidence("io.evidence-regular-steps", percent=100 * within),
         evidence("io.evidence-missing-samples", missing=missing),
     )
-    # Bursts make the mean the rate of the sensor, and losses the median.
+    # With bursts the mean is the sensor's rate; with losses the median is.
     nominal = 1.0 / median if within > 0.5 else 1.0 / step
     return Inference("rate", nominal, 1.0 - 1e-4 if within > 0.5 else 0.9, told, (), "--rate")
 
 
 def infer_time_faults(stamps: NDArray[Any]) -> Inference:
-    """Count what is wrong with stamps: repeated, backwards, wrapped, constant, in bursts, jumps.
+    """Count faults of stamps: repeated, reversed, wrapped, constant, in bursts, jumps.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def infer_time_faults(stamps: NDArray[Any]) -> Inference:
 
 
 def wrap_bits(before: float, step: float, usual: float) -> int | None:
-    """Width of the counter that wrapped in this step, if one did."""
+    """Return the width of the counter that wrapped in this step, or None."""
     for bits in COUNTER_BITS:
         if 0.0 < step + 2.0**bits <= 50.0 * usual and 0 <= before < 2.0**bits:
             return bits

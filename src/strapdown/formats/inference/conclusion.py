@@ -1,4 +1,4 @@
-"""A conclusion from numbers, with its probability and what speaks for it."""
+"""An inference from numbers, with its probability and evidence."""
 
 from __future__ import annotations
 
@@ -12,14 +12,12 @@ from strapdown.errors import Finding
 
 K = TypeVar("K", bound=Hashable)
 
-#: Below this a conclusion is a question to the user. A wrong unit spoils a whole run and a
-#: question costs one word, so that a guess pays only where it fails far less than once in a
-#: hundred logs that need one.
+#: Below this probability the user is asked. A wrong unit spoils a whole run while a question costs
+#: one word, so a guess pays only if it fails far less than once in a hundred logs that need one.
 THRESHOLD = 0.99
-# The models here are physics with stated idealisations; no number of samples makes them surer
-# than this.
+# Upper limit of a probability: the models idealize the physics, whatever the number of samples.
 MODEL_DOUBT = 1e-4
-# An answer less probable than this is not shown.
+# Less probable answers are not shown.
 LEAST_SHARE = 0.005
 
 __all__ = ["THRESHOLD", "Inference", "conclude", "evidence", "posterior"]
@@ -27,7 +25,7 @@ __all__ = ["THRESHOLD", "Inference", "conclude", "evidence", "posterior"]
 
 @dataclass(frozen=True)
 class Inference:
-    """What the numbers of a log say about one quantity.
+    """Inference of one quantity from the numbers of a log.
 
     Attributes
     ----------
@@ -35,15 +33,15 @@ class Inference:
         ``time_unit``, ``time_faults``, ``rate``, ``accel_unit``, ``gravity``, ``accel_form``,
         ``gyro_unit``, ``gyro_form``, ``gyro_axes``, ``up_axis``, ``accel_sign``, ``mag_unit``.
     value : str, float or None
-        The most probable answer; None where none that is known fits.
+        The most probable answer; None if no known one fits.
     confidence : float
         Its probability, 0 to 1.
     evidence : tuple of Finding
-        The numbers that it rests on.
+        The numbers that it is based on.
     alternatives : tuple of (value, float)
         The other answers with their probabilities, the most probable first.
     flag : str
-        The option that answers the question; empty where there is none.
+        The option that answers the question; empty if there is none.
     """
 
     quantity: str
@@ -55,18 +53,18 @@ class Inference:
 
     @property
     def settled(self) -> bool:
-        """Whether it is sure enough to be used without asking."""
+        """Whether it is certain enough to be used without asking."""
         return self.value is not None and self.confidence >= THRESHOLD
 
     def finding(self, code: str = "io.inferred", **where: Any) -> Finding:
-        """Return it as a note.
+        """Return the inference as a note.
 
         Parameters
         ----------
         code : str
-            Whose sentence shows `value`, `confidence` and `evidence`.
+            Code whose message shows `value`, `confidence` and `evidence`.
         **where
-            Location and further data, as of a `Finding`.
+            Location and further data, as for a `Finding`.
         """
         return Finding(
             code,
@@ -78,7 +76,7 @@ class Inference:
         )
 
     def shares(self) -> tuple[Finding, ...]:
-        """Return the answers that are not excluded, each with its probability, as notes."""
+        """Return the answers that are not excluded, with their probabilities, as notes."""
         pairs = ((self.value, self.confidence), *self.alternatives)
         return tuple(
             evidence(
@@ -93,12 +91,12 @@ class Inference:
 
 
 def evidence(code: str, **values: Any) -> Finding:
-    """Return what speaks for a conclusion, as a note."""
+    """Return a piece of evidence as a note."""
     return Finding(code, severity="note", **values)
 
 
 def posterior(log_weights: dict[K, float]) -> dict[K, float]:
-    """Probabilities from logarithms of prior times likelihood, the most probable first.
+    """Normalize logarithms of prior times likelihood to probabilities, in descending order.
 
     Parameters
     ----------
@@ -108,7 +106,7 @@ def posterior(log_weights: dict[K, float]) -> dict[K, float]:
     Returns
     -------
     dict
-        Hypothesis to probability. A share of 1e-4 is spread over all: the models may be wrong.
+        Hypothesis to probability. A total of 1e-4 is spread over all: the models may be wrong.
     """
     if not log_weights:
         return {}
@@ -125,13 +123,13 @@ def conclude(
     evidence: tuple[Finding, ...],
     flag: str = "",
 ) -> Inference:
-    """The most probable answer as an `Inference`.
+    """Make an `Inference` of the most probable answer.
 
     Parameters
     ----------
     quantity : str
     probabilities : dict
-        The most probable first, as `posterior` gives them.
+        The most probable first, as from `posterior`.
     evidence : tuple of Finding
     flag : str
     """

@@ -1,4 +1,4 @@
-"""Unit and form of an accelerometer: gravity is in every one that is at rest or carried."""
+"""Inference of an accelerometer's unit and form, from gravity."""
 
 from __future__ import annotations
 
@@ -10,26 +10,26 @@ from strapdown.formats.inference.conclusion import Inference, conclude, evidence
 
 Array = NDArray[np.float64]
 
-# Scales without the sign: which of the two signs it is, no motion can say (both f and -f turn
-# alike in the body), so that it is a question of its own.
+# Scales without the sign. Motion cannot decide the sign, because f and -f rotate alike in the body:
+# it is a separate question.
 SCALES = {"m/s2": 1.0, "g": STANDARD_GRAVITY, "mg": 1e-3 * STANDARD_GRAVITY}
 _PRIOR = {"m/s2": 0.6, "g": 0.37, "mg": 0.03}
-# How often a log under these names holds something else.
+# Prior of the content of a log under these names.
 _PRIOR_FORM = {"rate": 0.93, "linear": 0.03, "increment": 0.01, "other": 0.03}
-# Raw counts of 8 to 16 bits a gravity; 1024 is near enough to be taken for mg.
+# Raw counts per g of 8 to 16 bits; 1024 is close enough to mg.
 _COUNTS = (256.0, 1024.0, 2048.0, 4096.0, 8192.0, 16384.0)
 _PRIOR_COUNTS = 0.03
-_BROKEN_COUNTS = 0.05  # how often counts have fractions
-# How often all numbers are whole in each unit.
+_BROKEN_COUNTS = 0.05  # probability of fractional counts
+# Probability of integers only, for each unit.
 _WHOLE = {"m/s2": 1e-4, "g": 1e-4, "mg": 0.7}
-# Scale and offset of cheap sensors together: 3 % and 80 mg (MPU-6050 data sheet, section 6.2).
+# Scale and offset error of low-cost sensors: 3 % and 80 mg (MPU-6050 data sheet, section 6.2).
 _ERROR = 0.04  # of g
-_DECADES = 12.0  # the range of scales of what has no unit known here
-PIECE = 0.2  # s, over which the norm of the mean is taken
+_DECADES = 12.0  # range of scales for unknown units
+PIECE = 0.2  # s, interval of a mean vector
 
 
 def piece_means(values: Array, per_piece: int) -> Array:
-    """Means over pieces of so many samples, (m, 3)."""
+    """Average over consecutive intervals of equally many samples, (m, 3)."""
     count = max(len(values) // per_piece, 1)
     per_piece = min(per_piece, len(values))
     whole = values[: count * per_piece].reshape(count, per_piece, -1)
@@ -37,27 +37,27 @@ def piece_means(values: Array, per_piece: int) -> Array:
 
 
 def infer_accel(accel: Array, step: float | None) -> tuple[Inference, Inference, Inference, float]:
-    """Conclude unit, form, and whether gravity is in it.
+    """Infer unit, form, and presence of gravity.
 
     Parameters
     ----------
     accel : ndarray, (n, 3)
-        Finite, as it stands in the log.
+        Finite, as in the log.
     step : float or None, s
-        Mean step, where it is known.
+        Mean step, if known.
 
     Returns
     -------
     unit, form, gravity : Inference
         The form is ``rate`` or ``increment``.
     magnitude : float
-        The usual norm of the accelerometer in its own unit.
+        Median norm of the accelerometer in its own unit.
 
     Notes
     -----
-    The norm of short means stays at 9.8 m/s² in a sensor that is carried, to the offset of the
-    sensor and the part of the motion that does not average out; its spread over the log says how
-    much that is. Without gravity it may be anything, and swings as much as it is large.
+    The norm of short means stays at 9.8 m/s² in a sensor that is carried, up to the offset of the
+    sensor and the part of the motion that does not average out; its spread over the log measures
+    the latter. Without gravity it may have any value, and its spread is as large as its mean.
     """
     pieces = piece_means(accel, max(round(PIECE / step), 1) if step else 10)
     norms = np.linalg.norm(pieces, axis=1)
@@ -73,18 +73,18 @@ def infer_accel(accel: Array, step: float | None) -> tuple[Inference, Inference,
         )
     whole = bool((accel == np.round(accel)).all())
     spread = MAD_TO_SD * float(np.median(np.abs(norms - usual))) / usual
-    # The median over m pieces is better than a piece, but what the motion adds is one-sided. A
-    # log of few pieces does not know its spread, and a crash is shorter than one.
+    # The median over m means is more accurate than one, but the effect of motion is one-sided. A
+    # short log cannot measure its spread, and a crash is shorter than one interval.
     few = 2.0 / len(norms) if step else 0.4
     sd = np.hypot(np.hypot(_ERROR, 0.5 * spread), few) / np.log(10.0)
     where = np.log10(usual)
-    # Mean vectors without gravity are those of a random motion, whose norm spreads by 0.4 of
-    # itself or more; a constant offset is possible, and small.
+    # Without gravity the mean vectors are those of random motion, whose norm has a relative spread
+    # of 0.4 or more; a constant offset is possible, and small.
     swings = min(spread / 0.3, 1.0) ** 2
     direction = float(np.linalg.norm(pieces.mean(axis=0))) / usual
-    # What moves and has no gravity averages to nothing, for velocities stay bounded.
+    # Acceleration without gravity averages to zero, because velocities stay bounded.
     lasting = 0.01 if direction > 0.7 and len(norms) > 20 else 1.0
-    # With gravity the motion of a hand or a car spreads it by a tenth.
+    # With gravity the motion of a hand or a car spreads the norm by a tenth.
     calm = float(np.exp(-spread / 0.12)) if len(norms) >= 5 else 0.1
     weights: dict[tuple[str | None, str], float] = {}
 
@@ -94,12 +94,12 @@ def infer_accel(accel: Array, step: float | None) -> tuple[Inference, Inference,
     for unit, scale in SCALES.items():
         prior = _PRIOR[unit] * (_WHOLE[unit] if whole else 1.0)
         off = (where - np.log10(STANDARD_GRAVITY / scale)) / sd
-        # A cubic tail, for what is shaken and spun more than its median spread tells.
+        # A cubic tail, for sensors that shake and turn more than the median spread shows.
         peak = 0.45 / sd / (1.0 + off * off / 3.0) ** 2
         add(unit, "rate", prior * _PRIOR_FORM["rate"], calm * peak)
         si = usual * scale
         broad = 0.25 * min(1.0, 10.0 / si) ** 2 * min(1.0, si / 1e-3)
-        offset = broad * min(1.0, 0.3 / si) ** 3  # constant, and yet not gravity
+        offset = broad * min(1.0, 0.3 / si) ** 3  # constant offset other than gravity
         add(
             unit,
             "linear",
@@ -155,7 +155,7 @@ def infer_accel(accel: Array, step: float | None) -> tuple[Inference, Inference,
 
 
 def posterior_of(probabilities: dict[str | None, float]) -> dict[str | None, float]:
-    """The same, the most probable first."""
+    """Sort probabilities in descending order."""
     return dict(sorted(probabilities.items(), key=lambda p: -p[1]))
 
 
@@ -167,7 +167,7 @@ def _summed(found: dict[tuple[str | None, str], float], key: int) -> dict[str | 
 
 
 def infer_up(accel: Array, step: float | None) -> Inference:
-    """Which sensor axis points up, as far as the log keeps one up, if gravity reads as reaction.
+    """Infer which sensor axis points up most of the time, for accelerometers that read +1 g up.
 
     Parameters
     ----------
@@ -176,13 +176,13 @@ def infer_up(accel: Array, step: float | None) -> Inference:
 
     Notes
     -----
-    A sensor of the other sign (iOS) reads the same numbers upside down. That share of sensors,
-    a twentieth, bounds the confidence; the flag is the user's to give.
+    A sensor of the opposite sign (iOS) gives the same numbers upside down. The share of such
+    sensors, a twentieth, limits the confidence; the flag is left to the user.
     """
     pieces = piece_means(accel, max(round(1.0 / step), 1) if step else 100)
     norms = np.linalg.norm(pieces, axis=1, keepdims=True)
     units = pieces / np.where(norms > 0, norms, 1.0)
-    # Within 30 deg of an axis; more than half the log makes it the sensor's usual attitude.
+    # Within 30 deg of an axis; in more than half of the log it is the sensor's usual attitude.
     shares = {
         f"{'-' if sign < 0 else ''}{'xyz'[k]}": float(np.mean(sign * units[:, k] > np.sqrt(0.75)))
         for k in range(3)

@@ -1,4 +1,4 @@
-"""What the numbers of a log say of its units, axes, clock and content."""
+"""Inference of a log's units, axes, clock and content from its numbers."""
 
 from __future__ import annotations
 
@@ -26,22 +26,22 @@ from strapdown.formats.recording import RawLog, ReadOptions
 from strapdown.formats.unit_words import parse_unit
 
 Array = NDArray[np.float64]
-# Longer logs are looked at in parts: this many rows say all that there is to say.
+# Longer logs are sampled in parts with this many rows in total.
 LARGEST = 40_000
 
 
 @dataclass(frozen=True)
 class Signals:
-    """Numbers of a log as they stand in it, without units.
+    """Raw numbers of a log, without units.
 
     Attributes
     ----------
     stamps : ndarray, (n,), or None
     gyro, accel, mag : ndarray, (n, 3), or None
     time_unit : str or None
-        Where it is known.
+        If known.
     rate : float or None, Hz
-        Where there are no stamps.
+        If there are no stamps.
     """
 
     stamps: NDArray[Any] | None
@@ -53,14 +53,14 @@ class Signals:
 
 
 def infer(raw: RawLog, options: ReadOptions | None = None) -> tuple[Inference, ...]:
-    """Conclude what can be concluded from the numbers of a log, whatever it says of itself.
+    """Infer from the numbers of a log, regardless of its statements.
 
     Parameters
     ----------
     raw : RawLog
     options : ReadOptions, optional
-        Which columns to take, and the unit of time where it is known. Units that it states of
-        the sensors are not used: the numbers are asked.
+        Which columns to use, and the unit of time if known. Stated units of the sensors are
+        ignored: they are inferred from the numbers.
 
     Returns
     -------
@@ -70,7 +70,7 @@ def infer(raw: RawLog, options: ReadOptions | None = None) -> tuple[Inference, .
     Raises
     ------
     ConfigError
-        An option names what is not in the log.
+        An option names a column that the log does not have.
     DataError
         A value or a stamp is not a number.
     """
@@ -100,7 +100,7 @@ def _triad(raw: RawLog, found: dict[str, Column], triad: str) -> Array | None:
 
 
 def infer_signals(signals: Signals) -> tuple[Inference, ...]:
-    """The same for arrays.
+    """Infer from the numbers of arrays; see `infer`.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def infer_signals(signals: Signals) -> tuple[Inference, ...]:
             assert signals.accel is not None
             force = signals.accel / usual
         elif gravity.value is None and _steady(accel):
-            # Gravity in a unit that is not known still turns as gravity does.
+            # Gravity in an unknown unit still rotates like gravity.
             assert signals.accel is not None
             force = signals.accel / usual
         if arm is not None and arm.locks_turn:
@@ -141,7 +141,7 @@ def infer_signals(signals: Signals) -> tuple[Inference, ...]:
         if len(gyro) > 1:
             *turned, joint = infer_gyro(ticks, gyro, force, times or {"s": 1.0}, _increments(heard))
             if times and next(iter(joint)) != next(iter(times)):
-                # A turn that fits in another unit of time alone is a doubt, and no proof.
+                # A rotation that fits only in another unit of time is a doubt, not a proof.
                 times = {u: min(p, 0.5) for u, p in times.items()}
     if stamps is not None and times:
         best = next(iter(times))
@@ -190,19 +190,19 @@ def _arm(signals: Signals, step: float | None) -> Arm | None:
 
 
 def _doubted(one: Inference, arm: Arm) -> Inference:
-    """The same as a question: the norm of the force is an arm's, and need not be gravity's."""
+    """Turn an inference into a question: the force may be an arm's instead of gravity."""
     told = evidence("io.evidence-arm-explains-force", percent=100 * arm.alone)
     return replace(one, confidence=min(one.confidence, 0.5), evidence=(*one.evidence, told))
 
 
 def _steady(accel: Array) -> bool:
-    """Whether the norm is that of one vector: it spreads by less than a fifth of itself."""
+    """Whether the norm is nearly constant: relative spread below a fifth."""
     norms = np.linalg.norm(accel, axis=1)
     return bool(np.std(norms) < 0.2 * np.mean(norms))
 
 
 def _increments(heard: list[Inference]) -> float:
-    """Prior of increments in the gyro: what the accelerometer holds, within bounds."""
+    """Return the prior of gyro increments: that of the accelerometer, within bounds."""
     form = next((i for i in heard if i.quantity == "accel_form"), None)
     if form is None:
         return 0.01
@@ -211,7 +211,7 @@ def _increments(heard: list[Inference]) -> float:
 
 
 def _sign() -> Inference:
-    """Which sign the accelerometer has: no motion tells it, only where its axes point does."""
+    """Infer the sign of the accelerometer: motion cannot decide it, only the axes can."""
     told = (
         evidence("io.evidence-signs-turn-alike"),
         evidence("io.evidence-sign-of-gravity"),
@@ -234,7 +234,7 @@ def _finite_rows(values: Array | None) -> Array | None:
 
 
 def _increasing(signals: Signals, force: Array | None) -> tuple[Array, Array, Array | None]:
-    """Finite rows with increasing stamps, no more than are needed."""
+    """Select finite rows with increasing stamps, no more than needed."""
     assert signals.gyro is not None
     gyro = signals.gyro
     keep = np.isfinite(gyro).all(axis=1)
@@ -254,7 +254,7 @@ def _increasing(signals: Signals, force: Array | None) -> tuple[Array, Array, Ar
         keep &= ticks > np.concatenate([[-np.inf], latest[:-1]])
     rows = np.flatnonzero(keep)
     if rows.size > LARGEST:
-        # The first, a middle and the last part whole; sums do not cross the holes between.
+        # First, middle and last part, each contiguous; sums do not cross the gaps between.
         part = LARGEST // 3
         middle = rows.size // 2 - part // 2
         rows = np.concatenate([rows[:part], rows[middle : middle + part], rows[-part:]])
@@ -262,33 +262,33 @@ def _increasing(signals: Signals, force: Array | None) -> tuple[Array, Array, Ar
     return ticks, gyro[rows], None if force is None else force[rows]
 
 
-# Whether the force is that of a swinging arm: a function of the turn, with or without gravity.
+# Whether the force is that of a swinging arm: a function of the rotation, with or without gravity.
 #
-# A point at r of a body that turns feels a x r + w x (w x r), with a = dw/dt: linear in a and in
-# the products of w, and nothing where both vanish. Gravity is what is left there. Free
-# coefficients hold for every unit and for every set of axes of gyro and accelerometer.
+# A point at r of a rotating body feels a x r + w x (w x r), with a = dw/dt: linear in a and in
+# the products of w, and zero where both vanish. The remainder is gravity. Free coefficients cover
+# every unit and every orientation of gyro and accelerometer axes.
 
-PIECE = 0.1  # s, short beside the period of an arm
-LEAST_PIECES = 30  # of them, twice the unknowns of a fit
-# Slower than this, an arm of 0.7 m cannot add half of gravity to a turn of a radian.
+PIECE = 0.1  # s, short compared with the period of an arm
+LEAST_PIECES = 30  # intervals, twice the unknowns of a fit
+# At lower frequencies an arm of 0.7 m cannot add half of gravity to a rotation of one radian.
 LEAST_FREQUENCY = 2.5  # rad/s
-# A constant is explained by squares to two thirds for one sine, to 6/7 for three that are not in
-# step; an arm without gravity leaves the noise alone.
+# Squares explain two thirds of a constant for one sine, 6/7 for three that are not in phase; for an
+# arm without gravity only the noise remains.
 ARM_ALONE = 0.95
-# Of the variation, that of gravity in step with the turn included.
+# Fraction of the variation, including that of gravity in phase with the rotation.
 ARM_IN_STEP = 0.97
 
 
 @dataclass(frozen=True)
 class Arm:
-    """How much of the mean square of a force an arm explains.
+    """Fraction of a force's mean square that a lever arm explains.
 
     Attributes
     ----------
     alone : float
-        Of the whole force, with nothing left where the turn vanishes (gravity-free).
+        Of the whole force, for a model that is zero without rotation (gravity-free).
     in_step : float
-        Of its variation.
+        Of its variation about the mean.
     frequency : float, rad/s
         Root mean square of the angular acceleration over that of the rate.
     """
@@ -299,12 +299,12 @@ class Arm:
 
     @property
     def hides_gravity(self) -> bool:
-        """Whether the force needs no gravity at all."""
+        """Whether the force is explained without gravity."""
         return self.locks_turn and self.alone > ARM_ALONE
 
     @property
     def locks_turn(self) -> bool:
-        """Whether an arm's acceleration cannot be told from gravity that turns."""
+        """Whether the acceleration of an arm is indistinguishable from rotating gravity."""
         return self.frequency > LEAST_FREQUENCY and self.in_step > ARM_IN_STEP
 
 
@@ -320,12 +320,12 @@ def fit_arm(step: float, gyro: Array, accel: Array) -> Arm | None:
     Returns
     -------
     Arm or None
-        None where the log is too short or nothing turns.
+        None if the log is too short or does not rotate.
     """
     gyro, accel = gyro[:LARGEST], accel[:LARGEST]
     size = max(round(PIECE / step), 1)
     count = len(gyro) // size
-    # The mean is the bias, as far as a swing returns.
+    # The mean is the bias, provided that the swing returns.
     rate = gyro - gyro.mean(axis=0) if len(gyro) else gyro
     largest = float(np.abs(rate).max(initial=0.0))
     if count < LEAST_PIECES or not largest > 0:
@@ -340,7 +340,7 @@ def fit_arm(step: float, gyro: Array, accel: Array) -> Arm | None:
     moved = float(np.sum(w**2))
     if not moved > 0:
         return None
-    # What is left of a bias multiplies the rate: w itself is among the regressors.
+    # A residual bias multiplies the rate, so w itself is among the regressors.
     alone = _explained(np.hstack([a, p, w]), f)
     turn = np.hstack([a, p])
     in_step = _explained(turn - turn.mean(axis=0), f - f.mean(axis=0))
@@ -354,24 +354,24 @@ def _explained(x: Array, y: Array) -> float:
     return 1.0 - float(np.sum(left**2)) / max(float(np.sum(y**2)), 1e-300)
 
 
-# Unit of a magnetometer, from the strength of the Earth's field.
+# Inference of a magnetometer's unit, from the strength of the Earth's field.
 
 
-# The field at the surface is 22 to 67 µT (IGRF-13); iron around it and in the device, where it
-# was not calibrated away, adds its own.
+# The field at the surface is 22 to 67 µT (IGRF-13), plus uncalibrated iron in the device and its
+# surroundings.
 _FIELD = (22.0, 67.0)
-_IRON = 0.15  # decades, of the tail on either side
+_IRON = 0.15  # decades, width of the tail on either side
 _PRIOR = {"uT": 0.75, "nT": 0.05, "gauss": 0.12, "mG": 0.06, "T": 0.02}
 _OTHER, _DECADES = 0.05, 12.0
 
 
 def infer_mag_unit(mag: Array) -> Inference:
-    """Conclude the unit of a magnetometer.
+    """Infer the unit of a magnetometer.
 
     Parameters
     ----------
     mag : ndarray, (n, 3)
-        Finite, as it stands in the log.
+        Finite, as in the log.
     """
     usual = float(np.median(np.linalg.norm(mag, axis=1)))
     remedy = evidence("io.evidence-unit-in-name")

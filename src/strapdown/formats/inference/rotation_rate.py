@@ -1,4 +1,4 @@
-"""The unit of a gyro, whether it holds rates or increments, and how its axes stand."""
+"""Inference of a gyro's unit, its form (rates or increments) and its axes."""
 
 from __future__ import annotations
 
@@ -16,37 +16,37 @@ from strapdown.formats.inference.conclusion import Inference, conclude, evidence
 
 Array = NDArray[np.float64]
 
-# How often a gyro without a stated unit is in each.
+# Prior of the unit of an unlabeled gyro.
 _PRIOR = {"rad/s": 0.55, "deg/s": 0.43, "mdeg/s": 0.01, "mrad/s": 0.005, "deg/h": 0.005}
 _INCREMENTS = 0.01
-_OTHER = 0.02  # turns a second and what else is not known here
-# Raw counts of a 16-bit sensor, deg/s each (data sheets of MPU-6050, BMI160, LSM6DS3): 2000 deg/s
-# full scale makes them 1.06 mrad/s, near enough to be taken for that.
+_OTHER = 0.02  # turns per second and other unlisted units
+# Raw counts of a 16-bit sensor, deg/s each (data sheets of MPU-6050, BMI160, LSM6DS3). A full scale
+# of 2000 deg/s gives 1.06 mrad/s, close enough to be taken for that.
 _COUNTS = [2000.0 / 32768.0 / 2.0**k for k in range(5)] + [0.00875, 0.0175, 0.035, 0.07]
 _PRIOR_COUNTS = 0.03
-# How often all numbers are whole in each unit; counts always are, but for averages of them.
+# Probability of integers only, for each unit; counts are integers unless averaged.
 _WHOLE = {"rad/s": 1e-4, "deg/s": 0.01, "mrad/s": 0.1, "mdeg/s": 0.5, "deg/h": 0.2}
 _BROKEN_COUNTS = 0.05
-# Gyro and accelerometer of one device share their axes, as a rule; of what does not, a sense of
-# rotation that counts the other way and single reversed axes are as common as all else.
+# Gyro and accelerometer of one device usually share their axes. The rest of the prior is even:
+# reversed sense of rotation and single reversed axes are as common as all other cases.
 _PRIOR_SAME = 0.9
-# The gravity of a car or of a swinging arm may follow no turn; then the best fit means nothing.
+# In a car or on a swinging arm gravity may not follow the rotation; the best fit is then void.
 _PRIOR_FREE = 0.05
-# The largest rate of a log, rad/s: from the bias of a good sensor to the full scale of a common
-# one (2000 deg/s); little lies below, and nearly nothing above.
+# Range of the largest rate of a log, rad/s: from the bias of a good sensor to the full scale of a
+# common one (2000 deg/s).
 _QUIET, _FULL_SCALE = 3e-3, 25.0
-# A turn must move gravity by this much, and one unit and one set of axes explain this much of its
-# movement, to be evidence; on scales on which it does not, the motion's acceleration is at work.
+# Evidence requires that rotation moves gravity by this much, and that one unit and one set of axes
+# explain this fraction of the movement; on other time scales acceleration dominates.
 LEAST_TURN = 0.02  # rad
 LEAST_EXPLAINED = 0.85
 LEAST_SCALES = 2
 
-# Unit, form, axes (empty where the turn of gravity says nothing), unit of time.
+# Unit, form, axes (empty if the rotation of gravity is inconclusive), unit of time.
 Hypothesis = tuple[str | None, str, str, str]
 
 
 def _log_magnitude(rate: float) -> float:
-    """Logarithm of the density of the largest rate of a log, relative to its plateau."""
+    """Compute the log density of the largest rate of a log, relative to its plateau."""
     if not rate > 0:
         return -7.0
     below = max(0.0, np.log(_QUIET / rate))
@@ -61,7 +61,7 @@ def infer_gyro(
     time_units: dict[str, float],
     increments: float = _INCREMENTS,
 ) -> tuple[Inference, Inference, Inference, dict[str, float]]:
-    """Conclude unit, form and axes of a gyro, and weigh the units of time by it.
+    """Infer unit, form and axes of a gyro, and update the probabilities of the units of time.
 
     Parameters
     ----------
@@ -70,21 +70,21 @@ def infer_gyro(
     gyro : ndarray, (n, 3)
         In the log's own unit.
     force : ndarray, (n, 3), or None
-        Accelerometer in units of gravity; None where gravity is not in it.
+        Accelerometer in units of gravity; None if gravity has been removed.
     time_units : dict of str to float
         Probability of each unit of time.
     increments : float
-        Probability of increments instead of rates; that of the accelerometer, which is of the
-        same kind.
+        Prior probability of increments instead of rates: that of the accelerometer, which
+        usually has the same form.
 
     Returns
     -------
     unit, form, axes : Inference
     time_units : dict of str to float
-        Weighed anew.
+        Updated probabilities.
     """
     largest = float(np.quantile(np.linalg.norm(gyro, axis=1), 0.99)) if len(gyro) else 0.0
-    # Still sensors read zero in any unit; whole numbers say something where they vary.
+    # Stationary sensors read zero in any unit; integers are evidence only where they vary.
     whole = bool((gyro == np.round(gyro)).all()) and float(np.abs(gyro).max(initial=0.0)) >= 3.0
     names, matrices = signed_permutations()
     weights: dict[Hypothesis, float] = {}
@@ -117,7 +117,7 @@ def infer_gyro(
             }
             if max(float(e.max()) for _, e in rows.values()) < LEAST_EXPLAINED:
                 continue
-            # Where nine free numbers do much better than any gyro could, motion is in step.
+            # Nine free parameters that fit far better than any gyro show in-phase motion.
             free = turn.log_free()
             if max(float(logs.max()) for logs, _ in rows.values()) < free + np.log(_PRIOR_FREE):
                 continue
@@ -129,13 +129,13 @@ def infer_gyro(
                     table[key[0], key[1], name, tau] = (
                         base[key[0], key[1], tau] + log + np.log(same * (1 - _PRIOR_FREE))
                     )
-            # A fit that means nothing leaves the magnitudes to speak.
+            # A void fit leaves the magnitudes as evidence.
             for key in candidates:
                 table[key[0], key[1], "", tau] = (
                     base[key[0], key[1], tau] + free + np.log(_PRIOR_FREE)
                 )
             table[None, "other", "", tau] = base[None, "other", tau] + free
-    # An arm in step with its turn can pass for a gyro on one scale; on two it does not.
+    # An arm in phase with its rotation can pass for a gyro on one time scale, but not on two.
     if len(by_scale) < LEAST_SCALES:
         by_scale, scales = {}, []
     for (known, kind, tau), weight in base.items():
@@ -144,11 +144,11 @@ def infer_gyro(
             if not any(h[3] == tau and h[2] for h in table):
                 table[known, kind, "", tau] = weight
     pooled = [posterior(t) for t in by_scale.values()] or [posterior(weights)]
-    # Which scale is free of motion in step with the turn is not known: each has its share.
+    # Which time scale is free of in-phase motion is not known: each contributes its share.
     total: dict[Hypothesis, float] = {}
     for probabilities in pooled:
         for hypothesis, p in probabilities.items():
-            # Counts are rates, in no unit.
+            # Counts are rates in an unknown unit.
             kind = "rate" if hypothesis[1].startswith("counts") else hypothesis[1]
             merged = (hypothesis[0], kind, hypothesis[2], hypothesis[3])
             total[merged] = total.get(merged, 0.0) + p / len(pooled)
@@ -201,30 +201,30 @@ def _evidence(
     return tuple(told)
 
 
-# How gravity turns in the body, as the accelerometer sees it and as the gyro predicts it.
+# Rotation of gravity in the body, as measured by the accelerometer and predicted by the gyro.
 #
 # A specific force that is constant in the world obeys df/dt = -w x f in the body (differentiate
 # f_b = C_bn f_n with dC_bn/dt = -[w x] C_bn). Weighted with a triangle of half-width T and
-# integrated by parts, the left side becomes the difference of two neighbouring means of f over T,
-# and nothing is assumed of how far the body turns in between. What is left over is the motion's
-# own acceleration, of which the means over T hold no more than the change of velocity in T.
+# integrated by parts, the left side becomes the difference of two adjacent means of f over T,
+# without an assumption on how far the body turns in between. The residual is the motion's own
+# acceleration, whose means over T hold no more than the change of velocity in T.
 #
 # With unknown gyro scale k, axes M (a signed permutation of the gyro's axes) and bias b,
-# w = k M g + b is linear in (k M, b), so that every hypothesis is judged by one small Gram matrix.
+# w = k M g + b is linear in (k M, b), so one small Gram matrix serves all hypotheses.
 
 
 # Long enough for the accelerations of hands and legs to average out, and of different lengths,
-# so that an acceleration in step with the turn (a swinging arm), which grows with the square of
-# the frequency, does not look the same in all.
+# so that an acceleration in phase with the rotation (a swinging arm), which grows with the square
+# of the frequency, does not look the same in all.
 HALF_WIDTHS = (0.5, 1.0, 2.0, 4.0)  # s
 LEAST_WINDOWS = 3
 # A scale factor of 3 % and misalignments of 1 to 2 degrees are in the data sheets of consumer
-# sensors, and the acceleration of an arm in step with its turn adds its share; a difference below
-# that tells nothing. Units differ by far more.
+# sensors, and the acceleration of an arm in phase with its rotation adds to them; smaller
+# differences are not significant. Units differ by far more.
 MODEL_ERROR = 0.1
 # Zero-rate output, one sigma (MPU-6050 data sheet: within 20 deg/s).
 BIAS_SD = 0.12  # rad/s
-# Below this an offset or a scale error of the accelerometer could turn the direction as much.
+# Below this an offset or a scale error of the accelerometer could rotate the direction as much.
 LEAST_SIGNAL = 1e-4  # of gravity
 _LEVI_CIVITA = np.zeros((3, 3, 3))
 for _i, _j, _k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
@@ -232,12 +232,12 @@ for _i, _j, _k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
 
 
 def signed_permutations() -> tuple[tuple[str, ...], Array]:
-    """The 48 ways to lay the gyro's axes on the accelerometer's, the identity first.
+    """List the 48 mappings of the gyro's axes to the accelerometer's, the identity first.
 
     Returns
     -------
     names : tuple of str
-        As ``x,-y,z``: which gyro axis stands along each axis of the accelerometer.
+        As ``x,-y,z``: the gyro axis along each axis of the accelerometer.
     matrices : ndarray, (48, 3, 3)
     """
     names, matrices = [], []
@@ -254,16 +254,16 @@ def signed_permutations() -> tuple[tuple[str, ...], Array]:
 
 @dataclass(frozen=True)
 class Turn:
-    """One scale of time: the sums that every hypothesis is judged by.
+    """Sums of one time scale, from which every hypothesis is evaluated.
 
     Attributes
     ----------
     half_width : float, s
     windows : int
-        Windows that do not overlap.
+        Number of windows without overlap.
     gram : ndarray, (10, 10)
-        Of the nine elements of k M (row by row) and the change of gravity, with the bias taken
-        out; gravity has norm 1.
+        For the nine elements of k M (row by row) and the change of gravity, with the bias
+        eliminated; gravity has norm 1.
     """
 
     half_width: float
@@ -272,25 +272,25 @@ class Turn:
 
     @property
     def signal(self) -> float:
-        """Root mean square change of gravity's direction, rad, what a bias explains left out."""
+        """Root mean square change of gravity's direction, rad, without that explained by a bias."""
         return float(np.sqrt(max(self.gram[9, 9], 0.0) / max(6 * self.windows, 1)))
 
     def free(self) -> tuple[Array, float]:
-        """The best nine elements, and the sum of squares that they leave."""
+        """Fit the nine elements; return them and the residual sum of squares."""
         a, c = self.gram[:9, :9], self.gram[:9, 9]
         scale = np.sqrt(np.diag(a))
         scale = np.where(scale > 0, scale, 1.0)
-        # Directions that were not turned about stay zero.
+        # Axes without rotation stay zero.
         best = np.linalg.pinv(a / np.outer(scale, scale), rcond=1e-9, hermitian=True) @ (c / scale)
         best = best / scale
         return best.reshape(3, 3), float(max(self.gram[9, 9] - c @ best, 0.0))
 
     def log_likelihoods(self, matrices: Array) -> tuple[Array, Array]:
-        """Logarithm of the likelihood of each (m, 3, 3) matrix k M, and what it explains.
+        """Compute the log likelihood of each (m, 3, 3) matrix k M, and the explained fraction.
 
-        Relative to a gyro that predicts nothing, so that windows of different units of time
-        compare. The noise is not known; it is integrated out, which leaves the power
-        -windows / 2 of the sum of squares, to which the model's own error is added.
+        Relative to a gyro that predicts no change, so that windows of different units of time
+        compare. The unknown noise is integrated out, which gives the power -windows / 2 of the
+        sum of squares, to which the model's own error is added.
         """
         c = matrices.reshape(len(matrices), 9)
         a = np.einsum("ni,ij,nj->n", c, self.gram[:9, :9], c)
@@ -300,24 +300,24 @@ class Turn:
         return logs, 1.0 - left / max(self.gram[9, 9], 1e-30)
 
     def _nothing(self) -> float:
-        """What is left where the gyro predicts nothing."""
+        """Residual sum of squares of a gyro that predicts no change."""
         return float(self.gram[9, 9] + 6 * self.windows * LEAST_SIGNAL**2)
 
     def log_free(self) -> float:
-        """The same for nine free elements, each at the price of a parameter."""
+        """Log likelihood of nine free elements, each with the penalty of a parameter."""
         best, left = self.free()
         c = best.reshape(9)
         predicted = float(c @ self.gram[:9, :9] @ c)
         floor = MODEL_ERROR**2 * predicted + 6 * self.windows * LEAST_SIGNAL**2
-        # Five of nine elements are turned about on the way, as a rule; each costs sqrt(windows).
-        # Their common scale may lie anywhere in eight decades, and fits within a tenth.
+        # Usually five of nine elements are excited; each costs sqrt(windows). Their common scale
+        # may lie anywhere in eight decades, and is determined within a tenth.
         log = -0.5 * self.windows * np.log((left + floor) / self._nothing())
         cost = 2.5 * np.log(max(self.windows, 2)) + np.log(8.0 * np.log(10.0) / MODEL_ERROR)
         return float(log - cost)
 
 
 def turns(time: Array, gyro: Array, force: Array) -> tuple[Turn, ...]:
-    """Sums over each scale of time that the log is long enough for.
+    """Compute the sums of each time scale that the log is long enough for.
 
     Parameters
     ----------
@@ -326,7 +326,7 @@ def turns(time: Array, gyro: Array, force: Array) -> tuple[Turn, ...]:
     gyro : ndarray, (n, 3)
         In any unit.
     force : ndarray, (n, 3)
-        In units of gravity, of either sign.
+        In units of gravity, with either sign.
     """
     step = np.diff(time)
     # (w x f)_a = e_abc w_b f_c; products of the gyro's axis d and the force's axis c.
@@ -347,7 +347,7 @@ def _turn(
     time: Array, once: Array, twice: Array, holes: NDArray[np.bool_], width: float
 ) -> list[Turn]:
     grid = np.arange(time[0], time[-1] - 2 * width + 1e-9, 0.5 * width)
-    # At samples, not between them: there the integrals are known.
+    # At the samples, where the integrals are known.
     at = np.array([np.searchsorted(time, grid + k * width) for k in (0, 1, 2)])
     at = np.minimum(at, time.size - 1)
     hole = np.concatenate([[0], np.cumsum(holes)])
@@ -358,8 +358,8 @@ def _turn(
     if windows < LEAST_WINDOWS:
         return []
     w1, w2 = (time[i1] - time[i0])[:, None], (time[i2] - time[i1])[:, None]
-    # A triangle that rises over w1 and falls over w2, by parts: P at the peak less the mean of P
-    # over the rise, and the mean of P over the fall less P at the peak.
+    # A triangle that rises over w1 and falls over w2, by parts: P at the peak minus the mean of P
+    # over the rise, and the mean of P over the fall minus P at the peak.
     y = (once[i2] - once[i1])[:, :3] / w2 - (once[i1] - once[i0])[:, :3] / w1
     weighted = (twice[i2] - twice[i1]) / w2 - (twice[i1] - twice[i0]) / w1
     f_weighted, p_weighted = weighted[:, :3], weighted[:, 3:].reshape(-1, 3, 3)
@@ -367,7 +367,7 @@ def _turn(
     x = -np.einsum("abc,ndc->nabd", _LEVI_CIVITA, p_weighted).reshape(-1, 9)
     bias = -np.einsum("abc,nc->nab", _LEVI_CIVITA, f_weighted).reshape(-1, 3)
     block = np.column_stack([x, y.reshape(-1)])
-    # The spread of what nothing explains sets how hard the bias is held within its range.
+    # The unexplained spread sets how tightly the bias is held within its range.
     scale = np.linalg.norm(block, axis=0)
     scale = np.where(scale > 0, scale, 1.0)
     full = np.column_stack([x / scale[:9], bias])
