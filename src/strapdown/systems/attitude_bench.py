@@ -474,7 +474,7 @@ def source_spec(
     if trials > 1:
         raise ConfigError("attitude.recorded-log-not-drawn-again", quantity="--trials")
     if not exists(text) and not Path(text).suffix and len(Path(text).parts) == 1:
-        find_scenario(name)  # says which names there are
+        find_scenario(name)  # lists the valid names
     said = {key: value for key, value in reading.items() if value is not None}
     return [specify(LogSpec, path=str(Path(text)), sampling=sampling, rate_hz=rate, **said)]
 

@@ -49,7 +49,7 @@ def simulate_scenario(spec: ScenarioSpec) -> tuple[pd.DataFrame, pd.DataFrame]:
     Parameters
     ----------
     spec : ScenarioSpec
-        If it names a sensor, the errors of one unit of it replace the scenario's own.
+        If it names a sensor, the errors of one of its units replace the scenario's own.
 
     Returns
     -------

@@ -120,7 +120,7 @@ def coast_of_run(
     Raises
     ------
     ConfigError
-        An outage does not fit into the run, begins outside of it, or includes a new alignment.
+        An outage does not fit into the run, begins outside the run, or includes a new alignment.
     DataError
         Navigation never begins.
     """

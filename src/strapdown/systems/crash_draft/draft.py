@@ -908,6 +908,7 @@ def facings(units: Sequence[Unit]) -> list[Facing]:
 
     Returns
     -------
+    list of Facing
         Assumed zero where the columns are named x, y, z, the vertical is along z, and the impact
         then is frontal; the others agree with the first known heading.
     """
