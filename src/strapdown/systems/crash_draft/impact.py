@@ -21,7 +21,7 @@ __all__ = ["Impact", "Sitting", "find_impact", "sitting_at_rest"]
 
 Array = NDArray[np.float64]
 
-# Span before the largest pulse that belongs to it.
+# Span before the largest pulse that belongs to it, and window for the resting value before that.
 BEFORE, REACH = 0.3, 3.0  # s
 LEAST_BASE = 5  # samples
 # A record that counts from its trigger has the event within this of zero.

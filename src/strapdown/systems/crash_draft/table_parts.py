@@ -416,8 +416,9 @@ RATES = (50.0, 100.0, 200.0, 400.0, 500.0, 1000.0, 2000.0, 5000.0, 10_000.0, 20_
 # Typical duration of four fifths of the power of a frontal impact, s.
 USUAL_PULSE = 0.06
 
-# Steps within this share of their mean are even. Rounding moves a stamp from the fitted line by at
-# most twice its effect on a step, as both end points of the line are rounded; a step less.
+# Limits for even steps: spread of the steps relative to their mean; spread of the stamps about the
+# line through both end points, relative to that of the steps, as rounding moves both ends of the
+# line; spread of rounded steps relative to their mean.
 EVEN, ROUNDED, STEP = 0.01, 2.0, 1.05
 # Clock steps stay within this of their median, except for at most this share of them.
 REGULAR, IRREGULAR_PART = 0.5, 0.05

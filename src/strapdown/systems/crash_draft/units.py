@@ -60,7 +60,7 @@ class Unit:
         In order of increasing range.
     gyro : Part or None
     gyro_from : str
-        Name of the unit that the gyro belongs to; empty where it is its own.
+        Name of the unit whose gyro it uses; empty if it has its own or none.
     impact : Impact or None
         None where no accelerometer has a time base.
     ends : dict of int to RangeEnds

@@ -54,7 +54,7 @@ class Compass:
     Attributes
     ----------
     begin, time : float, s
-        Begin of the rest, and the time for which the heading holds.
+        Begin of the rest, and the instant at which the heading holds.
     q_nb : ndarray, (4,)
     gyro_bias : ndarray, (3,), rad/s
     lat_deg : float, deg

@@ -75,7 +75,7 @@ DOUBTED_TILT = 2.0
 TURN, RENEWED, HEARD = 60.0, 180.0, 20.0
 #: Epochs over which the scatter of the innovations is judged, and the fewest needed.
 JUDGED, FEWEST = 60, 8
-#: Limit of the weight of an innovation.
+#: Limit of a normalized innovation in the estimate of their scatter.
 CLIP = 3.0
 #: Stamps within this are equal, s.
 NEAR = 1e-6
