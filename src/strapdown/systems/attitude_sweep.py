@@ -275,7 +275,7 @@ def _largest_reference(q: Array, references: pd.DataFrame, used: pd.DataFrame) -
 
 
 #: Reference for the algorithm error on a log: of fourth order from rates and of sixth from
-#: increments, even with uneven steps.
+#: increments, for any steps.
 MOST_ACCURATE = RotationVector(samples=4, coefficients="fit")
 
 
