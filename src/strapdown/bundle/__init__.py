@@ -1,9 +1,9 @@
-"""Sealed bundles: what a run wrote, what it read, and how to run it again.
+"""Sealed bundles: outputs and inputs of a run, with all that is needed to repeat it.
 
 A bundle is a folder. ``manifest.json`` in it names the command, the resolved configuration,
 the seed, the versions, the platform, and the SHA-256 of every input and output; its own
-SHA-256 is the seal. A bundle is written beside its place and moved there whole, so that a run
-that fails leaves nothing. ``timing.json`` stands outside the seal, because clocks differ.
+SHA-256 is the seal. A bundle is written to a temporary folder and renamed as a whole, so that
+a failed run leaves no files. ``timing.json`` is outside the seal, because clocks differ.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Paths of inputs in a configuration: which values they are, and how they are changed."""
+"""Find and replace the paths of inputs in a configuration."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ __all__ = ["named_paths", "names_file", "resolved", "with_paths"]
 
 
 def names_file(key: str, value: Any) -> bool:
-    """Tell whether a value of a configuration is the path of an input.
+    """Whether a value of a configuration is the path of an input.
 
     Parameters
     ----------
     key : str
         Name of the field.
     value : object
-        A path; or of a sensor a file's path, which ends as such, or a name of the catalogue.
+        A path; for a sensor, a file path with its suffix, or a name of the catalogue.
     """
     if not isinstance(value, str):
         return False
@@ -36,14 +36,14 @@ def named_paths(value: Any) -> Iterator[str]:
 
 
 def with_paths(value: Any, change: Callable[[str], str]) -> Any:
-    """Return a configuration with every path of an input changed.
+    """Return a configuration with every path of an input replaced.
 
     Parameters
     ----------
     value : object
-        The configuration, or what stands in it.
+        The configuration, or a part.
     change : callable
-        From a path to what takes its place.
+        Maps a path to its replacement.
     """
     if isinstance(value, dict):
         return {
@@ -60,8 +60,8 @@ def resolved(value: Any, root: Path) -> Any:
     Parameters
     ----------
     value : object
-        Of a manifest.
+        From a manifest.
     root : Path
-        The bundle.
+        Folder of the bundle.
     """
     return with_paths(value, lambda path: str(root / path))

@@ -1,4 +1,4 @@
-"""Read the manifest of a bundle, and tell what is no longer as it was sealed."""
+"""Read the manifest of a bundle, and list the changes since it was sealed."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def read_manifest(bundle: Path) -> dict[str, Any]:
     Raises
     ------
     DataError
-        There is none, or it is damaged.
+        The manifest is missing or damaged.
     """
     path = bundle / MANIFEST
     if not bundle.exists():
@@ -54,7 +54,7 @@ def read_manifest(bundle: Path) -> dict[str, Any]:
 
 
 def _refuse_escape(manifest: dict[str, Any]) -> None:
-    """Refuse a manifest that is malformed, or whose own files lie outside its folder."""
+    """Refuse a malformed manifest, or one with own files outside its folder."""
     try:
         for item in [*manifest["inputs"], *manifest["outputs"]]:
             path, refers = Path(item["name"]), item.get("kept") == "reference"
@@ -75,7 +75,7 @@ def _refuse_escape(manifest: dict[str, Any]) -> None:
 
 
 def _refuse_unsealed_paths(manifest: dict[str, Any]) -> None:
-    """Refuse a configuration that reads what the seal does not hold."""
+    """Refuse a configuration that reads files not covered by the seal."""
     sealed = {item["name"] for item in manifest["inputs"]}
     sealed |= {str(Path(name).parent) for name in sealed}
     for path in named_paths(manifest["configuration"]):
@@ -84,7 +84,7 @@ def _refuse_unsealed_paths(manifest: dict[str, Any]) -> None:
 
 
 def unsealed_changes(bundle: Path, manifest: dict[str, Any]) -> list[str]:
-    """Say which files of a bundle are not as they were sealed.
+    """List the files of a bundle that differ from the seal.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def unsealed_changes(bundle: Path, manifest: dict[str, Any]) -> list[str]:
     Returns
     -------
     list of str
-        One sentence a file: changed, missing, or not in the manifest.
+        One sentence per file: changed, missing, or not in the manifest.
     """
     changes = []
     expected: set[str] = {MANIFEST, *UNSEALED}

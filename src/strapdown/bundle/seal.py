@@ -1,4 +1,4 @@
-"""The seal of a bundle, what stands outside of it, and the digests that it is made of."""
+"""Seal of a bundle, its digests, and the unsealed files."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ __all__ = [
 MANIFEST = "manifest.json"
 TIMING = "timing.json"
 LATENCY = "latency.json"
-#: Outside the seal: clocks differ.
+#: Files outside the seal: clocks differ.
 UNSEALED = (TIMING, LATENCY)
 SCHEMA = "strapdown bundle 2"
 
 
 @dataclass(frozen=True)
 class Seal:
-    """What a bundle's writer returns.
+    """Seal of a written bundle.
 
     Attributes
     ----------
@@ -59,16 +59,16 @@ def sha256(path: Path) -> str:
 
 
 def files_of(root: Path) -> list[str]:
-    """Everything but folders; a link to one is no folder of the bundle."""
+    """Everything but folders; a link to a folder is not a folder of the bundle."""
     found = (p for p in root.rglob("*") if p.is_symlink() or not p.is_dir())
     return sorted(p.relative_to(root).as_posix() for p in found)
 
 
-# Where a bundle may be written, told before the run that it is for.
+# Check of the destination before the run.
 
 
 def check_destination(out: Path, force: bool) -> None:
-    """Refuse a folder that may not be written.
+    """Refuse a folder that must not be written.
 
     Parameters
     ----------
@@ -92,19 +92,19 @@ def check_destination(out: Path, force: bool) -> None:
 
 
 def _refuse_unwritable(out: Path) -> None:
-    """Say before a long run what would fail after it."""
+    """Report before a long run a write error that would occur after it."""
     parent = next(p for p in out.absolute().parents if p.exists())
     if not parent.is_dir() or not os.access(parent, os.W_OK):
         raise ConfigError("bundle.not-writable", file=str(out), quantity="--out", parent=parent)
 
 
-# What is put beside a seal, because clocks differ.
+# Files beside the seal, because clocks differ.
 
 
 def write_timing(
     seal: Seal, seconds: dict[str, float], sample_ns: dict[str, dict[str, float]] | None = None
 ) -> None:
-    """Put the times that a run took beside its bundle's seal.
+    """Write the times of a run beside its bundle's seal.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def write_timing(
     seconds : dict of str to float
         Stage to seconds.
     sample_ns : dict of str to dict, optional
-        Algorithm to nanoseconds of a sample in each precision.
+        Algorithm to nanoseconds per sample in each precision.
     """
     timing: dict[str, Any] = {"seconds": {stage: round(t, 4) for stage, t in seconds.items()}}
     if sample_ns:
@@ -121,7 +121,7 @@ def write_timing(
 
 
 def write_latency(seal: Seal, latency: Mapping[str, Any]) -> None:
-    """Put what each sample took beside its bundle's seal.
+    """Write the latency of the samples beside the bundle's seal.
 
     Parameters
     ----------
@@ -132,11 +132,11 @@ def write_latency(seal: Seal, latency: Mapping[str, Any]) -> None:
     (seal.path / LATENCY).write_text(to_json(latency), encoding="utf-8", newline="\n")
 
 
-# JSON as bundles hold it.
+# JSON format of bundles.
 
 
 def to_json(content: Any) -> str:
-    """JSON as bundles hold it: readable, in the order given, the same bytes every time."""
+    """Format JSON for bundles: readable, in the given order, reproducible byte by byte."""
     text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-    # Names of files need not be text; what is not is shown as a question mark.
+    # Names of files need not be valid text; invalid parts become question marks.
     return text.encode("utf-8", "replace").decode("utf-8")

@@ -1,4 +1,4 @@
-"""Write a bundle, whole or not at all."""
+"""Write a bundle atomically."""
 
 from __future__ import annotations
 
@@ -40,38 +40,37 @@ def write_bundle(
     force: bool = False,
     seals: list[Seal],
 ) -> Iterator[Path]:
-    """Write a bundle, whole or not at all.
+    """Write a bundle atomically.
 
     Parameters
     ----------
     out : Path
-        The folder to make. An existing one is replaced only if `force` is set and it is empty
-        or a bundle itself.
+        Folder to create. An existing one is replaced only if `force` is set and it is empty or a
+        bundle itself.
     command : str
-        Which command can run it again.
+        Command that can repeat the run.
     configuration : dict
-        The resolved configuration; paths of inputs in it are replaced by where the bundle
-        keeps or finds them.
+        The resolved configuration; paths of inputs are replaced by those in or from the bundle.
     inputs : sequence of InputFiles
-        Copied, if all of them together have at most 64 MiB, or else referred to by path.
+        Copied if they total at most 64 MiB, otherwise referred to by path.
     force : bool
     seals : list of Seal
-        The seal is appended when the bundle stands.
+        The seal is appended when the bundle is complete.
 
     Yields
     ------
     Path
-        An empty folder; what is in it when the block ends becomes the bundle.
+        An empty folder; its content at the end of the block becomes the bundle.
 
     Raises
     ------
     ConfigError
-        `out` exists and may not be replaced.
+        `out` exists and must not be replaced.
     """
     out = out.absolute()
     check_destination(out, force)
     made = [p for p in out.parents if not p.exists()]
-    # Named before it is made: whoever interrupts in between leaves nothing either.
+    # Named before it is created: an interrupt in between leaves no folder either.
     staging = out.parent / f".{out.name}.{token_hex(8)}.partial"
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
@@ -84,7 +83,7 @@ def write_bundle(
         _move(staging, out)
     except BaseException:
         shutil.rmtree(staging, ignore_errors=True)
-        # One that somebody else has begun to use stays.
+        # A folder that another process has begun to use is kept.
         with suppress(OSError):
             for parent in made:
                 parent.rmdir()
@@ -93,7 +92,7 @@ def write_bundle(
 
 
 def _move(staging: Path, out: Path) -> None:
-    """Put the finished bundle in its place; an old one goes only once the new one stands."""
+    """Rename the finished bundle to its destination, then delete an old one."""
     if not out.exists():
         staging.rename(out)
         return
@@ -109,22 +108,22 @@ def _move(staging: Path, out: Path) -> None:
         raise
 
 
-# Make the manifest of a bundle, and keep the inputs that it names.
+# The manifest of a bundle, and copies of its inputs.
 
 
-# Inputs up to this size together are copied into the bundle, which then stands on its own.
+# Inputs up to this total size are copied into the bundle, which then is self-contained.
 COPY_LIMIT = 64 * 1024 * 1024  # bytes
 
 
 def make_manifest(
     folder: Path, command: str, configuration: dict[str, Any], inputs: Sequence[InputFiles]
 ) -> dict[str, Any]:
-    """Make the manifest of a finished folder, and copy its inputs into it.
+    """Create the manifest of a finished folder, and copy its inputs into it.
 
     Parameters
     ----------
     folder : Path
-        What is in it are the outputs.
+        Its files are the outputs.
     command, configuration, inputs
         As for `write_bundle`.
 
@@ -165,7 +164,7 @@ def _refuse_changed(file: Path, digest: str) -> None:
 def _keep(
     folder: Path, inputs: Sequence[InputFiles]
 ) -> tuple[list[dict[str, Any]], dict[str, str]]:
-    """Copy the inputs, or refer to them: their lines in the manifest, and where each is now."""
+    """Copy the inputs, or refer to them; return their manifest entries and present paths."""
     small = sum(f.stat().st_size for i in inputs for f in i.files) <= COPY_LIMIT
     kept: list[dict[str, Any]] = []
     moved: dict[str, str] = {}
@@ -199,15 +198,15 @@ def _keep(
 
 
 def _place(item: InputFiles, places: dict[Path, Path]) -> Path:
-    """A place of its own for each path; the same for a path that has one."""
-    # What two roles took of one folder stands in one: a path is of one place.
+    """Assign a separate folder to each path, and the same to a repeated path."""
+    # Files of one folder with two roles share a folder: each path has one.
     first = next((p for p, path in places.items() if path == item.path), None)
     if first is not None and item.path.is_dir():
         return first
-    # The name that was given; a link's target may have lost its ending.
+    # The given name; a link's target may have lost its suffix.
     own = item.path.name or item.path.resolve().name
     place = Path("inputs") / item.role / own
-    # Several logs may have one name, and one file may have been read for each of them.
+    # Several logs may share a name, and a file may have been read for each of them.
     number = 2
     while places.get(place, item.path) != item.path:
         place = Path("inputs") / f"{item.role}-{number}" / own
@@ -215,7 +214,7 @@ def _place(item: InputFiles, places: dict[Path, Path]) -> Path:
     return place
 
 
-# What a number may depend on besides its inputs: packages and the platform.
+# Dependencies of the results besides the inputs: packages and the platform.
 
 
 PACKAGES = (
@@ -232,7 +231,7 @@ PACKAGES = (
 
 
 def versions() -> dict[str, str]:
-    """Versions of the packages that numbers depend on, and the digest of our own sources."""
+    """Versions of the packages that affect results, and the digest of our own sources."""
     found = {"python": platform.python_version(), "strapdown source": source_digest()}
     for name in PACKAGES:
         try:
@@ -244,12 +243,12 @@ def versions() -> dict[str, str]:
 
 @functools.cache
 def source_digest() -> str:
-    """SHA-256 of the sources and data of this package: two installations of one version may differ.
+    """SHA-256 of the sources and data of this package, as installations of a version may differ.
 
     Returns
     -------
     str
-        Of the name and the content of each file but compiled ones, in the order of their names.
+        Of the name and the content of each file except compiled ones, in order of names.
     """
     root = Path(__file__).parents[1]
     digest = hashlib.sha256()
@@ -261,7 +260,7 @@ def source_digest() -> str:
 
 
 def machine() -> dict[str, str]:
-    """What of the platform can change the last bit of a number."""
+    """Platform properties that can change the last bit of a result."""
     from llvmlite.binding import get_host_cpu_name
 
     return {

@@ -1,1 +1,1 @@
-"""The command line: thin shells over the public functions, heavy imports inside them."""
+"""Command line: thin wrappers of the public functions, with deferred heavy imports."""

@@ -96,11 +96,11 @@ def align(
     out: Annotated[Path | None, folder_to_make("LOG-align")] = None,
     write: OutFlags,
 ) -> None:
-    """Find roll, pitch and heading of a body that stands, from its gyros and accelerometers.
+    """Find roll, pitch and heading of a stationary body from its gyros and accelerometers.
 
-    A coarse alignment finds north from the turn of the Earth, a filter refines it and estimates
-    drifts and biases; the report says how well each is known, what limits it, and after how long
-    it was known.
+    A coarse alignment finds north from the Earth's rotation, a filter refines it and estimates
+    drifts and biases; the report states the uncertainty of each, its limits, and the alignment
+    time.
     """
     from strapdown.api.alignment import run_specified
     from strapdown.bundle.seal import check_destination, write_timing

@@ -25,7 +25,7 @@ __all__ = [
     "spec_of_flags",
 ]
 
-#: Of how a log is read; the same of every command.
+#: How a log is read; common to all commands.
 LOG_FLAGS = {
     "axes, axes": "--axes",
     "log, from_s": "--from",
@@ -39,7 +39,7 @@ LOG_FLAGS = {
     "log, accel_unit": "--accel-unit",
     "log, time_unit": "--time-unit",
 }
-#: Flags by the place in a specification.
+#: Flags by key path of the specification.
 FLAGS = {
     "site, lat_deg": "--lat",
     "site, lon_deg": "--lon",
@@ -56,15 +56,15 @@ def refuse_beside_file(
     given: Mapping[str, Any],
     flags: Mapping[str, str] = FLAGS,
 ) -> None:
-    """Refuse options beside a file that states all of them, and name the key that does.
+    """Refuse options beside a file that states all of them, and name the key for each.
 
     Parameters
     ----------
     source : Path
     given : mapping
-        By flag, None where it is not given.
+        By flag, None where not given.
     flags : mapping
-        Flags by the place in a specification.
+        Flags by key path of the specification.
 
     Raises
     ------
@@ -92,13 +92,13 @@ def flag_of(name: str) -> str:
 
 
 def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
-    """Return the specification that flags make; the place may come from the log.
+    """Return the specification by the flags; the position may come from the log.
 
     Parameters
     ----------
     log : Path
     given : mapping
-        By flag, None where it is not given.
+        By flag, None where not given.
 
     Returns
     -------
@@ -107,7 +107,7 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
     Raises
     ------
     ConfigError
-        A value does not fit, or what is needed is not said; the message names the flag.
+        A value is invalid or missing; the message names the flag.
     DataError
         The log cannot be read.
     """
@@ -135,14 +135,14 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
 
 
 def refused_flag(error: Any, flag: Callable[[str], str] | None = None) -> ConfigError:
-    """Return what pydantic finds in options, as an error that names the option.
+    """Convert a pydantic error to one that names the option.
 
     Parameters
     ----------
     error : dict
         One of `ValidationError.errors`.
     flag : callable, optional
-        The flag of a place in a specification; those of ``strapdown align``, if not given.
+        Flag of a key path of a specification; those of ``strapdown align``, if not given.
     """
     path = [str(p) for p in error["loc"]]
     finding = misfit(error)
@@ -154,14 +154,14 @@ def refused_flag(error: Any, flag: Callable[[str], str] | None = None) -> Config
 
 
 def as_flag(error: ConfigError, flag: Callable[[str], str] | None = None) -> ConfigError:
-    """Return the error with the option in place of the place in a specification."""
+    """Return the error with the option instead of the key path of a specification."""
     return error.replaced(quantity=(flag or _flag)(error.finding.quantity or ""))
 
 
 def _flag(place: str) -> str:
     if place in FLAGS:
         return FLAGS[place]
-    # Where it was told by name of the flag already, that is the name.
+    # A path that names a flag already is kept.
     said = [part for part in place.split(", ") if part.startswith("--")]
     if said:
         return said[-1]

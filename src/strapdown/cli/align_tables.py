@@ -1,4 +1,4 @@
-"""What ``strapdown align`` prints."""
+"""Terminal output of ``strapdown align``."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["print_alignment"]
 
 
 def print_alignment(result: AlignmentResult) -> None:
-    """Print the answer of an alignment, and what limits it."""
+    """Print the result of an alignment, and its limits."""
     out = console()
     site = result.site
     out.print(

@@ -165,10 +165,10 @@ def attitude(
     out: Annotated[Path | None, folder_to_make("LOG-attitude")] = None,
     write: OutFlags,
 ) -> None:
-    """Name the simplest attitude algorithm, and the lowest rate, that are accurate enough.
+    """Find the simplest attitude algorithm, and the lowest rate, of sufficient accuracy.
 
     Runs attitude algorithms over a gyro log or a scenario at its own and at lower rates, compares
-    them with what is known, splits their error into the sensor's and their own, counts what they
+    them with the known attitude, splits their error into the sensor's and their own, counts their
     cost, and writes the answer with tables, JSON, CSV, a report page and its figures.
     """
     from strapdown.api.attitude import compare_attitude
@@ -246,7 +246,7 @@ def attitude(
 
 
 def _numbers(text: str | None) -> list[float]:
-    """Numbers joined by blanks or commas."""
+    """Parse numbers separated by blanks or commas."""
     from strapdown.errors import ConfigError
 
     try:
@@ -256,7 +256,7 @@ def _numbers(text: str | None) -> list[float]:
 
 
 def _split(text: str) -> list[str]:
-    """Names with options; a comma inside options belongs to them."""
+    """Split names with options; a comma within options belongs to them."""
     names: list[str] = []
     for word in text.replace(",", " , ").split():
         if word == ",":

@@ -1,4 +1,4 @@
-"""What ``strapdown attitude`` prints of a bench."""
+"""Terminal output of ``strapdown attitude``."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MOST_LINES = 8
 
 
 def print_bench(bench: AttitudeBench) -> None:
-    """Print what the run stood on, its tables, and the answer last, where it is seen.
+    """Print the input of the run, its tables, and the answer last, where it is visible.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def print_bench(bench: AttitudeBench) -> None:
 
 
 def print_speed(taken: pd.DataFrame) -> None:
-    """Print how long a sample takes each algorithm here.
+    """Print the time per sample of each algorithm on this machine.
 
     Parameters
     ----------

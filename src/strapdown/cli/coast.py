@@ -144,10 +144,10 @@ def coast(
     out: Annotated[Path | None, folder_to_make("SENSOR-coast, or DRIVE-coast")] = None,
     write: OutFlags,
 ) -> None:
-    """Foretell how far it drifts when its aids are away, and what makes the drift.
+    """Predict the drift during a GNSS outage, and the sources of the drift.
 
-    Of a sensor the answer is by its data sheet, along a motion that is stated. Of a run of
-    navigation the filter's own state is taken, and the drifts that came are laid over the forecast.
+    For a sensor the prediction uses its data sheet and a stated motion. For a navigation run it
+    uses the filter's own state, and compares the prediction with the measured drifts.
     """
     from strapdown.api.alignment import run_outage
     from strapdown.bundle.seal import check_destination, write_timing

@@ -1,4 +1,4 @@
-"""Flags of ``strapdown coast`` as the specification of a forecast."""
+"""Flags of ``strapdown coast`` as the specification of a drift prediction."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from strapdown.errors import ConfigError
 
 __all__ = ["coast_of_flags"]
 
-#: Flags by the place in a specification.
+#: Flags by key path of the specification.
 FLAGS = {
     "outage_s": "--outage",
     "places": "--places",
@@ -47,19 +47,19 @@ def coast_of_flags(
     keep: Sequence[str],
     run: Mapping[str, Any],
 ) -> CoastSpec:
-    """Return the specification that flags make.
+    """Return the specification by the flags.
 
     Parameters
     ----------
     source : str
-        As it was given.
+        As given.
     outage : float, s
     of_run : bool
-        Whether it is a run of navigation, which says motion and start itself.
+        Whether it is a navigation run, which states motion and start itself.
     motion, start, run : mapping
-        By key of their tables, None where nothing is given.
+        By key of their tables, None where not given.
     keep : sequence of str
-        Aids that stay, as they were written.
+        Remaining measurements, as given.
 
     Returns
     -------
@@ -68,7 +68,7 @@ def coast_of_flags(
     Raises
     ------
     ConfigError
-        A value does not fit, or goes with the other kind of source; the message names the flag.
+        A value is invalid, or belongs to the other kind of source; the message names the flag.
     """
     _refuse_others(source, of_run, motion, start, keep, run)
     parts = [key for key in ("from_s", "to_s", "duration_s") if run.get(key) is not None]

@@ -1,4 +1,4 @@
-"""What ``strapdown coast`` prints."""
+"""Terminal output of ``strapdown coast``."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["print_coast"]
 
 
 def print_coast(result: CoastResult) -> None:
-    """Print how far it drifts, what makes it, and what came."""
+    """Print the predicted drift, its sources, and the measured drifts."""
     out = console()
     out.print(spaced(f"{result.name}: {result.what}; {motion_words(result)}"))
     out.print(spaced(f"At the start: {start_words(result)}"))

@@ -1,4 +1,4 @@
-"""Says when inner loops are being compiled, which happens once on a machine and takes its time."""
+"""Report the compilation of kernels, which happens once on a machine and takes time."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ _EVENT = "numba:compile"
 
 
 class Compilations:
-    """Tells when compiling begins and ends, from when numba is there.
+    """Report begin and end of compilations, once numba is loaded.
 
     Parameters
     ----------
     tell : callable
-        Called with True when the first of nested compilations begins, with False when it ends.
+        Called with True at the begin of the first of nested compilations, with False at its end.
     """
 
     def __init__(self, tell: Callable[[bool], None]) -> None:
@@ -25,7 +25,7 @@ class Compilations:
         self._listener: Any = None
 
     def listen(self) -> None:
-        """Begin to listen, if numba is loaded; it is not loaded for this."""
+        """Start to listen if numba is loaded; this does not load it."""
         if self._listener is not None or "numba.core.event" not in sys.modules:
             return
         from numba.core import event
@@ -49,7 +49,7 @@ class Compilations:
         self._events().register(_EVENT, self._listener)
 
     def stop(self) -> None:
-        """Listen no more."""
+        """Stop listening."""
         if self._listener is not None:
             self._events().unregister(_EVENT, self._listener)
             self._listener = None

@@ -1,4 +1,4 @@
-"""What commands share: where they print, tables, and progress."""
+"""Output common to all commands: consoles, tables, and progress."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger("strapdown")
 
-#: Whose words messages speak: those of options, or the keys of the file that a command runs.
+#: Terms of messages: options, or the keys of the file that a command runs.
 WORDS: ContextVar[Words] = ContextVar("words", default="cli")
-# Redirected output has no width of its own; a table is then as wide as it is.
+# Redirected output has no width; its tables are as wide as needed.
 PIPE_WIDTH = 160
-# A name with many options is broken where many numbers stand beside it.
+# A long name with options is wrapped in a table with many columns of numbers.
 _NAME_WIDTH, _MANY_COLUMNS = 24, 6
 
 
 def console(*, err: bool = False) -> Console:
-    """A console that takes no text from outside for markup."""
+    """Return a console that ignores markup in external text."""
     from rich.console import Console
 
     class QuietlyPiped(Console):
-        """Ends with success when the reader has gone, as with ``| head``."""
+        """Exit with success when the reader has closed the pipe, as with ``| head``."""
 
         def on_broken_pipe(self) -> None:
             try:
@@ -64,7 +64,7 @@ def logged() -> Iterator[None]:
 
 
 class Stopwatch:
-    """Pass progress on, and keep how long each stage took."""
+    """Pass progress on, and record the duration of each stage."""
 
     def __init__(self, report: Callable[[str, float], None]) -> None:
         self._report = report
@@ -89,7 +89,7 @@ class Stopwatch:
 
 @contextmanager
 def progress(quiet: bool) -> Iterator[Callable[[str, float], None]]:
-    """Show the stage and the share done on the terminal, and leave nothing behind."""
+    """Show the stage and the share done on the terminal, and erase them at the end."""
     out = console(err=True)
     if quiet or not out.is_terminal:
         yield lambda stage, share: None
@@ -145,10 +145,10 @@ def print_table(
     columns : sequence of str
     rows : sequence of sequence of str
     text : sequence of int, optional
-        Columns of text, to the left; the first and the last if not given. The others are
-        numbers, to the right, and are never broken.
+        Left-aligned columns of text; the first and the last if not given. The others are
+        right-aligned numbers, which are never wrapped.
     strong : container of int
-        Rows that stand out.
+        Highlighted rows.
     """
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
@@ -167,7 +167,7 @@ def print_table(
 
 
 def print_block(block: TableBlock) -> None:
-    """Print a table of a report, its lines unbroken where the page has no break either."""
+    """Print a table of a report, with line breaks only where the page has them."""
     from strapdown.report.values import spaced
 
     rows = [[spaced(cell) for cell in row] for row in block.rows]
@@ -176,12 +176,12 @@ def print_block(block: TableBlock) -> None:
 
 
 def _broken(name: str) -> str:
-    """A long name with its options below each other."""
+    """Wrap a long name with one option per line."""
     return name.replace(",", ",\n  ") if len(name) > _NAME_WIDTH else name
 
 
 def print_findings(findings: Sequence[Finding], most: int | None = None) -> None:
-    """Print findings to stderr, in `WORDS`; the first alone of more than `most`."""
+    """Print findings to stderr, in `WORDS`; at most the first `most`."""
     out = console(err=True)
     for finding in findings[:most]:
         head, _, remedy = finding.text(WORDS.get()).partition("\n")
@@ -194,7 +194,7 @@ def print_findings(findings: Sequence[Finding], most: int | None = None) -> None
 
 
 def print_seal(seal: Seal, look_at: str) -> None:
-    """Say what was written, what to open, and the seal."""
+    """Print the written folder, the file to open, and the seal."""
     out = console()
     out.print(f"\nWrote {seal.path}")
     out.print(f"Open  {seal.path / look_at}")

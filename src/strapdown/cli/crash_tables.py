@@ -1,4 +1,4 @@
-"""What ``strapdown crash`` prints."""
+"""Terminal output of ``strapdown crash``."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["print_crash"]
 
 
 def print_crash(result: CaseResult) -> None:
-    """Print the answers of a case, and what limits them."""
+    """Print the results of a case, and their limits."""
     out = console()
     for block in (answers_table(result), path_table(result), comparison_table(result)):
         if block is not None and block.rows:

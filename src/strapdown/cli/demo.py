@@ -21,10 +21,10 @@ def demo(
     out: Annotated[Path, folder_to_make("demo")] = Path("demo"),
     write: WriteFlags,
 ) -> None:
-    """Show what all of it answers, in one page: attitude, a crash, navigation.
+    """Run all systems and show the results on one page: attitude, crash, navigation.
 
-    Runs on built-in data; recordings are shown, too, where they are in the folder that
-    STRAPDOWN_DATA names, by default ../shared/data.
+    Runs on built-in data; recordings are added if they are in the folder named by STRAPDOWN_DATA,
+    by default ../shared/data.
     """
     from strapdown.cli.console import console, progress
     from strapdown.cli.demo_runs import demo_runs
@@ -42,7 +42,7 @@ def demo(
         else None
     )
     _check(out, [name for run in there for name in run.folders], write.force)
-    # What it says is of the results before.
+    # It describes the previous results.
     (out / _PAGE).unlink(missing_ok=True)
     page = console()
     whole = sum(run.takes for run in there)
@@ -75,7 +75,7 @@ def _part_of(show: Progress, title: str, begin: float, share: float) -> Progress
 
 
 def _check(out: Path, names: list[str], force: bool) -> None:
-    """Refuse before the first run what a later one would be refused for."""
+    """Refuse before the first run what a later one would refuse."""
     from strapdown.bundle.seal import check_destination
     from strapdown.errors import ConfigError
 
@@ -87,7 +87,7 @@ def _check(out: Path, names: list[str], force: bool) -> None:
 
 
 def _write_whole(path: Path, text: str) -> None:
-    """Write a file that is there whole or not at all."""
+    """Write a file atomically."""
     partial = path.with_name(f".{path.name}.partial")
     try:
         partial.write_text(text, encoding="utf-8", newline="\n")

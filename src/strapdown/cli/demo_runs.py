@@ -1,4 +1,4 @@
-"""The runs that ``strapdown demo`` shows, by what each needs."""
+"""Runs of ``strapdown demo`` and their requirements."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ _OUTAGE = 30.0  # s
 
 @dataclass(frozen=True)
 class DemoRun:
-    """One run: what is shown of it, what it needs, and how it is made.
+    """One run of the demonstration.
 
     Attributes
     ----------
     shown : Shown
     make : callable
-        Takes the folder of the demonstration, whether results may be replaced, and progress.
+        Called with the folder of the demonstration, whether to replace results, and progress.
     takes : float
-        About how long, beside the others.
+        Approximate duration, relative to the others.
     folders : tuple of str
-        What it writes.
+        Folders that it writes.
     needs : str, optional
         Folder of recordings.
     """
@@ -45,12 +45,12 @@ class DemoRun:
 
 
 def demo_runs(out: Path, data: Path) -> list[DemoRun]:
-    """Every run of the demonstration, in the order of its page.
+    """Return every run of the demonstration, in the order of its page.
 
     Parameters
     ----------
     out : Path
-        Folder of the demonstration, as commands name it.
+        Folder of the demonstration, as named in commands.
     data : Path
         Folder of the recordings.
     """

@@ -1,4 +1,4 @@
-"""Write a drafted file whole or not at all, and never over another unasked."""
+"""Write a proposed file atomically, and replace another only on request."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ __all__ = ["check_free", "write_file"]
 
 
 def check_free(path: Path, usual: str, *, force: bool) -> None:
-    """Refuse a place where something stands.
+    """Refuse an existing path.
 
     Parameters
     ----------
     path : Path
     usual : str
-        What such a file is called.
+        Usual name of such a file.
     force : bool
         Whether a file may be replaced.
 
     Raises
     ------
     ConfigError
-        A file is there and may not be replaced, or a folder is.
+        A file exists and must not be replaced, or a folder exists.
     """
     if path.is_dir():
         raise ConfigError("cli.out-is-folder", file=str(path), quantity="--out", path=path / usual)
@@ -42,14 +42,14 @@ def write_file(path: Path, text: str, usual: str, *, force: bool) -> None:
     path : Path
     text : str
     usual : str
-        What such a file is called.
+        Usual name of such a file.
     force : bool
-        Replace a file that is there.
+        Replace an existing file.
 
     Raises
     ------
     ConfigError
-        As `check_free`, also for a file that came in the meantime.
+        As `check_free`, also for a file created in the meantime.
     """
     check_free(path, usual, force=force)
     path = path.absolute()
@@ -64,7 +64,7 @@ def write_file(path: Path, text: str, usual: str, *, force: bool) -> None:
             staged.replace(path)
             return
         try:
-            # A link is refused where something stands, in one step with making it.
+            # Creating a link fails if the path exists, in one atomic step.
             path.hardlink_to(staged)
         except FileExistsError:
             check_free(path, usual, force=force)

@@ -1,4 +1,4 @@
-"""``strapdown init``: a file to begin with, from records."""
+"""``strapdown init``: propose a configuration from records."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ ALIGN_EPILOG = "Example: strapdown init align log.imu, then strapdown align alig
 NAVIGATE_EPILOG = "Example: strapdown init navigate log.csv --gnss fixes.csv"
 CRASH_EPILOG = "Example: strapdown init crash left.csv right.csv --out case.toml"
 
-# Of what was left out.
+# Most unused parts to print.
 SHOWN = 6
 
 app = typer.Typer(
@@ -56,7 +56,7 @@ Force = Annotated[
 
 @app.callback(epilog=EPILOG)
 def init() -> None:
-    """Write a file to begin with, from your records: what they tell, and what only you know."""
+    """Propose a configuration from your records, with questions for missing data."""
 
 
 @app.command("crash", epilog=CRASH_EPILOG)
@@ -75,9 +75,9 @@ def crash(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Write the case file of a crash: records are looked through, and what is not in them is asked.
+    """Propose the case file of a crash from its records, with questions for missing data.
 
-    Each line says whether it was found, is assumed, or is yours to fill in ("?"). Then:
+    Each line states whether a value was found, is assumed, or is to be filled in ("?"). Then:
     strapdown crash case.toml
     """
     from strapdown.cli.console import progress
@@ -126,7 +126,7 @@ def align(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Write the file of an alignment: what a log tells is filled in, and what it does not is asked.
+    """Propose the configuration of an alignment from a log, with questions for missing data.
 
     Then: strapdown align align.toml
     """
@@ -191,7 +191,7 @@ def navigate(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Write the file of a run of navigation: what log and fixes tell is filled in.
+    """Propose the configuration of a navigation run from log and fixes.
 
     Then: strapdown navigate navigate.toml
     """
@@ -226,7 +226,7 @@ def navigate(
 
 
 def _say_found(findings: Sequence[Finding], found: Sequence[str]) -> Console:
-    """Print what the records told; return where the rest goes."""
+    """Print the findings from the records; return the console for the rest."""
     from strapdown.cli.console import console, print_findings
 
     print_findings(findings)
@@ -238,7 +238,7 @@ def _say_found(findings: Sequence[Finding], found: Sequence[str]) -> Console:
 
 
 def _list(page: Console, head: str, lines: Sequence[Asked]) -> None:
-    """Print lines of the file that wait for the user, if there are any."""
+    """Print the lines of the file that need the user, if any."""
     if lines:
         page.print(f"\n{head}", style="bold")
     for one in lines:

@@ -1,4 +1,4 @@
-"""Interrupts that Python drops, and how they end the program all the same."""
+"""Deliver interrupts that Python drops."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ def keep_interrupts() -> None:
 
     Notes
     -----
-    A handler of a signal runs between any two steps of the program, and so at times within a
-    callback of a weak reference or a finalizer, whose exceptions Python reports and forgets: the
-    program would go on to its end as if nobody had asked it to stop. While matplotlib draws, one
-    interrupt of twelve falls there. It is sent again until it falls elsewhere.
+    A signal handler runs between any two steps of the program, and so at times within a callback
+    of a weak reference or a finalizer, whose exceptions Python reports and ignores: the program
+    would continue to its end. While matplotlib draws, one interrupt of twelve is lost in this way.
+    It is sent again until it is raised elsewhere.
     """
     before = sys.unraisablehook
 
@@ -39,7 +39,7 @@ def keep_interrupts() -> None:
 
 
 def _signal_of(lost: Any) -> int | None:
-    """Which signal raised what was dropped; None where it was another error."""
+    """Signal of a dropped exception; None for another error."""
     if issubclass(lost.exc_type, KeyboardInterrupt):
         return int(signal.SIGINT)
     if issubclass(lost.exc_type, SystemExit):

@@ -1,4 +1,4 @@
-"""What the samples of a run took, on the terminal."""
+"""Print the latency of the samples of a run."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ __all__ = ["print_latency"]
 
 
 def print_latency(latency: Latency, what: str) -> None:
-    """Print how long it took from a sample to its state, and how often too long.
+    """Print the latency from a sample to its state, and the missed deadlines.
 
     Parameters
     ----------

@@ -74,25 +74,25 @@ app.command("verify", epilog=verify.EPILOG)(verify.verify)
 app.command("modules", epilog=modules.EPILOG)(modules.modules)
 app.command("demo", epilog=demo.EPILOG)(demo.demo)
 
-# Line breaks of a docstring would break the lines of its help a second time.
+# Line breaks of a docstring would wrap the help twice.
 for command in (*app.registered_commands, *init.app.registered_commands):
     told = inspect.getdoc(command.callback) or ""
     command.help = "\n\n".join(part.replace("\n", " ") for part in told.split("\n\n"))
 
 
-#: Before cycles of references are looked for.
+#: Number of new objects before a garbage collection.
 NEW_OBJECTS = 20_000
 
 
 def run() -> None:
-    """Run the command line; errors that are foreseen become a message and an exit code."""
-    # Looked for cycles at each 700 new objects, as by default, drawing takes a third longer.
+    """Run the command line; expected errors become a message and an exit code."""
+    # With the default of 700 new objects, drawing takes a third longer.
     gc.set_threshold(NEW_OBJECTS)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            # A terminal that cannot show a degree sign shows a question mark.
+            # A terminal without a degree sign shows a question mark.
             stream.reconfigure(errors="replace")
-    # A terminal that closes, or a scheduler that stops a job, leaves nothing behind either.
+    # A closed terminal, or a scheduler that ends a job, must not leave partial files either.
     for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
         signal.signal(number, lambda got, _: sys.exit(128 + got))
     keep_interrupts()
@@ -120,6 +120,6 @@ def _fail(message: str, code: int) -> NoReturn:
 
 
 def _reader_gone() -> NoReturn:
-    """End quietly: the reader of our output has gone, as with ``| head``; nothing is wrong."""
+    """Exit quietly: the reader has closed the pipe, as with ``| head``, which is not an error."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.__stdout__.fileno() if sys.__stdout__ else 1)
     sys.exit(0)

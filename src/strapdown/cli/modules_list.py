@@ -1,4 +1,4 @@
-"""What can stand in each slot, as plain data: for a terminal and for a script."""
+"""Modules of each slot as plain data, for a terminal and for a script."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from strapdown.simulation.crash_scenarios import CRASHES
 
 __all__ = ["HEADINGS", "Listed", "cell_text", "listed_modules"]
 
-#: What stands in a slot that a file leaves out, where that is none of the modules.
+#: Defaults of slots that a file omits, where the default is not a module.
 _UNSAID = {"update_rule": "; where none is named, every observation counts in full"}
 
 
-#: Headings of columns on a terminal, where they are not their names for a script.
+#: Column headings on a terminal, where they differ from the names for a script.
 HEADINGS = {
     "summary": "what it is",
     "duration_s": "s",
@@ -50,7 +50,7 @@ class Listed:
         Its name for a script.
     title : str
     rows : tuple of mapping
-        By column; a text, a number, a list of texts, or None where there is nothing.
+        By column; a text, a number, a list of texts, or None if empty.
     numbers : tuple of str
         Columns of numbers.
     """
@@ -62,7 +62,7 @@ class Listed:
 
 
 def cell_text(value: Any) -> str:
-    """A cell of a list as it is printed."""
+    """Format a cell of a list for printing."""
     if isinstance(value, float):
         return f"{value:.12g}"
     if isinstance(value, list):
@@ -70,7 +70,7 @@ def cell_text(value: Any) -> str:
     return value or "–"
 
 
-#: Of each list, the kind of the plug-ins that can stand in it, and what they must be.
+#: For each list, the kind of its plug-ins, and their base class.
 _PLUGINS: dict[str, tuple[str, type]] = {
     "attitude_algorithms": ("attitude", AttitudeAlgorithm),
     "aiding": ("measurement", Measurement),
@@ -79,13 +79,13 @@ _PLUGINS: dict[str, tuple[str, type]] = {
 
 
 def listed_modules() -> tuple[tuple[Listed, ...], tuple[Finding, ...]]:
-    """Return every list, in the order in which they are printed, with what plug-ins add.
+    """Return every list in printing order, including plug-ins.
 
     Returns
     -------
     lists : tuple of Listed
     findings : tuple of Finding
-        One of each plug-in that cannot be used.
+        One for each unusable plug-in.
     """
     lists: list[Listed] = []
     findings: list[Finding] = []

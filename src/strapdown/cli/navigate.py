@@ -143,7 +143,7 @@ def navigate(
     out: Annotated[Path | None, folder_to_make("LOG-navigate")] = None,
     write: OutFlags,
 ) -> None:
-    """Find place, velocity and attitude over a record, from inertial sensors and what aids them."""
+    """Find position, velocity and attitude over a record, by inertial sensors and measurements."""
     from strapdown.api.navigation import run_specified, smoothed_too
     from strapdown.bundle.seal import check_destination, write_latency, write_timing
     from strapdown.cli.align_options import flag_of, refuse_beside_file

@@ -1,4 +1,4 @@
-"""``strapdown navigate --live``: lines in, states out, and the bundle at the end."""
+"""``strapdown navigate --live``: read lines, write states, and write the bundle at the end."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ def navigate_live(
     quiet: bool,
     given: Mapping[str, Any],
 ) -> None:
-    """Navigate by lines, and write the bundle when they end.
+    """Navigate by lines, and write the bundle at their end.
 
-    Standard output has the states and nothing else; everything else is told on standard error.
+    Standard output holds the states only; all else goes to standard error.
 
     Parameters
     ----------
@@ -54,14 +54,14 @@ def navigate_live(
         As `StateLines`.
     force, quiet : bool
     given : mapping
-        Flags that have no meaning here, by name; None where one is not given.
+        Flags without a meaning here, by name; None where not given.
 
     Raises
     ------
     ConfigError
-        There is no configuration, or a flag is given that has no meaning here.
+        The configuration is missing, or a flag without a meaning here is given.
     StrapdownError
-        The run ended by it; what came before is in the bundle, if navigation had begun.
+        The error that ended the run; the bundle holds the run up to it, if navigation had begun.
     """
     flag = next((name for name, value in given.items() if value is not None), None)
     if flag is not None or file.suffix.lower() != ".toml":
@@ -99,7 +99,7 @@ def navigate_live(
 def _sealed(
     live: LiveRun, file: Path, folder: Path, received: Path, *, force: bool, quiet: bool
 ) -> Seal:
-    """Write the bundle; what was received stays beside it where the bundle has no copy."""
+    """Write the bundle; the received input is kept beside it unless the bundle has a copy."""
     try:
         received.mkdir(parents=True)
         with progress(quiet) as show:

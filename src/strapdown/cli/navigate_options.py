@@ -18,7 +18,7 @@ from strapdown.errors import ConfigError
 
 __all__ = ["FLAGS", "navigation_of_flags"]
 
-#: Flags by the place in a specification.
+#: Flags by key path of the specification.
 FLAGS = {
     "site, lat_deg": "--lat",
     "site, lon_deg": "--lon",
@@ -35,13 +35,13 @@ FLAGS = {
 
 
 def navigation_of_flags(log: Path, given: Mapping[str, Any]) -> NavigationSpec:
-    """Return the specification that flags make, with what the log and the fixes tell.
+    """Return the specification by the flags, completed from the log and the fixes.
 
     Parameters
     ----------
     log : Path
     given : mapping
-        By flag, None where it is not given.
+        By flag, None where not given.
 
     Returns
     -------
@@ -50,7 +50,7 @@ def navigation_of_flags(log: Path, given: Mapping[str, Any]) -> NavigationSpec:
     Raises
     ------
     ConfigError
-        A value does not fit, or what is needed is not said; the message names the flag.
+        A value is invalid or missing; the message names the flag.
     DataError
         A file cannot be read.
     """

@@ -1,4 +1,4 @@
-"""What ``strapdown navigate`` prints."""
+"""Terminal output of ``strapdown navigate``."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from strapdown.systems.sins.run import NavigationResult
 
 __all__ = ["print_navigation"]
 
-# Rows of a table on the terminal; the report has all.
+# Most rows of a table on the terminal; the report has all.
 _MOST = 12
 
 
 def print_navigation(result: NavigationResult) -> None:
-    """Print where a run ended, how well that is known, and what is to be careful about."""
+    """Print the final state of a run, its uncertainty, and the warnings."""
     out = console()
     found = examine(told_of(result))
     time = result.record.trajectory.index

@@ -1,4 +1,4 @@
-"""Folders of results: how the next is named, and what is said of one that is given for a log."""
+"""Name result folders, and refuse one that is given as a log."""
 
 from __future__ import annotations
 
@@ -14,27 +14,26 @@ if TYPE_CHECKING:
 
 __all__ = ["default_folder", "refuse_result", "source_name"]
 
-#: What folders of these commands end with.
+#: Suffixes of the folders of these commands.
 ENDINGS = ("align", "attitude", "coast", "crash", "navigate", "simulated")
 
 
 def default_folder(source: str | Path, ending: str, named: str | None = None) -> Path:
-    """Return the folder that a result goes to where none is named.
+    """Return the default folder of a result.
 
     Parameters
     ----------
     source : str or Path
-        What the command was given: a log, a configuration, a folder, a name.
+        Argument of the command: a log, a configuration, a folder, a name.
     ending : str
-        The word of the command.
+        Suffix by the command.
     named : str, optional
-        Where `source` is called after a command, as ``navigate.toml``: what it is of.
+        Name of the subject, if `source` is named after a command, such as ``navigate.toml``.
 
     Returns
     -------
     Path
-        ``drive-navigate`` of ``drive.csv``, and of ``navigate.toml`` about it; no word is in it
-        twice.
+        ``drive-navigate`` for ``drive.csv``, and for its ``navigate.toml``; without repeated words.
     """
     path = Path(source)
     whole = path.resolve() if path.name in ("", ".", "..") else path
@@ -44,32 +43,32 @@ def default_folder(source: str | Path, ending: str, named: str | None = None) ->
             return Path(f"{stem}-result" if stem.lower() == ending else f"{stem}-{ending}")
         stem = Path(named).stem
     for word in ENDINGS:
-        # A result of a result is of what that was of.
+        # The result of a result is named after the first source.
         if path.is_dir() and stem.endswith(f"-{word}"):
             stem = stem.removesuffix(f"-{word}")
     return Path(stem if stem.lower().endswith(f"-{ending}") else f"{stem}-{ending}")
 
 
 def source_name(spec: AlignmentSpec | NavigationSpec) -> str:
-    """The log of a configuration, or in a word where its samples come from."""
+    """Log of a configuration, or one word for the source of its samples."""
     if spec.log is not None:
         return Path(spec.log.path).name
     return "simulated" if spec.simulation is not None else "live"
 
 
 def refuse_result(source: str | Path, wanted: str) -> None:
-    """Refuse a folder of results that is given for what a command reads.
+    """Refuse a result folder given as the input of a command.
 
     Parameters
     ----------
     source : str or Path
     wanted : str
-        What the command reads, in words.
+        Expected input, in words.
 
     Raises
     ------
     ConfigError
-        It is one; the message says of which command, and what can be done with it.
+        It is one; the message names its command, and what can be done with it.
     """
     from strapdown.bundle import read_manifest
 
@@ -77,7 +76,7 @@ def refuse_result(source: str | Path, wanted: str) -> None:
     try:
         manifest = read_manifest(path)
     except DataError:
-        # Others, too, write a file of this name; what is wrong with one of ours, verify tells.
+        # Other programs write files of this name, too; damage to one of ours is reported by verify.
         return
     command = str(manifest["command"])
     data: dict[str, Any] = {"command": command, "wanted": wanted}
@@ -93,7 +92,7 @@ def refuse_result(source: str | Path, wanted: str) -> None:
 
 
 def _hints(path: Path, command: str, manifest: Mapping[str, Any]) -> Iterator[Finding]:
-    """Yield what can be done with a folder of results."""
+    """Yield the possible commands for a result folder."""
     yield Finding("cli.hint-open", severity="note", report=path / "report.html", folder=path)
     if command == "navigate":
         yield Finding("cli.hint-coast", severity="note", folder=path)

@@ -1,7 +1,7 @@
-"""Options that commands share: the same words, in the same order, in the same group everywhere.
+"""Options common to several commands, with the same words, order and group everywhere.
 
-A command takes a set of them as one parameter (`LogFlags`, `OutFlags`), which `spread` lays out
-as the flags of the set.
+A command takes a set of options as one parameter (`LogFlags`, `OutFlags`); `spread` expands it
+into separate flags.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ OUT_PANEL = "What to write"
 
 
 def part_from(else_from: str, panel: str) -> Any:
-    """The option ``--from``, with where a part begins that does not say it."""
+    """The option ``--from``, with the default begin of a part."""
     return typer.Option(
         "--from",
         metavar="S",
@@ -69,7 +69,7 @@ def part_long(panel: str) -> Any:
 
 @dataclass(frozen=True)
 class LogFlags:
-    """Which part of a log is used, and how it is read."""
+    """Part of a log to use, and how to read it."""
 
     from_s: Annotated[float | None, part_from("the first", LOG_PANEL)] = None
     to_s: Annotated[float | None, part_to(LOG_PANEL)] = None
@@ -139,17 +139,17 @@ class LogFlags:
     ] = False
 
     def given(self) -> dict[str, Any]:
-        """By name of the flag, None where it is not given."""
+        """By name of the flag, None where not given."""
         return {**asdict(self), "repair": self.repair or None}
 
 
 def log_keys(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Keys of a configuration's ``[log]`` that flags make.
+    """Keys of a configuration's ``[log]`` by the flags.
 
     Parameters
     ----------
     given : mapping
-        As `LogFlags.given`; what else is in it is not looked at.
+        As `LogFlags.given`; other entries are ignored.
 
     Returns
     -------
@@ -158,7 +158,7 @@ def log_keys(given: Mapping[str, Any]) -> dict[str, Any]:
     Raises
     ------
     ConfigError
-        A column is not named as it can be, or the part of the log is none.
+        A column name or the part of the log is invalid.
     """
     from strapdown.formats.columns import parse_column_option
     from strapdown.systems.part_of_log import check_part
@@ -179,7 +179,7 @@ def log_keys(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def folder_to_make(name: str) -> Any:
-    """The option ``--out`` of a command that makes a folder, with the name that it has else."""
+    """The option ``--out`` of a command that creates a folder, with its default name."""
     return typer.Option(
         metavar="DIR",
         help=f"Folder to make ({name}).",
@@ -195,7 +195,7 @@ Force = Annotated[
 
 
 def log_level(level: int) -> Callable[[bool], bool]:
-    """A callback of a flag that sets from which level on messages of the logger are shown."""
+    """Callback of a flag that sets the lowest level of shown log messages."""
 
     def shown(asked: bool) -> bool:
         if asked:
@@ -235,7 +235,7 @@ Json = Annotated[
 
 @dataclass(frozen=True)
 class WriteFlags:
-    """What becomes of a result that is there, and whether anything is printed."""
+    """Whether to replace an existing result, and whether to print."""
 
     force: Force = False
     quiet: Quiet = False
@@ -244,7 +244,7 @@ class WriteFlags:
 
 @dataclass(frozen=True)
 class OutFlags:
-    """`WriteFlags`, of a command that can print its result as JSON."""
+    """`WriteFlags` for a command that can print its result as JSON."""
 
     force: Force = False
     json: Json = False
@@ -253,7 +253,7 @@ class OutFlags:
 
 
 def spread(command: Callable[..., None]) -> Callable[..., None]:
-    """Lay the sets of options that a command takes out as the flags of the sets.
+    """Expand the option sets of a command into separate flags.
 
     Parameters
     ----------
@@ -263,7 +263,7 @@ def spread(command: Callable[..., None]) -> Callable[..., None]:
     Returns
     -------
     callable
-        The same command with a parameter for each option, where the set stood.
+        The same command with a parameter for each option instead of the set.
     """
     hints = get_type_hints(command, include_extras=True)
     hints.pop("return", None)
@@ -287,7 +287,7 @@ def spread(command: Callable[..., None]) -> Callable[..., None]:
         }
         command(**given, **made)
 
-    # What typer reads; the command itself would tell it of the sets.
+    # Signature for typer; that of the command itself has the sets.
     told: Any = run
     del told.__wrapped__
     told.__signature__ = inspect.Signature(laid_out)

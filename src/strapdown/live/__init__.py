@@ -1,1 +1,1 @@
-"""The same chain at the pace of a clock: a record played to it, or samples as they come."""
+"""Run a navigation pipeline in real time: replayed records and live samples."""

@@ -1,4 +1,4 @@
-"""The clock by which samples are delivered: that of the machine, or one that a test turns."""
+"""Clock for the delivery of samples: that of the machine, or one controlled by a test."""
 
 from __future__ import annotations
 
@@ -7,29 +7,29 @@ from typing import Protocol
 
 __all__ = ["Clock", "MachineClock"]
 
-#: A sleep may end so much later than it was asked to; the rest is waited for awake, s.
+#: Possible delay of the end of a sleep, s; the remaining time is waited actively.
 AWAKE = 1e-3
 
 
 class Clock(Protocol):
-    """Seconds that never go back."""
+    """Monotonic time in seconds."""
 
     def now(self) -> float:
-        """Seconds since any instant."""
+        """Seconds since an arbitrary instant."""
 
     def wait_until(self, instant: float) -> None:
-        """Return at an instant, or at once where it is past."""
+        """Return at an instant, or at once if it is past."""
 
 
 class MachineClock:
     """The monotonic clock of the machine."""
 
     def now(self) -> float:
-        """Seconds since any instant."""
+        """Seconds since an arbitrary instant."""
         return time.perf_counter()
 
     def wait_until(self, instant: float) -> None:
-        """Return at an instant, or at once where it is past."""
+        """Return at an instant, or at once if it is past."""
         left = instant - self.now()
         if left > AWAKE:
             time.sleep(left - AWAKE)

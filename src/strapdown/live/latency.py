@@ -1,4 +1,4 @@
-"""From a sample to the state that follows from it: how long, and how often too long."""
+"""Latency from a sample to its state, and missed deadlines."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ __all__ = ["Latency", "LatencyTape"]
 
 @dataclass(frozen=True)
 class Latency:
-    """What the samples of a run took.
+    """Latency of the samples of a run.
 
     Attributes
     ----------
     samples : int
     median, most, largest : float, s
-        From the delivery of a sample to its state; `most` is what 99 of 100 do not exceed.
+        From the delivery of a sample to its state; `most` is the 99th percentile.
     mean : float, s
     missed : int or None
-        States that came later than the next sample was due; None where nothing was due.
+        States later than the next sample's due time; None without due times.
     behind : float, s, or None
-        The most by which one did.
+        The largest such delay.
     """
 
     samples: int
@@ -37,7 +37,7 @@ class Latency:
     behind: float | None
 
     def told(self) -> Mapping[str, float | int | None]:
-        """By names with units, as ``latency.json`` has them."""
+        """Values by names with units, as in ``latency.json``."""
         return {
             "samples": self.samples,
             "median_ms": _ms(self.median),
@@ -54,27 +54,26 @@ def _ms(seconds: float) -> float:
 
 
 class LatencyTape:
-    """Takes when each sample was delivered, and when its state was there."""
+    """Collect the times of delivery and of the state of each sample."""
 
     def __init__(self) -> None:
         self._took = array("d")
         self._late = array("d")
 
     def take(self, delivered: float, done: float, deadline: float = math.nan) -> None:
-        """Take one sample.
+        """Add one sample.
 
         Parameters
         ----------
         delivered, done : float, s
         deadline : float, s
-            When its state has to be there: when the next sample is due; not a number where
-            nothing is due.
+            Due time of the next sample, by which the state is needed; NaN without due times.
         """
         self._took.append(done - delivered)
         self._late.append(done - deadline)
 
     def latency(self) -> Latency | None:
-        """Return what was taken; None where nothing was."""
+        """Return the collected latency; None without samples."""
         if not self._took:
             return None
         took, late = np.array(self._took), np.array(self._late)

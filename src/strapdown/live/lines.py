@@ -1,13 +1,13 @@
-"""Lines of a live run: samples, what aids measured, and commands, by commas.
+"""Line protocol of a live run: comma-separated samples, measurements and commands.
 
 ::
 
     imu,TIME,GX,GY,GZ,AX,AY,AZ        rad/s and m/s², axes of the sensors
-    NAME,TIME,COLUMN=VALUE,…          what the aid NAME measured
+    NAME,TIME,COLUMN=VALUE,…          measurement of the aid NAME
     command,WORD                      next, fine, navigation; end
-    TIME,4,GX,GY,GZ,3,AX,AY,AZ,…      as Sensorstream sends them
+    TIME,4,GX,GY,GZ,3,AX,AY,AZ,…      as sent by Sensorstream
 
-Blanks around commas, empty lines and those that begin with ``#`` mean nothing.
+Blanks around commas, empty lines and lines that begin with ``#`` are ignored.
 """
 
 from __future__ import annotations
@@ -49,27 +49,27 @@ __all__ = [
 ]
 
 
-#: The word that ends a run.
+#: Command that ends a run.
 END = "end"
 IMU, COMMAND = "imu", "command"
-#: Blocks of Sensorstream.
+#: Block numbers of Sensorstream.
 _ACCEL, _GYRO = 3, 4
 _FORM = "imu,TIME,GX,GY,GZ,AX,AY,AZ"
-#: Characters of a line that a message shows.
+#: Most characters of a line in a message.
 LONGEST = 40
 
 
 class BadLineError(Exception):
-    """A line that cannot be used; it is left out.
+    """Invalid line, which is ignored.
 
     Parameters
     ----------
     kind : str
-        What all lines of its kind have in common, by which they are counted.
+        Category for counting such lines.
     code : str or Finding
-        As of `StrapdownError`.
+        As in `StrapdownError`.
     **data
-        As of `Finding`.
+        As in `Finding`.
     """
 
     def __init__(self, kind: str, code: str | Finding, /, **data: Any) -> None:
@@ -88,7 +88,7 @@ class Sample:
 
 @dataclass(frozen=True)
 class Measured:
-    """What an aid measured."""
+    """Measurement of an aid."""
 
     name: str
     time: float
@@ -103,23 +103,23 @@ class Word:
 
 
 def parse_line(text: str, aids: Sequence[str]) -> Sample | Measured | Word | None:
-    """Read a line.
+    """Parse a line.
 
     Parameters
     ----------
     text : str
     aids : sequence of str
-        Names of those that take what they measured.
+        Names of the measurements that lines may hold.
 
     Returns
     -------
     Sample, Measured, Word or None
-        None of a line that says nothing.
+        None for an ignored line.
 
     Raises
     ------
     BadLineError
-        It has another form, or a number in it is none.
+        The line has another format, or an invalid number.
     """
     text = text.strip()
     if not text or text.startswith("#"):
@@ -190,7 +190,7 @@ def _shown(text: str) -> str:
     return text if len(text) <= LONGEST else f"{text[:LONGEST]}…"
 
 
-# What an aid measured, a line at a time: as a row of its table, and all rows as a file.
+# Measurements received line by line: as rows of a table, and all rows as a file.
 
 
 Array = NDArray[np.float64]
@@ -203,13 +203,13 @@ _UNITS_OF_FIXES = {
 
 
 class AidRows:
-    """The rows that came of one aid.
+    """Rows received for one measurement.
 
     Parameters
     ----------
     aid : TabulatedMeasurement
     given : AidSpec
-        What the configuration says in place of what is sent: standard deviations of fixes.
+        Configuration, whose standard deviations of fixes replace received ones.
     """
 
     def __init__(self, aid: TabulatedMeasurement, given: AidSpec) -> None:
@@ -223,26 +223,26 @@ class AidRows:
 
     @property
     def newest(self) -> float:
-        """Stamp of the newest row that was kept, s."""
+        """Stamp of the newest kept row, s."""
         return self._time[-1] if self._time else -math.inf
 
     @property
     def count(self) -> int:
-        """Rows that were kept."""
+        """Number of kept rows."""
         return len(self._time)
 
     def row(self, values: Mapping[str, float]) -> list[float]:
-        """Put what a line says in the order of the table.
+        """Arrange the values of a line in the order of the table.
 
         Parameters
         ----------
         values : mapping of str to float
-            By column; of a fix, velocity, standard deviations and quality may be left out.
+            By column; a fix may omit velocity, standard deviations and quality.
 
         Raises
         ------
         BadLineError
-            A column is missing, or is none of the table.
+            A column is missing or unknown.
         """
         name = self.aid.name
         for column in values:
@@ -256,7 +256,7 @@ class AidRows:
         return [float(whole[column]) for column in self._columns]
 
     def _whole_fix(self, values: dict[str, float]) -> dict[str, float]:
-        """A fix with what the configuration says; what was not measured is not known."""
+        """Complete a fix from the configuration; missing quantities are NaN."""
         if self._position_sd is not None:
             values |= dict(zip(POSITION_SD, self._position_sd, strict=True))
         if not set(values) & {*VELOCITY, *VELOCITY_SD}:
@@ -266,7 +266,7 @@ class AidRows:
         return {"quality": 1.0, **values}
 
     def table(self, time: float, row: list[float]) -> pd.DataFrame:
-        """A row as the aid takes it."""
+        """Convert a row to a table of the measurement."""
         values = np.array([row])
         if self.of_fixes:
             none = np.isnan(values)
@@ -279,12 +279,12 @@ class AidRows:
         return table
 
     def keep(self, time: float, row: list[float]) -> None:
-        """Keep a row that the chain was told."""
+        """Keep a row that the pipeline has received."""
         self._time.append(time)
         self._rows.append(row)
 
     def write(self, path: Path) -> None:
-        """Write the rows as a file that is read to the same numbers."""
+        """Write the rows to a file that reads back to the same numbers."""
         values = np.array(self._rows)
         units = _UNITS_OF_FIXES
         if not self.of_fixes:
@@ -302,18 +302,18 @@ def _three(value: float | tuple[float, float, float] | None) -> list[float] | No
     return None if value is None else [float(v) for v in np.broadcast_to(value, 3)]
 
 
-# The newest state as a line: JSON or by commas.
+# The newest state as a line of JSON or CSV.
 
 STATE = [*GEODETIC, *VELOCITY, *EULER]
 SD = [*POSITION_SD, *VELOCITY_SD, *(f"{angle}_sd" for angle in EULER)]
 LINE_FORMS = ("json", "csv")
-# Decimals: 0.1 mm of a place, and as much of an angle at 6 km.
+# Decimals: 0.1 mm of a position, and as much of an angle at 6 km.
 _FINE, _COARSE = 9, 6
 _DECIMALS = {name: _FINE if name in ("lat", "lon") else _COARSE for name in (*STATE, *SD)}
 
 
 class StateLines:
-    """Writes a line for the newest state, at most every so many seconds of the record.
+    """Write a line for the newest state, at a limited rate.
 
     Parameters
     ----------
@@ -322,12 +322,12 @@ class StateLines:
         Takes a line with its end.
     form : {'json', 'csv'}
     every : float, s
-        Of the stamps; zero for each sample.
+        Least interval between lines, by stamps; zero for each sample.
 
     Raises
     ------
     ConfigError
-        There is no such form.
+        Unknown format.
     """
 
     def __init__(
@@ -347,11 +347,11 @@ class StateLines:
         self._begun = False
 
     def take(self, piece: PipelineChunk) -> None:
-        """Take what came of a sample."""
+        """Write the state after a chunk, if due."""
         for navigation in piece.navigation:
             if navigation.marks:
                 self._mark = navigation.marks[-1]
-        # A stamp is a decimal fraction that was rounded.
+        # Stamps are rounded decimal fractions.
         if not math.isfinite(piece.time) or piece.time < self._next - 1e-9:
             return
         self._next = piece.time + self._every

@@ -1,4 +1,4 @@
-"""A record played to the chain sample by sample, each when it is due."""
+"""Replay a record to a pipeline sample by sample, each when it is due."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from strapdown.tables.checks import source_of
 
 __all__ = ["Replay", "before_stamp", "parse_pace"]
 
-#: How often progress is told, s of the record.
+#: Interval of progress reports, s of the record.
 TOLD = 1.0
 
 
 def parse_pace(text: str) -> float:
-    """Read a pace.
+    """Parse a pace.
 
     Parameters
     ----------
     text : str
-        How many seconds of the record pass in one; ``max`` for as many as can.
+        Seconds of the record per second; ``max`` for as many as possible.
 
     Returns
     -------
@@ -41,7 +41,7 @@ def parse_pace(text: str) -> float:
     Raises
     ------
     ConfigError
-        It is no pace.
+        The text is not a pace.
     """
     if text.strip().lower() == "max":
         return math.inf
@@ -55,16 +55,16 @@ def parse_pace(text: str) -> float:
 
 
 class Replay:
-    """Drives a chain by a clock: what `run_navigation` takes in place of a run at once.
+    """Run a pipeline by a clock; passed to `run_navigation` instead of `run_batch`.
 
-    A sample is delivered when its stamp is due, or as soon as the one before it is done; rows of
-    the tables of aids with the first sample that is not before them. The numbers are those of a
-    run at once to the last bit.
+    A sample is delivered when its stamp is due, or as soon as the one before it is processed;
+    measurement rows precede the first sample that is not before them. The numbers equal those of
+    `run_batch` to the last bit.
 
     Parameters
     ----------
     pace : float
-        Seconds of the record a second; infinite for as fast as it goes.
+        Seconds of the record per second; infinite for no limit.
     clock : Clock, optional
         That of the machine, if not given.
     """
@@ -82,7 +82,7 @@ class Replay:
         recorder: Recorder | None = None,
         progress: Progress = silent,
     ) -> PipelineRun:
-        """Run a chain, as `systems.sins.drive.run_batch`."""
+        """Run a pipeline, as `systems.sins.drive.run_batch`."""
         warm_up(chain, imu.attrs["sampling"])
         recording, clock = Recording(chain, recorder), self._clock
         stamps = imu.index.to_numpy(dtype=np.float64)
@@ -105,12 +105,12 @@ class Replay:
 
 
 def _ahead(chain: NavigationPipeline, tables: Mapping[str, pd.DataFrame]) -> float:
-    """By how much rows must be told before their stamps: what they tell may be of before."""
+    """Time by which rows must precede their stamps, as they may measure an earlier instant."""
     return max((before_stamp(chain.navigator.by_name[name]) for name in tables), default=0.0)
 
 
 def before_stamp(aid: Measurement) -> float:
-    """By how much what a row tells is of before its stamp, s: known offsets and delays.
+    """Time by which a measurement precedes its stamp, s: known offsets and delays.
 
     Parameters
     ----------

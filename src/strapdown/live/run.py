@@ -1,4 +1,4 @@
-"""A live run, from its first line to everything that a report tells."""
+"""Live run from its first line to all results of a report."""
 
 from __future__ import annotations
 
@@ -56,16 +56,16 @@ __all__ = ["LiveRun", "Reception", "live_spec", "receive", "result_of", "write_r
 
 @dataclass(frozen=True, eq=False)
 class LiveRun:
-    """What was received, and what the chain made of it.
+    """Received input and result of a live run.
 
     Attributes
     ----------
     spec : NavigationSpec
     got : Reception
     run : PipelineRun or None
-        None where navigation never began.
+        None if navigation never began.
     error : StrapdownError or None
-        What ended it before its time.
+        Error that ended the run early.
     """
 
     spec: NavigationSpec
@@ -79,7 +79,7 @@ class LiveRun:
         return self.got.tape.latency()
 
     def told(self) -> Mapping[str, Any]:
-        """What ``latency.json`` says of it."""
+        """Content of ``latency.json``."""
         latency = self.latency
         return {
             **({} if latency is None else latency.told()),
@@ -99,18 +99,18 @@ def receive(
     form: str = "json",
     every: float = 1.0,
 ) -> LiveRun:
-    """Navigate by lines until they end, an ``end`` is commanded, or a signal comes.
+    """Navigate by lines until they end, an ``end`` command, or a signal.
 
     Parameters
     ----------
     spec : NavigationSpec
-        With `live`, and without record (`live_spec`).
+        With `live`, and without a record (`live_spec`).
     source : LineSource
     clock : Clock
     write : callable
-        Given each line of the state.
+        Called with each line of the state.
     warn : callable
-        Given each finding.
+        Called with each finding.
     form, every
         As `StateLines`.
 
@@ -121,7 +121,7 @@ def receive(
     Raises
     ------
     ConfigError
-        The chain cannot be made.
+        The pipeline cannot be built.
     """
     with closing(source):
         chain = make_chain(spec, sensors_of(spec))
@@ -151,14 +151,14 @@ def receive(
 def result_of(
     live: LiveRun, folder: Path, file: Path | None = None, progress: Progress = silent
 ) -> NavigationResult:
-    """Write what was received, and return the result of the run over it.
+    """Write the received input, and return the result of the run over it.
 
     Parameters
     ----------
     live : LiveRun
         With a run.
     folder : Path
-        For what was received.
+        Destination of the received input.
     file : Path, optional
         The configuration.
     progress : callable, optional
@@ -166,8 +166,8 @@ def result_of(
     Returns
     -------
     NavigationResult
-        Of the states that were computed while the samples came. Where the record would be read to
-        other numbers, of the record: the result is always what can be run again.
+        From the states computed in real time. If reading the record back gives other numbers, from
+        the record: the result can always be reproduced.
 
     Raises
     ------
@@ -192,7 +192,7 @@ def result_of(
 
 
 class _Reader:
-    """Who reads the lines; when nobody does, the run ends."""
+    """Reader of the state lines; when it closes the pipe, the run ends."""
 
     def __init__(self, write: Callable[[str], None]) -> None:
         self._write = write
@@ -208,7 +208,7 @@ class _Reader:
 
 @contextmanager
 def _until_a_signal() -> Iterator[Callable[[], bool]]:
-    """Let the first of SIGINT and SIGTERM end the run in good order; the next one ends it all."""
+    """End the run in order at the first SIGINT or SIGTERM, and at once at the next one."""
     came: list[int] = []
     before: dict[int, Any] = {}
 
@@ -227,7 +227,7 @@ def _until_a_signal() -> Iterator[Callable[[], bool]]:
             signal.signal(asked, before[asked])
 
 
-# What a live run received, as a record: the same numbers again, at once.
+# The received input as a record, which reproduces the numbers in batch.
 
 
 SAMPLES = "received.csv"
@@ -243,12 +243,12 @@ def _plain(spec: NavigationSpec) -> dict[str, Any]:
 
 
 def live_spec(spec: NavigationSpec) -> NavigationSpec:
-    """Return a specification that takes from lines what it would take from files.
+    """Return a specification that reads from lines instead of files.
 
     Parameters
     ----------
     spec : NavigationSpec
-        With ``[live]``, or of a record: what it says of the record's files is left out.
+        With ``[live]``, or of a record, whose files are then ignored.
 
     Returns
     -------
@@ -263,27 +263,27 @@ def live_spec(spec: NavigationSpec) -> NavigationSpec:
 
 
 def write_received(spec: NavigationSpec, got: Reception, folder: Path) -> NavigationSpec:
-    """Write what a chain was given, and return the specification of a run over it.
+    """Write the input of a pipeline, and return the specification of a run over it.
 
     Parameters
     ----------
     spec : NavigationSpec
-        By which it was received.
+        Specification of the live run.
     got : Reception
     folder : Path
-        Where it is written: ``received.csv`` in body axes, and a file for each aid.
+        Destination: ``received.csv`` in body axes, and a file for each measurement.
 
     Returns
     -------
     NavigationSpec
-        Its aids without a row have no file.
+        Measurements without a row have no file.
     """
     whole = _plain(spec)
     samples = got.samples
     imu = pd.DataFrame(samples[:, 1:], index=samples[:, 0], columns=[*GYRO, *ACCEL])
     imu.attrs["sampling"] = got.sampling
     LOG_WRITERS["csv"](folder / SAMPLES, imu, None)
-    # Without what the reader may learn from the numbers: it is known.
+    # Without properties that the reader infers from the numbers: they are known.
     whole["log"] = {
         "path": str(folder / SAMPLES),
         "sampling": got.sampling,
@@ -298,14 +298,14 @@ def write_received(spec: NavigationSpec, got: Reception, folder: Path) -> Naviga
             rows.write(path)
             whole["aiding"][name]["path"] = str(path)
     if not all(rows.count for rows in got.rows.values()):
-        # Of an aid that sent nothing there is nothing to keep back.
+        # A measurement without rows cannot be withheld.
         whole.pop("withhold", None)
     commands = [one.model_dump(mode="json") for one in got.commands]
     whole["commands"] = [*whole.get("commands", []), *commands]
     return navigation_spec(whole)
 
 
-# Lines to a chain: what is in time, what is late, and what cannot be used.
+# From lines to the pipeline: timely, late and invalid lines.
 
 
 Array = NDArray[np.float64]
@@ -318,35 +318,35 @@ class _Waiting:
 
 
 class Reception:
-    """Gives a chain the samples of lines, and keeps what it was given.
+    """Pass the samples of lines to a pipeline, and record its input.
 
-    A sample waits until one comes that is `hold_s` later, by the stamps and not by a clock: what
-    an aid sends meanwhile is still in time, and the numbers do not depend on how busy the machine
-    is. What comes later than that is counted, and not used; so a run over what was kept gives the
+    A sample waits until one arrives that is `hold_s` later, by the stamps, not by a clock:
+    measurements that arrive meanwhile are still in time, and the numbers do not depend on the load
+    of the machine. Later ones are counted, not used; so a run over the recorded input gives the
     same numbers.
 
     Parameters
     ----------
-    chain : Chain
+    chain : NavigationPipeline
     spec : NavigationSpec
         With `live`.
     recording : Recording
     clock : Clock
     show : callable
-        Given the piece of each sample.
+        Called with the output chunk of each sample.
     warn : callable
-        Given a finding for each first line of its kind that is not used.
+        Called with a finding for each first unused line of its kind.
 
     Attributes
     ----------
     tape : LatencyTape
         From the line that made a sample due to its state.
     unused : Counter
-        Lines that were not used, by kind.
+        Unused lines, by kind.
     late : Counter
-        Rows of aids that came too late, by name.
+        Measurement rows that arrived too late, by name.
     error : StrapdownError or None
-        What the chain refused a sample with: the run ends before it.
+        Error of the pipeline at a sample: the run ends before it.
     """
 
     def __init__(
@@ -383,21 +383,21 @@ class Reception:
 
     @property
     def samples(self) -> Array:
-        """Stamps and values that the chain was given, body axes, (n, 7)."""
+        """Stamps and values passed to the pipeline, body axes, (n, 7)."""
         return self._samples.rows
 
     @property
     def sampling(self) -> str:
-        """Of the samples."""
+        """Kind of the samples: 'instantaneous' or 'mean'."""
         return self._live.sampling
 
     def take(self, line: Line) -> bool:
-        """Take a line.
+        """Process a line.
 
         Returns
         -------
         bool
-            Whether the run goes on.
+            Whether the run continues.
         """
         self.lines += 1
         try:
@@ -415,7 +415,7 @@ class Reception:
         return self.error is None
 
     def finish(self) -> None:
-        """Navigate what waits, and end the run of the chain.
+        """Process the waiting samples, and end the run of the pipeline.
 
         Raises
         ------
@@ -437,21 +437,21 @@ class Reception:
                 values[part] = turn @ values[part]
         self._waiting.append(_Waiting(time, values))
         self._newest = time
-        # Stamps are decimal fractions that were rounded.
+        # Stamps are rounded decimal fractions.
         while self._waiting and self._waiting[0].time <= time - self._live.hold_s + SAME_INSTANT:
             self._advance(arrived)
             if self.error is not None:
                 return
 
     def _own(self, stamp: float) -> float:
-        """A stamp as the reader of the record will have it, to the last bit."""
+        """A stamp as the record's reader will parse it, to the last bit."""
         if math.isnan(self._origin):
             self._origin = stamp if abs(stamp) > EPOCH else 0.0
             self._first = stamp - self._origin
         return self._first + ((stamp - self._origin) - self._first)
 
     def _advance(self, arrived: float) -> None:
-        """Give the chain the sample that has waited longest."""
+        """Pass the oldest waiting sample to the pipeline."""
         one = self._waiting[0]
         state = self._state
         for word in self._words:
@@ -515,7 +515,7 @@ class Reception:
 
 
 def _turns(spec: NavigationSpec) -> tuple[Array | None, Array | None]:
-    """Sensor axes to body, of gyros and accelerometers."""
+    """Rotation from sensor to body axes, of gyros and accelerometers."""
     gyro, accel = axes_matrices(spec.axes)
     if gyro is None and spec.axes.axes is not None:
         axis, sign = parse_axes(spec.axes.axes)

@@ -1,4 +1,4 @@
-"""Where lines come from: standard input or datagrams, read beside the run by a thread."""
+"""Sources of lines: standard input or datagrams, read by a thread."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from strapdown.live.clock import Clock
 
 __all__ = ["Line", "LineSource", "open_source"]
 
-#: Lines that wait at most; a pipe then waits too, and the system drops datagrams.
+#: Most waiting lines; beyond them a pipe blocks, and the system drops datagrams.
 WAITING = 20_000
-#: Longest line, bytes; a longer one is cut there, and neither part of it can be used.
+#: Longest line, bytes; a longer one is split there, and both parts are unusable.
 LONGEST = 4096
-#: How often a thread looks whether it is wanted, s.
+#: Interval at which a thread checks whether to stop, s.
 LOOK = 0.2
 _LOCAL = "127.0.0.1"
 
 
 @dataclass(frozen=True)
 class Line:
-    """A line as it came.
+    """Received line.
 
     Attributes
     ----------
@@ -44,18 +44,18 @@ class Line:
 
 
 class LineSource:
-    """Lines in the order in which they come.
+    """Lines in order of arrival.
 
     Parameters
     ----------
     name : str
         For messages.
     read : callable
-        Returns bytes; none at the end; raises `TimeoutError` where nothing came.
+        Returns bytes; empty at the end; raises `TimeoutError` if no data arrived.
     clock : Clock
     close : callable
     whole : bool
-        Whether what is read at a time ends with a line.
+        Whether each read ends with a complete line.
     """
 
     def __init__(
@@ -74,7 +74,7 @@ class LineSource:
         self._thread = threading.Thread(target=self._run, name=f"lines of {name}", daemon=True)
 
     def begin(self) -> None:
-        """Begin to read."""
+        """Start to read."""
         self._thread.start()
 
     def next(self, wait: float = LOOK) -> Line | None:
@@ -83,7 +83,7 @@ class LineSource:
         Raises
         ------
         TimeoutError
-            None came for so many seconds.
+            No line arrived within the timeout.
         """
         try:
             return self._queue.get(timeout=wait)
@@ -91,7 +91,7 @@ class LineSource:
             raise TimeoutError from None
 
     def close(self) -> None:
-        """Read no more."""
+        """Stop reading."""
         self._wanted = False
         self._close()
 
@@ -129,13 +129,13 @@ class LineSource:
 
 
 def open_source(where: str, clock: Clock, stdin: IO[bytes]) -> LineSource:
-    """Open what a person names.
+    """Open a source by its name.
 
     Parameters
     ----------
     where : str
-        ``-`` for standard input, or ``udp://HOST:PORT``; without a host that of this machine
-        alone. Port 0 takes a free one.
+        ``-`` for standard input, or ``udp://HOST:PORT``; without a host, for this machine only.
+        Port 0 selects a free one.
     clock : Clock
     stdin : file
 
@@ -146,7 +146,7 @@ def open_source(where: str, clock: Clock, stdin: IO[bytes]) -> LineSource:
     Raises
     ------
     ConfigError
-        It names nothing that lines can come from, or the port is taken.
+        It does not name a source of lines, or the port is in use.
     """
     if where == "-":
         # A thread in a buffered read holds its lock to the end of the process.

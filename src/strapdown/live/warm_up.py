@@ -1,4 +1,4 @@
-"""Everything that is compiled, or loaded late, before the first sample comes."""
+"""Compile and load everything before the first sample."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from strapdown.tables import gnss_table, imu_table
 
 __all__ = ["warm_up"]
 
-#: Rows of a rest: as many as an intake looks at before the first step, and some more.
+#: Samples of a rest: more than a preprocessor needs before the first step.
 ROWS, STEP = 80, 0.01
 
 
 def warm_up(chain: NavigationPipeline, sampling: str = "mean") -> None:
-    """Navigate a rest of less than a second by a copy of a chain; nothing of it is kept.
+    """Navigate a rest of less than a second with a copy of a pipeline, and discard the result.
 
     Parameters
     ----------
-    chain : Chain
+    chain : NavigationPipeline
     sampling : {'instantaneous', 'mean'}
     """
     time = STEP * np.arange(ROWS)
     force = np.tile([0.0, 0.0, -STANDARD_GRAVITY], (ROWS, 1))
-    # A sensor that repeats itself would be no rest to some who watch.
+    # Some detectors do not accept constant readings as a rest.
     force[1::2, 0] += 1e-3
     imu = imu_table(time, 1e-5 * force[:, [0, 0, 0]], force, sampling=sampling)
     here = NavState.from_degrees(45.0, 20.0, 0.0)
@@ -46,13 +46,13 @@ def warm_up(chain: NavigationPipeline, sampling: str = "mean") -> None:
         commands=(),
         intake=replace(chain.intake, gaps=GapPolicy()),
     )
-    # What cannot be done with this rest may well be done with the record.
+    # An error on this rest does not mean an error on the record.
     with suppress(StrapdownError):
         run_by_sample(own, imu, _fixes(chain))
 
 
 def _fixes(chain: NavigationPipeline) -> dict[str, pd.DataFrame]:
-    """Two fixes of each receiver that tells the first of them in time."""
+    """Two fixes of each receiver, the first in the middle of the rest."""
     at = 0.5 * ROWS * STEP
     return {
         aid.name: gnss_table(

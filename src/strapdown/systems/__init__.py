@@ -1,1 +1,1 @@
-"""The systems of the three papers, as thin compositions of what stands below."""
+"""The systems of the three papers, composed of the lower layers."""

@@ -1,4 +1,4 @@
-"""The file of an alignment to begin with: what a log tells filled in, what it does not asked."""
+"""Write a proposed alignment configuration from a log, with the open questions."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ from strapdown.systems.alignment_source import body_record
 
 __all__ = ["AlignmentDraft", "draft_alignment", "listed_kinds", "log_table_keys", "toml_value"]
 
-#: Of the catalogue those that can find north, or nearly.
+#: Grades of the catalogue with gyros for gyrocompassing, or nearly.
 GRADES = ("navigation", "tactical")
 
 
 @dataclass(frozen=True)
 class AlignmentDraft:
-    """A file of an alignment as text.
+    """Proposed alignment configuration as text.
 
     Attributes
     ----------
     text : str
     found : tuple of str
-        What the log told.
+        Findings from the log.
     asked : tuple of Asked
-        What only the user knows.
+        Questions that the user has to answer.
     findings : tuple of Finding
-        Of reading the log.
+        Findings of reading the log.
     """
 
     text: str
@@ -48,16 +48,16 @@ class AlignmentDraft:
 
 
 def draft_alignment(log: LogTable, *, folder: Path, axes: str | None = None) -> AlignmentDraft:
-    """Write the file of an alignment of a log.
+    """Write the proposed alignment configuration of a log.
 
     Parameters
     ----------
     log : LogTable
-        With a path that can be opened.
+        With a readable path.
     folder : Path
-        Where the file will stand: the log is named from there.
+        Folder of the configuration; the log is named relative to it.
     axes : str, optional
-        How the sensor's axes lie, as `AxesTable.axes`.
+        Orientation of the sensor's axes, as `AxesTable.axes`.
 
     Returns
     -------
@@ -100,7 +100,7 @@ def _log(page: Page, log: LogTable, folder: Path, name: str, imu: pd.DataFrame) 
 
 
 def log_table_keys(page: Page, log: LogTable, folder: Path) -> None:
-    """Write the keys of ``[log]`` that the user said, the log named from the file's folder."""
+    """Write the keys of ``[log]`` that the user stated, with the path relative to the folder."""
     page.path("path", Path(log.path), folder)
     if log.columns:
         page.key("columns", inline(log.columns))
@@ -174,7 +174,7 @@ def _stage(page: Page, slot: Slot, default: str, empty: bool) -> None:
 
 
 def listed_kinds(slot: Slot, empty: bool) -> list[str]:
-    """One line a kind of a slot, for comments; with ``none``, where it may stay empty."""
+    """List the kinds of a slot for comments, one per line; with ``none`` if it may be empty."""
     kinds = {kind: _summary(entry) for kind, entry in slot.entries.items()}
     if empty:
         kinds["none"] = "left out"
@@ -188,7 +188,7 @@ def _summary(entry: type) -> str:
 
 
 def toml_value(value: Any) -> str | None:
-    """A plain value of TOML; None for what is none."""
+    """Format a plain TOML value; None for other values."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, int | float):

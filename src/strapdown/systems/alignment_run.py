@@ -1,4 +1,4 @@
-"""An alignment, from its specification to everything that a report tells."""
+"""Alignment from its specification to all results of a report."""
 
 from __future__ import annotations
 
@@ -55,32 +55,32 @@ __all__ = [
 
 @dataclass(frozen=True, eq=False)
 class AlignmentResult:
-    """Everything that came of an alignment.
+    """Result of an alignment.
 
     Attributes
     ----------
     spec : AlignmentSpec
-        Resolved: every option of every module.
+        With every option of every module.
     source : AlignmentSource
     imu : DataFrame
-        Imu table as it was aligned, after the pre-filter.
+        Aligned Imu table, after the pre-filter.
     prefilter : PrefilterReport or None
     site : Site
     sensors : ImuUncertainty
     coarse : Alignment
     fine : FineResult or None
     start, end : Alignment
-        The answer at the first and at the last sample.
+        The result at the first and at the last sample.
     attitude : DataFrame
-        Attitude table over the record: the answer, carried by the gyros.
+        Attitude table over the record: the result, propagated by the gyros.
     readiness : AlignmentReadiness
     manoeuvres : tuple of Manoeuvre
-        What a turn and a further rest would make known; empty without a fine alignment.
+        Accuracy after a turn and a further rest; empty without a fine alignment.
     inputs : tuple of InputFiles
     unread : tuple of Finding
-        Of channels that read nothing for a while.
+        Intervals in which channels are silent.
     findings : tuple of Finding
-        Of reading, channels, pre-filter, coarse and fine alignment, in this order.
+        From reading, channels, pre-filter, coarse and fine alignment, in this order.
     """
 
     spec: AlignmentSpec
@@ -112,7 +112,7 @@ def run_alignment(
     spec : AlignmentSpec
         With absolute paths.
     file : Path, optional
-        Where it was read from: an input, too.
+        Configuration file, listed as an input.
     progress : callable, optional
         Called with a stage and the share that is done.
 
@@ -123,12 +123,12 @@ def run_alignment(
     Raises
     ------
     ConfigError
-        A file is not there, or an option cannot be.
+        A file does not exist, or an option is invalid.
     DataError
-        The record cannot be read, or it cannot give the attitude; the message names file, row,
+        The record cannot be read, or does not determine the attitude; the message names file, row,
         quantity and remedy.
     DivergenceError
-        The filter left what a body at rest can do.
+        The filter state is not that of a stationary body.
     """
     progress("reading", 0.02)
     source = read_alignment_source(spec)
@@ -141,7 +141,7 @@ def run_alignment(
     fine_way: FineAlignment | None = make_choice(spec.fine, SLOTS["fine"], given)
     imu, report, increments = source.imu, None, None
     unread = channel_findings(imu, sensors) if source.truth is None else ()
-    # Samples as they come may have any stamps.
+    # Without a pre-filter, stamps need not be even.
     if spec.prefilter.kind != "none":
         prefilter: Prefilter = make_choice(spec.prefilter, SLOTS["prefilter"], given)
         progress("pre-filter", 0.08)
@@ -214,7 +214,7 @@ def run_alignment(
 
 
 def _first(imu: pd.DataFrame, duration: float) -> pd.DataFrame:
-    """The first part of a record, from its first stamp."""
+    """First part of a record, from its first stamp."""
     time = imu.index.to_numpy(dtype=np.float64)
     step = float(np.median(np.diff(time)))
     kept = time <= time[0] + duration + 1e-6 * step
@@ -228,7 +228,7 @@ def _first(imu: pd.DataFrame, duration: float) -> pd.DataFrame:
 
 
 def _after(imu: pd.DataFrame, part: pd.DataFrame) -> pd.DataFrame:
-    """What follows a first part, its last sample included."""
+    """Remainder after a first part, including its last sample."""
     out = imu.iloc[len(part) - 1 :]
     out.attrs = dict(imu.attrs)
     if len(out) < 2:
@@ -244,51 +244,50 @@ def _after(imu: pd.DataFrame, part: pd.DataFrame) -> pd.DataFrame:
 def _at(
     answer: Alignment, time: float, imu: pd.DataFrame, site: Site, sensors: ImuUncertainty
 ) -> Alignment:
-    """The answer at an end of the record: as it is where it holds there, else carried."""
+    """Result at an end of the record: unchanged where it holds there, else propagated."""
     step = float(np.median(np.diff(imu.index.to_numpy(dtype=np.float64))))
     if abs(answer.time - time) < 0.5 * step:
         return replace(answer, findings=())
     return replace(carry(imu, answer, time, site, sensors), findings=())
 
 
-# Channels of a record that do not read anything: told, or refused, before it is aligned.
+# Silent channels of a record: reported or refused before the alignment.
 
 
-#: Faults that are seen in the samples themselves. Noise, jumps and levels are left to the
-#: alignments: a vehicle that people enter shows them, too.
+#: Faults visible in the samples themselves. Noise, jumps and levels are left to the alignments:
+#: people who enter a vehicle cause them, too.
 SILENT = ("missing", "stuck", "dead", "saturated")
-#: Part of a record that may be without a channel.
+#: Largest share of a record without a channel.
 MOST = 0.01
 
 
 def channel_findings(imu: pd.DataFrame, sensors: ImuUncertainty) -> tuple[Finding, ...]:
-    """Find channels that read nothing for a part of a record.
+    """Find channels that are silent over a part of a record.
 
     Parameters
     ----------
     imu : DataFrame
-        Imu table as it was recorded, body axes.
+        Recorded Imu table, body axes.
     sensors : ImuUncertainty
 
     Returns
     -------
     tuple of Finding
-        Stretches that are short; or that no channel ever changes.
+        Short stretches; or that no channel ever changes.
 
     Raises
     ------
     DataError
-        A channel is stuck, dead, saturated or without numbers for more than a hundredth of the
-        record.
+        A channel is stuck, dead, saturated or not finite over more than a hundredth of the record.
     """
     if len(imu) < LEAST_SAMPLES:
-        # So short a record is refused by each alignment, with what would be long enough.
+        # The alignments refuse a record this short, and state the length needed.
         return _made_up(imu)
     faults = [f for f in check_imu_channels(imu, sensors).faults if f.kind in SILENT]
     for channel in dict.fromkeys(f.channel for f in faults):
         own = [f for f in faults if f.channel == channel]
         lost = sum(f.last - f.first + 1 for f in own)
-        # One that is dead all the time is refused by each alignment in its own words.
+        # The alignments refuse a channel that is dead throughout.
         whole = lost == len(imu)
         if lost > MOST * len(imu) and not (whole and _alone(channel, faults)):
             worst = max(own, key=lambda f: f.last - f.first)
@@ -314,7 +313,7 @@ def channel_findings(imu: pd.DataFrame, sensors: ImuUncertainty) -> tuple[Findin
 
 
 def _alone(channel: str, faults: Sequence[ChannelFault]) -> bool:
-    """Whether another channel of its triad goes on."""
+    """Whether another channel of its triad still changes."""
     triad = channel.split("_")[0]
     return len({f.channel for f in faults if f.channel.startswith(triad)}) < len(GYRO)
 
@@ -333,28 +332,28 @@ def _made_up(imu: pd.DataFrame) -> tuple[Finding, ...]:
     )
 
 
-# Whether outliers may be why a record could not be aligned.
+# Outliers as a possible reason for a failed alignment.
 
 
-#: Of the samples of a channel: fewer are no reason, more are its habit and no outliers.
+#: Share of a channel's samples that count as outliers: fewer are irrelevant, more are normal.
 LEAST, ALIGNMENT_OUTLIERS_MOST = 1e-3, 0.03
 
-#: How many times its usual scatter over a second makes a channel loud; and for how much of a record
-#: that can be no habit of it.
+#: Ratio of a loud channel's scatter over a second to its usual one; share of a record beyond which
+#: this is normal.
 LOUD, MOST_LOUD = 10.0, 0.25
 LEAST_SECONDS = 8
 
 
 @contextmanager
 def saying_outliers(imu: pd.DataFrame, report: PrefilterReport | None) -> Iterator[None]:
-    """Add to an error that samples stand out: those that a pre-filter left, or all without one.
+    """Add outliers to an error message: those after the pre-filter, or all without one.
 
     Parameters
     ----------
     imu : DataFrame
-        Imu table that is aligned inside.
+        Imu table of the alignment inside.
     report : PrefilterReport or None
-        Of the pre-filter that it has passed.
+        Report of its pre-filter.
     """
     try:
         yield
@@ -381,7 +380,7 @@ def saying_outliers(imu: pd.DataFrame, report: PrefilterReport | None) -> Iterat
 
 
 def _faults(report: PrefilterReport) -> tuple[Finding, ...]:
-    """What a pre-filter found, but for the caution that goes with a low rate."""
+    """Findings of a pre-filter, except for the caution about a low rate."""
     return tuple(f for f in report.findings if f.code != LOW_RATE)
 
 
@@ -399,7 +398,7 @@ def _after_prefilter(error: DataError, said: Finding) -> DataError:
 
 
 def _with_unquiet(error: DataError, imu: pd.DataFrame) -> DataError:
-    """The error with the stretch in which the record is least like itself."""
+    """The error with the most unusual interval of the record."""
     found = _unquiet(imu)
     if found is None:
         return error
@@ -419,7 +418,7 @@ def _with_unquiet(error: DataError, imu: pd.DataFrame) -> DataError:
 
 
 def _unquiet(imu: pd.DataFrame) -> tuple[str, float, float, float] | None:
-    """The channel that scatters far more than it usually does, from when to when, how much."""
+    """Channel with a scatter far above its usual one: begin, end and ratio."""
     columns = [c for c in [*GYRO, *ACCEL] if c in imu.columns]
     time = index_of(imu)
     size = max(2, round(1.0 / float(np.median(np.diff(time)))))
@@ -446,7 +445,7 @@ def _unquiet(imu: pd.DataFrame) -> tuple[str, float, float, float] | None:
 
 
 def _outliers(imu: pd.DataFrame) -> tuple[str, np.ndarray] | None:
-    """The channel that has most of them, and its samples."""
+    """Channel with the most outliers, and its outlier samples."""
     columns = [c for c in [*GYRO, *ACCEL] if c in imu.columns]
     try:
         even_step(index_of(imu))
@@ -464,12 +463,12 @@ def _outliers(imu: pd.DataFrame) -> tuple[str, np.ndarray] | None:
     return columns[worst], np.flatnonzero(flagged[:, worst]) + screened.first
 
 
-# How accurate an alignment is after how long: coarse over shorter parts, fine epoch by epoch.
+# Accuracy over alignment time: coarse over shorter parts, fine epoch by epoch.
 
 
 Array = NDArray[np.float64]
 
-#: Lengths that are tried, from this many seconds to the whole record, evenly in their logarithm.
+#: Shortest length to try, s, and number of lengths, evenly spaced in their logarithm.
 ALIGNMENT_READINESS_LEAST, TRIES = 15.0, 16
 
 
@@ -480,14 +479,14 @@ class AlignmentReadiness:
     Attributes
     ----------
     against : {'truth', 'reference', 'answer'}
-        What the differences are from: the truth of a simulation, a reference that is stated, or
-        the answer of the whole record.
+        What the differences refer to: the truth of a simulation, a stated reference, or the
+        result of the whole record.
     coarse, fine : DataFrame
         By time since the start in s: ``roll_sd``, ``pitch_sd``, ``heading_sd`` and
-        ``roll_off``, ``pitch_off``, ``heading_off``, deg; NaN where nothing is known. The fine
-        one is empty where there was none.
+        ``roll_off``, ``pitch_off``, ``heading_off``, deg; NaN where unknown. ``fine`` is empty
+        without a fine alignment.
     refused : tuple of (float, Finding)
-        Lengths at which the coarse alignment found no attitude, and why.
+        Lengths for which the coarse alignment failed, and why.
     """
 
     against: str
@@ -507,7 +506,7 @@ def alignment_readiness(
     truth: pd.DataFrame | None,
     reference: ReferenceTable | None,
 ) -> AlignmentReadiness:
-    """Align over shorter parts of a record, and lay the errors beside their bounds.
+    """Align over shorter parts of a record, and compare the errors with their bounds.
 
     Parameters
     ----------
@@ -519,7 +518,7 @@ def alignment_readiness(
     gnss : DataFrame, optional
         Gnss table.
     attitude : DataFrame
-        Attitude table of the answer over the record.
+        Attitude table of the result over the record.
     fine : FineResult, optional
     truth : DataFrame, optional
         Attitude table.
@@ -551,7 +550,7 @@ def alignment_readiness(
 
 
 def reference_offset(attitude: pd.DataFrame, reference: ReferenceTable) -> Array:
-    """The answer less a stated attitude, (3,), deg; NaN where it says nothing."""
+    """Result minus a stated attitude, (3,), deg; NaN where it is not stated."""
     stated = np.array(
         [
             np.nan if x is None else x
@@ -573,7 +572,7 @@ def _fine(
 ) -> pd.DataFrame:
     if fine is None:
         return _table(np.empty(0), np.empty((0, 6)))
-    # The first row is what was assumed before the first epoch.
+    # The first row is the assumption before the first epoch.
     history = fine.history.iloc[1:]
     time = history.index.to_numpy(dtype=np.float64)
     sd = history[[f"{a}_sd" for a in EULER]].to_numpy(dtype=np.float64)
@@ -582,7 +581,7 @@ def _fine(
 
 
 def _off(angles: Array, time: Array, known: pd.DataFrame) -> Array:
-    """Angles less those that are known at the nearest stamps, deg."""
+    """Angles minus the known ones at the nearest stamps, deg."""
     stamps = known.index.to_numpy(dtype=np.float64)
     at = np.clip(np.searchsorted(stamps, time), 1, len(stamps) - 1)
     at -= (time - stamps[at - 1] < stamps[at] - time).astype(np.int64)

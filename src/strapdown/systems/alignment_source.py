@@ -1,4 +1,4 @@
-"""The record that is aligned: read from a log or simulated, in body axes, cut to its span."""
+"""Input of an alignment: a log or a simulation, in body axes, cut to its span."""
 
 from __future__ import annotations
 
@@ -39,19 +39,19 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class AlignmentSource:
-    """A record to align.
+    """Input of an alignment.
 
     Attributes
     ----------
     name, what : str
     imu : DataFrame
-        Imu table, body axes, of the span that is used.
+        Imu table of the used span, body axes.
     truth : DataFrame or None
         Attitude table at the same stamps, of a simulation.
     start : StatedStart or None
-        What the file says of its place and attitude.
+        Position and attitude stated in the file.
     gnss : DataFrame or None
-        Gnss table, where one is given.
+        Gnss table, if given.
     readings : tuple of Reading
     inputs : tuple of InputFiles
     findings : tuple of Finding
@@ -82,7 +82,7 @@ def read_alignment_source(spec: AlignmentSpec) -> AlignmentSource:
     Raises
     ------
     DataError, ConfigError
-        It cannot be used; the message names file, row and remedy.
+        The input cannot be used; the message names file, row and remedy.
     """
     if spec.log is None:
         return _simulated(spec)
@@ -111,7 +111,7 @@ def read_alignment_source(spec: AlignmentSpec) -> AlignmentSource:
 def body_record(
     log: LogTable, axes: AxesTable
 ) -> tuple[Recording, pd.DataFrame, tuple[Finding, ...]]:
-    """Read a log, turn it into body axes, and cut it to the span that is used.
+    """Read a log, rotate it into body axes, and cut it to the used span.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def body_record(
     Returns
     -------
     recording : Recording
-        As it was read: all of it.
+        The whole log as recorded.
     imu : DataFrame
         Imu table of the span, body axes.
     findings : tuple of Finding
@@ -129,7 +129,7 @@ def body_record(
     Raises
     ------
     DataError, ConfigError
-        It cannot be used; the message names file, row and remedy.
+        The log cannot be used; the message names file, row and remedy.
     """
     gyro, accel = axes_matrices(axes)
     letters, turn = axes_letters(gyro) if gyro is not None else (axes.axes, None)
@@ -165,7 +165,7 @@ def _options(log: LogTable, axes: str | None) -> ReadOptions:
 
 
 def axes_matrices(axes: AxesTable) -> tuple[Array | None, Array | None]:
-    """Sensor axes to body of gyros and accelerometers, where they are stated as matrices.
+    """Rotation from sensor to body axes of gyros and accelerometers, where stated as matrices.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def axes_matrices(axes: AxesTable) -> tuple[Array | None, Array | None]:
     Raises
     ------
     ConfigError
-        One is no rotation.
+        A matrix is not a rotation.
     """
     both = axes.matrix if axes.design is None else NAMED_AXES[axes.design]
     if both is not None:
@@ -202,7 +202,7 @@ def _turned(imu: pd.DataFrame, gyro: Array, accel: Array) -> pd.DataFrame:
 
 
 def _said(recording: Recording, gyro: Array, accel: Array) -> Sequence[Finding]:
-    """How far the axes that are stated lie beside those that letters can name."""
+    """Angle between the stated axes and the nearest that letters can name."""
     out = []
     for name, turn in (("gyro", gyro), ("accel", accel)):
         roll, pitch, heading = euler_from_dcm(turn)

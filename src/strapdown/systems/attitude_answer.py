@@ -1,4 +1,4 @@
-"""The answer: the simplest algorithm, and the lowest rate, that are accurate enough."""
+"""Answer of the attitude bench: simplest algorithm and lowest rate of sufficient accuracy."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from strapdown.rotation.euler_angles import unit_rotation_angle
 from strapdown.systems.attitude_sweep import MOST_ACCURATE, Grounds, best_error, error_at_full_rate
 from strapdown.tables import GYRO
 
-# Where the sensor's error is beyond the tolerance, an algorithm's own error of this share of it
-# changes nothing that could be seen.
+# Where the sensor error exceeds the tolerance, an algorithm error below this share of it is
+# negligible.
 UNSEEN = 0.1
-# What is suggested leaves at most this share of the error.
+# A recommendation must reduce the error at least to this share.
 WORTH = 0.9
-# Further up than this an order of accuracy says little.
+# Largest ratio for an extrapolation by the order of accuracy.
 MOST_EXTRAPOLATED = 10.0
 
 
-# An attitude this far off tells no more how far: angles end at half a turn.
+# Attitude error beyond which its magnitude has no meaning: angles end at half a turn.
 LOST = 90.0
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """What the answer is drawn from.
+    """Evidence for the answer.
 
     Attributes
     ----------
@@ -43,21 +43,20 @@ class Evidence:
     sensor : tuple of float or None
         Error of the sensor alone, deg, where it is known.
     known : bool
-        Whether anything is known of the attitude: a truth or a reference point.
+        Whether a truth or a reference point of the attitude is known.
     exact : bool
-        Whether the algorithms' own errors are against exact truth.
+        Whether the algorithm errors are against exact truth.
     without_bias : float or None
-        Error in deg that would be left with the bias of a rest removed, where it was not.
+        Remaining error in deg if the bias of a rest were removed, where it was not.
     with_cubic : float or None
-        Error in deg that would be left with rates as cubics between their stamps, where they
-        were chords.
+        Remaining error in deg with cubic interpolation of the rates, where it was linear.
     start : float
-        What the attitude at the start is off by, deg, where that is known.
+        Initial attitude error, deg, where it is known.
     sampling : float
-        How far the course of the rate between its stamps may matter, deg, on a log.
+        Possible effect of the rate between its stamps, deg, for a log.
     reference_sd : float
-        What the best reference point is known to, 1σ in deg; 0 where there is a truth, or
-        nothing was said.
+        Standard deviation of the best reference point, deg; 0 where there is a truth, or it is
+        not stated.
     """
 
     algorithms: Sequence[AttitudeAlgorithm]
@@ -75,7 +74,7 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Choice:
-    """An algorithm, and the lowest rate at which it and every higher rate pass."""
+    """Algorithm, and the lowest rate at which it passes, as it does at every higher rate."""
 
     cost: Cost
     meaning: str
@@ -84,7 +83,7 @@ class Choice:
 
     @property
     def cycles_per_second(self) -> float:
-        """Cycles of a Cortex-M4F a second."""
+        """Cycles of a Cortex-M4F per second."""
         return self.cost.cycles * self.rate_hz
 
 
@@ -95,21 +94,21 @@ def find_answer(evidence: Evidence, tolerance_deg: float) -> Answer:
     ----------
     evidence : Evidence
     tolerance_deg : float
-        On the largest error that is known: against the truth wherever it counts, and at every
-        reference point; where nothing is known, on the algorithm's own error.
+        Limit of the largest error: against the truth at scored samples, and at every reference
+        point; without either, of the algorithm's own error.
 
     Returns
     -------
     Answer
-        The simplest is that of the fewest cycles a sample; its rate the lowest at which it
-        passes, as it does at every rate above. Where nothing passes, the sentence says whether
-        the sensor or the rate is the limit, and what is then good enough.
+        The simplest algorithm has the fewest cycles per sample; its rate is the lowest at which it
+        passes, as it does at every rate above. If none passes, the sentence states whether the
+        sensor or the rate is the limit, and which tolerance is met.
     """
     passing = choices(evidence, "error_deg", tolerance_deg)
     if passing:
         return _enough(evidence, passing, tolerance_deg)
     full = evidence.sweep[evidence.sweep["factor"] == 1]
-    # By their own errors: a wrong algorithm may end nearer to the truth by luck.
+    # By algorithm error: a poor algorithm may end nearer to the truth by chance.
     best = full.iloc[int(full["own_deg"].to_numpy().argmin())]
     sensor = _sensor_error(evidence, best)
     if sensor > tolerance_deg:
@@ -124,7 +123,7 @@ def choices(evidence: Evidence, column: str, limit: float, meaning: str = "drop"
     ----------
     evidence : Evidence
     column : str
-        Of the sweep: what is judged.
+        Judged column of the sweep.
     limit : float, deg
     meaning : {'drop', 'sum'}
 
@@ -137,9 +136,9 @@ def choices(evidence: Evidence, column: str, limit: float, meaning: str = "drop"
         cells = evidence.sweep[
             (evidence.sweep["algorithm"] == cost.algorithm) & (evidence.sweep["meaning"] == meaning)
         ].sort_values("factor")
-        # One whose own error is larger than the whole is right by luck.
+        # With an algorithm error above the total error it passes by chance.
         passes = cells[[column, "own_deg"]].max(axis=1).to_numpy() <= limit
-        # A lower rate that passes where a higher one does not passes by luck.
+        # A lower rate that passes where a higher one fails passes by chance.
         count = len(passes) if passes.all() else int(np.argmin(passes))
         if count:
             last = cells.iloc[count - 1]
@@ -275,10 +274,10 @@ def _limited_by_rate(
             f"{_deg(evidence.with_cubic)} would be left."
         )
     own = float(best["own_deg"])
-    # What the sensor makes stays, whatever the rate.
+    # The sensor error remains at any rate.
     left = tolerance - sensor
     if order and np.isfinite(own) and own <= MOST_EXTRAPOLATED**order * left:
-        # From rates by the trapezoid no algorithm is of more than second order.
+        # With rates integrated by the trapezoid rule, no algorithm exceeds second order.
         order = order if evidence.with_cubic is None else min(order, 2)
         needed = rate * max(1.0, own / left) ** (1.0 / order)
         helps.append(
@@ -290,9 +289,9 @@ def _limited_by_rate(
 
 
 def _sensor_error(evidence: Evidence, best: pd.Series) -> float:
-    """Error that the sensor makes: against the truth, and what the algorithm's own leaves.
+    """Sensor error: against the truth, and the total less the algorithm error.
 
-    A reference point may be further off than the truth, where there are both.
+    A reference point may have a larger error than the truth, where there are both.
     """
     if not evidence.known:
         return 0.0
@@ -357,7 +356,7 @@ def _deg(angle: float) -> str:
     return f"{angle:.3g}°"
 
 
-# What the answer of a bench rests on: of one source, and the worst of several.
+# Evidence for the answer of a bench: of one source, and the worst of several.
 
 
 def find_evidence(
@@ -369,7 +368,7 @@ def find_evidence(
     rests: tuple[RestStretch, ...],
     between_deg: float | None,
 ) -> Evidence:
-    """Gather what the answer for one source rests on.
+    """Gather the evidence for one source.
 
     Parameters
     ----------
@@ -383,7 +382,7 @@ def find_evidence(
         As `results.AttitudeBench.gyro_bias`.
     rests : tuple of RestStretch
     between_deg : float or None, deg
-        How far the course of the rate between its stamps may matter.
+        Possible effect of the rate between its stamps.
 
     Returns
     -------
@@ -406,14 +405,14 @@ def find_evidence(
 
 
 def worst_evidence(evidence: Sequence[Evidence], sweep: pd.DataFrame) -> Evidence:
-    """Gather what an answer for several trials rests on: the worst of them.
+    """Gather the evidence for several trials: the worst case.
 
     Parameters
     ----------
     evidence : sequence of Evidence
         Of each trial, over the same algorithms.
     sweep : DataFrame
-        Of all of them (`attitude_trials.worst_sweep`).
+        Of all trials (`attitude_sweep.worst_sweep`).
 
     Returns
     -------
@@ -435,20 +434,20 @@ def worst_evidence(evidence: Sequence[Evidence], sweep: pd.DataFrame) -> Evidenc
 
 
 def _worst(errors: Sequence[float | None]) -> float | None:
-    """The largest, where all of them are known."""
+    """The largest value, if all are known."""
     known = [e for e in errors if e is not None]
     return max(known) if len(known) == len(errors) else None
 
 
 def _reference_sd(grounds: Grounds) -> float:
-    """What the best reference point is known to, where there is no truth."""
+    """Standard deviation of the best reference point, if there is no truth."""
     if grounds.truth is not None or grounds.references.empty:
         return 0.0
     return float(np.nan_to_num(grounds.references["sd"].to_numpy(dtype=np.float64)).min())
 
 
 def _start_error(grounds: Grounds) -> float:
-    """What the run's first attitude is off by, in deg, where that is known."""
+    """Error of the initial attitude in deg, where it is known."""
     known = grounds.truth
     if known is None or not known.counts[0]:
         return 0.0
@@ -458,7 +457,7 @@ def _start_error(grounds: Grounds) -> float:
 def _without_bias(
     grounds: Grounds, bias: dict[str, object], rests: tuple[RestStretch, ...]
 ) -> float | None:
-    """Error that the most accurate algorithm would leave with the bias of a rest removed."""
+    """Remaining error of the most accurate algorithm with the bias of a rest removed."""
     nothing_known = grounds.truth is None and grounds.references.empty
     if bias["rad_per_s"] is not None or not rests or nothing_known:
         return None
@@ -468,7 +467,7 @@ def _without_bias(
 
 
 def _with_cubic(grounds: Grounds) -> float | None:
-    """Error that would be left with rates as cubics, where they were taken as chords."""
+    """Remaining error with cubic interpolation of the rates, where it was linear."""
     if grounds.interpolation == "cubic" or grounds.imu.attrs["sampling"] == "mean":
         return None
     if grounds.truth is None and grounds.references.empty:

@@ -1,4 +1,4 @@
-"""System A, Alexiev (2021): attitude algorithms on one log, and how far they can be trusted."""
+"""System A, Alexiev (2021): attitude algorithms on one log, and their accuracy."""
 
 from __future__ import annotations
 
@@ -101,52 +101,52 @@ def bench_attitude(
     peers: Sequence[str] = (),
     progress: Progress = silent,
 ) -> AttitudeBench:
-    """Run attitude algorithms over a log or a scenario and compare them with what is known.
+    """Run attitude algorithms over a log or a scenario and compare them with the known attitude.
 
     Parameters
     ----------
-    source : str or Path, or a sequence of them
+    source : str, Path, or a sequence of both
         Name of a scenario (`simulation.SCENARIOS`), or path of a log: a file of a known
         format, or the folder of a known recording. Several are trials of the same question:
-        the first is shown, and the answer holds for all of them.
+        the first is shown, and the answer covers all trials.
     algorithms : sequence of str
         Names with options, as in ``quaternion:order=3`` (`attitude.make_algorithm`), or
         ``all``: the paper's four, Runge-Kutta, and rotation vectors of 1 to 4 increments.
     rates : sequence of float, optional, Hz
-        Lower rates to try; the full rate and its halves if none is given.
+        Lower rates to try; the full rate and its halves, if not given.
     tolerance_deg : float
-        What counts as accurate enough: the largest error that is known, in deg.
+        Largest acceptable error, in deg.
     interpolation : {'linear', 'cubic'}
-        How rates at the stamps run between them (`increments.increments_from_imu`).
+        Interpolation of the rates between stamps (`increments.increments_from_imu`).
     trials : int
-        Of a scenario: so many seeds, from `seed` on.
+        Number of seeds of a scenario, from `seed` on.
     reference : sequence of str
-        Reference points in words (``end same as start``, `evaluation.reference_points`), or
-        the path of a file of them, or of an attitude truth; ``rests``: gravity at every rest.
+        Reference points in words (``end same as start``, `evaluation.reference_points`), or the
+        path of a file with reference points or an attitude truth; ``rests``: gravity at every rest.
     reference_log : str or Path, optional
-        Log of a second, better sensor on the same body: laid over this one in time and
-        mounting, its attitude is taken for the truth.
+        Log of a second, better sensor on the same body: synchronized and aligned with this one,
+        its attitude serves as the truth.
     initial : str
         ``auto``, ``truth``, ``level``, ``zero``, or ``roll,pitch,heading`` in deg. ``auto`` is
-        the truth where there is one, levelled where the log begins at rest, and zero else.
+        the truth where there is one, leveled where the log begins at rest, and zero otherwise.
     gyro_bias : str
-        ``none``; ``rest``, the mean over the first stationary stretch; ``rests``, the course
-        through all of them; three numbers and a
-        unit about forward, right, down; or the path of a log of the sensor lying still.
+        ``none``; ``rest``, the mean over the first stationary stretch; ``rests``, interpolated
+        between all of them; three numbers and a unit about forward, right, down; or the path of a
+        log of the stationary sensor.
     rate : float, optional, Hz
-        Of a scenario (100 if not given), or of a log without a time column.
+        Sample rate of a scenario (100 if not given), or of a log without a time column.
     sampling : {'instantaneous', 'mean'}, optional
-        What a row holds: the rate at its stamp, or its mean over the interval ending there.
+        Meaning of a row: the rate at its stamp, or its mean over the interval ending there.
     seed : int, optional
-        Of a scenario's noise; 0 if not given.
+        Seed of a scenario's noise; 0 if not given.
     sensor : str or Path, optional
-        Of a scenario: a sensor of the catalogue, or a file like its entries.
+        For a scenario: a sensor of the catalogue, or a file like its entries.
     columns, gyro_unit, accel_unit, time_unit, axes, repair
         How to read a log, as in `formats.recording.ReadOptions`.
     from_s, to_s, duration_s : float, optional, s
-        Use a part of the log: to an instant, or so much of it.
+        Part of the log: from an instant, to an instant, or of a duration.
     peers : sequence of str
-        Filters of other libraries to lay beside (`peers.PEERS`), or ``all``.
+        Filters of other libraries to compare (`peers.PEERS`), or ``all``.
     progress : callable, optional
         Called with the name of a stage and the share done.
 
@@ -160,7 +160,7 @@ def bench_attitude(
     DataError
         The log or a reference cannot be used; the message names file, row and remedy.
     ConfigError
-        Something that was asked for is not known, or cannot be had from this log.
+        An option is unknown, or not available for this log.
 
     Notes
     -----
@@ -211,7 +211,7 @@ def bench_attitude(
 
 
 def run_bench(spec: AttitudeSpec, progress: Progress = silent) -> AttitudeBench:
-    """Run attitude algorithms over a log or a scenario and compare them with what is known.
+    """Run attitude algorithms over a log or a scenario and compare them with the known attitude.
 
     Parameters
     ----------
@@ -228,7 +228,7 @@ def run_bench(spec: AttitudeSpec, progress: Progress = silent) -> AttitudeBench:
     DataError
         The log or a reference cannot be used.
     ConfigError
-        Something that was asked for is not known, or cannot be had from this log.
+        An option is unknown, or not available for this log.
     """
     specs = [spec.model_copy(update={"source": s, "also": ()}) for s in (spec.source, *spec.also)]
     judged = []
@@ -262,7 +262,7 @@ def _named(texts: list[str]) -> tuple[str, ...]:
 
 
 def _part_of(progress: Progress, k: int, count: int) -> Progress:
-    """Progress of one of several alike."""
+    """Progress of one of several equal parts."""
     return lambda stage, share: progress(stage, (k + share) / count)
 
 
@@ -285,7 +285,7 @@ def _make_algorithms(texts: Sequence[str]) -> list[AttitudeAlgorithm]:
 
 
 def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeBench, Evidence]:
-    """Bench one source, and what its answer rests on."""
+    """Run the bench on one source; return the result and the evidence for its answer."""
     algorithms = _make_algorithms(spec.algorithms)
     progress("reading", 0.0)
     source = read_source(spec)
@@ -372,7 +372,7 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeBench, Evide
 def _grounds(
     spec: AttitudeSpec, source: Source, imu: pd.DataFrame, q_nb: Array, references: pd.DataFrame
 ) -> Grounds:
-    """What errors are measured against, and what is known of the attitude itself."""
+    """Reference for the errors, and the known attitude."""
     stamps = imu.index.to_numpy(dtype=np.float64)
     known = None
     if source.truth is not None and source.scored is not None:
@@ -383,10 +383,10 @@ def _grounds(
     return Grounds(imu, q_nb, own, known, references, spec.interpolation)
 
 
-# What was asked of the attitude bench, in whatever form it was said, as a specification.
+# Conversion of the bench's arguments to a specification.
 
 
-#: What ``all`` stands for: Alexiev's four, Runge-Kutta, and 1 to 4 increments.
+#: Meaning of ``all``: Alexiev's four, Runge-Kutta, and 1 to 4 increments.
 ALL_ALGORITHMS = (
     *("naive", "euler", "dcm", "quaternion", "rk4"),
     *(f"rotvec:samples={n}" for n in (1, 2, 3, 4)),
@@ -394,14 +394,14 @@ ALL_ALGORITHMS = (
 
 
 def as_text(value: object) -> str:
-    """A text as it is; three numbers as the text that means them."""
+    """Return a text unchanged, three numbers as text."""
     if isinstance(value, str | Path):
         return str(value).strip()
     return ",".join(str(v) for v in np.asarray(value).ravel().tolist())
 
 
 def as_texts(values: object) -> list[str]:
-    """One text or many, or none."""
+    """Return one text, several or none as a list."""
     if values is None:
         return []
     if isinstance(values, str | Path):
@@ -419,7 +419,7 @@ def source_spec(
     rates: Sequence[float] = (),
     sensor: str | Path | None = None,
 ) -> list[ScenarioSpec] | list[LogSpec]:
-    """Specify a scenario, as often as there are trials, or a log.
+    """Specify a scenario, once per trial, or a log.
 
     Parameters
     ----------
@@ -428,14 +428,14 @@ def source_spec(
     rate : float or None, Hz
     seed : int or None
     reading : dict
-        What was said about reading a log; None where nothing was.
+        Options for reading a log; None where not given.
     sampling : str or None
     trials : int
-        Seeds of a scenario.
+        Number of seeds of a scenario.
     rates : sequence of float, Hz
-        That will be tried; a scenario without a rate is sampled at the highest.
+        Rates to try; a scenario without a rate is sampled at the highest.
     sensor : str, Path or None
-        Of a scenario.
+        Sensor of a scenario.
 
     Returns
     -------
@@ -444,7 +444,7 @@ def source_spec(
     Raises
     ------
     ConfigError
-        There is no such thing, or something was said that the other kind needs.
+        Unknown source, or an option of the other kind of source.
     """
     if trials < 1:
         raise ConfigError("attitude.no-number-trials", quantity="--trials", trials=trials)
@@ -474,7 +474,7 @@ def source_spec(
     if trials > 1:
         raise ConfigError("attitude.recorded-log-not-drawn-again", quantity="--trials")
     if not exists(text) and not Path(text).suffix and len(Path(text).parts) == 1:
-        find_scenario(name)  # says which names there are
+        find_scenario(name)  # lists the valid names
     said = {key: value for key, value in reading.items() if value is not None}
     return [specify(LogSpec, path=str(Path(text)), sampling=sampling, rate_hz=rate, **said)]
 
@@ -498,7 +498,7 @@ def one_of_each(
 
 
 def exists(text: str) -> bool:
-    """Tell whether a text is the path of something; sentences and odd characters are not."""
+    """Whether a text is an existing path; False for sentences and invalid characters."""
     if text in ("", "none", "rest", "rests"):
         return False
     try:
@@ -508,7 +508,7 @@ def exists(text: str) -> bool:
 
 
 def sort_references(items: Sequence[str]) -> tuple[tuple[str, ...], str | None]:
-    """Sort references into sentences and the path of a truth."""
+    """Separate reference sentences from the path of a truth."""
     words: list[str] = []
     truth: str | None = None
     for item in items:
@@ -530,13 +530,13 @@ def sort_references(items: Sequence[str]) -> tuple[tuple[str, ...], str | None]:
     return tuple(words), truth
 
 
-# Where a run of the attitude bench starts, and what is taken off its rates.
+# Initial attitude and gyro bias of a run.
 
 
 def find_gyro_bias(
     spec: AttitudeSpec, source: Source, rests: tuple[RestStretch, ...]
 ) -> tuple[dict[str, Any], tuple[InputFiles, ...]]:
-    """Find what is to be taken off the rates.
+    """Determine the gyro bias to subtract.
 
     Parameters
     ----------
@@ -549,14 +549,14 @@ def find_gyro_bias(
     bias : dict
         ``rad_per_s`` about forward, right, down, or None; ``from``, in words.
     inputs : tuple of InputFiles
-        Files that it was taken from.
+        Files from which it was taken.
 
     Raises
     ------
     DataError
-        There is no rest to take it from.
+        The log has no rest.
     ConfigError
-        It was not understood.
+        The option cannot be parsed.
     """
     if spec.gyro_bias_path is not None:
         options = read_options(spec.source) if isinstance(spec.source, LogSpec) else None
@@ -596,13 +596,13 @@ def find_gyro_bias(
 def without_bias(
     spec: AttitudeSpec, imu: pd.DataFrame, bias: dict[str, Any], rests: tuple[RestStretch, ...]
 ) -> pd.DataFrame:
-    """Take a bias that was found off the rates of a log.
+    """Subtract a gyro bias from the rates of a log.
 
     Parameters
     ----------
     spec : AttitudeSpec
     imu : DataFrame
-        An Imu table; it is not changed.
+        Imu table; it is not changed.
     bias : dict
         From `find_gyro_bias`.
     rests : tuple of RestStretch
@@ -645,7 +645,7 @@ def _stated_bias(text: str) -> tuple[list[float], str]:
 def initial_attitude(
     text: str, source: Source, rests: tuple[RestStretch, ...], findings: list[Finding]
 ) -> tuple[Array, dict[str, Any], float]:
-    """Attitude at the start of the run, in words, and where the run starts."""
+    """Initial attitude of the run, its description, and the start time."""
     start = float(source.imu.index[0])
     at_rest = bool(rests) and rests[0].start - start <= 1.0 and rests[0].accel_mean is not None
     choice = text.strip().lower()
@@ -685,7 +685,7 @@ def _first_truth(source: Source, start: float) -> tuple[Array, float]:
     if source.truth is None:
         raise ConfigError("attitude.log-no-truth-take", file=source.name, quantity="--initial")
     stamps = source.imu.index.to_numpy(dtype=np.float64)
-    # Scored or not, an attitude that is known is one to start from.
+    # A known attitude is a valid start, even at samples that are not scored.
     known = known_at(source.truth, np.ones(len(source.truth), dtype=bool), stamps)
     good = np.flatnonzero(known.counts)
     if not good.size:

@@ -1,4 +1,4 @@
-"""What is known of the attitude, beside a truth: reference points, rests, places, a second log."""
+"""References for the attitude besides a truth: reference points, rests, positions, second log."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ from strapdown.tables import QUATERNION, THETA, attitude_table, find_gaps
 
 Array = NDArray[np.float64]
 
-#: The word that makes a reference point of every rest.
+#: The word that makes every rest a reference point.
 RESTS = "rests"
 
 
 @dataclass(frozen=True)
 class Told:
-    """Reference points of attitude and of place, and what could be one."""
+    """Reference points of attitude and position, and suggestions for more."""
 
     points: pd.DataFrame
     places: tuple[PlaceReference, ...]
@@ -52,17 +52,17 @@ def gather_references(
     rests: tuple[RestStretch, ...],
     levelled: bool,
 ) -> Told:
-    """Make reference points of what was said, of a scenario's own, and of rests.
+    """Collect reference points from sentences, a scenario, and rests.
 
     Parameters
     ----------
     spec : AttitudeSpec
     source : Source
     span : tuple of float, s
-        What the words start and end stand for.
+        Meaning of the words start and end.
     rests : tuple of RestStretch
     levelled : bool
-        Whether the run starts levelled at the first rest, which is then no reference.
+        Whether the run starts leveled at the first rest, which then is not a reference.
 
     Returns
     -------
@@ -71,8 +71,8 @@ def gather_references(
     Raises
     ------
     ConfigError, DataError
-        A sentence is not understood, an instant lies outside the log, or rests were asked for
-        and there are none with acceleration.
+        A sentence cannot be parsed, an instant lies outside the log, or rests are requested and
+        there are none with acceleration.
     """
     words = list(spec.references)
     whole = spec.from_s is spec.to_s is spec.duration_s is None
@@ -100,14 +100,14 @@ def gather_references(
 
 @dataclass(frozen=True)
 class Second:
-    """A second log, laid over the first."""
+    """Second log, synchronized and aligned with the first."""
 
     recording: Recording
     aligned: SecondLog
 
 
 def read_second(spec: AttitudeSpec, source: Source) -> tuple[Source, Second | None]:
-    """Read and lay over the log of a second sensor, where one is named.
+    """Read the log of a second sensor, if one is named, and align it with the first.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def read_second(spec: AttitudeSpec, source: Source) -> tuple[Source, Second | No
     Returns
     -------
     source : Source
-        The part that both cover; with a truth, where the second log has one itself.
+        The part that both cover; with a truth, if the second log has one.
     second : Second or None
 
     Raises
@@ -125,7 +125,7 @@ def read_second(spec: AttitudeSpec, source: Source) -> tuple[Source, Second | No
     ConfigError
         A truth was given, too.
     DataError
-        The second log cannot be read or laid over the first.
+        The second log cannot be read or aligned with the first.
     """
     if spec.reference_log_path is None:
         return source, None
@@ -139,7 +139,7 @@ def read_second(spec: AttitudeSpec, source: Source) -> tuple[Source, Second | No
     imu = source.imu[inside]
     truth = scored = None
     if recording.truth is not None and recording.scored is not None:
-        # It tells the attitude from the start, which a gyro alone cannot.
+        # Its truth includes the initial attitude, which gyros alone do not observe.
         truth = truth_from_second_log(aligned, imu, recording.imu, attitude=recording.truth)
         there = second_clock(aligned, truth.index)
         scored = known_at(recording.truth, recording.scored, there).counts
@@ -148,7 +148,7 @@ def read_second(spec: AttitudeSpec, source: Source) -> tuple[Source, Second | No
         imu=imu,
         truth=truth,
         scored=scored,
-        # What a second sensor says is no exact truth.
+        # A second sensor is not an exact truth.
         clean=None,
         findings=source.findings + findings,
         inputs=(*source.inputs, inputs),
@@ -156,21 +156,21 @@ def read_second(spec: AttitudeSpec, source: Source) -> tuple[Source, Second | No
 
 
 def truth_of_second(source: Source, second: Second, imu: pd.DataFrame, q_nb: Array) -> Source:
-    """Take the attitude by the second log's rates for the truth.
+    """Use the attitude by the second log's rates as the truth.
 
     Parameters
     ----------
     source : Source
     second : Second
     imu : DataFrame
-        Of the first sensor, from where the run starts.
+        Samples of the first sensor, from the start of the run.
     q_nb : ndarray, (4,)
-        Attitude there, which the second log's rates are carried on from.
+        Attitude there, from which the second log's rates are integrated.
 
     Returns
     -------
     Source
-        With a truth, and a finding where the second log's own bias is not known.
+        With a truth, and a finding if the second log's own bias is unknown.
     """
     rests = find_rests(second.recording.imu)
     bias = rests[0].gyro_mean if rests else (0.0, 0.0, 0.0)
@@ -193,22 +193,22 @@ def truth_of_second(source: Source, second: Second, imu: pd.DataFrame, q_nb: Arr
     return replace(source, truth=truth, scored=np.ones(len(truth), dtype=bool), findings=findings)
 
 
-# What is to be thought of the runs of the attitude bench.
+# Findings about the runs of the attitude bench.
 
 
-# Within this of ±90° of pitch the kinematics of Euler angles amplify every error tenfold.
+# Within this of ±90° pitch the kinematics of Euler angles amplify every error tenfold.
 NEAR_POLE = 5.7  # deg: 1/cos = 10
-# A step that turns by more than this says little of what happened within it.
+# A larger rotation within a step hides the motion within it.
 LARGE_STEP = 0.5  # rad
 
 
 def passed_pole(run: AttitudeRun) -> bool:
-    """Tell whether a run came so near ±90° of pitch that its angles are not to be trusted."""
+    """Whether a run came too near to ±90° pitch for reliable angles."""
     return run.diagnostics.get("closest_to_pole_deg", 90.0) < NEAR_POLE
 
 
 def truth_score(run: AttitudeRun, source: Source) -> list[Score]:
-    """Compare a run with the truth, where there is one.
+    """Compare a run with the truth, if there is one.
 
     Parameters
     ----------
@@ -218,7 +218,7 @@ def truth_score(run: AttitudeRun, source: Source) -> list[Score]:
     Returns
     -------
     list of Score
-        One, or none. Errors are rotation angles in deg over the samples that count.
+        One or none. Errors are rotation angles in deg over the scored samples.
     """
     if source.truth is None or source.scored is None:
         return []
@@ -238,7 +238,7 @@ def truth_score(run: AttitudeRun, source: Source) -> list[Score]:
 
 
 def judge_turns(scores: list[Score]) -> list[Finding]:
-    """Say where the turns that were stated are not those that the gyro saw."""
+    """Report stated turns that differ from those of the gyro."""
     findings = {}
     for score in scores:
         if score.turned_deg is None or score.expected_deg is None:
@@ -256,7 +256,7 @@ def judge_turns(scores: list[Score]) -> list[Finding]:
 
 
 def judge_truth(source: Source, span: tuple[float, float]) -> list[Finding]:
-    """Say where the truth tells of a small part of the log only."""
+    """Report a truth that covers a small part of the log only."""
     if source.truth is None or source.scored is None or not source.scored.any():
         return []
     counted = source.truth.index[source.scored]
@@ -276,14 +276,14 @@ def judge_truth(source: Source, span: tuple[float, float]) -> list[Finding]:
 
 
 def judge_runs(runs: list[AttitudeRun], increments: pd.DataFrame) -> list[Finding]:
-    """Say what in the runs themselves, or in their steps, is not to be trusted.
+    """Report unreliable parts of the runs or of their steps.
 
     Parameters
     ----------
     runs : list of AttitudeRun
         On the same samples.
     increments : DataFrame
-        The Increments table that they ran over.
+        The Increments table of the runs.
 
     Returns
     -------
@@ -303,7 +303,7 @@ def judge_runs(runs: list[AttitudeRun], increments: pd.DataFrame) -> list[Findin
                 )
             )
     turn = np.sqrt((increments[THETA].to_numpy() ** 2).sum(axis=1))
-    # Gaps have been reported when the log was read.
+    # Gaps are reported by the reader.
     turn[[gap.sample - 1 for gap in find_gaps(runs[0].attitude.index)]] = 0.0
     largest = int(turn.argmax())
     if turn[largest] > LARGE_STEP:
@@ -318,10 +318,10 @@ def judge_runs(runs: list[AttitudeRun], increments: pd.DataFrame) -> list[Findin
     return findings
 
 
-# Other libraries' filters over the log of the bench.
+# Filters of other libraries on the log of the bench.
 
 
-#: A filter that would take longer is left out, and a finding says so.
+#: A filter that would take longer is skipped with a finding.
 LONGEST = 60.0  # s
 
 
@@ -333,27 +333,27 @@ def run_beside(
     references: pd.DataFrame,
     findings: list[Finding],
 ) -> tuple[PeerRun, ...]:
-    """Run the filters that are named, and compare them with what is known.
+    """Run the named filters of other libraries, and compare them with the references.
 
     Parameters
     ----------
     names : sequence of str
-        Of `peers.PEERS`, one filter as in ``ahrs:madgwick``, or ``all``.
+        Names of `peers.PEERS`, one filter as in ``ahrs:madgwick``, or ``all``.
     source : Source
-        With the truth, where there is one.
+        With the truth, if there is one.
     imu : DataFrame
-        The samples as used.
+        The used samples.
     q_nb : ndarray, (4,)
-        Attitude at the start.
+        Initial attitude.
     references : DataFrame
     findings : list of Finding
-        What was left out is added.
+        Skipped filters are appended.
 
     Returns
     -------
     tuple of PeerRun
-        With an accelerometer alone a filter cannot tell the heading: its own zero is turned to
-        the truth at the first instant that counts, where there is one.
+        With an accelerometer alone a filter does not observe the heading: its heading is rotated
+        to the truth at the first scored instant, if there is one.
 
     Raises
     ------

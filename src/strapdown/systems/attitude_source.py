@@ -1,4 +1,4 @@
-"""What the attitude bench runs on: a log or a scenario, its truth, its window."""
+"""Input of the attitude bench: a log or a scenario, its truth, its window."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Source:
-    """A log or a scenario, read; `clean` is a scenario without the sensor's errors."""
+    """Log or scenario; `clean` is a scenario without sensor errors."""
 
     name: str
     what: str
@@ -49,8 +49,7 @@ def simulate_scenario(spec: ScenarioSpec) -> tuple[pd.DataFrame, pd.DataFrame]:
     Parameters
     ----------
     spec : ScenarioSpec
-        Where it names a sensor, the errors of one unit of that take the place of the
-        scenario's own.
+        If it names a sensor, the errors of one of its units replace the scenario's own.
 
     Returns
     -------
@@ -73,7 +72,7 @@ def simulate_scenario(spec: ScenarioSpec) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 
 def scenario_errors(spec: ScenarioSpec) -> ImuErrors:
-    """Return the errors that a scenario is simulated with: its own, or those of a sensor's unit.
+    """Return the errors of a simulated scenario: its own, or those of a sensor's unit.
 
     Raises
     ------
@@ -86,7 +85,7 @@ def scenario_errors(spec: ScenarioSpec) -> ImuErrors:
 
 
 def read_options(spec: LogSpec) -> ReadOptions:
-    """Return what a specification says about reading its log."""
+    """Return the options of a specification for reading its log."""
     return ReadOptions(
         columns=dict(spec.columns),
         gyro_unit=spec.gyro_unit,
@@ -105,7 +104,7 @@ def read_source(spec: AttitudeSpec) -> Source:
     Raises
     ------
     DataError, ConfigError
-        It cannot be used; the message names file, row and remedy.
+        The source cannot be used; the message names file, row and remedy.
     """
     if isinstance(spec.source, ScenarioSpec):
         return _scenario(spec.source)
@@ -126,12 +125,12 @@ def read_source(spec: AttitudeSpec) -> Source:
 
 
 def input_files(role: str, path: str, files: tuple[Path, ...]) -> InputFiles:
-    """Files that were read in a role, with their digests as of now."""
+    """List files read in a role, with their present digests."""
     return InputFiles(role, Path(path), files, tuple(sha256(file) for file in files))
 
 
 def sensor_file(sensor: str | None) -> tuple[InputFiles, ...]:
-    """The file that a sensor was read from, where it is not of the catalogue."""
+    """Return the file of a sensor that is not from the catalogue."""
     if sensor is None or sensor.lower() in SENSORS:
         return ()
     return (input_files("sensor", sensor, (Path(sensor),)),)
@@ -166,16 +165,16 @@ def _scenario(spec: ScenarioSpec) -> Source:
 
 
 def describe(imu: pd.DataFrame, what: str, whole: pd.DataFrame) -> str:
-    """Say in words what was run on: how long, how fast, what a row is, and which part.
+    """Describe the input in words: duration, rate, meaning of a row, and part.
 
     Parameters
     ----------
     imu : DataFrame
-        The part that was used.
+        The used part.
     what : str
-        What it is.
+        Name of the input.
     whole : DataFrame
-        What it is a part of.
+        The whole log.
     """
     length = float(imu.index[-1] - imu.index[0])
     rate = (len(imu) - 1) / length
@@ -193,7 +192,7 @@ def describe(imu: pd.DataFrame, what: str, whole: pd.DataFrame) -> str:
 
 
 def with_truth(source: Source, spec: AttitudeSpec) -> Source:
-    """The source with the truth that was given, on its own clock and within its window."""
+    """Add the given truth to the source, on its own clock and within its window."""
     if spec.truth_path is None:
         if source.truth is None or source.scored is None:
             return source
@@ -224,7 +223,7 @@ def with_truth(source: Source, spec: AttitudeSpec) -> Source:
         source,
         truth=truth[inside],
         scored=np.ones(int(inside.sum()), dtype=bool),
-        # It need not be the scenario's own, which alone is exact.
+        # It may differ from the scenario's own truth, which alone is exact.
         clean=None,
         inputs=(*source.inputs, input_files("truth", spec.truth_path, (path,))),
     )

@@ -1,4 +1,4 @@
-"""The same log at lower rates, by leaving samples out and by summing increments."""
+"""Run the bench at lower rates, by dropping samples and by summing increments."""
 
 from __future__ import annotations
 
@@ -31,21 +31,21 @@ COLUMNS = [
     *("algorithm", "meaning", "factor", "rate_hz", "own_deg", "final_deg", "rms_deg"),
     *("max_deg", "reference_deg", "error_deg"),
 ]
-# Halved as long as there is something left to judge.
+# Halved while enough samples remain.
 FACTORS = (1, 2, 4, 8, 16, 32)
 LEAST_STEPS = 20
 
 
 @dataclass(frozen=True)
 class Grounds:
-    """What every cell of a sweep is judged on.
+    """Input and references common to all cells of a sweep.
 
     Attributes
     ----------
     imu : DataFrame
-        The samples as used, at the full rate.
+        The used samples, at the full rate.
     q_nb : ndarray, (4,)
-        Attitude at the start.
+        Initial attitude.
     own : OwnTruth
     truth : Known or None
     references : DataFrame
@@ -70,15 +70,15 @@ def refuse_no_rate(rate: float) -> None:
 def choose_factors(
     imu: pd.DataFrame, rates: Sequence[float], findings: list[Finding]
 ) -> tuple[int, ...]:
-    """Find by what whole numbers the rate of a log is to be divided.
+    """Choose the integer divisors of a log's rate.
 
     Parameters
     ----------
     imu : DataFrame
     rates : sequence of float, Hz
-        What was asked for; none: the full rate and its halves.
+        Requested rates; if empty, the full rate and its halves.
     findings : list of Finding
-        Where a rate that was asked for is not among them.
+        Reports requested rates that cannot be reached.
 
     Returns
     -------
@@ -128,7 +128,7 @@ def sweep_rates(
     factors: Sequence[int],
     progress: Progress,
 ) -> pd.DataFrame:
-    """Run every algorithm at every rate, by both meanings of a lower rate.
+    """Run every algorithm at every rate, with both meanings of a lower rate.
 
     Parameters
     ----------
@@ -143,10 +143,9 @@ def sweep_rates(
     -------
     DataFrame
         As `results.AttitudeBench.sweep`. ``drop`` keeps one sample in `factor` and forms
-        increments between those that are left, as a slow logger would; ``sum`` adds up the
-        increments of the full rate, as a sensor that integrates would. A last step may be
-        shorter, so that every cell ends where the log does. An algorithm that leaves the range
-        of floating point has an infinite error.
+        increments between those, as a slow logger would; ``sum`` adds up the increments of the
+        full rate, as an integrating sensor would. The last step may be shorter, so that every
+        cell ends at the end of the log. An algorithm that overflows has an infinite error.
     """
     cells = [(meaning, factor) for meaning in MEANINGS for factor in factors]
     clean = grounds.own.clean
@@ -155,7 +154,7 @@ def sweep_rates(
     rows: list[dict[str, object]] = []
     for k, (meaning, factor) in enumerate(cells):
         if meaning == "sum" and factor == 1:
-            # Nothing is left out and nothing summed: what has been found already.
+            # At the full rate both meanings are the same: reuse the rows.
             full = [row for row in rows if row["factor"] == 1]
             rows += [row | {"meaning": "sum"} for row in full]
             continue
@@ -181,13 +180,13 @@ def sweep_rates(
 
 
 def error_at_full_rate(algorithm: AttitudeAlgorithm, grounds: Grounds) -> float:
-    """Return the error in deg by which one algorithm is judged at the full rate."""
+    """Return the error in deg that judges an algorithm at the full rate."""
     steps = steps_of(increments_from_imu(grounds.imu, grounds.interpolation))
     return _cell(algorithm, grounds, steps, None, grounds.imu)["error_deg"]
 
 
 def chosen_samples(count: int, factor: int) -> NDArray[np.int64]:
-    """Every factor-th of so many samples, and the last."""
+    """Indices of every factor-th sample, and the last."""
     samples = np.arange(0, count, factor)
     return samples if samples[-1] == count - 1 else np.append(samples, count - 1)
 
@@ -199,7 +198,7 @@ def _steps(
     meaning: str,
     interpolation: str,
 ) -> Steps:
-    """Steps of a lower rate; `whole` are the increments of the full one."""
+    """Steps of a lower rate; `whole` are the increments of the full rate."""
     if meaning == "drop":
         return steps_of(increments_from_imu(imu.iloc[samples], interpolation))
     return steps_of(sum_increments(whole, samples))
@@ -218,8 +217,8 @@ def sum_increments(increments: pd.DataFrame, samples: NDArray[np.int64]) -> pd.D
     Returns
     -------
     DataFrame
-        An Increments table of one step between each two. What the rate did within a step is
-        known only where nothing was added up.
+        Increments table with one step between each two of the samples. The rate within a step is
+        known only where the step was not summed.
     """
     if len(samples) == len(increments) + 1:
         return increments
@@ -227,7 +226,7 @@ def sum_increments(increments: pd.DataFrame, samples: NDArray[np.int64]) -> pd.D
     dt = np.add.reduceat(increments["dt"].to_numpy(), begin)
     theta = np.add.reduceat(increments[THETA].to_numpy(), begin, axis=0)
     ends = increments.index.to_numpy(dtype=np.float64)[samples[1:] - 1]
-    # A step that holds a single one keeps what is known of it.
+    # A step of a single increment keeps its rate.
     single = np.diff(samples) == 1
     change = np.zeros_like(theta)
     change[single] = increments[DTHETA].to_numpy()[begin[single]]
@@ -260,7 +259,7 @@ def _cell(
         "rms_deg": rms,
         "max_deg": largest,
         "reference_deg": reference,
-        # A truth tells more than a reference point, and better.
+        # A truth is more complete and more accurate than a reference point.
         "error_deg": next(e for e in (largest, reference, own_deg) if not np.isnan(e)),
     }
 
@@ -272,22 +271,22 @@ def _largest_reference(q: Array, references: pd.DataFrame, used: pd.DataFrame) -
     return max(reference_errors(attitude, references))
 
 
-# Whose the error is: the sensor's, the algorithm's, or single precision's.
+# Shares of the error: sensor, algorithm, single precision.
 
 
-#: What stands for the truth of the algorithm alone on a log: of fourth order from rates and of
-#: sixth from increments, whatever the steps.
+#: Reference for the algorithm error on a log: of fourth order from rates and of sixth from
+#: increments, for any steps.
 MOST_ACCURATE = RotationVector(samples=4, coefficients="fit")
 
 
 @dataclass(frozen=True)
 class OwnTruth:
-    """What an algorithm without error, on a sensor without error or with it, would say.
+    """Attitude by an error-free algorithm, with an error-free sensor or the actual one.
 
     Attributes
     ----------
     known : Known
-        On a simulation the exact attitude, turned to begin where the run does; on a log that of
+        In a simulation the exact attitude, rotated to the start of the run; for a log that of
         the most accurate algorithm.
     clean : DataFrame or None
         The Imu table without the sensor's errors, on a simulation.
@@ -298,7 +297,7 @@ class OwnTruth:
 
     @property
     def exact(self) -> bool:
-        """Whether it is the truth itself, and not an estimate."""
+        """Whether it is the truth itself, not an estimate."""
         return self.clean is not None
 
 
@@ -309,17 +308,17 @@ def own_truth(
     q_nb: Array,
     interpolation: str,
 ) -> OwnTruth:
-    """Find what the algorithms' own errors are to be measured against.
+    """Find the reference for the algorithm errors.
 
     Parameters
     ----------
     imu : DataFrame
-        The samples as used.
+        The used samples.
     clean : DataFrame or None
         The same without the sensor's errors, for a simulation.
     truth : Known or None
     q_nb : ndarray, (4,)
-        Attitude at the start.
+        Initial attitude.
     interpolation : str
 
     Returns
@@ -327,8 +326,8 @@ def own_truth(
     OwnTruth
     """
     if clean is not None and truth is not None:
-        # An algorithm is not to blame for a start that was given otherwise: the truth is turned
-        # to begin there.
+        # The error of the initial attitude is not the algorithm's: the truth is rotated to start
+        # with the run.
         start = rotation.compose(q_nb, rotation.conjugate(truth.q_nb[0]))
         return OwnTruth(replace(truth, q_nb=rotation.compose(start, truth.q_nb)), clean)
     increments = increments_from_imu(imu, interpolation)
@@ -337,7 +336,7 @@ def own_truth(
 
 
 def between_samples(imu: pd.DataFrame, q_nb: Array) -> tuple[float, float] | None:
-    """Estimate what the course of the rate between the samples matters.
+    """Estimate the effect of the rate between the samples.
 
     Parameters
     ----------
@@ -347,9 +346,8 @@ def between_samples(imu: pd.DataFrame, q_nb: Array) -> tuple[float, float] | Non
     Returns
     -------
     tuple of float, or None
-        Rotation angle at the end, and the largest, in deg, between the attitude from rates that
-        run along chords and from rates that run along cubics; None for mean rates, between
-        which nothing runs.
+        Rotation angle at the end, and the largest, in deg, between the attitudes with linear and
+        with cubic interpolation of the rates; None for mean rates, which are not interpolated.
     """
     if imu.attrs["sampling"] == "mean":
         return None
@@ -370,7 +368,7 @@ def find_shares(
     q_nb: Array,
     interpolation: str,
 ) -> tuple[Share, ...]:
-    """Split the error of each run.
+    """Split the error of each run into the shares of sensor and algorithm.
 
     Parameters
     ----------
@@ -378,7 +376,7 @@ def find_shares(
     runs : sequence of AttitudeRun
         In the same order.
     imu : DataFrame
-        The samples that they ran on.
+        The samples of the runs.
     own : OwnTruth
     truth : Known or None
     q_nb : ndarray, (4,)
@@ -387,13 +385,13 @@ def find_shares(
     Returns
     -------
     tuple of Share
-        On a simulation an error is exactly the algorithm's own, turned on by the sensor's:
+        In a simulation an error is exactly the algorithm error, rotated by the sensor error:
         ``q_true^-1 q = (q_true^-1 q_clean)(q_clean^-1 q)``, so that their rotation vectors add up
         to within half their product.
     """
     clean = None if own.clean is None else increments_from_imu(own.clean, interpolation)
     rounded = single_increments(imu, interpolation)
-    # On a log the sensor's share is what the most accurate algorithm is off by.
+    # For a log the sensor error is that of the most accurate algorithm.
     of_sensor = None if truth is None or own.exact else truth.errors(own.known.q_nb)
     shares = []
     for algorithm, run in zip(algorithms, runs, strict=True):
@@ -413,7 +411,7 @@ def find_shares(
 def best_error(
     own: OwnTruth, truth: Known | None, imu: pd.DataFrame, q_nb: Array, interpolation: str
 ) -> Errors | None:
-    """Error against the truth that no algorithm can do away with: that of sensor and start.
+    """Error against the truth due to sensor and initial attitude, common to all algorithms.
 
     Parameters
     ----------
@@ -440,10 +438,10 @@ def best_error(
     return truth.errors(rotation.compose(own.known.q_nb, sensor))
 
 
-# Several logs or seeds together, so that a rank is not luck.
+# Statistics over several logs or seeds, so that a rank is not due to chance.
 
 
-#: Decimals of a degree beyond which two errors differ by rounding alone.
+#: Decimals of a degree beyond which errors differ by rounding alone.
 ROUNDED = 9
 CONFIDENCE = 0.95
 _KIND = ["algorithm", "meaning"]
@@ -451,12 +449,12 @@ _NUMBERS = [
     *("rate_hz", "own_deg", "final_deg", "rms_deg"),
     *("max_deg", "reference_deg", "error_deg"),
 ]
-# Rates halve from cell to cell: one that is nearer than the root of two is the same.
+# Rates halve from cell to cell: within a factor of the root of two they count as the same.
 NEAR = 2.0**0.5
 
 
 def trial_names(sources: Sequence[ScenarioSpec | LogSpec]) -> list[str]:
-    """Names of trials: of logs their path's last part, of a scenario its seed.
+    """Names of trials: of a log the last part of its path, of a scenario its seed.
 
     Parameters
     ----------
@@ -475,14 +473,14 @@ def trial_names(sources: Sequence[ScenarioSpec | LogSpec]) -> list[str]:
 
 
 def gather(benches: Sequence[AttitudeBench], names: Sequence[str]) -> Trials:
-    """Put the errors of several benches together.
+    """Combine the errors of several benches.
 
     Parameters
     ----------
     benches : sequence of AttitudeBench
-        Of the same algorithms.
+        With the same algorithms.
     names : sequence of str
-        Of the trials.
+        Names of the trials.
 
     Returns
     -------
@@ -544,11 +542,11 @@ def rank(errors: pd.DataFrame) -> pd.DataFrame:
 
 
 def _luck(worse_by: Array) -> float:
-    """Probability that differences with this mean come of a mean that is not positive."""
+    """Probability of differences with this mean, if the true mean is not positive."""
     from scipy import stats
 
     spread = float(worse_by.std(ddof=1))
-    # Rounding alone tells nothing apart.
+    # Differences due to rounding alone are not significant.
     if float(np.abs(worse_by).max()) < 10.0**-ROUNDED:
         return 0.5
     if spread <= 1e-12 * max(1.0, float(np.abs(worse_by).max())):
@@ -558,7 +556,7 @@ def _luck(worse_by: Array) -> float:
 
 
 def worst_sweep(sweeps: Sequence[pd.DataFrame]) -> pd.DataFrame:
-    """Cell by cell the largest errors of several sweeps.
+    """Largest errors of several sweeps, cell by cell.
 
     Parameters
     ----------
@@ -568,14 +566,14 @@ def worst_sweep(sweeps: Sequence[pd.DataFrame]) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        The cells of the first for which each of the others has a rate that is no more than
-        `NEAR` times higher; its highest such is taken. The rate of a cell is the highest among
-        those taken: each trial is judged at that rate or below.
+        The cells of the first sweep for which each of the others has a rate at most `NEAR` times
+        higher; the highest such rate is used. The rate of a cell is the highest of these: each
+        trial is judged at that rate or below.
 
     Raises
     ------
     ConfigError
-        There is none.
+        No cell remains.
     """
     first, *others = sweeps
     rows = []
@@ -596,12 +594,12 @@ def worst_sweep(sweeps: Sequence[pd.DataFrame]) -> pd.DataFrame:
 
 
 def not_judged(known: Sequence[bool], names: Sequence[str]) -> tuple[Finding, ...]:
-    """Say which trials have nothing known, where others have.
+    """Report the trials without a reference, where others have one.
 
     Parameters
     ----------
     known : sequence of bool
-        Whether anything is known of the attitude, trial by trial.
+        Whether a reference of the attitude is known, by trial.
     names : sequence of str
 
     Returns

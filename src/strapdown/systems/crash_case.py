@@ -1,4 +1,4 @@
-"""A crash case, from its file to everything that a report tells."""
+"""Crash case from its file to all results of a report."""
 
 from __future__ import annotations
 
@@ -50,13 +50,13 @@ __all__ = [
 ]
 
 
-# Numbers that a Monte Carlo may hold at once: half a gigabyte.
+# Most numbers of a Monte Carlo in memory: half a gigabyte.
 MOST_NUMBERS = 64_000_000
 
 
 @dataclass(frozen=True, eq=False)
 class CaseResult:
-    """Everything that came of a case.
+    """Result of a case.
 
     Attributes
     ----------
@@ -65,17 +65,17 @@ class CaseResult:
     inputs : tuple of InputFiles
         The case file (role ``case``), records (``record``), sensors, references, fixes.
     records : dict of str to CrashRecord
-        By path as the case names it.
+        By path as in the case.
     units : tuple of CrashUnit
         As read from the records.
     reconstruction : CrashReconstruction
     samples : PathSamples or None
-        Of the main path's Monte Carlo.
+        Monte Carlo samples of the main path.
     severity : tuple of SeverityAnswer
     references : tuple of ReferenceAnswer
         Of the main answer, then of every unit by itself.
     findings : tuple of Finding
-        Of reading and reconstruction, in this order.
+        From reading and reconstruction, in this order.
     """
 
     spec: CaseSpec
@@ -100,7 +100,7 @@ def run_case(
     spec : CaseSpec
         With absolute paths.
     case_file : Path, optional
-        Where it was read from: an input, too.
+        Case file, listed as an input.
     progress : callable, optional
         Called with a stage and the share that is done.
 
@@ -111,11 +111,11 @@ def run_case(
     Raises
     ------
     ConfigError
-        A file is not there, or an option cannot be.
+        A file does not exist, or an option is invalid.
     DataError
         A record cannot be used; the message names file, row, quantity and remedy.
     DivergenceError
-        A path left what a vehicle can do.
+        A path left the range of vehicle motion.
     """
     progress("reading", 0.02)
     records, spec = whole_records(spec)
@@ -185,7 +185,7 @@ def whole_records(spec: CaseSpec) -> tuple[dict[str, CrashRecord], CaseSpec]:
         )
         for unit in spec.units
     )
-    # A record has one name, by whichever of its files it was given: the bundle has the folder.
+    # A record has one name, whichever of its files is given: the bundle has the folder.
     records = {
         moved[path]: replace(record, path=Path(moved[path])) for path, record in read.items()
     }
@@ -249,7 +249,7 @@ def _preparation(spec: CaseSpec) -> dict[str, dict[str, object]]:
     for unit in spec.units:
         own: dict[str, object] = {}
         if spec.entry.kind == "standstill":
-            # What is quiet was at rest, and not at a constant speed.
+            # A quiet start was at rest, not at a constant speed.
             own["moving_at_impact"] = False
         if unit.rest_s is not None:
             own["rest"] = unit.rest_s
@@ -277,7 +277,7 @@ def _samples(path: CrashPath, runs: int, seed: int) -> tuple[PathSamples | None,
     ]
 
 
-# The recorders of a case, from its file and the records.
+# Recorders of a case, from its file and the records.
 
 
 # Quantity of a record's channels, and the triad of the catalogue.
@@ -285,7 +285,7 @@ TRIADS = {"acceleration": "accel", "rate": "gyro"}
 
 
 def case_unit(spec: UnitSpec, records: Mapping[str, CrashRecord]) -> CrashUnit:
-    """Make a unit of what the case says of it.
+    """Build a unit from its specification in the case.
 
     Parameters
     ----------
@@ -300,9 +300,9 @@ def case_unit(spec: UnitSpec, records: Mapping[str, CrashRecord]) -> CrashUnit:
     Raises
     ------
     DataError
-        A channel is not there, or cannot be used.
+        A channel is missing, or cannot be used.
     ConfigError
-        A sensor, a key or a number is none.
+        A sensor, a key or a number is invalid.
     """
     count = len(spec.accelerometers)
     accelerometers = tuple(
@@ -357,7 +357,7 @@ def _triad(
     return RecordedTriad(table, uncertainty, name)
 
 
-# The answers of a case beside what else is known of the crash.
+# Comparison of a case's answers with references.
 
 
 AXES = {"forward": (1.0, 0.0, 0.0), "right": (0.0, 1.0, 0.0)}
@@ -365,20 +365,20 @@ AXES = {"forward": (1.0, 0.0, 0.0), "right": (0.0, 1.0, 0.0)}
 
 @dataclass(frozen=True, eq=False)
 class ReferenceAnswer:
-    """One unit's answer beside something else that is known.
+    """Comparison of one unit's answer with a reference.
 
     Attributes
     ----------
     spec : ReferenceSpec
     unit : str
-        Whose answer it is.
+        Unit of the answer.
     table : DataFrame or None
-        Of a path, as read.
+        Reference path as read.
     path : PathComparison or None
     span : tuple of float, s
-        Of a change of velocity.
+        Span of a delta-v.
     delta_v, sd : float, m/s
-        Ours over the span; NaN for a path.
+        Computed over the span; NaN for a path.
     consistent : bool
         Whether the difference is within the 95 % bound of both together.
     """
@@ -399,7 +399,7 @@ def compare_reference(
     gravity: float,
     tables: Mapping[str, pd.DataFrame],
 ) -> ReferenceAnswer:
-    """Hold one unit against one reference.
+    """Compare one unit with one reference.
 
     Parameters
     ----------
@@ -418,7 +418,7 @@ def compare_reference(
     DataError
         The reference and the record have no time in common.
     ConfigError
-        Nothing says over which span a change of velocity is meant: there is no event.
+        The span of a delta-v is not stated, and there is no event.
     """
     if spec.path is not None:
         table = tables[spec.path]
@@ -469,19 +469,19 @@ def compare_reference(
     return ReferenceAnswer(spec, unit.name, None, None, (start, end), value, sd, near)
 
 
-# What published models say of the severity of a case.
+# Severity of a case by published models.
 
 
 @dataclass(frozen=True, eq=False)
 class SeverityAnswer:
-    """What one model says, or why it says nothing.
+    """Severity by one model, or why it does not apply.
 
     Attributes
     ----------
     model : SeverityModel
     risk : InjuryRisk or None
     because : Finding or None
-        Why there is none.
+        Why there is no risk.
     """
 
     model: SeverityModel
@@ -490,12 +490,12 @@ class SeverityAnswer:
 
 
 def main_event(unit: UnitReconstruction) -> int | None:
-    """Return the number, from 0, of the event in which the velocity changed most.
+    """Return the number, from 0, of the event with the largest delta-v.
 
     Returns
     -------
     int or None
-        None where there is no event.
+        None without an event.
     """
     if not unit.body:
         return None
@@ -503,18 +503,18 @@ def main_event(unit: UnitReconstruction) -> int | None:
 
 
 def case_severity(spec: CaseSpec, unit: UnitReconstruction) -> tuple[SeverityAnswer, ...]:
-    """Ask the models that the case names, or all that fit the type of the crash.
+    """Evaluate the models that the case names, or all that fit the type of the crash.
 
     Parameters
     ----------
     spec : CaseSpec
     unit : UnitReconstruction
-        Whose event of the largest change is meant.
+        Its event with the largest delta-v is used.
 
     Returns
     -------
     tuple of SeverityAnswer
-        Empty without an event. A model that is not valid here, or lacks an input, says why.
+        Empty without an event. A model that is not valid here, or lacks an input, states why.
 
     Raises
     ------
@@ -540,6 +540,6 @@ def case_severity(spec: CaseSpec, unit: UnitReconstruction) -> tuple[SeverityAns
 
 
 def _fitting(kind: str) -> list[SeverityModel]:
-    """Models of this type alone, or those of all crashes where there are none."""
+    """Models of this type alone, or those of all crashes if there are none."""
     own = [m for m in SEVERITY_MODELS.values() if kind in m.applies.get("crash_type", ())]
     return own or [m for m in SEVERITY_MODELS.values() if not m.applies]

@@ -1,4 +1,4 @@
-"""A crash, from the records of its units to changes of velocity, direction of force and path."""
+"""Reconstruct a crash from its units' records: delta-v, direction of force and path."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ __all__ = ["check_crash_options"]
 
 @dataclass(frozen=True, eq=False)
 class CrashReconstruction:
-    """What the units say of a crash, each for itself and together.
+    """Reconstruction of a crash by each unit and by all together.
 
     Attributes
     ----------
@@ -38,14 +38,13 @@ class CrashReconstruction:
         The reference point, vehicle axes from the vehicle's origin.
     synchronised : SynchronisedUnits
     units : tuple of UnitReconstruction
-        Each unit for itself, at the reference point.
+        Each unit by itself, at the reference point.
     comparison : UnitComparison or None
         None for a single unit.
     combined : UnitReconstruction or None
-        Of the weighted mean of the units, where it was asked for, there are several and they
-        agree.
+        Of the weighted mean of the units, if requested and if several units agree.
     findings : tuple of Finding
-        What a person should know, of everything that was done.
+        Findings of all steps.
     """
 
     point: tuple[float, float, float]
@@ -62,24 +61,24 @@ class CrashReconstruction:
 
     @property
     def answers(self) -> tuple[UnitReconstruction, ...]:
-        """Every unit, and the mean of them where there is one."""
+        """Every unit, and their mean if there is one."""
         return (*self.units, *(() if self.combined is None else (self.combined,)))
 
     def summary(self) -> pd.DataFrame:
-        """Changes of velocity, directions of force and ends of the path, with their bounds.
+        """Table of delta-v, directions of force and ends of the path, with their bounds.
 
         Returns
         -------
         DataFrame
             Indexed by ``unit``, ``part`` (number and type of the event, or ``path``) and
-            ``quantity``; ``value``, ``low`` and ``high`` in the unit that the quantity names. The
-            bounds hold 95 %.
+            ``quantity``; ``value``, ``low`` and ``high`` in the unit that the quantity names: 95 %
+            bounds.
         """
         return summary_table(self.answers)
 
     @property
     def main(self) -> UnitReconstruction:
-        """The mean of the units, or the first one."""
+        """The mean of the units, or the first unit."""
         return self.units[0] if self.combined is None else self.combined
 
     def unit(self, name: str) -> UnitReconstruction:
@@ -88,7 +87,7 @@ class CrashReconstruction:
         Raises
         ------
         ConfigError
-            There is none of that name.
+            No unit has this name.
         """
         for unit in self.units:
             if unit.name == name:
@@ -121,10 +120,10 @@ def reconstruct_crash(
     units : sequence of CrashUnit
         Of one rigid vehicle, as recorded.
     entry : Entry, GnssEntry or None
-        Velocity, heading and instant that the path is tied to; or fixes of a satellite receiver
-        before the crash, from which each unit finds them together with its biases (the mean of
-        the units is then tied to the entry of the first). None: the vehicle stood still at
-        the beginning of the record, and the path is told in its axes at the trigger.
+        Velocity, heading and instant of the path; or fixes of a GNSS receiver before the crash,
+        from which each unit finds them together with its biases (the mean of the units then uses
+        the entry of the first). None: the vehicle was stationary at the beginning of the record,
+        and the path is given in its axes at the trigger.
     point : sequence of float, (3,), m
         Reference point in vehicle axes (forward, right, down) from the vehicle's origin.
     window : (float, float), s, optional
@@ -133,29 +132,29 @@ def reconstruct_crash(
     rate : float, Hz
         Of the common stamps. Faster channels are decimated without aliasing.
     sampling : {'instantaneous', 'mean'}
-        What the samples at the common stamps are: values of a band-limited signal, or true means
-        over the step, in which nothing of a fast channel is lost to the change of velocity.
+        Meaning of the samples at the common stamps: values of a band-limited signal, or true means
+        over the step, which preserve the delta-v of a fast channel.
     clock : {'trigger', 'correlation'}
         As `synchronise`.
     combine : bool
-        Also reconstruct the weighted mean of the units, if they agree: of units of which one must
-        be wrong there is none, and a finding says so. `combine_units` makes it all the same.
+        Also reconstruct the weighted mean of the units, if they agree; if they contradict, a
+        finding reports it. `combine_units` computes the mean in any case.
     preparation : mapping, optional
-        Options of `prepare_unit`, for all units alike; under the name of a unit, a mapping of its
-        own ones.
+        Options of `prepare_unit`, for all units; under the name of a unit, a mapping of its own
+        options.
     peak_window : float, s
-        Of the change of velocity that severity is usually told by.
+        Window of the delta-v that usually rates severity.
     rule : EventRule
-        What an event is: 49 CFR 563 by default.
+        Definition of an event: 49 CFR 563 by default.
     gravity : float, m/s²
-        At the place.
+        Local gravity.
     mechanization : NorthEastDown, optional
 
     Returns
     -------
     CrashReconstruction
-        All bounds hold 95 %. Without an event in the record there are no changes of velocity,
-        and a finding tells how near it came; the path is there all the same.
+        All bounds are 95 % bounds. Without an event in the record there are no changes of velocity,
+        and a finding states how near it came; the path is returned in any case.
 
     Raises
     ------
@@ -164,7 +163,7 @@ def reconstruct_crash(
     ConfigError
         An option is out of range.
     DivergenceError
-        A path left what a vehicle can do.
+        A path left the range of vehicle motion.
     """
     check_crash_options(
         units, entry, point, window, preparation, peak_window, rule, gravity, mechanization
@@ -174,7 +173,7 @@ def reconstruct_crash(
     there = prepare_together(together, point, gravity, preparation or {})
     for of in there:
         findings += () if of.prepared is None else of.prepared.findings
-    # Before each finds its own biases, which takes them from what tells how far two may differ.
+    # Before each unit estimates its own biases, which absorbs part of the differences.
     comparison = compare_units(there) if len(there) > 1 else None
     tied: list[Entry | None] = [None if isinstance(entry, GnssEntry) else entry] * len(there)
     if isinstance(entry, GnssEntry):
@@ -217,7 +216,7 @@ def _no_mean(units: Sequence[PointKinematics]) -> Finding:
     )
 
 
-# What is asked of `reconstruct_crash`, checked before any work is done.
+# Checks of the arguments of `reconstruct_crash` before any work.
 
 
 def check_crash_options(
@@ -231,12 +230,12 @@ def check_crash_options(
     gravity: object,
     mechanization: object,
 ) -> None:
-    """Check the arguments whose kind or size no later stage would name.
+    """Check the arguments that no later stage would report by kind or size.
 
     Raises
     ------
     DataError
-        There is no unit.
+        No unit is given.
     ConfigError
         An argument is of another kind, or out of range.
     """

@@ -1,4 +1,4 @@
-"""Linear algebra on one thread: how many there are changes the last digits of a sum."""
+"""Single-threaded linear algebra, as the number of threads changes the last digits of a sum."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ __all__ = ["one_thread"]
 def one_thread() -> Iterator[None]:
     """Run on one thread of the linear algebra library, whatever the machine allows.
 
-    OpenBLAS divides a product or a factorisation among its threads, and so adds in another order
-    with each number of them: 1e-14 of a result, which is another byte in a sealed file. Numbers
-    of threads are as before afterwards.
+    OpenBLAS divides a product or a factorization among its threads, and the order of additions
+    depends on their number: a relative change of 1e-14, which changes bytes of a sealed file. The
+    number of threads is restored afterwards.
     """
-    # What is not loaded yet cannot be told.
+    # Only loaded libraries can be limited.
     import numpy  # noqa: F401
     import scipy.linalg  # noqa: F401
     from threadpoolctl import threadpool_limits

@@ -1,4 +1,4 @@
-"""The part of a log that is used: from one instant to another, or for so long."""
+"""Select a part of a log by begin, end or duration."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["check_part", "part_of_log"]
 
 
 def check_part(from_s: float | None, to_s: float | None, duration_s: float | None) -> None:
-    """Refuse a part that cannot be meant.
+    """Refuse an invalid part.
 
     Parameters
     ----------
@@ -20,7 +20,7 @@ def check_part(from_s: float | None, to_s: float | None, duration_s: float | Non
     Raises
     ------
     ConfigError
-        Both say where it ends, it ends before it begins, or one is no number.
+        Both end and duration are given, it ends before it begins, or a value is not finite.
     """
     for flag, value in (("--from", from_s), ("--to", to_s), ("--duration", duration_s)):
         if value is not None and not np.isfinite(value):
@@ -58,14 +58,14 @@ def part_of_log(
     from_s, to_s : float or None, s
         On the log's own clock; its first and its last stamp, where they are not given.
     duration_s : float or None, s
-        In place of `to_s`: so long from `from_s`, or from the first stamp.
+        Duration from `from_s`, or from the first stamp, instead of `to_s`.
     name : str
         Of the log, for messages.
 
     Returns
     -------
     DataFrame
-        The same table where all of it is used.
+        The same table if all of it is used.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def part_of_log(
     last = float(time[-1]) if to_s is None else to_s
     if duration_s is not None:
         last = first + duration_s
-    # A stamp that is a sum of steps may miss the instant by its rounding.
+    # A stamp that is a sum of steps may miss the instant by rounding.
     slack = 1e-6 * float(np.median(np.diff(time)))
     kept = (time >= first - slack) & (time <= last + slack)
     if kept.sum() < 2:

@@ -1,4 +1,4 @@
-"""How a long run says how far it is."""
+"""Progress reports of a long run."""
 
 from __future__ import annotations
 
@@ -11,4 +11,4 @@ Progress = Callable[[str, float], None]
 
 
 def silent(stage: str, share: float) -> None:
-    """Report progress to nobody."""
+    """Ignore progress."""

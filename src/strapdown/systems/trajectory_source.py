@@ -1,4 +1,4 @@
-"""From a trajectory's specification to the motion, and to what a sensor reads on it."""
+"""Build a specified trajectory and simulate the sensor readings along it."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ from strapdown.simulation.path_motion import Manoeuvre
 from strapdown.simulation.vehicles import LIMITS
 from strapdown.simulation.walking import GAITS, walk
 
-# How fast a turn or a climb comes and goes where nothing is said, s.
+# Default onset and end time of a turn or a climb, s.
 TURN_RAMP = {"car": 1.0, "aircraft": 3.0, "ship": 10.0}
 CLIMB_RAMP = 3.0
 
-# Quantities of the simulation, as a file has them.
+# Quantities of the simulation by key of a file.
 _KEYS = {
     "acceleration": "most_acceleration_m_per_s2",
     "place": "waypoints",
@@ -78,8 +78,8 @@ def simulate_trajectory(
     Raises
     ------
     ConfigError
-        The sensor, the ellipsoid or the sampling is unknown, or the motion cannot be; the message
-        names the key.
+        The sensor, the ellipsoid or the sampling is unknown, or the motion is not possible; the
+        message names the key.
     """
     errors = ImuErrors() if spec.sensor is None else load_sensor(spec.sensor).draw(spec.seed)
     with with_key(f"{spec.name}.toml"):
@@ -97,12 +97,12 @@ def simulate_trajectory(
 
 
 def make_motion(spec: motions.MotionSpec, ellipsoid: Ellipsoid) -> EarthMotion:
-    """Make the motion of a specification.
+    """Build the motion of a specification.
 
     Raises
     ------
     ConfigError
-        It cannot be: a latitude beyond the pole, a turn too tight for its speed and so on.
+        It is not possible: a latitude beyond the pole, a turn too tight for its speed, etc.
     """
     if isinstance(spec, motions.WaypointsSpec):
         return _waypoints(spec, ellipsoid)
@@ -199,7 +199,7 @@ def _vehicle(
 
 
 def _step(spec: motions.Step, ramp: float) -> tuple[str, Manoeuvre]:
-    """One manoeuvre with its name."""
+    """One maneuver with its name."""
     side = -1.0 if spec.do in ("turn_left", "descend") else 1.0
     step: Manoeuvre
     if isinstance(spec, motions.SpeedSpec):
@@ -244,12 +244,12 @@ def _angle_waves(waves: Iterable[motions.AngleWaveSpec]) -> tuple[Wave, ...]:
 
 @contextmanager
 def with_key(name: str) -> Iterator[None]:
-    """Tell errors with the keys of a file in place of the simulation's own words.
+    """Report errors with the keys of a file instead of the simulation's parameters.
 
     Parameters
     ----------
     name : str
-        Of the file.
+        Name of the file.
     """
     try:
         yield

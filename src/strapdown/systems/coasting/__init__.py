@@ -1,1 +1,1 @@
-"""How far it drifts when what aids it stays away."""
+"""Drift during a GNSS outage."""

@@ -1,4 +1,4 @@
-"""A drift foretold: the filter's own covariance over an outage, and what each source adds to it."""
+"""Predict drift: the filter's covariance over an outage, and the share of each source."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-#: Goes over the samples of an outage with a navigator from a state.
+#: Runs a navigator from a state over the samples of an outage.
 Go = Callable[[Navigator, NavigatorState], Sequence[NavigationChunk]]
 
-#: What is foretold, with its unit.
+#: Predicted quantities with units.
 QUANTITIES = {
     "horizontal": "m",
     "along": "m",
@@ -47,31 +47,31 @@ QUANTITIES = {
     "speed": "m/s",
     "heading": "rad",
 }
-#: By how much a source is made larger and smaller. Without aids a variance is quadratic in it, and
-#: any part is exact; with aids weights change with it, and what is left is of its second power.
+#: Relative step of a source's size. Without measurements a variance is quadratic in it, and any
+#: step is exact; with measurements the gains change, and the remainder is of second order.
 LINEAR_PART, AIDED_PART = 0.5, 0.02
-#: Instants of a forecast.
+#: Number of instants of a forecast.
 INSTANTS = 240
-# A body that is slower has no course, m/s.
+# Speed below which a body has no course, m/s.
 STANDS = 0.1
 
 
 @dataclass(frozen=True, eq=False)
 class Share:
-    """What one source adds.
+    """Contribution of one source.
 
     Attributes
     ----------
     source : Source
     sd : ndarray, (k,)
-        Of its errors where the outage begins, in SI; empty for white noise.
+        Standard deviation of its errors at the begin of the outage, in SI; empty for white noise.
     variance : mapping of str to ndarray, (n,)
-        By quantity: its part of the variance. All of them, with what the aids add, are the whole.
-        Where errors of the start are bound to each other, as tilt and accelerometer bias are, each
-        has half of what they make together, which may be negative: they cancel.
+        By quantity: share of the variance. All shares and that of the measurements add up to the
+        total. Of initial errors that are correlated, as tilt and accelerometer bias are, each has
+        half of their joint contribution, which may be negative: they cancel.
     alone : mapping of str to ndarray, (n,)
-        By quantity: the standard deviation, were there nothing else; not a number where aids stay,
-        which then would do otherwise.
+        By quantity: standard deviation without other sources; NaN with measurements, whose gains
+        would then differ.
     """
 
     source: Source
@@ -82,24 +82,24 @@ class Share:
 
 @dataclass(frozen=True, eq=False)
 class Forecast:
-    """A drift foretold.
+    """Predicted drift.
 
     Attributes
     ----------
     begin : float, s
         Of the outage, on the clock of the samples.
     time : ndarray, (n,), s
-        Since then.
+        Time since then.
     trajectory : DataFrame
         Trajectory table of the motion over the outage, by time since its begin.
     covariance : ndarray, (n, 9, 9)
         Displacement m, velocity m/s, rotation rad, north-east-down.
     course : ndarray, (n,), rad
-        Of the velocity; of the heading, where it stands.
+        Course; the heading while stationary.
     shares : tuple of Share
         The largest at the end first.
     aids : mapping of str to ndarray, (n,)
-        By quantity: what of the variance is from the noise of the aids that stay; empty without.
+        By quantity: variance due to the noise of the remaining measurements; empty without.
     """
 
     begin: float
@@ -111,7 +111,7 @@ class Forecast:
     aids: dict[str, Array]
 
     def variance(self, quantity: str) -> Array:
-        """Variance of a quantity, (n,); of the plane, the sum of its two."""
+        """Variance of a quantity, (n,); for the plane, the sum of both components."""
         return variances(self.covariance, self.course)[quantity]
 
     def sd(self, quantity: str) -> Array:
@@ -120,17 +120,17 @@ class Forecast:
 
     @property
     def bound(self) -> Array:
-        """Longer half axis of the ellipse that holds 95 % of the places, (n,), m."""
+        """95 % bound: semi-major axis of the horizontal position ellipse, (n,), m."""
         return plane_bound(self.covariance)
 
 
 def variances(P: Array, course: Array) -> dict[str, Array]:
-    """Return the variances of what is foretold.
+    """Return the variances of the predicted quantities.
 
     Parameters
     ----------
     P : ndarray, (n, 9, 9)
-        In north-east-down; any symmetric matrices, as what one source adds.
+        In north-east-down; any symmetric matrices, such as the share of one source.
     course : ndarray, (n,), rad
 
     Returns
@@ -159,23 +159,23 @@ def forecast(
     aided: bool,
     progress: Progress = silent,
 ) -> Forecast:
-    """Run the filter over an outage, and once more with each source larger and smaller.
+    """Run the filter over an outage, and again with each source larger and smaller.
 
-    The variance at any instant is homogeneous of the second degree in the sizes of all sources, the
-    noise of the aids that stay among them: so half of its derivatives by the logarithms of these
-    sizes add up to it (Euler). Each is taken by a central difference of the filter's own runs.
+    The variance at any instant is homogeneous of the second degree in the sizes of all sources,
+    including the noise of the remaining measurements: half of its derivatives by the logarithms of
+    these sizes add up to it (Euler). Each is a central difference of the filter's own runs.
 
     Parameters
     ----------
     navigator : Navigator
-        Without what is away.
+        Without the missing measurements.
     state : NavigatorState
-        Where the outage begins.
+        At the begin of the outage.
     go : callable
-        Goes over the samples of the outage; the same for every run.
+        Processes the samples of the outage; the same for every run.
     outage : float, s
     aided : bool
-        Whether aids stay.
+        Whether measurements remain.
     progress : callable, optional
 
     Returns
@@ -218,7 +218,7 @@ def _as_it_would_be(
 ) -> dict[str, Array]:
     """Variances over a run, by quantity, at the instants of another.
 
-    They are the same, unless an aid that stays looks at what is known before it observes.
+    The instants are equal unless a remaining measurement depends on the covariance.
     """
     marks = [(mark.time, mark.covariance) for piece in go(navigator, state) for mark in piece.marks]
     time = np.array([state.time, *(t for t, _ in marks)])
@@ -230,7 +230,7 @@ def _as_it_would_be(
 
 
 def _start(navigator: Navigator, state: NavigatorState) -> Array:
-    """Covariance of the state where an outage begins, (9, 9), in north-east-down."""
+    """Covariance of the state at the begin of an outage, (9, 9), in north-east-down."""
     row = state.engine.filter.row
     turn = np.kron(np.eye(3), navigator.filter.mechanization.level_from_ned(row))
     P = physical(navigator, state)[:9, :9]
@@ -238,7 +238,7 @@ def _start(navigator: Navigator, state: NavigatorState) -> Array:
 
 
 def courses(trajectory: pd.DataFrame, at: Array) -> Array:
-    """Direction of the way at instants, rad: of the heading, where it stands."""
+    """Course at instants, rad: the heading while stationary."""
     time = trajectory.index.to_numpy(dtype=np.float64)
     near = np.clip(np.searchsorted(time, at), 0, len(time) - 1)
     north, east, heading = (
@@ -248,7 +248,7 @@ def courses(trajectory: pd.DataFrame, at: Array) -> Array:
     return np.asarray(way, dtype=np.float64)
 
 
-# What a drift comes from: the errors of the start and of the sensors, each made larger alone.
+# Sources of drift: initial errors and sensor errors, each scaled separately.
 
 
 @dataclass(frozen=True)
@@ -259,15 +259,15 @@ class Source:
     ----------
     name : str
         ``position``, ``velocity``, ``tilt``, ``heading``, ``gyro_noise``, ``accel_noise``;
-        ``gyro_bias``, ``accel_bias``: as they are at the start, with what of them drifts;
-        ``gyro_instability``, ``accel_instability``: by how much they change after it; or the name
+        ``gyro_bias``, ``accel_bias``: initial biases, including drifting parts;
+        ``gyro_instability``, ``accel_instability``: their change during the outage; or the name
         of another block of states.
     rows : tuple of tuple of int
-        Places among the physical errors. What stands in one row of it adds up to one error.
+        Indices of physical errors. Those of one row add up to one error.
     driven : tuple of str
         Blocks whose driving noise belongs to it.
     unit : str
-        Of these errors in SI; empty for noise.
+        SI unit of these errors; empty for noise.
     """
 
     name: str
@@ -276,12 +276,12 @@ class Source:
     unit: str = ""
 
     def sd(self, P: Array) -> Array:
-        """Standard deviations of its errors, (k,), of a covariance of the physical errors."""
+        """Standard deviations of its errors, (k,), from a covariance of the physical errors."""
         sums = [P[np.ix_(row, row)].sum() for row in self.rows]
         return np.sqrt(np.maximum(np.array(sums, dtype=np.float64), 0.0))
 
 
-#: Blocks that are one bias in two parts, by name of the triad.
+#: Blocks that form one bias in two parts, by name of the triad.
 BIASES = {triad: (f"{triad}_bias", f"{triad}_drift") for triad in ("gyro", "accel")}
 
 
@@ -295,7 +295,7 @@ def sources_of(model: ErrorModel) -> tuple[Source, ...]:
     Returns
     -------
     tuple of Source
-        The errors of the start, white noise, and the blocks of states of the sensors and aids.
+        Initial errors, white noise, and the state blocks of sensors and measurements.
     """
     units = {one.block.name: one.block.unit for one in model.sensors}
     places = {n: tuple(range(rows.start, rows.stop)) for n, rows in model.columns_of.items()}
@@ -326,16 +326,16 @@ def _each(*rows: int) -> tuple[tuple[int, ...], ...]:
 def scaled(
     navigator: Navigator, state: NavigatorState, source: Source, factor: float
 ) -> tuple[Navigator, NavigatorState]:
-    """Return a navigator and its state as they would be, were one source so many times as large.
+    """Return a navigator and its state with one source scaled by a factor.
 
-    Standard deviations of its errors at the start, with what binds them to others, and the white
-    noise that drives them, are multiplied by the factor.
+    The factor multiplies the initial standard deviations of its errors, keeping their correlations
+    with others, and the white noise that drives them.
 
     Parameters
     ----------
     navigator : Navigator
     state : NavigatorState
-        Where the coasting begins.
+        At the begin of the outage.
     source : Source
     factor : float
 

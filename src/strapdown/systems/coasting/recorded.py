@@ -1,4 +1,4 @@
-"""A run of navigation that coasts: outages of its receivers, foretold and as they were."""
+"""Drift of a navigation run during outages of its receivers, predicted and measured."""
 
 from __future__ import annotations
 
@@ -30,29 +30,29 @@ __all__ = ["Drift", "RecordedCoast", "coast_of_run"]
 
 Array = NDArray[np.float64]
 
-#: Of the record that is taken at a time until navigation begins, s.
+#: Length of a chunk until navigation begins, s.
 CHUNK = 2.0
-#: Instants of a cone.
+#: Number of instants of an error cone.
 INSTANTS = 120
 
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """What was foretold for one outage, and what came.
+    """Predicted and measured drift of one outage.
 
     Attributes
     ----------
     span : Span
     variance : mapping of str to ndarray, (m,)
-        By quantity, foretold, on the cone's instants.
+        By quantity, predicted, at the cone's instants.
     bound : ndarray, (m,), m
-        Of the horizontal place, 95 %.
+        95 % bound of the horizontal position.
     time : ndarray, (n,), s
-        Of the fixes that were kept back, since the begin.
+        Time of the withheld fixes since the begin.
     along, across, down : ndarray, (n,), m
-        Computed less fix; along and across the way.
+        Computed minus fix; along and across the course.
     inside : ndarray of bool, (n,)
-        Whether it is within the ellipse of 95 %, the noise of the fix with it.
+        Whether it is within the 95 % ellipse, including the noise of the fix.
     """
 
     span: Span
@@ -72,22 +72,22 @@ class Drift:
 
 @dataclass(frozen=True, eq=False)
 class RecordedCoast:
-    """What came of the outages of a run.
+    """Result of the outages of a run.
 
     Attributes
     ----------
     forecast : Forecast
-        Of the outage whose bound at its end is the middle one.
+        Of the outage with the median bound at its end.
     time : ndarray, (m,), s
         Instants of the cone, since the begin of an outage.
     variance : mapping of str to ndarray, (m,)
         By quantity: the mean over the outages.
     bound : ndarray, (m,), m
-        The root of the mean square of their bounds of 95 %.
+        Root mean square of their 95 % bounds.
     drifts : tuple of Drift
-        In the order of their begins; without fixes where the run has no receiver.
+        In order of time; without fixes if the run has no receiver.
     stays : tuple of str
-        Names of the aids that stayed.
+        Names of the remaining measurements.
     """
 
     forecast: Forecast
@@ -104,7 +104,7 @@ def coast_of_run(
     source: NavigationSource,
     progress: Progress = silent,
 ) -> RecordedCoast:
-    """Navigate over a record, and take its receivers away at even places.
+    """Navigate over a record with outages of its receivers at even intervals.
 
     Parameters
     ----------
@@ -120,12 +120,12 @@ def coast_of_run(
     Raises
     ------
     ConfigError
-        The outage does not fit into the run, begins outside of it, or is where it aligns anew.
+        An outage does not fit into the run, begins outside the run, or includes a new alignment.
     DataError
         Navigation never begins.
     """
     chain = make_chain(navigation, sensors_of(navigation))
-    # What comes after an outage tells nothing of it while it lasts.
+    # Measurements after an outage do not affect the solution during it.
     chain = replace(chain, navigator=replace(chain.navigator, smoother=None))
     receivers = [name for name, aid in aids_of(navigation).items() if aid.kind == "gnss"]
     stays = tuple(name for name in aids_of(navigation) if name not in receivers)
@@ -230,7 +230,7 @@ def _spans(
 def _drift(
     navigator: Navigator, run: WithheldRun, span: Span, scored: str | None, grid: Array
 ) -> Drift:
-    """What was foretold for an outage, and what came."""
+    """Predicted and measured drift of an outage."""
     if run.state.navigator is None or run.through.navigator is None:
         raise _aligns_anew(span.begin, span.end)
     record = record_of(navigator, run.pieces)
@@ -275,10 +275,10 @@ def _foretold(
     aided: bool,
     progress: Progress,
 ) -> Forecast:
-    """The forecast from a state of a run over the samples that follow it."""
+    """Forecast from a state of a run over the samples that follow it."""
     begin = state.navigator
     assert begin is not None
-    # What a receiver would tell is not even looked at.
+    # The receiver's measurements are not even compared.
     queues = {
         name: replace(queue, time=queue.time[:0], values=queue.values[:0])
         if name in receivers

@@ -1,4 +1,4 @@
-"""A forecast of coasting, from its specification to everything that a report tells."""
+"""Drift prediction from its specification to all results of a report."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ __all__ = ["CoastResult", "run_coast"]
 
 @dataclass(frozen=True, eq=False)
 class CoastResult:
-    """Everything that came of a forecast.
+    """Result of a drift prediction.
 
     Attributes
     ----------
     spec : CoastSpec
     navigation : NavigationSpec or None
-        The run that coasts; None of a sensor along a stated motion.
+        The run with outages; None for a sensor along a stated motion.
     name, what : str
-        The sensor or the record, in words.
+        Sensor or record, in words.
     sensors : ImuUncertainty
     forecast : Forecast
     recorded : RecordedCoast or None
     stays : tuple of str
-        Aids that stay.
+        Remaining measurements.
     inputs : tuple of InputFiles
     findings : tuple of Finding
     """
@@ -62,16 +62,16 @@ def run_coast(
     file: Path | None = None,
     progress: Progress = silent,
 ) -> CoastResult:
-    """Foretell how far it drifts in an outage; of a run of navigation, try it, too.
+    """Predict the drift in an outage; for a navigation run, also measure it.
 
     Parameters
     ----------
     spec : CoastSpec
         With absolute paths.
     navigation : NavigationSpec, optional
-        The run whose receivers are taken away; without one, a sensor along a stated motion.
+        The run whose receivers are removed; without one, a sensor along a stated motion.
     file : Path, optional
-        Where the run was read from: an input, too.
+        Configuration file of the run, listed as an input.
     progress : callable, optional
         Called with a stage and the share that is done.
 
@@ -82,7 +82,7 @@ def run_coast(
     Raises
     ------
     ConfigError
-        Nothing says which sensor, the motion cannot be, or the outage does not fit into the run.
+        No sensor is stated, the motion is invalid, or the outage does not fit into the run.
     DataError
         The record of the run cannot be read.
     """

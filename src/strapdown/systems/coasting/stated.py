@@ -1,4 +1,4 @@
-"""A forecast of coasting of a sensor along a stated motion."""
+"""Predict the drift of a sensor along a stated motion."""
 
 from __future__ import annotations
 
@@ -43,11 +43,11 @@ __all__ = ["coast_navigator", "forecast_of_sensor", "sensor_of", "stated_motion"
 
 Array = NDArray[np.float64]
 
-#: Samples of a stated motion, Hz. Without errors they are exact at any rate that follows it.
+#: Sample rate of a stated motion, Hz. Without errors, samples are exact at any sufficient rate.
 RATE = 50.0
-#: What an alignment leaves: m, m/s, deg, deg.
+#: Standard deviations after an alignment: m, m/s, deg, deg.
 ALIGNED = (10.0, 0.1, 0.5, 5.0)
-#: An odometer that stays, Hz and m/s.
+#: Rate and standard deviation of a remaining odometer, Hz and m/s.
 ODOMETER_RATE, ODOMETER_SD = 2.0, 0.03
 RECEIVER = "fixes"
 #: Rows of the physical errors that each key of a start replaces, and the factor to SI.
@@ -68,17 +68,17 @@ CORE = {
 
 
 def sensor_of(name: str) -> ImuUncertainty:
-    """Return what is not known of a sensor.
+    """Return the uncertainty of a sensor.
 
     Parameters
     ----------
     name : str
-        Of the catalogue, or the path of a file.
+        Name in the catalogue, or path of a file.
 
     Raises
     ------
     ConfigError
-        There is none, or it says nothing of bias or noise.
+        The sensor is unknown, or its bias or noise is not stated.
     """
     sensor = load_sensor(name)
     for triad in ("gyro", "accel"):
@@ -101,7 +101,7 @@ def coast_navigator(spec: CoastSpec, sensors: ImuUncertainty, fixes: bool) -> Na
     spec : CoastSpec
     sensors : ImuUncertainty
     fixes : bool
-        Whether a receiver is among its aids.
+        Whether a receiver is among its measurements.
 
     Returns
     -------
@@ -130,10 +130,10 @@ def coast_navigator(spec: CoastSpec, sensors: ImuUncertainty, fixes: bool) -> Na
 def forecast_of_sensor(
     spec: CoastSpec, sensors: ImuUncertainty, progress: Progress = silent
 ) -> Forecast:
-    """Foretell the drift of a sensor along a stated motion.
+    """Predict the drift of a sensor along a stated motion.
 
-    A filter is taken over a drive with fixes, and from there over the outage without. Samples and
-    fixes are those of the truth: what is wanted is the covariance, which knows their errors.
+    A filter runs over a drive with fixes, and from there over the outage. Samples and fixes are
+    those of the truth: the result is the covariance, which includes their errors.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def forecast_of_sensor(
     Raises
     ------
     ConfigError
-        The motion cannot be done.
+        The motion is not possible.
     """
     motion, begin = stated_motion(spec)
     progress("the motion", 0.1)
@@ -184,7 +184,7 @@ def forecast_of_sensor(
 
 
 def _first(motion: EarthMotion) -> NavState:
-    """The true state at time zero."""
+    """True state at time zero."""
     row = motion.trajectory([0.0]).iloc[0]
     return NavState.from_degrees(
         row["lat"],
@@ -198,7 +198,7 @@ def _first(motion: EarthMotion) -> NavState:
 
 
 def _aligned(navigator: Navigator, sensors: ImuUncertainty) -> Array:
-    """What an alignment leaves, and what data sheets do."""
+    """Covariance after an alignment, with sensors by their data sheets."""
     position, velocity, tilt, heading = ALIGNED
     core = np.repeat([position, velocity, math.radians(tilt)], 3)
     core[8] = math.radians(heading)
@@ -207,7 +207,7 @@ def _aligned(navigator: Navigator, sensors: ImuUncertainty) -> Array:
 
 
 def _stated(state: NavigatorState, navigator: Navigator, start: CoastStartTable) -> NavigatorState:
-    """The state with what is stated in place of what the drive left, bound to nothing else."""
+    """Replace errors by stated ones, uncorrelated with all others."""
     P = physical(navigator, state).copy()
     for key, (name, factor) in STATED.items():
         value = getattr(start, key)
@@ -222,7 +222,7 @@ def _stated(state: NavigatorState, navigator: Navigator, start: CoastStartTable)
 def _tables(
     spec: CoastSpec, motion: EarthMotion, begin: float, driven: bool
 ) -> dict[str, pd.DataFrame]:
-    """What receivers and wheels would tell at the truth."""
+    """Error-free tables of receivers and odometers."""
     out: dict[str, pd.DataFrame] = {}
     if driven:
         receiver = GnssReceiver(
@@ -241,25 +241,25 @@ def _tables(
     return out
 
 
-# A stated motion: a drive with fixes that makes a filter know what it can, and the outage.
+# Stated motion: a drive with fixes, in which the filter converges, and the outage.
 
 
-#: Of the drive with fixes: m/s, mean m/s² of a change of speed, m.
+#: Drive with fixes: m/s, mean m/s² of a change of speed, m.
 SPEED, GENTLE, RADIUS = 12.0, 1.0, 25.0
-#: How long it goes on with its speed before the outage, at least, s.
+#: Least time at constant speed before the outage, s.
 SETTLING = 12.0
-#: A turn comes and goes over it, s.
+#: Duration of a turn's onset and end, s.
 RAMP = 1.0
-#: No more is asked of a stated motion than a fast aircraft does, m/s².
+#: Limits of a stated motion, those of a fast aircraft, m/s².
 LIMITS = Limits(acceleration=100.0, lateral=100.0, climb_deg=20.0)
 
 
 def stated_motion(spec: CoastSpec) -> tuple[EarthMotion, float]:
-    """Return the motion of a forecast, and when the outage begins.
+    """Return the motion of a forecast, and the begin of the outage.
 
-    Before it, for `aided_s`, a car goes round blocks to the left and to the right, with changes of
-    speed: what makes heading, tilts and biases known. It ends with the heading that the outage
-    begins with.
+    Before it, for `aided_s`, a car drives around blocks to the left and to the right, with changes
+    of speed, which makes heading, tilts and biases observable. It ends with the heading at which
+    the outage begins.
 
     Parameters
     ----------
@@ -273,7 +273,7 @@ def stated_motion(spec: CoastSpec) -> tuple[EarthMotion, float]:
     Raises
     ------
     ConfigError
-        The motion asks for more than 100 m/s².
+        The motion exceeds 100 m/s².
     """
     asked, outage = spec.motion, spec.outage_s
     before, begin = _drive(spec.start.aided_s, asked.speed_m_per_s)
@@ -288,7 +288,7 @@ def stated_motion(spec: CoastSpec) -> tuple[EarthMotion, float]:
 
 
 def _drive(length: float, speed: float) -> tuple[list[Manoeuvre], float]:
-    """What is done before, and how long it takes; nothing, if it is not to be."""
+    """Maneuvers before the outage, and their duration; empty if no drive is specified."""
     if length == 0.0:
         return [], 0.0
     turn = math.radians(90.0) * RADIUS / SPEED + RAMP
@@ -309,14 +309,14 @@ def _drive(length: float, speed: float) -> tuple[list[Manoeuvre], float]:
     rounds = max(1, round((length - 30.0 - change) / round_))
     done += block * rounds
     done += [(Accelerate(speed, change), change)]
-    # Whole seconds, so that samples and fixes fall on the begin of the outage.
+    # Whole seconds, so that samples and fixes coincide with the begin of the outage.
     took = sum(t for _, t in done)
     whole = math.ceil(took + SETTLING)
     return [*(one for one, _ in done), Straight(whole - took)], float(whole)
 
 
 def _coasting(spec: CoastSpec) -> list[Manoeuvre]:
-    """What is done in the outage."""
+    """Maneuvers during the outage."""
     asked, outage = spec.motion, spec.outage_s
     speed, rate = asked.speed_m_per_s, asked.turn_rate_deg_per_s
     to = asked.to_speed_m_per_s

@@ -1,4 +1,4 @@
-"""A case file drafted from records: found, assumed, and left to the user."""
+"""Propose a case file from records: found values, assumptions and open questions."""
 
 from strapdown.systems.crash_draft.draft import Draft, draft_case, read_records
 

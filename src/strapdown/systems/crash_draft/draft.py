@@ -1,4 +1,4 @@
-"""A commented case.toml from records: what was found, what is assumed, what only the user knows."""
+"""Write a commented case.toml from records: found values, assumptions and open questions."""
 
 from __future__ import annotations
 
@@ -72,21 +72,21 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Draft:
-    """A case as it was drafted.
+    """Proposed case file.
 
     Attributes
     ----------
     text : str
-        Of the file.
+        Text of the file.
     found : tuple of str
-        For the user, a line each.
+        Lines for the user.
     asked : tuple of Asked
-        What is left to the user.
+        Questions that the user has to answer.
     to_check : tuple of Asked
-        What follows from values that were found or assumed, for a person to confirm.
+        Consequences of found or assumed values, for the user to confirm.
     left_out : tuple of Skipped
     findings : tuple of Finding
-        What a person should know of the records.
+        Findings about the records.
     """
 
     text: str
@@ -106,20 +106,20 @@ def write_draft(
     findings: Sequence[Finding] = (),
     paths: Sequence[KnownPath] = (),
 ) -> Draft:
-    """Write a case of units.
+    """Write the case file of recording units.
 
     Parameters
     ----------
     units : sequence of Unit
     skipped : sequence of Skipped
-        What was left out, for a comment.
+        Parts left out, for a comment.
     title : str
-        As the record says; empty where it says none.
+        From the record; empty where not stated.
     facts : mapping, optional
-        Of a test: the keys of `CrashRecord.facts`.
+        Facts of the test: the keys of `CrashRecord.facts`.
     findings : sequence of Finding
     paths : sequence of KnownPath
-        What else is known of the crash.
+        Other known facts about the crash.
     """
     page = Page()
     facing = facings(units)
@@ -183,7 +183,7 @@ def _found(units: Sequence[Unit]) -> list[str]:
 
 
 def read_records(paths: Sequence[str | Path]) -> list[CrashRecord]:
-    """Read the records that a case shall be drafted of.
+    """Read the records for a proposed case.
 
     Parameters
     ----------
@@ -196,9 +196,9 @@ def read_records(paths: Sequence[str | Path]) -> list[CrashRecord]:
     Raises
     ------
     ConfigError
-        There is no such file, or one is named twice.
+        A file does not exist, or is named twice.
     DataError
-        One cannot be read.
+        A file cannot be read.
     """
     seen: dict[Path, str] = {}
     records = []
@@ -222,23 +222,23 @@ def read_records(paths: Sequence[str | Path]) -> list[CrashRecord]:
 
 
 def draft_case(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> Draft:
-    """Draft a case of records.
+    """Write a proposed case from records.
 
     Parameters
     ----------
     records : sequence of CrashRecord
     folder : str or Path
-        Of the case file, from which it names the records.
+        Folder of the case file; record paths are relative to it.
 
     Returns
     -------
     Draft
-        Its text is TOML that `read_case_spec` takes when every ``"?"`` is answered.
+        `read_case_spec` accepts its TOML text when every ``"?"`` is answered.
 
     Raises
     ------
     DataError
-        There is no record, or none holds an accelerometer; the message says what was found.
+        No record, or none with an accelerometer; the message lists the findings.
     """
     parts: list[Part] = []
     skipped: list[Skipped] = []
@@ -247,7 +247,7 @@ def draft_case(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> D
     paths: list[KnownPath] = []
     for record in records:
         path = named_from(record.path, Path(folder))
-        # What the reader concluded of the clock is stated in the case.
+        # The case states the reader's finding about the clock.
         findings += [f for f in record.findings if f.quantity != "time"]
         known = known_path(path, record)
         if known is not None:
@@ -280,17 +280,17 @@ def _nothing(
     )
 
 
-# What a case says once: what it is about, the vehicle, its entry, options.
+# The tables that occur once in a case: title, vehicle, entry, options.
 
 
-# Laboratories sample so fast that ringing is in their records.
+# Laboratories sample fast enough to record ringing.
 FAST = 5000.0  # Hz
-# Two units of one vehicle that differ by more are not explained by their places.
+# A larger difference between two units of a vehicle is not explained by their positions.
 FAR_APART = 1.5
 
 
 def head(page: Page) -> None:
-    """What the file is and how it is filled in."""
+    """Explain the file and how to complete it."""
     page.say(
         "A crash case for strapdown. It was written from the records; the answers are yours.",
         "",
@@ -305,7 +305,7 @@ def head(page: Page) -> None:
 
 
 def case_table(page: Page, title: str, facts: Mapping[str, str]) -> None:
-    """Title and number: found in a test's record, else asked."""
+    """Title and number: from the test's record, or a question."""
     page.blank()
     if title:
         page.key("title", string(title), "found: in the record")
@@ -347,7 +347,7 @@ def vehicle_table(page: Page, facts: Mapping[str, str]) -> None:
 
 
 def entry_table(page: Page, facts: Mapping[str, str], units: Sequence[Unit]) -> None:
-    """Speed at the impact: found in a test's record, else asked."""
+    """Speed at the impact: from the test's record, or a question."""
     page.table(
         "[entry]",
         "How fast the vehicle was at the impact, and how that is known. If it stood still before "
@@ -410,7 +410,7 @@ def _fact(facts: Mapping[str, str], key: str) -> float | None:
 
 
 def agreement(page: Page, units: Sequence[Unit], facing: Sequence[Facing]) -> None:
-    """How far the units tell the same, as comments."""
+    """State how far the units agree, as comments."""
     told, sizes = [], []
     for unit, faces in zip(units, facing, strict=True):
         if not unit.impact.found or not unit.accelerometers[-1].clock.unit:
@@ -435,7 +435,7 @@ def agreement(page: Page, units: Sequence[Unit], facing: Sequence[Facing]) -> No
 
 
 def left_out(page: Page, skipped: Sequence[Skipped]) -> None:
-    """What of the records is not used, and why, as comments."""
+    """List the unused parts of the records with reasons, as comments."""
     if not skipped:
         return
     page.blank()
@@ -445,7 +445,7 @@ def left_out(page: Page, skipped: Sequence[Skipped]) -> None:
 
 
 def options_table(page: Page, units: Sequence[Unit]) -> None:
-    """How the clocks are tied, and what else may be chosen."""
+    """Clock synchronization and the other options."""
     page.table("[options]")
     several = len(units) > 1
     if several:
@@ -472,27 +472,27 @@ def options_table(page: Page, units: Sequence[Unit]) -> None:
     )
 
 
-# What a case says of each unit: where it sits, when it was struck, its triads.
+# The tables of each unit: mounting, trigger, triads.
 
 
 SHOWN_SENSORS = 8
-# Of a zeroed record: what is taken for the rest before the blow, s.
+# Zeroed records: length of the rest before the impact, s.
 LEAST_REST, LONGEST_REST, BEFORE_BLOW = 0.02, 1.0, 0.005
 ONLY = "only you know which way it faces: "
 
 
 def unit_tables(page: Page, unit: Unit, facing: Facing, units: Sequence[Unit]) -> None:
-    """One unit: its mounting, trigger and triads.
+    """Write the tables of a unit: mounting, trigger and triads.
 
     Parameters
     ----------
     page : Page
-        To which it is added.
+        The tables are added to it.
     unit : Unit
     facing : Facing
-        Of this unit.
+        Heading of this unit.
     units : sequence of Unit
-        All of the case.
+        All units of the case.
     """
     page.blank()
     page.say(f"---- the unit '{plain(unit.name)}'")
@@ -642,7 +642,7 @@ def _trigger(page: Page, unit: Unit) -> None:
 
 
 def _zeroed_rest(page: Page, unit: Unit) -> None:
-    """Where gravity was taken off, the rest is bias: it is named, as none would be found."""
+    """State the rest bias of a zeroed record: with gravity removed, the solution finds none."""
     part, impact = unit.accelerometers[0], unit.impact
     before = float(part.time[0]) - impact.trigger
     if not part.zeroed or part.unit in FACTORS["velocity"] or before > -LEAST_REST:
@@ -735,7 +735,7 @@ def _channels(page: Page, unit: Unit, part: Part) -> None:
     sitting = unit.impact.sitting
     axis = sitting.along.lstrip("-") if sitting else ""
     vertical = part.channels.get(axis, "")
-    # Of yaw, pitch and roll some count to the left and some to the right.
+    # Yaw, pitch and roll channels may be positive to the left or to the right.
     if vertical and re.search(r"yaw|gier|pitch|nick", " ".join(part.channels.values()).lower()):
         page.say(
             why,
@@ -772,7 +772,7 @@ def _first_of_its_file(part: Part, unit: Unit) -> Part:
 
 
 def _sensor(page: Page, part: Part, ends: RangeEnds, unit: Unit) -> None:
-    """What is not known of the part: of the catalogue where its range tells it, else assumed."""
+    """Unknown data of a part: from the catalogue where its range identifies it, else assumed."""
     if ends.saturated and len(ends.sensors) == 1 and not part.uncertainty:
         page.key(
             "sensor",
@@ -832,17 +832,17 @@ def _assumed(page: Page, unit: Unit) -> None:
     )
 
 
-# By how much a vehicle turned after the blow, as its gyro has it: what a person can confirm.
+# Turn of the vehicle after the impact by its gyro, for a person to confirm.
 
 
-# How long after the blow is looked at, s, and how long before it the gyro's rest is.
+# Span after the impact, and rest of the gyro before it, s.
 AFTER, BEFORE, GAP = 0.5, 1.0, 0.05
-#: Of less a person who saw the crash cannot tell the direction, deg.
+#: An eyewitness cannot give the direction of a smaller turn, deg.
 LEAST_TURN = 3.0
 
 
 def turn_after(unit: Unit) -> float | None:
-    """Turn about the vertical in the half second after the blow.
+    """Turn about the vertical in the half second after the impact.
 
     Parameters
     ----------
@@ -851,8 +851,8 @@ def turn_after(unit: Unit) -> float | None:
     Returns
     -------
     float or None, deg
-        Positive to the right; None where no gyro or no rest tells it. It does not depend on the
-        heading of the mounting.
+        Positive to the right; None without a gyro or a rest. Independent of the heading of the
+        mounting.
     """
     gyro, sitting = unit.gyro, unit.impact.sitting
     if gyro is None or sitting is None or len(gyro.axes) < 3 or not unit.impact.found:
@@ -867,17 +867,17 @@ def turn_after(unit: Unit) -> float | None:
 
 
 def in_turn_words(turn: float) -> str:
-    """A turn as a person who saw it from above would tell it."""
+    """Describe a turn as an eyewitness above would."""
     return f"{abs(turn):.0f} deg to the {'right' if turn > 0.0 else 'left'}"
 
 
-# Which way a unit faces, as far as headings of columns, the blow and other units tell it.
+# Heading of a unit by its column headings, the impact and the other units.
 
 
 TURNS = (0.0, 90.0, 180.0, -90.0)
-# A blow from the front, as most crashes of vehicles that drive are, comes within this of it.
+# A frontal impact, the most common one, is within this of the front.
 FRONTAL = 45.0  # deg
-# Two units of one vehicle feel one direction; the next right angle is farther than this.
+# Two units of a vehicle measure one direction; the next right angle differs by more than this.
 SAME_DIRECTION = 30.0  # deg
 POINTS = {0.0: "forward", 90.0: "to the right", 180.0: "rearward", -90.0: "to the left"}
 SIDES = {0: "the front", 1: "the right", 2: "the rear", 3: "the left"}
@@ -890,9 +890,9 @@ class Facing:
     Attributes
     ----------
     heading_deg : float or None
-        None where only a person knows.
+        None where the user has to answer.
     why : str
-        How it is known; what each of the four would mean, where it is not.
+        Reason for the heading, or the meaning of each of the four.
     """
 
     heading_deg: float | None
@@ -909,8 +909,8 @@ def facings(units: Sequence[Unit]) -> list[Facing]:
     Returns
     -------
     list of Facing
-        Assumed zero where the columns are named x, y, z, the vertical is along z, and the blow
-        then comes from the front; for the others what agrees with the first that is known.
+        Assumed zero where the columns are named x, y, z, the vertical is along z, and the impact
+        then is frontal; the others agree with the first known heading.
     """
     out: list[Facing | None] = [_own(u) for u in units]
     known = next((k for k, f in enumerate(out) if f and f.heading_deg is not None), None)
@@ -923,7 +923,7 @@ def facings(units: Sequence[Unit]) -> list[Facing]:
 
 
 def direction(unit: Unit, heading_deg: float) -> float | None:
-    """Where the force came from, deg, if the unit faced so; None where nothing moved it."""
+    """Direction of the force, deg, at this heading of the unit; None without acceleration."""
     sitting = unit.impact.sitting
     change = np.nan_to_num(unit.impact.change)
     if sitting is not None:
@@ -936,7 +936,7 @@ def direction(unit: Unit, heading_deg: float) -> float | None:
 
 
 def _pointing(unit: Unit, turn: float) -> str:
-    """Where x of a housing points that is turned so; nothing where it points up or down."""
+    """Direction of the x axis of a turned housing; empty where it is vertical."""
     sitting = unit.impact.sitting
     if sitting is None or abs(sitting.pitch_deg) > FRONTAL:
         return ""
@@ -944,7 +944,7 @@ def _pointing(unit: Unit, turn: float) -> str:
 
 
 def side_of(came: float) -> str:
-    """In words, where a force came from at this direction, deg."""
+    """Name the side that the force came from, by its direction in deg."""
     return SIDES[round(came / 90.0) % 4]
 
 

@@ -1,4 +1,4 @@
-"""What a column's heading says of a crash record's channel, in the words of several languages."""
+"""Meaning of a crash record's column headings, in several languages."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ _AXES = {
     "y": ("y", "lateral", "quer", "right", "transv", "pitch", "nick"),
     "z": ("z", "vertical", "vertikal", "vert", "hoch", "down", "yaw", "gier"),
 }
-# Words of a turn that others are made with: Gierrate, Nickwinkel.
+# Rotation words used in compounds: Gierrate, Nickwinkel.
 _TURNS = {"wank": "x", "roll": "x", "nick": "y", "pitch": "y", "gier": "z", "yaw": "z"}
 _NO_AXIS = ("hz", "khz", "mhz", "max", "idx", "index", "mux", "aux", "fix")
 _UNITS = {"grad/s": "deg/s", "km/h": "km/h", "kmh": "km/h", "kph": "km/h", "mph": "mph"}
@@ -103,19 +103,19 @@ _WORD = re.compile(r"[^\W\d_]+|\d+")
 
 @dataclass(frozen=True)
 class Heading:
-    """What a heading says.
+    """Meaning of a column heading.
 
     Attributes
     ----------
     quantity : str
         ``time``, ``counter``, ``acceleration``, ``rate``, ``velocity``, ``other``; empty where
-        it says nothing.
+        not stated.
     axis : str
         ``x``, ``y``, ``z`` or empty.
     unit : str
-        In this package's spelling, ``km/h`` or ``mph``; empty where it says none.
+        In this package's spelling, ``km/h`` or ``mph``; empty where not stated.
     stem : str
-        What is left without axis and unit: channels of one triad share it.
+        The heading without axis and unit: channels of one triad share it.
     reversed : bool
         The axis points the other way: left, rearward, up.
     """
@@ -128,7 +128,7 @@ class Heading:
 
 
 def read_heading(name: str) -> Heading:
-    """Read a heading.
+    """Parse a column heading.
 
     Parameters
     ----------
@@ -137,8 +137,8 @@ def read_heading(name: str) -> Heading:
 
     Notes
     -----
-    A single ``g`` with an axis is an acceleration to one maker and a gyro to another: it says
-    its axis and nothing else.
+    A single ``g`` with an axis means acceleration to some makers and gyro to others: only the axis
+    is returned.
     """
     said = read_name(name)
     unit = said.unit or _unit(name)
@@ -210,7 +210,7 @@ def _quantity(words: list[str], joined: str) -> str:
 
 
 def _axis(words: list[str]) -> tuple[str, list[str]]:
-    """The axis of the last word that is one, or that ends in one; and the others."""
+    """Axis of the last word that is one, or ends in one; and the other words."""
     for k in range(len(words) - 1, -1, -1):
         for axis, known in _AXES.items():
             if words[k] in known:

@@ -1,4 +1,4 @@
-"""When a unit was struck, by its own clock, and how it was at rest before."""
+"""Impact of a unit on its own clock, and its state of rest before."""
 
 from __future__ import annotations
 
@@ -21,35 +21,35 @@ __all__ = ["Impact", "Sitting", "find_impact", "sitting_at_rest"]
 
 Array = NDArray[np.float64]
 
-# What is before the largest pulse by less is part of it.
+# Span before the largest pulse that belongs to it, and window for the resting value before that.
 BEFORE, REACH = 0.3, 3.0  # s
 LEAST_BASE = 5  # samples
-# A record that counts from its trigger has it at zero, this near to where the event begins.
+# A record that counts from its trigger has the event within this of zero.
 AT_ZERO = 0.05  # s
 CHANGE_OVER = 0.15  # s
-# A pulse without an event begins where it is this part of its peak, after so long below it.
+# A pulse without an event begins at this share of its peak, after this time below it.
 BEGUN, QUIET = 0.2, 0.02  # s
 
 
 @dataclass(frozen=True)
 class Impact:
-    """What accelerometers tell of a crash.
+    """Impact as measured by accelerometers.
 
     Attributes
     ----------
     trigger : float, s
-        On their clock; without an event, where the largest pulse begins.
+        On their clock; without an event, the begin of the largest pulse.
     trigger_sd : float, s
     at_zero : bool
         The record counts from its trigger.
     found : bool
-        Whether there is an event after 49 CFR 563.
+        Whether an event as defined by 49 CFR 563 was found.
     largest : float, m/s
-        Horizontal change of velocity of the event; without one, the largest within 150 ms.
+        Horizontal delta-v of the event; without one, the largest within 150 ms.
     peak : float, m/s²
         Of the resultant, without gravity.
     change : ndarray, (3,), m/s
-        In sensor axes, over 150 ms from the trigger, with the resting value taken off.
+        Delta-v in sensor axes, over 150 ms from the trigger, with the resting value subtracted.
     base : ndarray, (3,), m/s²
         The resting value.
     rest : (float, float) or None, s
@@ -82,7 +82,7 @@ def find_impact(strong: Part, fine: Part, gyro: Part | None = None) -> Impact:
     strong : Part
         The accelerometer of the highest range.
     fine : Part
-        Of the lowest, on the same clock; may be the same.
+        The accelerometer of the lowest range, on the same clock; may be the same.
     gyro : Part, optional
         On the same clock.
     """
@@ -93,7 +93,7 @@ def find_impact(strong: Part, fine: Part, gyro: Part | None = None) -> Impact:
     sitting = sitting_at_rest(fine_base) if len(fine.axes) == 3 else None
     level = _ahead(sitting.into_vehicle(free) if sitting else free)
     step = float(np.median(np.diff(time)))
-    # Stamps that are rounded have steps of two lengths.
+    # Rounded stamps have steps of two lengths.
     lasts = np.gradient(time)[:, None]
     before = time < time[int(np.argmax(np.linalg.norm(free, axis=1)))] - BEFORE
     noise = free[before].std(axis=0) if before.sum() > LEAST_BASE else np.zeros(3)
@@ -109,7 +109,7 @@ def find_impact(strong: Part, fine: Part, gyro: Part | None = None) -> Impact:
     else:
         trigger, sd = _onset(time, np.linalg.norm(free, axis=1), peak_at), math.nan
         largest = detector.largest_change[0]
-    # Time zero is known no better than the interval that it is looked for with lets it.
+    # Time zero is not more accurate than the interval in which it is searched allows.
     sd = max(sd if math.isfinite(sd) else 0.0, step, 0.25 * PART_563.wake_window)
     at_zero = bool(time[0] - 1.5 * step <= 0.0 <= time[-1] and abs(trigger) < AT_ZERO)
     after = (time >= trigger) & (time <= trigger + CHANGE_OVER)
@@ -131,13 +131,13 @@ def find_impact(strong: Part, fine: Part, gyro: Part | None = None) -> Impact:
 
 
 def _ahead(level: Array) -> Array:
-    """With the larger of the two horizontal components first: which is ahead is not known yet."""
+    """With the larger of the two horizontal components first, as the heading is not known yet."""
     size = (level[:, :2] ** 2).sum(axis=0)
     return level if size[0] >= size[1] else np.asarray(level[:, [1, 0, 2]])
 
 
 def _onset(time: Array, size: Array, peak_at: int) -> float:
-    """Where the largest pulse begins: the last quiet instant before it, quiet for 5 ms."""
+    """Begin of the largest pulse: the last quiet instant before it, quiet for 5 ms."""
     above = np.flatnonzero(size[: peak_at + 1] > BEGUN * size[peak_at])
     gaps = np.flatnonzero(np.diff(time[above]) > QUIET)
     first = above[gaps[-1] + 1] if gaps.size else above[0]
@@ -145,12 +145,12 @@ def _onset(time: Array, size: Array, peak_at: int) -> float:
 
 
 def _struck(part: Part) -> float:
-    """When it felt most, less what a pulse lasts."""
+    """Time of the largest acceleration minus the duration of a pulse."""
     return float(part.time[int(np.argmax((part.free**2).sum(axis=1)))]) - BEFORE
 
 
 def _base(part: Part, rest: tuple[float, float, str] | None) -> Array:
-    """Resting value: the mean over the rest; else over what is before the largest pulse."""
+    """Resting value: the mean over the rest, or else before the largest pulse."""
     time, values, has = part.time, part.values, part.axes
     out = np.full(3, np.nan)
     if part.zeroed:
@@ -164,7 +164,7 @@ def _base(part: Part, rest: tuple[float, float, str] | None) -> Array:
         if rows.sum() >= LEAST_BASE:
             out[has] = values[rows][:, has].mean(axis=0)
             return out
-    # A record that begins with the crash: it is zeroed, or nothing can be said.
+    # A record that begins with the crash: either zeroed, or without a usable rest.
     out[has] = values[: LEAST_BASE - 2, has].mean(axis=0)
     return out
 
@@ -187,23 +187,23 @@ def _rest(fine: Part, gyro: Part | None, impact: float) -> tuple[float, float, s
     return None if found is None else (found.start, found.end, found.grade)
 
 
-# How a unit sits, as far as gravity at rest tells it: roll and pitch, and no heading.
+# Roll and pitch of a mounting from gravity at rest; gravity does not observe the heading.
 
 
-# A housing is bolted along the vehicle's axes; a floor, a bracket and a bias lean it no more.
+# A housing is bolted along the vehicle's axes; floor, bracket and bias tilt it by less.
 MOST_LEAN = 20.0  # deg
-# What a sensor at rest may read: scale and bias of a cheap part, or none that can be told.
+# Plausible magnitudes at rest: scale factor and bias of a low-cost sensor.
 LEAST_LENGTH, MOST_LENGTH = 0.8, 1.2  # g
 
 
 @dataclass(frozen=True)
 class Sitting:
-    """What gravity at rest says of a mounting.
+    """Mounting angles from gravity at rest.
 
     Attributes
     ----------
     roll_deg, pitch_deg : float, deg
-        Of `Mounting.angles_deg`, with a heading that gravity does not tell.
+        As `Mounting.angles_deg`, without the heading, which gravity does not observe.
     along : str
         Sensor axis that points up, as ``-z``; empty where none does.
     lean_deg : float, deg
@@ -241,9 +241,9 @@ def sitting_at_rest(force: Array) -> Sitting | None:
     Returns
     -------
     Sitting or None
-        None where its length is not that of gravity. An axis within 20° of the vertical is
-        taken to be along it: what is left is the lean of vehicle and sensor together, which the
-        levelling finds.
+        None where its magnitude is not that of gravity. An axis within 20° of the vertical is
+        taken to be along it: the rest is the tilt of vehicle and sensor together, which the
+        leveling finds.
 
     Notes
     -----
@@ -266,5 +266,5 @@ def sitting_at_rest(force: Array) -> Sitting | None:
     roll = 0.0 if along.endswith("x") else math.degrees(math.atan2(-up[1], -up[2]))
     if not along:
         roll, pitch = round(roll, 1), round(pitch, 1)
-    # A turn by -180 is one by 180.
+    # -180 deg equals 180 deg.
     return Sitting(180.0 if roll == -180.0 else roll + 0.0, pitch + 0.0, along, lean, length)

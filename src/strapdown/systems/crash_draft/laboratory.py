@@ -1,4 +1,4 @@
-"""Units of a crash test of a laboratory: which channels of which place, and what is left out."""
+"""Units of a laboratory crash test: channels by sensor position, and the unused ones."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ Array = NDArray[np.float64]
 
 _AXIS_WORD = re.compile(r"(?<![A-Za-z])([XYZ])[RGL]?(?![A-Za-z])(?:[ -]?AXIS)?", re.I)
 _FAILED = ("failed", "no data", "questionable", "meaningless")
-# Of the accelerometers of crash laboratories, after their calibration by SAE J211.
-# Zeroed channels have lost gravity with their bias.
+# Accelerometers of crash laboratories, after calibration by SAE J211. Zeroed channels have lost
+# gravity with their bias.
 LABORATORY = {"bias_sd_mg": 1020.0, "scale_sd_percent": 1.0, "misalignment_sd_deg": 1.0}
 LABORATORY_GYRO = {"bias_sd_deg_per_s": 1.0, "scale_sd_percent": 1.0, "misalignment_sd_deg": 1.0}
 
 
 def laboratory_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skipped]]:
-    """Find the triads of a test: one a place on the vehicle, of its primary channels.
+    """Find the triads of a test: one per sensor position on the vehicle, of primary channels.
 
     Parameters
     ----------
     path : str
-        As a case names it.
+        As in the case.
     record : CrashRecord
-        Whose channels say quantity, axis, place and body.
+        Its channels state quantity, axis, position and body.
 
     Returns
     -------
@@ -77,7 +77,7 @@ def laboratory_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[S
 
 
 def _place(channel: CrashChannel) -> str:
-    """The place without its axis: channels of one block share it."""
+    """Sensor position without the axis, common to the channels of one block."""
     return " ".join(_AXIS_WORD.sub(" ", channel.place).split()).strip(" ,-") or "vehicle"
 
 
@@ -156,15 +156,15 @@ def _part(
     )
 
 
-# Changes of velocity, as event data recorders keep them, as what accelerometers would have.
+# Delta-v of event data recorders, converted to accelerations.
 
 
-# 49 CFR 563.8, Table III: a change of velocity is kept to ±10 %.
+# 49 CFR 563.8, Table III: delta-v is recorded to ±10 %.
 RECORDER = {"scale_bound_percent": 10.0, "misalignment_sd_deg": 2.0}
 
 
 def as_accelerations(part: Part) -> Part:
-    """Mean accelerations over the intervals of a table of changes of velocity.
+    """Mean accelerations over the intervals of a table of delta-v.
 
     Parameters
     ----------
@@ -190,16 +190,16 @@ def as_accelerations(part: Part) -> Part:
     )
 
 
-# A path that another instrument measured, among the records: a reference to hold the answer to.
+# A path measured by another instrument among the records: a reference for the result.
 
 
-# A path that is counted from the trigger has it within this.
+# A path that counts from the trigger contains it within this.
 LONGEST = 10.0  # s
 
 
 @dataclass(frozen=True)
 class KnownPath:
-    """A path as the case names it.
+    """Path as named in the case.
 
     Attributes
     ----------
@@ -220,12 +220,12 @@ class KnownPath:
 
 
 def known_path(path: str, record: CrashRecord) -> KnownPath | None:
-    """Take a record for the path of a point, where it has time, north, east and down.
+    """Read a record as the path of a point, if it has time, north, east and down.
 
     Parameters
     ----------
     path : str
-        As the case names it.
+        As in the case.
     record : CrashRecord
     """
     if len(record.files) != 1 or not {"north", "east", "down"} <= _words(record):
@@ -244,7 +244,7 @@ def _words(record: CrashRecord) -> set[str]:
 
 
 def reference_tables(page: Page, paths: list[KnownPath]) -> None:
-    """A table for each; one whose time does not count from the trigger stays a comment."""
+    """One table per path; commented out where its time does not count from the trigger."""
     for one in paths:
         page.blank()
         page.say(

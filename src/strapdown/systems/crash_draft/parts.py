@@ -1,4 +1,4 @@
-"""What is found in records before a case is written of it: triads of channels on their clocks."""
+"""Parts of a proposed case: triads of channels with their clocks."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ __all__ = ["Clock", "Part", "Skipped"]
 
 @dataclass(frozen=True)
 class Clock:
-    """Where the time of a part comes from.
+    """Time base of a part.
 
     Attributes
     ----------
     column : str
-        Name of the column; empty where there is none.
+        Name of the column; empty without one.
     unit : str
-        Empty where it is not known to be one.
+        Empty where it is not settled.
     why : str
-        What it was concluded from.
+        Evidence for the unit.
     step : float
-        Mean, in the clock's own unit; NaN where there is no time.
+        Mean, in the clock's own unit; NaN without time.
     rate : float, Hz
-        By the likeliest unit.
+        In the likeliest unit.
     candidates : str
-        Units that it may be, in words, where `unit` is empty.
+        Possible units, in words, where `unit` is empty.
     stated : bool
-        There is no column, and a line above the table states the rate; or its stamps are rounded.
+        The rate is stated: in a line above a table without a clock column, or for rounded stamps.
     rate_why : str
-        What the rate of rounded stamps was concluded from.
+        Evidence for the rate of rounded stamps.
     """
 
     column: str
@@ -51,51 +51,51 @@ class Clock:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A triad, or what there is of one.
+    """Triad of channels, possibly incomplete.
 
     Attributes
     ----------
     path : str
-        As the case names the record.
+        Of the record, as in the case.
     kind : str
-        ``acceleration``, ``rate`` or ``velocity`` (a change of it, as event data recorders keep).
+        ``acceleration``, ``rate`` or ``velocity`` (delta-v of event data recorders).
     channels : dict of str to str
-        Axis to name of the channel; axes that are missing are left out.
+        Axis to name of the channel, without missing axes.
     clock : Clock
     unit : str
-        Empty where it is not known.
+        Empty where it is not settled.
     why : str
-        How kind and axes are known.
+        Evidence for kind and axes.
     candidates : str
-        Units that it may be, in words, where `unit` is empty.
+        Possible units, in words, where `unit` is empty.
     time : ndarray, (n,), s
-        By the likeliest unit, where it is not known.
+        In the likeliest unit, where it is not settled.
     values : ndarray, (n, 3)
-        In SI, by the likeliest unit where it is not known; NaN for axes that are missing.
+        In SI, by the likeliest unit where it is not settled; NaN for missing axes.
     label : str
-        What tells it from the others of its record.
+        Distinguishes the triad from others of its record.
     unit_why : tuple of str
-        How the unit is known, where it is not with the axes.
+        Evidence for the unit, where it differs from that for the axes.
     zeroed : bool
-        Gravity at rest has been taken off.
+        Gravity at rest has been subtracted.
     sampling : str
-        Where the record tells; else empty.
+        Empty where the record does not state it.
     full_scale : float or None
         In SI, where the record states it.
     named : bool
         The record names the axes.
     place : str
-        Where the sensor sits, as far as the record tells.
+        Position of the sensor, as far as the record states it.
     sensor : str
-        What the record says of the part.
+        Sensor as named in the record.
     uncertainty : dict of str to float
-        What is known or assumed of the part, by keys of the catalogue of sensors.
+        Known or assumed error model, by keys of the catalogue of sensors.
     basis : str
-        Why.
+        Grounds for the error model.
     notes : tuple of str
-        What else belongs in a comment.
+        Further lines for a comment.
     remarks : tuple of str
-        Lines that the record has for people.
+        Remarks in the record.
     """
 
     path: str
@@ -122,12 +122,12 @@ class Part:
 
     @property
     def axes(self) -> list[int]:
-        """Which of the three there are."""
+        """The available axes."""
         return [k for k, axis in enumerate("xyz") if axis in self.channels]
 
     @property
     def free(self) -> Array:
-        """Values less the median of each axis, (n, 3); zero along axes that are missing."""
+        """Values minus the median of each axis, (n, 3); zero along missing axes."""
         out = np.zeros_like(self.values)
         has = self.axes
         out[:, has] = self.values[:, has] - np.median(self.values[:, has], axis=0)
@@ -141,7 +141,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Skipped:
-    """What of a record was left out, and why."""
+    """Unused part of a record, with the reason."""
 
     path: str
     what: str

@@ -1,4 +1,4 @@
-"""Triads of a table of unknown layout, with their clock, as far as headings tell."""
+"""Find the triads of a table of unknown layout and their clock, from its headings."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-#: A crash of a tenth of a second, at the slowest rate that shows it.
+#: A crash of a tenth of a second, at the slowest useful rate.
 LEAST_SAMPLES = 8
-# Ticks beyond this are counted from the first, before they become floats.
+# Ticks beyond this are counted from the first before conversion to floats.
 FAR = 2.0**40
-# What the reader calls a column that has no heading.
+# The reader's name for a column without a heading.
 _NUMBERED = re.compile(r"column \d+")
 _KINDS = ("acceleration", "rate", "velocity", "time")
 
@@ -58,20 +58,20 @@ def table_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skippe
     Parameters
     ----------
     path : str
-        As a case names it.
+        As in the case.
     record : CrashRecord
-        Whose channels are columns.
+        With columns as channels.
 
     Returns
     -------
     parts : list of Part
-        Values as recorded; kind and unit as far as headings tell.
+        Values as recorded; kind and unit as far as the headings state them.
     skipped : list of Skipped
 
     Raises
     ------
     DataError
-        It holds fewer than eight samples, time does not advance, or a value of a sensor is none.
+        Fewer than eight samples, time that does not advance, or an invalid sensor value.
     """
     table, skipped = _columns(path, record)
     rows = max((len(v) for v in table.columns.values()), default=0)
@@ -102,7 +102,7 @@ def table_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skippe
         _check_advances(record.channel(clock.column), table.columns[clock.column])
         factor = 1.0 / (clock.rate * clock.step)
         origin = table.origins.get(clock.column, 0.0) * factor
-        # As those are read who read the case: what counts from far away counts from midnight.
+        # As the case reader does: a clock with a distant origin counts from midnight.
         raw = table.origins.get(clock.column, 0.0) + float(table.columns[clock.column][0])
         far = abs(origin + time[0]) > EPOCH
         stamps = (
@@ -172,7 +172,7 @@ def _sampling(record: CrashRecord, names: object) -> str:
 
 
 def _columns(path: str, record: CrashRecord) -> tuple[_Table, list[Skipped]]:
-    """Columns as recorded: those that cannot be read are left out with what was wrong."""
+    """Columns as recorded, without unreadable ones, which are listed with the reason."""
     columns: dict[str, Array] = {}
     headings: dict[str, Heading] = {}
     origins: dict[str, float] = {}
@@ -200,7 +200,7 @@ def _columns(path: str, record: CrashRecord) -> tuple[_Table, list[Skipped]]:
 
 
 def _heading(channel: CrashChannel) -> Heading:
-    """What the heading says: the reader's word where it has a unit, ours in other languages."""
+    """Meaning of a heading: the reader's where it finds a unit, else by other languages."""
     if _NUMBERED.fullmatch(channel.name) and not channel.unit:
         return Heading("", "", "", "")
     own = read_heading(channel.name)
@@ -208,7 +208,7 @@ def _heading(channel: CrashChannel) -> Heading:
     if axis:
         own = replace(own, axis=axis, reversed=turned)
     if channel.quantity in _KINDS and (channel.unit or not own.quantity):
-        # One letter g is an acceleration to one maker and a gyro to another.
+        # A lone g means acceleration to some makers, gyro to others.
         if channel.unit or own.stem != "g":
             own = replace(own, quantity=channel.quantity, unit=channel.unit)
     elif channel.quantity in ("displacement", "force"):
@@ -216,11 +216,11 @@ def _heading(channel: CrashChannel) -> Heading:
     return own
 
 
-# Which columns of a table of unknown layout belong together as triads.
+# Grouping of a table's columns into triads.
 
 
-# A sensor that feels a crash steps off by more than this many of its usual steps; a temperature
-# stands far from zero for its spread, and does not.
+# A sensor's largest deviation in a crash exceeds this many of its usual steps; a temperature's mean
+# is far from zero relative to its spread, a sensor's is not.
 FEELS, TABLE_TRIADS_FAR = 6.0, 10.0
 
 
@@ -233,13 +233,13 @@ class Group:
     columns : dict of str to str
         Axis to column.
     quantity : str
-        ``acceleration``, ``rate``, ``velocity``, or empty where headings do not tell.
+        ``acceleration``, ``rate``, ``velocity``, or empty where the headings do not state it.
     unit : str
-        Of the headings; empty where they do not tell.
+        Of the headings; empty where they do not state it.
     by_heading : bool
-        Whether headings tell the axes.
+        Whether the headings state the axes.
     label : str
-        What tells it from others.
+        Distinguishes the triad from others.
     """
 
     columns: dict[str, str]
@@ -257,14 +257,14 @@ def group_columns(
     Parameters
     ----------
     columns : dict of str to ndarray
-        Without the clock, in their order.
+        Without the clock, in file order.
     headings : dict of str to Heading
 
     Returns
     -------
     groups : list of Group
     left : list of (str, str)
-        Columns that belong to none, and why.
+        Ungrouped columns, with reasons.
     """
     left: list[tuple[str, str]] = []
     open_: dict[str, Array] = {}
@@ -298,7 +298,7 @@ def _by_heading(
         said = headings[name]
         if not said.axis:
             continue
-        # Roll, pitch and yaw are words of one triad, each with a stem of its own.
+        # Roll, pitch and yaw form one triad, though their stems differ.
         key = (said.quantity, said.stem)
         axes = found.setdefault(key, {})
         if said.axis in axes:
@@ -308,7 +308,7 @@ def _by_heading(
     rest = dict(columns)
     for key, axes in found.items():
         quantity, stem = key
-        # A lone letter that is no axis by the company it keeps is left to the numbers.
+        # A lone letter that its neighbors show not to be an axis is left to the numbers.
         if key in spoiled or (len(axes) < 2 and not quantity):
             continue
         units = {headings[c].unit for c in axes.values()} - {""}
@@ -322,7 +322,7 @@ def _by_heading(
 
 
 def _joined(groups: list[Group], headings: Mapping[str, Heading]) -> list[Group]:
-    """Single channels of one quantity with axes that do not meet are one triad."""
+    """Join single channels of one quantity with different axes into a triad."""
     out: list[Group] = []
     for group in groups:
         mate = next(
@@ -349,7 +349,7 @@ def _joined(groups: list[Group], headings: Mapping[str, Heading]) -> list[Group]
 def _by_order(
     columns: Mapping[str, Array], headings: Mapping[str, Heading]
 ) -> tuple[list[Group], list[tuple[str, str]]]:
-    """Threes of neighbouring columns; of those that are too many, the ones that feel least go."""
+    """Triads of adjacent columns; of surplus columns, those with the least motion are dropped."""
     names = list(columns)
     dropped: list[tuple[str, str]] = []
     dull = [n for n in names if not headings[n].quantity and _is_dull(columns[n])]
@@ -382,7 +382,7 @@ def _by_order(
 
 
 def _runs(names: Sequence[str], headings: Mapping[str, Heading]) -> list[list[str]]:
-    """Neighbours of one quantity and unit, as far as headings tell."""
+    """Adjacent columns of one quantity and unit, as far as the headings state them."""
     runs: list[list[str]] = []
     for name in names:
         said = headings[name]
@@ -413,15 +413,16 @@ def _is_dull(values: Array) -> bool:
 
 
 RATES = (50.0, 100.0, 200.0, 400.0, 500.0, 1000.0, 2000.0, 5000.0, 10_000.0, 20_000.0)
-# Four fifths of the power of a frontal impact, s.
+# Typical duration of four fifths of the power of a frontal impact, s.
 USUAL_PULSE = 0.06
 
-# Steps that differ by less than this of their mean are even; rounding moves a stamp by no more than
-# twice what it moves a step, as the line goes through two that are rounded, and a step not twice.
+# Limits for even steps: spread of the steps relative to their mean; spread of the stamps about the
+# line through both end points, relative to that of the steps, as rounding moves both ends of the
+# line; spread of rounded steps relative to their mean.
 EVEN, ROUNDED, STEP = 0.01, 2.0, 1.05
-# Steps of a clock stay within this of their median, but for as many as this part of them.
+# Clock steps stay within this of their median, except for at most this share of them.
 REGULAR, IRREGULAR_PART = 0.5, 0.05
-# Rates at which what happens in a crash is recorded; a sum that grows is no clock.
+# Sampling rates of crash records; a column outside them is a sum, not a clock.
 SLOWEST, FASTEST = 5.0, 200_000.0  # Hz
 
 
@@ -433,22 +434,21 @@ def find_clock(
     Parameters
     ----------
     columns : dict of str to ndarray, (n,)
-        Those that hold numbers, in their order.
+        Numeric columns, in file order.
     headings : dict of str to Heading
-        Of each.
 
     Returns
     -------
     clock : Clock
-        With an empty `column` where there is none.
+        `column` is empty where there is none.
     time : ndarray, (n,), s, or None
-        By the likeliest unit.
+        In the likeliest unit.
 
     Notes
     -----
-    A column is a clock where it grows in nearly equal steps. One that is named so goes first;
-    of the others one that does not count samples, then the first. A column that grows by one
-    counts samples, or milliseconds at 1 kHz: that its name must tell.
+    A clock column increases in nearly equal steps. A column named as a clock has priority; of the
+    others one that does not count samples, then the first. A column that increases by one counts
+    samples, or milliseconds at 1 kHz: only its name can decide.
     """
     growing = [name for name, values in columns.items() if _grows(values)]
     named = [name for name in growing if headings[name].quantity == "time"]
@@ -462,14 +462,14 @@ def find_clock(
     ):
         if not names:
             continue
-        # A clock that says its unit goes before one that does not.
+        # A clock with a stated unit has priority.
         name = next((n for n in names if headings[n].unit in TIME_UNITS), names[0])
         return _clock(name, columns[name], headings[name], why)
     return Clock("", "", "no column grows in equal steps", math.nan, math.nan), None
 
 
 def likely_rate(values: Array) -> float:
-    """A usual rate at which the pulse lasts as long as one does, for numbers without time.
+    """Likeliest sampling rate of numbers without time, by the usual duration of a pulse.
 
     Parameters
     ----------
@@ -484,14 +484,14 @@ def _clock(name: str, values: Array, heading: Heading, why: str) -> tuple[Clock,
     if heading.unit in TIME_UNITS:
         factor = TIME_UNITS[heading.unit]
         rate = 1.0 / (step * factor)
-        # Dates and times of day are read in ns, which no heading says.
+        # Dates and times of day are read in ns, a unit that the heading does not name.
         names_it = heading.unit != "ns" or "ns" in name.lower() or "nano" in name.lower()
         how = f"{why}, which names the unit" if names_it else f"{why}; a time of day, read in ns"
         return Clock(name, heading.unit, how, step, rate), values * factor
     said = infer_time_unit(_whole(values))
     shares = {str(v): p for v, p in ((said.value, said.confidence), *said.alternatives) if v}
     within = {u: p for u, p in shares.items() if SLOWEST <= 1.0 / (step * TIME_UNITS[u]) <= FASTEST}
-    # A step of one is a count as often as it is a millisecond.
+    # A step of one is a sample count as often as a millisecond.
     total = sum(within.values()) + (1.0 if _counts(values) and heading.quantity != "time" else 0.0)
     best = max(within, key=lambda u: within[u], default="s")
     rate = 1.0 / (step * TIME_UNITS[best])
@@ -509,7 +509,7 @@ def _clock(name: str, values: Array, heading: Heading, why: str) -> tuple[Clock,
 
 
 def evenly(clock: Clock, time: Array) -> tuple[Clock, Array]:
-    """Stamps that are rounded, or written late, made even; others as they are.
+    """Make rounded or late stamps even; return others unchanged.
 
     Parameters
     ----------
@@ -524,8 +524,8 @@ def evenly(clock: Clock, time: Array) -> tuple[Clock, Array]:
 
     Notes
     -----
-    The stamps of an even clock that are rounded to q stay within q of it, and their steps differ
-    by q. Several samples that are missing bend the line by more.
+    The stamps of an even clock rounded to q stay within q of it, and their steps differ by q.
+    Several missing samples bend the line by more.
     """
     count = np.arange(time.size)
     steps = np.diff(time)
@@ -542,7 +542,7 @@ def evenly(clock: Clock, time: Array) -> tuple[Clock, Array]:
 
 
 def _whole(values: Array) -> NDArray[np.float64] | NDArray[np.int64]:
-    """Whole numbers as such: clocks that count ticks say so."""
+    """Convert whole numbers to integers, for clocks that count ticks."""
     whole = np.round(values)
     if np.array_equal(whole, values) and np.abs(values).max(initial=0.0) < 2.0**53:
         return whole.astype(np.int64)
@@ -564,20 +564,20 @@ def _grows(values: Array) -> bool:
     return bool(off <= max(IRREGULAR_PART * steps.size, 0 if steps.size < 20 else 1))
 
 
-# The rate of a record without time, where a line above its table states one.
+# Sampling rate of a record without time, where a line above its table states one.
 
 
 _RATE = re.compile(
     r"(?<![\w.,])(\d+(?:[.,]\d+)?)\s*(k?)\s*(?:hz|sps|s/s|samples?\s*(?:/|per)\s*s)", re.I
 )
-# A filter's limit is in Hz, too.
+# The limit of a filter is in Hz, too.
 _OTHER = re.compile(
     r"filter|cfc|band ?width|bandbreite|cut.?off|grenzfrequenz|low.?pass|tiefpass", re.I
 )
 
 
 def stated_rate(remarks: Sequence[str]) -> tuple[float, str] | None:
-    """Find the samples a second that lines above a table state.
+    """Find the sampling rate stated in the lines above a table.
 
     Parameters
     ----------
@@ -593,7 +593,7 @@ def stated_rate(remarks: Sequence[str]) -> tuple[float, str] | None:
         if _OTHER.search(line):
             continue
         for said in _RATE.finditer(line):
-            # A comma of three digits parts thousands in one country and decimals in another.
+            # A comma before three digits separates thousands in some countries, decimals in others.
             if re.fullmatch(r"\d+[.,]\d{3}", said[1]):
                 return None
             rate = float(said[1].replace(",", ".")) * (1000.0 if said[2] else 1.0)

@@ -1,4 +1,4 @@
-"""What three columns of numbers are: an accelerometer or a gyro, and in which unit."""
+"""Kind and unit of three columns of numbers: accelerometer or gyro."""
 
 from __future__ import annotations
 
@@ -19,43 +19,43 @@ Array = NDArray[np.float64]
 
 __all__ = ["Answer", "Quiet", "accel_unit", "gyro_unit", "quiet_part", "same_quantity"]
 
-# A stretch is quiet until a sample steps off by this many times the usual step.
+# A rest ends at a sample that deviates by this many times the usual step.
 BURST = 15.0
 LEAST_QUIET = 10  # samples
-# Noise and zero-rate offset of the MEMS gyros of crash recorders: decades about these, with a
+# Noise and zero-rate offset of MEMS gyros of crash recorders: decades about these, with a
 # standard deviation that covers an order of magnitude either way twice.
 USUAL_NOISE, USUAL_OFFSET, DECADES = math.radians(0.1), math.radians(1.0), 0.7
-# Turns in a crash: a tenth of a revolution a second, within a factor of four.
+# Peak rate in a crash, within a factor of four.
 USUAL_PEAK, PEAK_DECADES = math.radians(120.0), 0.6
-# Two ranges of one sensor, or two recorders, agree so far.
+# Least correlation between two ranges of one sensor, or two recorders.
 LEAST_CORRELATION = 0.8
-# Of the logarithm: noise flattens the slope, and the next unit is a factor of 9.8 away.
+# In logarithm: noise flattens the slope, and the next unit is a factor of 9.8 away.
 SCALE_TOLERANCE = 0.35
-# Ends of the ranges of accelerometers, in g, and how exactly they are met.
+# Full scales of accelerometers, in g, and their tolerance.
 FULL_SCALES = (
     *(1.2, 1.5, 1.7, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 18.0, 20.0, 24.0, 25.0, 30.0),
     *(35.0, 37.0, 40.0, 50.0, 55.0, 64.0, 70.0, 75.0, 100.0, 120.0, 150.0, 200.0, 250.0, 400.0),
     *(500.0, 1000.0, 2000.0),
 )
 ROUND = 0.003
-# Four fifths of the power of a crash are within so long.
+# Duration of four fifths of the power of a crash.
 PULSE = (0.008, 0.8)  # s
-# A pulse stands so far above the noise.
+# Least ratio of a pulse to the noise.
 LEAST_PULSE = 8.0
-# Of a reading: where a low range stands at its end, the two have nothing to agree on.
+# Share of the largest reading: a saturated low range cannot be compared beyond it.
 NEAR_END = 0.98
-# What is below this part of the largest is mostly noise.
+# Values below this share of the largest are mostly noise.
 MOVES = 0.15
 
 
 @dataclass(frozen=True)
 class Quiet:
-    """Rest of a triad before something happens, in its own numbers.
+    """Rest of a triad before the event, in recorded numbers.
 
     Attributes
     ----------
     count : int
-        Samples from the first.
+        Samples from the first on.
     mean, sd : ndarray, (3,)
     """
 
@@ -66,7 +66,7 @@ class Quiet:
 
 @dataclass(frozen=True)
 class Answer:
-    """A unit with what speaks for it.
+    """Unit with its evidence.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class Answer:
     others : tuple of (str, float)
         Units with their probabilities, the likeliest first, `unit` among them.
     gravity : float
-        Probability that it is an accelerometer with gravity in it, in whatever unit.
+        Probability that it is an accelerometer that measures gravity, in whatever unit.
     """
 
     unit: str
@@ -88,12 +88,12 @@ class Answer:
 
     @property
     def settled(self) -> bool:
-        """Whether it is sure enough to be written without asking."""
+        """Whether it is certain enough to be written without a question."""
         return self.confidence >= THRESHOLD
 
 
 def quiet_part(values: Array) -> Quiet:
-    """The samples before the first burst of any column.
+    """Return the samples before the first burst of any column.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def quiet_part(values: Array) -> Quiet:
     """
     steps = np.abs(np.diff(values, axis=0))
     usual = np.median(steps, axis=0)
-    # A coarse converter repeats most values; its step is what a change is measured by.
+    # A coarse converter repeats most values; its step is the unit of change.
     least = np.array([s[s > 0].min(initial=np.inf) if (s > 0).any() else np.inf for s in steps.T])
     limit = BURST * np.maximum(usual, least)
     bursts = np.flatnonzero((steps > limit).any(axis=1))
@@ -113,24 +113,24 @@ def quiet_part(values: Array) -> Quiet:
 
 
 def accel_unit(values: Array, step: float, quiet: Quiet) -> Answer:
-    """Unit of an accelerometer by the length of its rest.
+    """Unit of an accelerometer by the magnitude of its rest.
 
     Parameters
     ----------
     values : ndarray, (n, 3)
     step : float, s
     quiet : Quiet
-        Of these values.
+        Rest of these values.
 
     Returns
     -------
     Answer
-        With confidence 0 where gravity is not in it; `gravity` tells how sure it is that it is.
+        With confidence 0 where gravity is not measured; `gravity` is the probability that it is.
 
     Notes
     -----
-    Counts of a converter may be 1024 a gravity, as mg nearly are. A sensor that stood at its end
-    tells them apart: full scales are round in g, and converters end at a power of two.
+    Counts of a converter may be 1024 per g, nearly as many as mg. Saturation distinguishes them:
+    full scales are round in g, and converters end at a power of two.
     """
     length = float(np.linalg.norm(quiet.mean))
     said, form, gravity, _ = infer_accel(values[: quiet.count], step if step > 0 else None)
@@ -164,18 +164,18 @@ def _round_end(values: Array, unit: str) -> float | None:
 
 
 def pulse_samples(values: Array) -> int:
-    """How many samples hold the middle four fifths of the power of the shortest pulse.
+    """Samples in the middle four fifths of the power of the shortest pulse.
 
     Parameters
     ----------
     values : ndarray, (n, k)
-        In any units; what grows evenly, as a clock does, and what feels nothing is not counted. A
-        gyro that turns long after the blow does not make it longer.
+        In any units. Columns that increase evenly, as a clock does, and those without a pulse are
+        ignored. A gyro that turns long after the impact does not lengthen the pulse.
 
     Returns
     -------
     int
-        0 where there is no pulse.
+        0 without a pulse.
     """
     lengths = []
     for column in values.T:
@@ -183,7 +183,7 @@ def pulse_samples(values: Array) -> int:
         noise = max(float(np.median(free)), float(np.sort(free)[int(0.7 * free.size)]))
         if np.ptp(np.diff(column)) == 0.0 or not free.max() > LEAST_PULSE * noise:
             continue
-        # Without the noise, which a long record has more of than the pulse has power.
+        # Without the noise, which has more power than the pulse in a long record.
         power = np.cumsum(np.where(free > 3.0 * noise, free, 0.0) ** 2)
         edges = np.searchsorted(power, np.array([0.1, 0.9]) * power[-1])
         lengths.append(int(edges[1] - edges[0]))
@@ -191,19 +191,19 @@ def pulse_samples(values: Array) -> int:
 
 
 def clock_by_pulse(clock: Clock, values: Array) -> tuple[str, str] | None:
-    """Unit of time by how long the crash lasts.
+    """Unit of time by the duration of the crash.
 
     Parameters
     ----------
     clock : Clock
-        Whose `rate` is that of its likeliest unit, and whose `candidates` are not settled.
+        `rate` is that of its likeliest unit; its `candidates` are not settled.
     values : ndarray, (n, k)
         In any unit.
 
     Returns
     -------
     (unit, why) or None
-        None where more than one unit, or none, makes a crash of it.
+        None where no unit, or more than one, gives a plausible crash.
     """
     samples = pulse_samples(values)
     if samples < 3:
@@ -220,7 +220,7 @@ def clock_by_pulse(clock: Clock, values: Array) -> tuple[str, str] | None:
 
 
 def gyro_unit(time: Array, values: Array, quiet: Quiet) -> Answer:
-    """Unit of a gyro by its size, its rest and its noise.
+    """Unit of a gyro by its magnitude, its rest and its noise.
 
     Parameters
     ----------
@@ -230,9 +230,9 @@ def gyro_unit(time: Array, values: Array, quiet: Quiet) -> Answer:
 
     Notes
     -----
-    The probabilities of `formats.inference` hold the largest rates of the crash; to them come
-    the rest's offset and noise, and the peak, each as a broad normal distribution of the
-    logarithm.
+    The probabilities of `formats.inference` consider the largest rates of the crash. They are
+    combined with the offset and noise at rest, and with the peak, each as a broad normal
+    distribution of the logarithm.
     """
     crash = slice(max(quiet.count - 1, 0) if quiet.count < len(values) - LEAST_QUIET else 0, None)
     said, _, _, _ = infer_gyro(time[crash] - time[crash][0], values[crash], None, {"s": 1.0})
@@ -263,18 +263,18 @@ def gyro_unit(time: Array, values: Array, quiet: Quiet) -> Answer:
 
 
 def same_quantity(known: Array, other: Array) -> tuple[str, float, float] | None:
-    """Unit of a triad by one that felt the same and is known.
+    """Unit of a triad by a known triad with the same motion.
 
     Parameters
     ----------
     known : ndarray, (n, 3), m/s²
     other : ndarray, (n, 3)
-        At the same instants, in a unit that is looked for.
+        At the same instants, in an unknown unit.
 
     Returns
     -------
     (unit, ratio, correlation) or None
-        The ratio is that of the scale found to the unit's; None where they do not agree.
+        Ratio of the scale found to that of the unit; None where they do not agree.
     """
     slope, correlation = regress(known, other)
     if correlation < LEAST_CORRELATION or slope <= 0.0:
@@ -288,7 +288,7 @@ def same_quantity(known: Array, other: Array) -> tuple[str, float, float] | None
 
 
 def regress(known: Array, other: Array) -> tuple[float, float]:
-    """How one triad follows another that may have a shorter range.
+    """Regress one triad on another that may have a shorter range.
 
     Parameters
     ----------
@@ -298,10 +298,10 @@ def regress(known: Array, other: Array) -> tuple[float, float]:
     Returns
     -------
     scale : float
-        Of `other` to `known`, from where `known` moves and is not at its end; 0 where it cannot
-        be told.
+        Of `other` to `known`, where `known` moves and is not saturated; 0 where it cannot be
+        determined.
     correlation : float
-        Of all axes together, `other` being cut where `known` ends.
+        Of all axes together, `other` being clipped where `known` saturates.
     """
     x, y = (v - np.median(v, axis=0) for v in (known, other))
     largest = np.abs(x).max(axis=0)
@@ -312,7 +312,7 @@ def regress(known: Array, other: Array) -> tuple[float, float]:
     power, own = float(y_in @ y_in), float(x_in @ x_in)
     if power <= 0.0 or own <= 0.0:
         return 0.0, 0.0
-    # Both are noisy: the slope between the two regressions is not drawn to zero.
+    # Both are noisy: the geometric mean of the two regression slopes is not biased to zero.
     scale = math.copysign(math.sqrt(own / power), float(x_in @ y_in))
     cut = np.clip(scale * y, x.min(axis=0), x.max(axis=0))
     power, own = float((cut * cut).sum()), float((x * x).sum())

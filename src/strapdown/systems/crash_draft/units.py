@@ -1,4 +1,4 @@
-"""Which triads are one recorder, and which recorders lend each other a gyro."""
+"""Group triads into recorders, and assign gyros to recorders without one."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ from strapdown.systems.crash_draft.triad_kind import (
 __all__ = ["RangeEnds", "Unit", "group_units", "range_ends", "settle_units", "stated_of"]
 
 
-# Impacts on one clock are felt this near to each other, or within three steps of the slower.
+# Impacts on one clock differ by less than this, or by three steps of the slower.
 SAME_INSTANT = 0.01  # s
 STEPS = 3.0
-# Two ranges of one housing feel the same.
+# Least correlation of two ranges of one housing.
 SAME_PLACE = 0.8
 SAME_SCALE = 0.25
-# A gyro's clock is that of the accelerometer where it begins to turn within this of the impact.
+# A gyro shares the accelerometer's clock if it begins to turn within this of the impact.
 TURNS_WITHIN = 0.15  # s
 TURNS = 8.0
 _RANGE_WORDS = re.compile(
@@ -51,22 +51,22 @@ _RANGE_WORDS = re.compile(
 
 @dataclass(frozen=True, eq=False)
 class Unit:
-    """A recorder, as far as it was made out.
+    """Recorder found in the records.
 
     Attributes
     ----------
     name : str
     accelerometers : tuple of Part
-        The lowest range first.
+        In order of increasing range.
     gyro : Part or None
     gyro_from : str
-        Name of the unit that lends one; empty where there is none.
+        Name of the unit whose gyro it uses; empty if it has its own or none.
     impact : Impact or None
-        None where nothing of it can be read against time.
+        None where no accelerometer has a time base.
     ends : dict of int to RangeEnds
-        Of each accelerometer, and of the gyro under -1.
+        Of each accelerometer by index; of the gyro under -1.
     why : tuple of str
-        Why these triads are one unit, and no other is in it.
+        Grounds for the grouping.
     """
 
     name: str
@@ -79,7 +79,7 @@ class Unit:
 
 
 def group_units(parts: Sequence[Part]) -> tuple[list[Unit], list[Skipped]]:
-    """Put triads together to units.
+    """Group triads into units.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def group_units(parts: Sequence[Part]) -> tuple[list[Unit], list[Skipped]]:
     Returns
     -------
     units : list of Unit
-        In the order of their first triad.
+        In order of their first triad.
     skipped : list of Skipped
         Gyros that fit no unit.
     """
@@ -201,7 +201,7 @@ def _overlap(a: Part, b: Part) -> bool:
 
 
 def _instant(part: Part, reach: float) -> float:
-    """When it first felt half of what the lower range reaches, on its clock."""
+    """Time of half of the lower range's peak, on the triad's clock."""
     size = np.abs(part.free).max(axis=1)
     over = size > 0.5 * min(reach, float(size.max()))
     return float(part.time[int(np.argmax(over))])
@@ -210,7 +210,7 @@ def _instant(part: Part, reach: float) -> float:
 def _owner(
     gyro: Part, drafts: Sequence[tuple[list[Part], Impact, list[str]]], taken: dict[int, Part]
 ) -> tuple[int | None, str]:
-    """Whose gyro it is, and why."""
+    """Unit that a gyro belongs to, and why."""
     free = [k for k in range(len(drafts)) if k not in taken]
     for k in free:
         if any(p.path == gyro.path for p in drafts[k][0]):
@@ -238,7 +238,7 @@ def _owner(
 
 
 def _turns_at(gyro: Part, impact: float) -> bool:
-    """Whether it turns more after the impact than before, and does so there."""
+    """Whether it turns more after the impact than before, starting there."""
     values = gyro.values[:, gyro.axes]
     before = (gyro.time < impact - TURNS_WITHIN) & (gyro.time > impact - 3.0)
     if before.sum() < 5:
@@ -251,7 +251,7 @@ def _turns_at(gyro: Part, impact: float) -> bool:
 
 
 def _names(groups: Sequence[Sequence[Part]], gyros: Sequence[Part | None]) -> list[str]:
-    """Short names, one a unit: of the files, else of the columns."""
+    """Short unit names: of the files, else of the columns."""
     stems = []
     for group, gyro in zip(groups, gyros, strict=True):
         files = dict.fromkeys(PurePath(p.path).stem for p in (*group, *((gyro,) if gyro else ())))
@@ -272,7 +272,7 @@ def _names(groups: Sequence[Sequence[Part]], gyros: Sequence[Part | None]) -> li
 
 
 def _shared(names: Sequence[str]) -> str:
-    """With what all names begin."""
+    """Common beginning of all names."""
     together = itertools.takewhile(lambda chars: len(set(chars)) == 1, zip(*names, strict=False))
     return "".join(chars[0] for chars in together)
 
@@ -287,29 +287,29 @@ def _of(part: Part) -> str:
     return f"{shown} of {PurePath(part.path).name}"
 
 
-# What each triad is and in which unit: by its heading, its rest, or by one that felt the same.
+# Kind and unit of each triad: by its heading, its rest, or a triad with the same motion.
 
 
 Array = NDArray[np.float64]
 
-# Of the shorter record: so much must lie within the other for the two to be held together.
+# Least overlap for comparing two records, as a share of the shorter one.
 OVERLAP = 0.5
-# Without gravity a rest is below this part of the peak.
+# A rest below this share of the peak has no gravity.
 ZEROED = 0.05
 
 
 def settle_units(parts: Sequence[Part]) -> list[Part]:
-    """Conclude kind and unit of every triad.
+    """Determine kind and unit of every triad.
 
     Parameters
     ----------
     parts : sequence of Part
-        With values as recorded, and kind and unit as far as headings tell them.
+        With values as recorded, and kind and unit as far as the headings state them.
 
     Returns
     -------
     list of Part
-        In the same order, with values in SI; by the likeliest unit where `Part.unit` is empty.
+        In the same order, with values in SI; in the likeliest unit where `Part.unit` is empty.
     """
     parts = [_timed(p) for p in parts]
     out: list[Part | None] = [_by_heading(p) for p in parts]
@@ -324,7 +324,7 @@ def settle_units(parts: Sequence[Part]) -> list[Part]:
 
 
 def _off_gravity(part: Part) -> float:
-    """How far its rest is from gravity in any unit, relative."""
+    """Smallest relative difference of its rest from gravity over all units."""
     if len(part.axes) < 3:
         return math.inf
     length = float(np.linalg.norm(quiet_part(part.values).mean))
@@ -335,7 +335,7 @@ def _off_gravity(part: Part) -> float:
 
 
 def _timed(part: Part) -> Part:
-    """Settle a clock by how long the crash lasts."""
+    """Settle the unit of a clock by the duration of the crash."""
     clock = part.clock
     if clock.unit or not clock.column:
         return part
@@ -363,7 +363,7 @@ def _by_heading(part: Part) -> Part | None:
 
 
 def _weighed(part: Part, known: Sequence[Part]) -> Answer | None:
-    # A gyro may rest at what gravity is in some unit: beside an accelerometer it must agree.
+    # A gyro bias may equal gravity in some unit: beside an accelerometer it must agree.
     if not part.kind and any(q.path == part.path for q in known):
         return None
     if part.kind not in ("", "acceleration") or len(part.axes) < 3:
@@ -379,7 +379,7 @@ def _by_gravity(part: Part, known: Sequence[Part]) -> Part | None:
 
 
 def _by_gravity_alone(part: Part, known: Sequence[Part]) -> Part | None:
-    """An accelerometer, as it weighs something at rest, in a unit that is not settled."""
+    """Accelerometer by gravity at rest, in a unit that is not settled."""
     said = _weighed(part, known)
     if said is None or said.gravity < THRESHOLD:
         return None
@@ -399,7 +399,7 @@ def _by_another(part: Part, known: Sequence[Part]) -> Part | None:
                 f"{correlation:.2f}, scale {ratio:.3f})"
             )
             if not other.unit:
-                # In the same unit, whichever that is.
+                # In the same unit, whichever it is.
                 return _asked(part, "acceleration", unit, ACCEL_UNITS, _accelerations, told)
             return _scaled(part, "acceleration", unit, ACCEL_UNITS[unit], told)
     return None
@@ -432,7 +432,7 @@ def _by_elimination(part: Part, known: Sequence[Part]) -> Part | None:
 
 
 def _likeliest(part: Part) -> Answer:
-    """A crash has tens of g: what peaks above two hundred is not in g."""
+    """Likeliest unit by the peak: a crash has tens of g, so more than two hundred is not in g."""
     peak = float(np.nanmax(np.abs(part.values)))
     return Answer("g" if peak < 100.0 else "m/s2" if peak < 5000.0 else "mg", 0.0, "by its size")
 
@@ -493,7 +493,7 @@ def _speeds(part: Part, unit: str, factor: float) -> str:
 
 
 def _together(known: Part, other: Part) -> tuple[Array, Array] | None:
-    """Both at the stamps of the slower one, where both were on."""
+    """Both at the stamps of the slower one, over their common time."""
     start, end = max(known.time[0], other.time[0]), min(known.time[-1], other.time[-1])
     shorter = min(np.ptp(known.time), np.ptp(other.time))
     if end - start < OVERLAP * shorter:
@@ -511,40 +511,40 @@ def _named(other: Part, part: Part) -> str:
     return names if other.path == part.path else f"{other.path}: {names}"
 
 
-# What is not known of a part without a data sheet: its noise from the record, the rest assumed.
+# Error model of a part without a data sheet: noise from the record, the rest assumed.
 
 
 GYRO_SCALES = (90.0, 125.0, 250.0, 300.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0, 20000.0)
 # Wide enough for an uncalibrated MEMS part: data sheets give 3 % and 2 % as bounds of the first
-# two (MPU-6050 and LSM6DSO), 20 to 100 mg and 1 to 20 deg/s of zero error.
+# two (MPU-6050 and LSM6DSO), and a zero error of 20 to 100 mg and 1 to 20 deg/s.
 SCALE_PERCENT, MISALIGNMENT_DEG = 2.0, 1.0
 BIAS_MG, BIAS_DEG_PER_S, G_SENSITIVITY = 60.0, 5.0, 0.1
 # A record that was zeroed at rest has lost gravity with its bias.
 ZEROED_G = 1.0
-# An end is not looked for below the largest reading and this part of it.
+# The range ends at least this factor above the largest reading.
 HEADROOM = 1.01
 
 
 def stated_of(
     part: Part, ends: RangeEnds, impact: Impact, finest: Part
 ) -> tuple[dict[str, float], str]:
-    """Numbers by keys of the catalogue of sensors, and why these.
+    """Error model by keys of the sensor catalogue, and its grounds.
 
     Parameters
     ----------
     part : Part
         With values in SI.
     ends : RangeEnds
-        Of it.
+        Range ends of the part.
     impact : Impact
-        Of its unit.
+        Impact of its unit.
     finest : Part
         The accelerometer of the lowest range of the unit.
     """
     values = part.values[:, part.axes]
     quiet = quiet_part(values)
     step = float(np.median(np.diff(part.time)))
-    # Of differences from sample to sample, which no motion is in.
+    # From differences between samples, which contain no motion.
     moved = np.diff(values[: max(quiet.count, 3)], axis=0)
     density = float(np.sqrt(np.mean(moved**2) / 2.0) * math.sqrt(step))
     reached = max(p for p in ends.peak if p == p)
@@ -594,29 +594,29 @@ def _next(value: float, usual: tuple[float, ...]) -> float:
     return next((u for u in usual if u >= value * (1.0 - 1e-6)), float(math.ceil(value)))
 
 
-# Where a triad stood at the end of its range, and which parts of the catalogue end there.
+# Saturation of a triad, and sensors of the catalogue with that full scale.
 
 
-# A full scale is met within this: converters stop a step or two short of it, and scale factors
-# are a few percent off.
+# Tolerance of a full scale: converters end a step or two below it, and scale factors are a few
+# percent off.
 SAME_END = 0.03
 
 
 @dataclass(frozen=True)
 class RangeEnds:
-    """What a triad reached, and at which end it stood.
+    """Peak readings of a triad, and the range end where it saturated.
 
     Attributes
     ----------
     peak : tuple of float, (3,)
-        Largest of each axis, SI; NaN where it is missing.
+        Largest magnitude of each axis, SI; NaN where it is missing.
     ends : tuple of float or None, (3,)
         End of the range, where it was found.
     samples : int
-        That stood at an end.
+        Number of saturated samples.
     sensors : tuple of str
-        Of the catalogue: those with this full scale; where no end was found, those whose range
-        holds the peaks.
+        Sensors of the catalogue with this full scale; where no end was found, those whose range
+        includes the peaks.
     """
 
     peak: tuple[float, ...]
@@ -626,7 +626,7 @@ class RangeEnds:
 
     @property
     def saturated(self) -> bool:
-        """Whether an axis stood at an end."""
+        """Whether an axis saturated."""
         return any(e is not None for e in self.ends)
 
 
@@ -636,7 +636,7 @@ def range_ends(part: Part) -> RangeEnds:
     Parameters
     ----------
     part : Part
-        Of accelerations or rates, with values in SI.
+        Accelerations or rates, with values in SI.
     """
     has = part.axes
     values = part.values[:, has]
@@ -665,7 +665,7 @@ def _fits(peak: float, end: float | None, full: float) -> bool:
 
 @cache
 def _full_scales(kind: str) -> dict[str, tuple[float, ...]]:
-    """Of every sensor of the catalogue that has such a triad, SI."""
+    """Full scales of all sensors of the catalogue with such a triad, SI."""
     found = {}
     for name in SENSORS:
         sensor = load_sensor(name)
@@ -677,7 +677,7 @@ def _full_scales(kind: str) -> dict[str, tuple[float, ...]]:
 
 
 def in_words(value: float, kind: str) -> str:
-    """A size in the unit that people use for it."""
+    """Write a magnitude in its customary unit."""
     if kind == "acceleration":
         return f"{value / STANDARD_GRAVITY:.3g} g"
     return f"{value / GYRO_UNITS['deg/s']:.4g} deg/s"

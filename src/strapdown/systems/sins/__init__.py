@@ -1,1 +1,1 @@
-"""System C: one chain over a simulation, a recorded log, or samples as they come."""
+"""System C: one navigation pipeline for simulations, recorded logs and live samples."""

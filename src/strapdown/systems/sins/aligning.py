@@ -1,4 +1,4 @@
-"""What a chain does at the end of a mode of alignment."""
+"""Alignment at the end of an alignment mode, and the handover to navigation."""
 
 from __future__ import annotations
 
@@ -36,20 +36,20 @@ __all__ = ["align", "from_alignment", "from_fine", "from_state", "handed_over", 
 
 Array = NDArray[np.float64]
 
-# An instant is come to within this, s.
+# Tolerance of an instant, s.
 INSTANT = 1e-7
-# Over so much before and after it the rate at an instant is a mean, s.
+# The rate at an instant is a mean over this time before and after it, s.
 STEADY = 0.1
 
 
 def align(chain: NavigationPipeline, state: PipelineState) -> Aligned:
-    """Align by what was kept of the mode that a chain is in.
+    """Align with the steps and measurements kept during the mode.
 
     Parameters
     ----------
-    chain : Chain
+    chain : NavigationPipeline
     state : PipelineState
-        In a mode of alignment.
+        In an alignment mode.
 
     Returns
     -------
@@ -58,7 +58,7 @@ def align(chain: NavigationPipeline, state: PipelineState) -> Aligned:
     Raises
     ------
     DataError, DivergenceError
-        It is not possible.
+        The alignment is not possible.
     """
     mode = chain.modes[state.mode]
     assert chain.sensors is not None
@@ -84,13 +84,13 @@ def align(chain: NavigationPipeline, state: PipelineState) -> Aligned:
 
 
 def handed_over(chain: NavigationPipeline, state: PipelineState, found: Aligned) -> FilterState:
-    """Return the state of the filter with which navigation begins.
+    """Return the filter state with which navigation begins.
 
     Parameters
     ----------
-    chain : Chain
+    chain : NavigationPipeline
     state : PipelineState
-        At the end of a mode of alignment.
+        At the end of an alignment mode.
     found : Aligned
 
     Returns
@@ -143,21 +143,21 @@ def handed_over(chain: NavigationPipeline, state: PipelineState, found: Aligned)
 def unused_fixes(
     chain: NavigationPipeline, state: PipelineState, begun: float
 ) -> dict[str, tuple[pd.DataFrame, ...]]:
-    """What is left of the tables of a receiver by whose fixes navigation has begun.
+    """Return the fixes of the alignment's receiver that the alignment has not used.
 
     Parameters
     ----------
-    chain : Chain
+    chain : NavigationPipeline
     state : PipelineState
-        At the end of a mode of alignment.
+        At the end of an alignment mode.
     begun : float, s
         When navigation begins.
 
     Returns
     -------
     dict of str to tuple of DataFrame
-        By name of the aid: rows that an alignment by course has not met yet. A fix at the very end
-        of it has told place and velocity already, and would count twice.
+        By name of the measurement: rows after an alignment by course. A fix at its very end has
+        already given position and velocity, and would count twice.
     """
     mode, name = chain.modes[state.mode], chain.fixes_from
     if name is None or not (isinstance(mode, CoarseMode) and isinstance(mode.way, GnssCourse)):
@@ -170,7 +170,7 @@ def unused_fixes(
 def _by_antenna(
     chain: NavigationPipeline, q_nb: Array, velocity: Array, turn: Array
 ) -> Array | None:
-    """What other errors add to a place and velocity by the fixes of the alignment."""
+    """Error of position and velocity from fixes per physical error."""
     if chain.fixes_from is None:
         return None
     arm, filter_ = _lever_arm(chain), chain.navigator.filter
@@ -178,7 +178,7 @@ def _by_antenna(
 
 
 def _turn(kept: Array, at: float) -> Array:
-    """Rate of the body about an instant, without its shaking; body axes."""
+    """Mean body rate about an instant, body axes."""
     near = np.abs(kept[:, 0] - at) <= STEADY
     if not near.any():
         near = np.arange(len(kept)) == np.argmin(np.abs(kept[:, 0] - at))
@@ -186,7 +186,7 @@ def _turn(kept: Array, at: float) -> Array:
 
 
 def _window(chain: NavigationPipeline, state: PipelineState) -> Array:
-    """Steps that are aligned."""
+    """Steps to align with."""
     kept, mode = state.kept.rows, chain.modes[state.mode]
     if not isinstance(mode, CoarseMode):
         return kept
@@ -210,7 +210,7 @@ def _fixes(chain: NavigationPipeline, state: PipelineState) -> pd.DataFrame | No
 def _site(
     chain: NavigationPipeline, state: PipelineState, q_nb: Array | None
 ) -> tuple[Site, Array]:
-    """Where the sensors are, and how well that is known."""
+    """Position of the sensors and its standard deviation."""
     if chain.site is not None:
         return chain.site, np.asarray(chain.site_sd, dtype=np.float64)
     ellipsoid = find_ellipsoid(chain.navigator.filter.mechanization.ellipsoid)
@@ -225,12 +225,12 @@ def _site(
 
 
 def _receiver(chain: NavigationPipeline) -> Measurement | None:
-    """That which has the fixes."""
+    """The receiver whose table holds the fixes."""
     return chain.navigator.by_name.get(chain.fixes_from or "")
 
 
 def _antenna(chain: NavigationPipeline) -> Antenna:
-    """Where and when the receiver measures."""
+    """Lever arm and time offset of the receiver."""
     aid = _receiver(chain)
     x, y, z = _lever_arm(chain).tolist()
     return Antenna(
@@ -241,27 +241,27 @@ def _antenna(chain: NavigationPipeline) -> Antenna:
 
 
 def _lever_arm(chain: NavigationPipeline) -> Array:
-    """Of its antenna."""
+    """Lever arm of the receiver's antenna."""
     arm = getattr(_receiver(chain), "lever_arm", (0.0, 0.0, 0.0))
     return np.asarray(arm, dtype=np.float64)
 
 
-# From an alignment to navigation: the state, and what is known of it and of the sensors.
+# Handover from alignment to navigation: the state and its covariance.
 
 
-# Errors of sensors that go together to this part of them are one.
+# Sensor errors that are correlated to within this fraction count as one.
 SAME = 1e-9
 
 
 def from_state(filter_: ErrorFilter, start: NavState, P: Array) -> FilterState:
-    """Begin a filter with a state and the covariance of its nine errors.
+    """Initialize a filter with a state and the covariance of its nine errors.
 
     Parameters
     ----------
     filter_ : ErrorFilter
     start : NavState
     P : ndarray, (9, 9)
-        Displacement, velocity, rotation in north-east-down; the sensors are as the model says.
+        Displacement, velocity, rotation in north-east-down; sensor errors are as the model states.
 
     Returns
     -------
@@ -278,30 +278,30 @@ def from_alignment(
     rest: Array,
     by_others: Array | None = None,
 ) -> FilterState:
-    """Begin a filter with a coarse alignment.
+    """Initialize a filter with a coarse alignment.
 
     Parameters
     ----------
     filter_ : ErrorFilter
     found : Alignment
-        Its biases, where it tells any, are taken off.
+        Its biases, if estimated, are subtracted.
     start : NavState
-        Place and velocity; the attitude is that of the alignment.
+        Position and velocity; the attitude is that of the alignment.
     P : ndarray, (6, 6)
-        Of displacement and velocity, north-east-down; that of the velocity is the alignment's,
-        where it tells it.
+        Displacement and velocity, north-east-down. The velocity block is replaced by the
+        alignment's, if estimated.
     rest : ndarray, (6,)
-        Mean rate and force of the record, which say what scale factors do.
+        Mean rate and specific force of the record; they scale the scale-factor errors.
     by_others : ndarray, (6, p), optional
-        What every physical error adds to those of place and velocity, north-east-down
-        (`by_antenna.errors_by_antenna`); they are correlated with them from the start.
+        Error of position and velocity per physical error, north-east-down
+        (`by_antenna.errors_by_antenna`), which correlates them from the start.
 
     Returns
     -------
     FilterState
-        Where the alignment does not tell biases, its tilt goes together with what accelerometers
-        read too much at rest (`_levelled`): were they independent, the first zero velocity would
-        take each for a witness of the other, and both for better known than they are.
+        If the alignment does not estimate biases, its tilt is correlated with the accelerometer
+        errors at rest (`_levelled`). If they were independent, the first zero-velocity update
+        would take each to confirm the other, and both covariances would become too small.
     """
     whole = np.zeros((PHYSICAL, PHYSICAL))
     whole[:6, :6] = P
@@ -321,8 +321,8 @@ def from_alignment(
     joint[PHYSICAL:, PHYSICAL:] = np.diag(np.square(sd))
     if found.joint is not None:
         joint[3:, 3:] = found.joint
-        # What is wrong of the velocity moved the place since its fix, and with it goes whatever
-        # the alignment knows to go with the velocity.
+        # A velocity error has moved the position since its fix, and carries the alignment's
+        # correlations with the velocity.
         joint[:3, 3:] = np.linalg.solve(P[3:, 3:], P[3:, :3]).T @ found.joint[:3]
         joint[3:, :3] = joint[:3, 3:].T
     return _with_biases(filter_, start, joint, told, rest, by_others)
@@ -336,29 +336,29 @@ def from_fine(
     shift: ArrayLike = (0.0, 0.0, 0.0),
     by_others: Array | None = None,
 ) -> FilterState:
-    """Begin a filter where a fine alignment ended, with everything that it learned.
+    """Initialize a filter with the result of a fine alignment.
 
-    The fine alignment has one bias for all that a sensor reads too much at rest: its covariance
-    with the attitude goes on. Where the filter has more states that read as a bias at rest (a
-    drift, a scale factor under gravity), each takes its part of it in proportion to its variance,
-    as a Kalman filter that is told their sum: with x of covariance P0 before, and ``b = A x``,
+    The fine alignment has one bias for the total error of a sensor at rest; its covariance with
+    the attitude is carried over. Where the filter has more states that act as a bias at rest (a
+    drift, a scale factor under gravity), the bias is divided in proportion to their variances, as
+    by a Kalman update with their sum: with x of covariance P0 before, and ``b = A x``,
     ``K = P0 A' (A P0 A')^-1``, the estimate is ``K b``, the covariance ``K P_b K' + (1 - K A) P0``
-    and that with an attitude ``K P_ba``. Of biases alone K is 1.
+    and that with an attitude ``K P_ba``. With bias states alone K is 1.
 
     Parameters
     ----------
     filter_ : ErrorFilter
-        Of navigation; any mechanization, error model and form.
+        Filter of navigation; any mechanization, error model and form.
     fine : FineResult
     rest : ndarray, (6,)
-        Mean rate in rad/s and force in m/s² of the rest, body axes.
+        Mean rate in rad/s and specific force in m/s² at rest, body axes.
     site_sd : array_like, (3,), m
-        How well the place of alignment itself is known, north, east, down.
+        Standard deviation of the site of alignment, north, east, down.
     shift : array_like, (3,), m
-        By which the place is to be moved, north, east, down: what a better attitude does to the
+        Correction of the position, north, east, down: effect of the refined attitude on the lever
         arm of the antenna by which it was found.
     by_others : ndarray, (6, p), optional
-        As of `from_alignment`.
+        As in `from_alignment`.
 
     Returns
     -------
@@ -383,7 +383,7 @@ def from_fine(
 
 
 def _added(P: Array, by_others: Array | None) -> Array:
-    """Covariance with what every error adds to those of place and velocity."""
+    """Covariance with the errors of position and velocity per physical error added."""
     if by_others is None:
         return P
     T = np.eye(len(P))
@@ -392,19 +392,19 @@ def _added(P: Array, by_others: Array | None) -> Array:
 
 
 def _with_sensors(filter_: ErrorFilter, P: Array) -> Array:
-    """Covariance of all physical errors: the sensors as their model says."""
+    """Covariance of all physical errors, with the sensor errors of their model."""
     out = np.diag(np.concatenate([np.zeros(PHYSICAL), np.square(filter_.model.stacked.sd)]))
     out[:PHYSICAL, :PHYSICAL] = P
     return out
 
 
 def _levelled(filter_: ErrorFilter, P: Array, q_nb: Array, rest: Array) -> Array:
-    """Covariance of all physical errors after levelling by accelerometers.
+    """Covariance of all physical errors after leveling by accelerometers.
 
-    What they read too much, ``e = A x`` of the states x, tilts what is taken for gravity: by
-    ``psi_x = -(C e)_east / g``, ``psi_y = (C e)_north / g``. A heading that goes with the tilt goes
-    with x by that. Where x may be larger than the tilt is said to be, they go together as far as
-    both can be.
+    Accelerometer errors at rest, ``e = A x`` of the states x, tilt the measured gravity by
+    ``psi_x = -(C e)_east / g``, ``psi_y = (C e)_north / g``. A heading correlated with the tilt is
+    correlated with x accordingly. Where x may exceed the stated tilt, the correlation is limited
+    to the largest possible.
     """
     out = _with_sensors(filter_, P)
     P0 = out[PHYSICAL:, PHYSICAL:]
@@ -428,9 +428,9 @@ def _with_biases(
     rest: Array,
     by_others: Array | None = None,
 ) -> FilterState:
-    """Begin with a state whose errors are correlated with errors of sensors that were found.
+    """Initialize with a state whose errors are correlated with estimated sensor errors.
 
-    Of these the first six are what is read too much at the mean, and any more are by input.
+    The first six sensor errors are those at the mean input; any more are per input.
     """
     P0 = np.diag(np.square(filter_.model.stacked.sd))
     A = _read_at_rest(filter_, rest - told[:6])
@@ -439,7 +439,7 @@ def _with_biases(
     size = np.sqrt(np.diagonal(A @ P0 @ A.T))
     known = size > 0.0
     A, at, size = A[known], PHYSICAL + np.flatnonzero(known), size[known]
-    # Where scale factors are all that a channel errs by, its bias is one of them.
+    # Where a channel has scale-factor errors only, its bias is one of them.
     parts = np.linalg.pinv(A @ P0 @ A.T / np.outer(size, size), SAME, hermitian=True)
     K = P0 @ A.T @ (parts / np.outer(size, size))
     P = _with_sensors(filter_, joint[:PHYSICAL, :PHYSICAL])
@@ -452,14 +452,14 @@ def _with_biases(
 
 
 def _read_at_rest(filter_: ErrorFilter, rest: Array) -> Array:
-    """What each state of the sensors adds to the six channels of a body at rest, (6, k)."""
+    """Contribution of each sensor state to the six channels of a stationary body, (6, k)."""
     stacked = filter_.model.stacked
     inputs = np.concatenate([[1.0], rest])
     return np.vstack([np.tensordot(inputs, of, axes=1) for of in (stacked.gyro, stacked.accel)])
 
 
 def _read_by_input(filter_: ErrorFilter) -> Array:
-    """What each state of the sensors adds to `Alignment.by_input`, (27, k)."""
+    """Contribution of each sensor state to `Alignment.by_input`, (27, k)."""
     stacked = filter_.model.stacked
     parts = (stacked.gyro[1:4], stacked.gyro[4:7], stacked.accel[4:7])
     return np.concatenate([one.transpose(1, 0, 2).reshape(9, -1) for one in parts])

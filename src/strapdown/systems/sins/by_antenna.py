@@ -1,4 +1,4 @@
-"""What a place and a velocity owe to the antenna by whose fixes they were found."""
+"""Correlation of a position and velocity from fixes with lever arm and time offset."""
 
 from __future__ import annotations
 
@@ -22,34 +22,34 @@ def errors_by_antenna(
     velocity: Array,
     turn: Array,
 ) -> Array:
-    """Return what every error adds to those of a place and velocity that are of fixes.
+    """Return the errors of position and velocity from fixes per physical error.
 
     Parameters
     ----------
     filter_ : ErrorFilter
     name : str
-        Of the aid whose fixes they are.
+        Name of the measurement with the fixes.
     q_nb : ndarray, (4,)
     lever_arm : ndarray, (3,), m
-        Of the antenna, body axes.
+        Lever arm of the antenna, body axes.
     velocity : ndarray, (3,), m/s
         North, east, down.
     turn : ndarray, (3,), rad/s
-        Of the body relative to the Earth, body axes.
+        Rate of the body relative to the Earth, body axes.
 
     Returns
     -------
     ndarray, (6, p)
-        Of displacement and velocity, north-east-down, by the physical errors.
+        Displacement and velocity, north-east-down, per physical error.
 
     Notes
     -----
-    A fix is of an instant that is later by what the time offset is assumed too large, tau, so that
-    the place is wrong by ``v tau``. With arm r and rate W in north-east-down, the place ``p - r``
+    A time offset that is assumed too large by tau shifts a fix in time, so that the position is
+    wrong by ``v tau``. With arm r and rate W in north-east-down, the position ``p - r``
     is wrong by ``[r x] psi - C e``, and the velocity ``v - W x r`` by
     ``[(W x r) x] psi - W x C e``, where psi is the error of the attitude and e that of the arm.
-    Without these correlations the first fixes would be taken for independent of the place that
-    they made, and prove that no time is off.
+    Without these correlations the first fixes would count as independent of the position that was
+    made from them, and would confirm a zero time offset.
     """
     columns = filter_.model.columns_of
     C = rotation.dcm_from_quaternion(q_nb)

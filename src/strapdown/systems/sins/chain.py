@@ -1,4 +1,4 @@
-"""The chain of system C: samples and tables of aids in, navigation out, in pieces of any length."""
+"""Navigation pipeline of system C: IMU samples and measurement tables in, navigation out."""
 
 from __future__ import annotations
 
@@ -46,40 +46,40 @@ __all__ = ["ModeSequencer", "NavigationPipeline", "PipelineState"]
 Array = NDArray[np.float64]
 Three = tuple[float, float, float]
 
-#: A step as it is kept during an alignment: time, six values, ten increments.
+#: Columns of a step kept for an alignment: time, six values, ten increments.
 KEPT = 17
-#: How long what an aid was told is kept in navigation, where a gap may need it again, s.
+#: How long measurements are kept during navigation, for an alignment after a gap, s.
 REMEMBERED = 60.0
 
 
 @dataclass(frozen=True, eq=False)
 class PipelineState:
-    """Everything that a chain remembers: from here it goes on.
+    """Complete state of a pipeline between two chunks.
 
     Attributes
     ----------
     intake : ImuPreprocessorState
     mode : int
-        Place of the mode in the chain's `modes`.
+        Index of the mode in the pipeline's `modes`.
     begun : float, s
-        When the mode began; not a number before the first sample.
+        When the mode began; NaN before the first sample.
     next_try : float, s
-        Since then, when an alignment is tried next.
+        Time from `begun` to the next attempt to align.
     kept : GrowingRows
         Steps of an alignment.
     aligned : Aligned or None
-        What the mode before ended with.
+        Result of the previous mode.
     told : mapping of str to tuple of DataFrame
-        Tables that aids were told, as long as an alignment may need them.
+        Measurement tables, as long as an alignment may need them.
     commands : tuple of Command
-        That are still to come.
+        Pending commands.
     holes : tuple of Hole
-        That the steps have not come to yet.
+        Gaps that the steps have not reached yet.
     navigator : NavigatorState or None
     deliveries : MeasurementMonitorState
-        What each aid delivered.
+        Measurements received so far.
     time : float, s
-        Of the newest step.
+        Time of the newest step.
     """
 
     intake: ImuPreprocessorState
@@ -98,44 +98,42 @@ class PipelineState:
 
 @dataclass(frozen=True, eq=False)
 class NavigationPipeline:
-    """Samples to steps, coarse and fine alignment, navigation: a timeline of modes.
+    """Run preprocessing, coarse and fine alignment, and navigation as a sequence of modes.
 
-    It does not know where its samples come from. They may come in pieces of any length, and the
-    table of each aid at once or bit by bit, as long as a row is told before the samples that
-    follow it: the numbers are the same to the last bit. A method never changes the state that it
-    is given.
+    Samples may arrive in chunks of any length, and the table of each measurement at once or row by
+    row, as long as a row arrives before the samples that follow it: the results are identical to
+    the last bit. Methods do not change the state passed in.
 
-    During an alignment the steps of its mode are kept (136 bytes each; of a coarse mode with a
-    `window` no more than that), and what aids were told; afterwards nothing but the states of the
-    stages.
+    During an alignment the steps of its mode (136 bytes each; limited by the `window` of a coarse
+    mode) and the measurements are kept; afterwards only the states of the stages.
 
     Attributes
     ----------
     navigator : Navigator
-    intake : Intake
+    intake : ImuPreprocessor
     modes : tuple of Mode
         The last is navigation.
     start : KnownStart, optional
-        Where navigation alone is the timeline.
+        Initial state, for a sequence of navigation alone.
     sensors : ImuUncertainty, optional
-        Of alignments.
+        For alignments.
     site : Site, optional
-        Where the body stands while it is aligned; by fixes, if not given.
+        Position during the alignment; from fixes, if not given.
     site_sd : tuple of float, (3,), m
-        How well that is known, north, east, down.
+        Standard deviation of the site, north, east, down.
     velocity_sd : tuple of float, (3,), m/s
-        Of a body after a coarse alignment at a site, which is at rest.
+        Standard deviation of the velocity after a coarse alignment at a site, where it is zero.
     fixes : str, optional
-        The aid whose table has the fixes of an alignment; the first that is a satellite receiver,
-        if not given.
+        Name of the measurement whose table holds the fixes of an alignment; the first GNSS
+        receiver, if not given.
     commands : tuple of Command
-    deliveries : Deliveries
-        How outages, recoveries and rejections are told.
+    deliveries : MeasurementMonitor
+        Reports outages, recoveries and rejections.
 
     Raises
     ------
     ConfigError
-        The modes do not lead from one to the next, or something that they need is not given.
+        The order of the modes is invalid, or a required input is missing.
     """
 
     navigator: Navigator
@@ -169,7 +167,7 @@ class NavigationPipeline:
 
     @property
     def fixes_from(self) -> str | None:
-        """The aid whose table has the fixes of an alignment."""
+        """Name of the measurement whose table holds the fixes of an alignment."""
         if self.fixes is not None:
             return self.fixes
         return next((aid.name for aid in self.navigator.aids if aid.kind == "gnss"), None)
@@ -200,13 +198,13 @@ class NavigationPipeline:
         )
 
     def tell(self, state: PipelineState, name: str, table: pd.DataFrame) -> PipelineState:
-        """Take rows of the table of an aid, later than those before.
+        """Append rows to the table of a measurement, later than those before.
 
         Parameters
         ----------
         state : PipelineState
         name : str
-            Of the aid.
+            Name of the measurement.
         table : DataFrame
 
         Returns
@@ -216,7 +214,7 @@ class NavigationPipeline:
         Raises
         ------
         ConfigError
-            There is no such aid.
+            Unknown measurement.
         DataError
             The table is not valid.
         """
@@ -233,7 +231,7 @@ class NavigationPipeline:
                 word=name,
                 known=self._tables(),
             )
-        # What is wrong with it is said when it comes, and not after an alignment.
+        # Validated on arrival, not after an alignment.
         aid.epochs(table)
         return self._remembering(state, name, table)
 
@@ -246,7 +244,7 @@ class NavigationPipeline:
         word : str
             As `Command.word`.
         time : float, s
-            It holds from the first sample at or after it: the next one, if not given.
+            The command holds from the first sample at or after it; from the next one, if not given.
         """
         self._check_word(word)
         commands = sorted((*state.commands, Command(time, word)), key=lambda one: one.time)
@@ -255,7 +253,7 @@ class NavigationPipeline:
     def advance(
         self, state: PipelineState, time: Array, values: Array, last: bool = False
     ) -> tuple[PipelineState, PipelineChunk]:
-        """Go on over samples.
+        """Process samples.
 
         Parameters
         ----------
@@ -265,7 +263,7 @@ class NavigationPipeline:
         values : ndarray, (k, 6)
             Rates in rad/s and specific forces in m/s², axes of the sensors.
         last : bool
-            Whether no sample follows: what waits in a pre-filter comes out.
+            Whether no sample follows: a pre-filter then releases its delayed samples.
 
         Returns
         -------
@@ -275,7 +273,7 @@ class NavigationPipeline:
         Raises
         ------
         DataError
-            The samples cannot be used, a gap is longer than is bridged, or an alignment is not
+            The samples are invalid, a gap exceeds the limit for bridging, or the alignment is not
             possible.
         DivergenceError
             As `Navigator.advance`.
@@ -286,7 +284,7 @@ class NavigationPipeline:
         return going.state(), going.piece(last)
 
     def finish(self, state: PipelineState) -> tuple[PipelineState, PipelineChunk]:
-        """Say that no sample follows; as the last piece does with `last`."""
+        """End the input, as the last chunk does with `last`."""
         return self.advance(state, np.empty(0), np.empty((0, 6)), last=True)
 
     @property
@@ -294,7 +292,7 @@ class NavigationPipeline:
         return self.intake.gaps.beyond == "align"
 
     def _remembering(self, state: PipelineState, name: str, table: pd.DataFrame) -> PipelineState:
-        """Keep a table for what is to begin; in navigation, without what is long past."""
+        """Keep a table for a later alignment; during navigation drop expired rows."""
         known = state.told[name]
         if state.navigator is not None:
             known = tuple(one for one in known if one.index[-1] > state.time - REMEMBERED)
@@ -313,23 +311,23 @@ class NavigationPipeline:
             )
 
 
-# A chain on its way over one piece: modes, holes, and navigation.
+# Processing of one chunk: modes, gaps, navigation.
 
 
-# Stamps are decimal fractions that were rounded: an instant is come to within this, s.
+# Stamps are rounded decimal fractions: tolerance of an instant, s.
 INSTANT = 1e-7
-# An attitude that is known so well must stay so for as long, s, until fixes tell the biases.
+# A well-known attitude must stay so for this long without fixes that observe the biases, s.
 AHEAD = 3.0
-#: Columns of a step as it is kept.
+#: Columns of a kept step.
 TIME, VALUES, ROWS = 0, slice(1, 7), slice(7, 17)
 
 
 class ModeSequencer:
-    """A chain on its way.
+    """Mode sequence during one chunk.
 
     Parameters
     ----------
-    chain : Chain
+    chain : NavigationPipeline
     state : PipelineState
     """
 
@@ -343,7 +341,7 @@ class ModeSequencer:
         self._outages: list[tuple[str, Span]] = []
 
     def over(self, steps: ImuIncrements) -> None:
-        """Go over what the samples of a piece made."""
+        """Process the steps of a chunk."""
         for hole in steps.holes:
             self._found(hole)
         gaps = {hole.begin for hole in steps.holes}
@@ -361,11 +359,11 @@ class ModeSequencer:
             kept = self._some(kept)
 
     def state(self) -> PipelineState:
-        """Where it is now."""
+        """Return the present state."""
         return self._state
 
     def piece(self, last: bool) -> PipelineChunk:
-        """What came of it."""
+        """Return the output of the chunk."""
         state = self._state
         mode = self._chain.modes[state.mode]
         if last:
@@ -414,7 +412,7 @@ class ModeSequencer:
         self._state = replace(self._state, holes=(*self._state.holes, hole))
 
     def _some(self, kept: Array) -> Array:
-        """Go on to where the next thing happens; return what is left."""
+        """Process steps up to the next event; return the remaining ones."""
         if np.isnan(self._state.begun):
             self._begin_mode(0, float(kept[0, TIME]))
         state = self._state
@@ -423,7 +421,7 @@ class ModeSequencer:
         if due < np.inf:
             count = min(count, int(np.searchsorted(kept[:, TIME], due - INSTANT)) + 1)
         if state.holes:
-            # Steps that end by the begin of a hole come before it.
+            # Steps that end by the begin of a gap precede it.
             before = int(np.searchsorted(kept[:, TIME], state.holes[0].begin + INSTANT))
             if before == 0:
                 self._over_hole()
@@ -451,7 +449,7 @@ class ModeSequencer:
         self._events.append(Event(time, "mode", mode.name))
 
     def _due(self) -> float:
-        """When the next thing happens that is no sample."""
+        """Time of the next event other than a sample."""
         state, chain = self._state, self._chain
         mode = chain.modes[state.mode]
         due = state.commands[0].time if state.commands else np.inf
@@ -462,7 +460,7 @@ class ModeSequencer:
         return due
 
     def _over_hole(self) -> None:
-        """Come to the step over a hole."""
+        """Process the step over a gap."""
         state, policy = self._state, self._chain.intake.gaps
         hole, *others = state.holes
         state = replace(state, holes=tuple(others))
@@ -510,7 +508,7 @@ class ModeSequencer:
         self._state = replace(state, navigator=after, deliveries=deliveries)
 
     def _at_due(self) -> None:
-        """Do what is to be done now."""
+        """Do what is due at the present time."""
         state = self._state
         mode = self._chain.modes[state.mode]
         if mode.kind == "navigation" and state.navigator is None:
@@ -528,7 +526,7 @@ class ModeSequencer:
         try:
             found = align(self._chain, state)
         except (DataError, DivergenceError):
-            # Not yet; the longest duration says it.
+            # Not yet; the longest duration gives the reason.
             return
         roll, pitch, heading = found.alignment.sd_deg_after(AHEAD).tolist()
         if mode.until.met(heading, max(roll, pitch)):
@@ -537,7 +535,7 @@ class ModeSequencer:
             self._aligned_to(found, state.mode + 1, words)
 
     def _obey(self) -> None:
-        """Take the next command."""
+        """Execute the next command."""
         state, chain = self._state, self._chain
         command, *others = state.commands
         self._state = state = replace(state, commands=tuple(others))
@@ -564,7 +562,7 @@ class ModeSequencer:
         self._aligned_to(found, place, "by command")
 
     def _aligned_to(self, found: Aligned, place: int, why: str) -> None:
-        """End a mode of alignment, and begin another mode."""
+        """End an alignment mode and begin the next mode."""
         state, chain = self._state, self._chain
         self._aligned.append(found)
         self._modes.append(Span(found.mode, state.begun, state.time))
@@ -586,7 +584,7 @@ class ModeSequencer:
         )
 
     def _start_known(self) -> None:
-        """Begin navigation with the state that is known."""
+        """Begin navigation with the known initial state."""
         state, start = self._state, self._chain.start
         assert start is not None
         slack = 0.5 * state.intake.usual

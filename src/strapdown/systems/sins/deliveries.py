@@ -1,4 +1,4 @@
-"""What each aid delivered while it came: outages, recoveries, rejected and late observations."""
+"""Monitor measurements: outages, recoveries, rejected and late observations."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from strapdown.tables.checks import is_number
 
 __all__ = ["MeasurementMonitor", "MeasurementMonitorState"]
 
-# Intervals whose median is an aid's own.
+# Number of intervals whose median is the measurement's own.
 INTERVALS = 5
 
 
 @dataclass(frozen=True)
 class Rejected:
-    """Observations of one name that were given no weight, one after the other.
+    """Consecutive rejected observations of one name.
 
     Attributes
     ----------
     begin, end : float, s
     count : int
     largest : float
-        In standard deviations of what was expected.
+        In expected standard deviations.
     """
 
     begin: float
@@ -39,18 +39,18 @@ class Rejected:
 
 @dataclass(frozen=True)
 class MeasurementStatus:
-    """What is known of one aid.
+    """Status of one measurement.
 
     Attributes
     ----------
     newest : float, s
-        Of its last observation; before the first, the begin of navigation.
+        Time of its last observation; before the first, the begin of navigation.
     intervals : tuple of float, s
-        The last ones, outages left out.
+        The last ones, without outages.
     seen : bool
         Whether it has observed anything.
     out : bool
-        Whether an outage of it has been told.
+        Whether its outage has been reported.
     """
 
     newest: float
@@ -61,17 +61,17 @@ class MeasurementStatus:
 
 @dataclass(frozen=True, eq=False)
 class MeasurementMonitorState:
-    """Between pieces.
+    """State between chunks.
 
     Attributes
     ----------
-    aids : mapping of str to Delivery
+    aids : mapping of str to MeasurementStatus
     rejected : mapping of str to Rejected
         By name of the observation.
     late : mapping of str to Rejected
-        By name of the aid.
+        By name of the measurement.
     begun : float, s
-        When navigation began: what is of a time before is not late.
+        Begin of navigation: observations before it are not late.
     """
 
     aids: Mapping[str, MeasurementStatus]
@@ -82,19 +82,19 @@ class MeasurementMonitorState:
 
 @dataclass(frozen=True)
 class MeasurementMonitor:
-    """Tells events of aids; it holds no state.
+    """Report events of measurements; the state is kept by the caller.
 
     Attributes
     ----------
     outage : float
-        An aid with a table is out when it delivers nothing for more than so many of its own
-        intervals: the median of the last five. Before the second observation there is none, and an
-        outage at the start is told where it ends.
+        A measurement with a table is in outage when it is silent for longer than this multiple of
+        its own interval, the median of the last five. Before the second observation there is no
+        interval, and an outage at the start is reported at its end.
 
     Raises
     ------
     ConfigError
-        It is no number above 1.
+        The number is not above 1.
     """
 
     outage: float = 3.0
@@ -106,32 +106,32 @@ class MeasurementMonitor:
             )
 
     def begin(self, tables: Sequence[str]) -> MeasurementMonitorState:
-        """Return the state before navigation, of aids with tables."""
+        """Return the state before navigation, for measurements with tables."""
         return MeasurementMonitorState({name: MeasurementStatus(math.nan) for name in tables})
 
     def started(self, state: MeasurementMonitorState, time: float) -> MeasurementMonitorState:
-        """Return the state where navigation begins."""
+        """Return the state at the begin of navigation."""
         aids = {name: replace(one, newest=time) for name, one in state.aids.items()}
         return replace(state, aids=aids, begun=time)
 
     def over(
         self, state: MeasurementMonitorState, piece: NavigationChunk, time: float
     ) -> tuple[MeasurementMonitorState, list[Event], list[tuple[str, Span]]]:
-        """Look at what came of a piece.
+        """Process the output of a chunk.
 
         Parameters
         ----------
         state : MeasurementMonitorState
         piece : NavigationChunk
         time : float, s
-            To which navigation has come.
+            Time of the newest step.
 
         Returns
         -------
         state : MeasurementMonitorState
         events : list of Event
         outages : list of (str, Span)
-            That ended.
+            Ended outages.
         """
         aids, rejected, late = dict(state.aids), dict(state.rejected), dict(state.late)
         events: list[Event] = []
@@ -159,7 +159,7 @@ class MeasurementMonitor:
     def finish(
         self, state: MeasurementMonitorState, time: float
     ) -> tuple[list[Event], list[tuple[str, Span]]]:
-        """Tell what is still open at the end."""
+        """Report rejections and outages that are open at the end."""
         events = [_rejected(name, one) for name, one in state.rejected.items()]
         events += [_late(name, one) for name, one in state.late.items()]
         outages = []
@@ -185,7 +185,7 @@ class MeasurementMonitor:
         events: list[Event],
         outages: list[tuple[str, Span]],
     ) -> MeasurementStatus:
-        """Take an observation of an aid."""
+        """Process an observation of a measurement."""
         if one.time <= aid.newest and aid.seen:
             return aid
         since = one.time - aid.newest
@@ -210,7 +210,7 @@ class MeasurementMonitor:
 
 
 def _in_sd(one: InnovationRecord) -> float:
-    """The largest component of an innovation in standard deviations of what was expected."""
+    """Largest component of an innovation in expected standard deviations."""
     return float(np.abs(one.innovations.nu / np.sqrt(one.innovations.s)).max())
 
 

@@ -1,4 +1,4 @@
-"""The file of a run of navigation to begin with: what log and fixes tell, and what is asked."""
+"""Write a proposed navigation configuration from log and fixes, with the open questions."""
 
 from __future__ import annotations
 
@@ -38,25 +38,25 @@ __all__ = [
 ]
 
 
-#: What else an aid may be, as comments.
+#: Other measurements, as comments.
 OTHER_AIDS = ("no_slip", "zero_velocity", "odometer", "barometer")
 
 
 @dataclass(frozen=True)
 class NavigationDraft:
-    """A file of a run of navigation as text.
+    """Proposed navigation configuration as text.
 
     Attributes
     ----------
     text : str
     found : tuple of str
-        What log and fixes told.
+        Findings from log and fixes.
     asked : tuple of Asked
-        What only the user knows.
+        Questions that the user has to answer.
     to_check : tuple of Asked
-        What was assumed.
+        Assumptions to check.
     findings : tuple of Finding
-        Of reading.
+        Findings of reading.
     """
 
     text: str
@@ -75,18 +75,18 @@ def draft_navigation(
     sensor: str | None = None,
     foot: bool = False,
 ) -> NavigationDraft:
-    """Write the file of a run of navigation over a log.
+    """Write the proposed navigation configuration of a log.
 
     Parameters
     ----------
     log : LogTable
-        With a path that can be opened.
+        With a readable path.
     folder : Path
-        Where the file will stand: other files are named from there.
+        Folder of the configuration; other files are named relative to it.
     axes, gnss, sensor
         As `propose`.
     foot : bool
-        Whether it is of a unit on a shoe: zero velocity at its stances (`on_foot`).
+        Whether the unit is on a shoe: zero-velocity updates at its stances (`on_foot`).
 
     Returns
     -------
@@ -238,7 +238,7 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
 
 
 def _whole() -> list[Any]:
-    """Sensors of the catalogue with gyros and accelerometers that measure a motion."""
+    """Sensors of the catalogue whose gyros and accelerometers measure motion."""
     return [s for s in map(load_sensor, SENSORS) if s.grade != "crash"]
 
 
@@ -255,7 +255,7 @@ def _stage(page: Page, name: str, chosen: Mapping[str, Any]) -> None:
             page.key(key, toml_value(value) or "", _ENDS.get(key, ""))
 
 
-#: What ends an alignment.
+#: End conditions of an alignment.
 _ENDS = {
     "duration_s": "it ends then",
     "window_s": "the newest part of it that is aligned",
@@ -269,7 +269,7 @@ def _keys(slot: Slot, kind: str) -> tuple[str, ...]:
 
 
 def _options(page: Page, module: type, chosen: Mapping[str, Any]) -> None:
-    """Options that are chosen as keys, the others as comments with their defaults."""
+    """Write chosen options as keys, the others as comments with their defaults."""
     for option in options_of(module):
         if option.key in chosen:
             page.key(option.key, _inline(chosen[option.key]))
@@ -285,17 +285,17 @@ def _options(page: Page, module: type, chosen: Mapping[str, Any]) -> None:
 
 
 def _inline(value: Any) -> str:
-    """A value, or a module with its options, on one line."""
+    """Write a value, or a module with its options, on one line."""
     if isinstance(value, Mapping):
         parts = ", ".join(f"{key} = {_inline(one)}" for key, one in value.items())
         return f"{{ {parts} }}"
     return toml_value(value) or ""
 
 
-#: For a vehicle that drives, ready to be used.
+#: Ready-made tables for a vehicle.
 WHEELS = ("[aiding.no_slip]", 'kind = "no_slip"', "mounting_sd_deg = [6.0, 6.0]")
 
-#: Of a unit on a shoe.
+#: Ready-made tables for a unit on a shoe.
 ON_FOOT = (
     "stance: zero velocity at each stance, the heart of it. It bounds velocity, roll and pitch, "
     "and with them two of the gyros' biases; of heading and place it tells nothing: the heading "
@@ -398,14 +398,14 @@ def _rest(page: Page, foot: bool) -> None:
         )
 
 
-# A chain for the log of a unit on a shoe, without satellites: a path from where it began.
+# Foot-mounted pedestrian dead reckoning without GNSS: a path relative to its start.
 
 
-#: Zero velocity at stances. Noise of a stance: a foot sways and the sole gives, far beyond the
-#: noise of a sensor: so much a sample. The threshold begins at ten of these, 10 deg/s and 1 m/s²,
-#: and goes to where stances and swings part. A speed that the filter knows better than this is no
-#: stance, unless none was seen for five seconds. The shoe rolls over its sole, about the ground
-#: 0.1 m below the unit, all of a stance.
+#: Zero-velocity updates at stances. Their noise per sample is that of a swaying foot and a soft
+#: sole, far beyond the sensor's. The threshold begins at ten times it, 10 deg/s and 1 m/s², and
+#: adapts to separate stance from swing. A speed that the filter knows better than this rejects a
+#: stance, unless none was seen for five seconds. During a stance the shoe rolls over its sole,
+#: about the ground 0.1 m below the unit.
 STANCE: dict[str, Any] = {
     "kind": "zero_velocity",
     "detector": "shoe",
@@ -421,8 +421,7 @@ STANCE: dict[str, Any] = {
     "pivot_m": 0.1,
     "correlation_time_s": 0.1,
 }
-#: No turn where the whole person stands: bias of the gyros, as well as a body that sways lets it
-#: be known.
+#: ZARU where the whole person is stationary: gyro bias, limited by the sway of the body.
 STANDING: dict[str, Any] = {
     "kind": "zero_rate",
     "detector": "variance",
@@ -434,28 +433,28 @@ STANDING: dict[str, Any] = {
     "largest_speed_m_per_s": 0.2,
     "sd_deg_per_s": 0.3,
 }
-#: A foot that has left its stance turns or pushes more than this, rad/s and m/s².
+#: Rate and acceleration beyond which a foot has left its stance, rad/s and m/s².
 LEAVES, PUSHES = math.radians(30.0), 2.0
-#: Before the first such sample it begins to, s; and so long it must stand, s.
+#: The stance ends this long before the first such sample, s; least duration of a stance, s.
 BEFORE, LEAST = 0.2, 0.3
-#: Of a stance between two steps: how long it is at least, and how much of either end rolls, s.
+#: Stance between two steps: least duration, and the rolling part at either end, s.
 STEPPED, ROLLS = 0.2, 0.05
-#: Of the standing start the alignment takes half, so that gyros are told their bias by the other,
-#: and at most so much, s.
+#: The alignment takes half of the initial stance, at most this, s; the other half gives the gyro
+#: biases.
 LONGEST = 10.0
 #: Longest step of the covariance, s: in a swing of half a second a foot turns by 70 deg and back,
-#: and over steps of 0.1 s the errors of a sensor would be laid to the wrong directions.
+#: and steps of 0.1 s would assign sensor errors to wrong directions.
 STEP = 0.02
-#: Over so long, some strides, what a filter takes for linear stays what it is, s.
+#: Time, some strides, over which the filter's linearization holds, s.
 BENT = 10.0
-#: The place is counted from the start: how well that is known itself is not in the answer, m, m/s.
+#: The position is relative to the start: initial uncertainty, m, m/s.
 HERE, STILL = 0.01, 0.01
-#: The heading is counted from where the unit points at the start, deg.
+#: The heading is relative to the unit's direction at the start: initial uncertainty, deg.
 FROM_START = 0.1
 
 
 def first_stand(imu: pd.DataFrame) -> tuple[float, float] | None:
-    """Return when a unit on a shoe first stands, and how long.
+    """Find the first stationary interval of a unit on a shoe.
 
     Parameters
     ----------
@@ -488,7 +487,7 @@ def first_stand(imu: pd.DataFrame) -> tuple[float, float] | None:
 
 
 def second_order(sensors: ImuUncertainty) -> float:
-    """Return what a linear filter leaves of a tilt that accelerometers at rest do not know.
+    """Second-order effect of a tilt that stationary accelerometers cannot observe.
 
     Parameters
     ----------
@@ -497,17 +496,16 @@ def second_order(sensors: ImuUncertainty) -> float:
     Returns
     -------
     float, m/s²
-        ``sqrt(2) g sd²`` of the tilt's standard deviation sd: root mean square of
-        ``g (x² + y²)/2``, by which gravity along a body that is tilted by x and y differs from that
-        of one that is not. All that was learnt of the accelerometers before the tilt is known, as
-        it is at the first corner, is off by as much after that.
+        ``sqrt(2) g sd²`` for a tilt of standard deviation sd: root mean square of
+        ``g (x² + y²)/2``, the difference of gravity along a body tilted by x and y. Accelerometer
+        biases estimated before the tilt is known, as it is at the first corner, are off by as much.
     """
     _, accel = resting_sd(sensors, (0.0, 0.0, 0.0), (0.0, 0.0, -STANDARD_GRAVITY))
     return math.sqrt(2.0) * STANDARD_GRAVITY * float(max(accel[:2]) / STANDARD_GRAVITY) ** 2
 
 
 def on_foot(made: Proposal) -> Proposal:
-    """Return the chain for a unit on a shoe in the place of that for a vehicle.
+    """Replace the proposal for a vehicle by that for a unit on a shoe.
 
     Parameters
     ----------
@@ -520,7 +518,7 @@ def on_foot(made: Proposal) -> Proposal:
     Raises
     ------
     DataError
-        The log has no accelerometers, or the unit stands nowhere in it.
+        The log has no accelerometers, or the unit is never stationary in it.
     """
     if ACCEL[0] not in made.imu.columns:
         raise DataError(
@@ -540,8 +538,8 @@ def on_foot(made: Proposal) -> Proposal:
     late = begin - float(index_of(made.imu)[0])
     length = math.floor(10.0 * min(0.5 * rest, LONGEST)) / 10.0
     length = max(length, LEAST) if not late else rest
-    # Noise that shakes it is how a foot goes, and none of the sensor's. Whatever goes with rate and
-    # force is at its largest on a foot: a g-sensitivity of 0.1 deg/s/g turns a run by degrees.
+    # This noise is the motion of a foot, not the sensor's. Errors that depend on rate and force are
+    # largest on a foot: a g-sensitivity of 0.1 deg/s/g turns a run by degrees.
     named = made.table.get("sensors", {}).get("sensor")
     sensors: dict[str, Any] = {}
     states = dict(made.table.get("states", {}))

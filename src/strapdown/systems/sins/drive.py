@@ -1,4 +1,4 @@
-"""What feeds a chain: a whole record in chunks, or sample by sample."""
+"""Run a pipeline over a whole record in chunks, or sample by sample."""
 
 from __future__ import annotations
 
@@ -31,22 +31,22 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-#: Of a record that is taken at a time, s.
+#: Length of a chunk of a record, s.
 CHUNK = 60.0
 CHANNELS = [*GYRO, *ACCEL]
 
 
 @dataclass(frozen=True, eq=False)
 class PipelineRun:
-    """What came of a run.
+    """Result of a pipeline run.
 
     Attributes
     ----------
     record : NavigationRecord
     aligned : tuple of Aligned
-        What each mode of alignment found.
+        Result of each alignment mode.
     smoothed : NavigationRecord or None
-        The same as seen from its end, where the navigator has a smoother.
+        Smoothed solution, where the navigator has a smoother.
     """
 
     record: NavigationRecord
@@ -55,11 +55,11 @@ class PipelineRun:
 
 
 class Recording:
-    """Puts the pieces of a chain together, in what a recorder keeps of them.
+    """Collect the output chunks of a pipeline in a recorder.
 
     Parameters
     ----------
-    chain : Chain
+    chain : NavigationPipeline
     recorder : Recorder, optional
         All samples, if not given.
     """
@@ -74,7 +74,7 @@ class Recording:
         self._outages: list[tuple[str, Span]] = []
 
     def take(self, piece: PipelineChunk) -> None:
-        """Take a piece."""
+        """Append a chunk."""
         for navigation in piece.navigation:
             self._tape.take(navigation)
             if self._smoothing is not None:
@@ -85,7 +85,7 @@ class Recording:
         self._outages += piece.outages
 
     def run(self, source: str | None = None) -> PipelineRun:
-        """Return everything that was taken.
+        """Return the collected run.
 
         Parameters
         ----------
@@ -114,21 +114,21 @@ def run_batch(
     progress: Progress = silent,
     chunk: float = CHUNK,
 ) -> PipelineRun:
-    """Run a chain over a record.
+    """Run a pipeline over a record.
 
     Parameters
     ----------
-    chain : Chain
+    chain : NavigationPipeline
     imu : DataFrame
         Imu table.
     tables : mapping of str to DataFrame, optional
-        By name of the aid.
+        By name of the measurement.
     recorder : Recorder, optional
         All samples, if not given.
     progress : callable, optional
-        Told the mode and the share that is done.
+        Called with the mode and the share that is done.
     chunk : float, s
-        Of the record that is taken at a time: nothing longer is copied.
+        Length of the chunks of the record; limits the size of copies.
 
     Returns
     -------
@@ -137,7 +137,7 @@ def run_batch(
     Raises
     ------
     DataError, ConfigError, DivergenceError
-        As `Chain.advance` and `Chain.tell`.
+        As `NavigationPipeline.advance` and `NavigationPipeline.tell`.
     """
     recording = Recording(chain, recorder)
     begin, end = float(imu.index[0]), float(imu.index[-1])
@@ -155,15 +155,15 @@ def run_by_sample(
     recorder: Recorder | None = None,
     ahead: float = 0.0,
 ) -> PipelineRun:
-    """Run a chain over a record as it would have come: sample by sample, each fix when it is due.
+    """Run a pipeline over a record as in real time: sample by sample, each fix when it is due.
 
     Parameters
     ----------
     chain, imu, tables, recorder
-        As `run_batch`, whose numbers it gives to the last bit.
+        As `run_batch`, whose numbers it reproduces to the last bit.
     ahead : float, s
-        By how much rows of tables are told before the samples of their stamps: an aid whose stamps
-        are late by a known time needs at least that.
+        Time by which table rows precede the samples of their stamps; at least the known delay of a
+        measurement with late stamps.
 
     Returns
     -------
@@ -181,7 +181,7 @@ def pieces_of(
     tables: Mapping[str, pd.DataFrame] | None = None,
     chunk: float = CHUNK,
 ) -> Iterator[PipelineChunk]:
-    """Run a chain over a record in chunks, and give the pieces as they come; see `run_batch`."""
+    """Run a pipeline over a record in chunks, and yield the output chunks; see `run_batch`."""
     if not chunk > 0.0:
         raise ConfigError("navigation.chunk-not-positive", quantity="chunk", chunk=chunk)
     check_columns(imu, CHANNELS, source_of(imu))
@@ -205,15 +205,15 @@ def pieces_by_sample(
     ahead: float = 0.0,
     each: Callable[[PipelineState, float], PipelineState] | None = None,
 ) -> Iterator[PipelineChunk]:
-    """Run a chain sample by sample; see `run_by_sample`.
+    """Run a pipeline sample by sample; see `run_by_sample`.
 
     Parameters
     ----------
     chain, imu, tables, ahead
         As `run_by_sample`.
     each : callable, optional
-        Given the state and the stamp of each sample before it is taken, returns the state: where
-        commands are given.
+        Called with the state and the stamp before each sample; returns the state. Commands are
+        given here.
     """
     check_columns(imu, CHANNELS, source_of(imu))
     state = _begun(chain, imu)

@@ -1,4 +1,4 @@
-"""What a body at rest tells of its heading by the Earth's rate, and how far it bears itself out."""
+"""Heading of a stationary body by the Earth's rate, and the check of the gyros at rest."""
 
 from __future__ import annotations
 
@@ -39,34 +39,34 @@ __all__ = ["Compass", "Manoeuvre", "compasses_of", "manoeuvres_from", "north_wit
 
 Array = NDArray[np.float64]
 
-#: Two-sided quantiles of 99 of 100 of Student's t, with one degree of freedom to three.
+#: Two-sided 99 % quantiles of Student's t, with one degree of freedom to three.
 STUDENT = (63.656741162872, 9.924843200918, 5.840909309733)
-#: Root mean square of normalised innovations beyond which an alignment says nothing.
+#: Root mean square of normalized innovations beyond which an alignment is rejected.
 INCONSISTENT = 2.0
-#: A body whose turns about the vertical, each second, scatter more rocks, rad/s.
+#: Scatter of the rotations about the vertical, each second, beyond which a body rocks, rad/s.
 ROCKS_BY = math.radians(0.01)
 
 
 @dataclass(frozen=True, eq=False)
 class Compass:
-    """A heading that the gyros found at rest, from nothing that was known of it before.
+    """Heading found by the gyros at rest, without prior knowledge.
 
     Attributes
     ----------
     begin, time : float, s
-        Of the rest, and the instant at which it holds.
+        Begin of the rest, and the instant at which the heading holds.
     q_nb : ndarray, (4,)
     gyro_bias : ndarray, (3,), rad/s
     lat_deg : float, deg
-        Of the place.
+        Latitude.
     sd : float, deg
-        Of the heading, by what is stated of the gyros, times what its innovations scatter too
-        much.
+        Standard deviation of the heading by the stated gyro errors, times the excess scatter of
+        the innovations.
     bound : float, deg
-        Of 99 of 100 headings, by what the rest itself shows of the gyros.
+        99 % bound of the heading, by the gyro errors observed during the rest.
     unsteady : float, rad/s
-        Mean rate about the vertical that is neither the Earth's nor the bias that was found: a
-        gyro that changed within the rest.
+        Mean rate about the vertical minus the Earth's and the estimated bias: a gyro change within
+        the rest.
     """
 
     begin: float
@@ -80,7 +80,7 @@ class Compass:
 
 
 def north_within(sensors: ImuUncertainty, lat_deg: float, ellipsoid: Ellipsoid) -> float:
-    """Return to how many degrees gyros as stated find north: one standard deviation, deg."""
+    """Return the standard deviation of gyrocompassing with the stated gyros, deg."""
     bias = np.hypot(sensors.gyro.axis("bias"), sensors.gyro_drift.triad)
     across = float(np.linalg.norm(Site(lat_deg, 0.0, 0.0, ellipsoid).earth_rate[:2]))
     worst = float(np.max(bias))
@@ -95,20 +95,20 @@ def compasses_of(
     aligned: Sequence[Aligned],
     ellipsoid: Ellipsoid,
 ) -> tuple[list[Compass], list[float], Finding | None]:
-    """Return what the alignments and the rests of a run found, each by itself.
+    """Return the headings found by the alignments and the rests of a run, each independently.
 
-    Of an alignment that was told its heading, and of each rest that an aid saw, a fine alignment of
-    its own is made, that begins with north as the inertial frame shows it.
+    An alignment with a given heading, and each rest that a zero-velocity measurement detected, get
+    a fine alignment of their own, which begins with north as the inertial frame shows it.
 
     Parameters
     ----------
-    chain : Chain
-        Of the run.
+    chain : NavigationPipeline
+        Pipeline of the run.
     sensors : ImuUncertainty
     imu : DataFrame
-        Its samples.
+        Samples of the run.
     record : NavigationRecord
-        What came of it.
+        Result of the run.
     aligned : sequence of Aligned
         Its alignments.
     ellipsoid : Ellipsoid
@@ -116,11 +116,11 @@ def compasses_of(
     Returns
     -------
     compasses : list of Compass
-        In the order of time.
+        In order of time.
     doubts : list of float, s
-        Ends of rests at which the gyros were not what they are stated to be.
+        Ends of rests at which the gyros were not as stated.
     why : Finding or None
-        Why there is none; None where there is one.
+        Why no heading was found; None where one was.
     """
     found: list[Compass] = []
     refused: list[Finding] = []
@@ -131,7 +131,7 @@ def compasses_of(
     for one in aligned:
         if one.fine is None:
             coarse = one.alignment
-            # One by course moved, and one before a fine alignment is the begin of that.
+            # Alignments by course moved; those before a fine alignment are its beginning.
             if coarse.velocity is None and one.end not in fines and one.end - one.begin >= SHORTEST:
                 rests.append((one.begin, one.end))
             continue
@@ -153,7 +153,7 @@ def compasses_of(
         try:
             fine, before = _aligned_anew(imu, site, sensors, begin, end)
         except StrapdownError as error:
-            # It stood, by its aids, and its gyros do not show that.
+            # The body was stationary by its measurements, but not by its gyros.
             doubts.append(end)
             refused.append(_note("navigation.rest-without-north", reason=error.finding))
             continue
@@ -177,13 +177,13 @@ def _note(code: str, **data: Any) -> Finding:
 
 
 def _judged(fine: FineResult, begin: float, site: Site) -> Compass:
-    """A heading with what its own rest shows of the gyros.
+    """Heading with the gyro errors observed during its own rest.
 
-    An east rate that is none of the Earth's and a heading look alike. The rest shows those to the
-    north and down, which must be the Earth's. How good the gyros are is then known by what is
-    stated, which counts as one observation, and by these n, u of their standard deviations each:
-    the heading is within ``t sqrt((1 + sum u²)/(1 + n))`` of its own in 99 of 100 cases, with t of
-    Student's distribution of 1 + n degrees of freedom.
+    An east rate error and a heading error are indistinguishable. The rest shows the rates to the
+    north and down, which must be the Earth's. The gyro accuracy is then known by the stated
+    errors, which count as one observation, and by these n, u of their standard deviations each:
+    the heading error is within ``t sqrt((1 + sum u²)/(1 + n))`` standard deviations in 99 of 100
+    cases, with t of Student's distribution of 1 + n degrees of freedom.
     """
     found = fine.alignment
     sd = float(found.sd_deg[2]) * max(1.0, _scatter(fine))
@@ -204,7 +204,7 @@ def _judged(fine: FineResult, begin: float, site: Site) -> Compass:
 def _unsteady(
     imu: pd.DataFrame, one: Compass, sensors: ImuUncertainty, ellipsoid: Ellipsoid
 ) -> float:
-    """Mean rate about the vertical over a rest, less the Earth's and the bias; rad/s."""
+    """Mean rate about the vertical over a rest, minus the Earth's and the bias; rad/s."""
     time = index_of(imu)
     first, last = np.searchsorted(time, [one.begin, one.time])
     rates = values_of(imu, GYRO)[first:last]
@@ -221,10 +221,10 @@ def _unsteady(
 
 
 def _surprises(fine: FineResult, site: Site) -> Array:
-    """Rates to the north and down that are none of the Earth's, by what was expected of them.
+    """Rates to the north and down minus the Earth's, in expected standard deviations.
 
-    One that was seen less well than the heading itself, as that about the vertical of a body that
-    rocks, shows nothing of the gyros.
+    One observed less accurately than the heading itself, such as that about the vertical of a
+    rocking body, does not show gyro errors.
     """
     found = fine.alignment
     assert found.gyro_bias is not None
@@ -245,7 +245,7 @@ def _surprises(fine: FineResult, site: Site) -> Array:
 
 
 def _scatter(fine: FineResult) -> float:
-    """Root mean square of its normalised innovations, of the worst component."""
+    """Root mean square of the normalized innovations, of the worst component."""
     worst = 0.0
     for table in fine.innovations.values():
         late = table.iloc[len(table) // 10 :]
@@ -256,10 +256,9 @@ def _scatter(fine: FineResult) -> float:
 
 
 def _against(fine: FineResult, coarse: Alignment | None) -> tuple[Finding | None, bool]:
-    """What speaks against an alignment, and whether it is the gyros.
+    """Finding against an alignment, and whether the gyros cause it.
 
-    A vehicle that does not quite stand tells nothing; gyros that read what they should not have
-    changed since they were believed.
+    A vehicle in slight motion is inconclusive; gyros with impossible readings have changed.
     """
     found = [one for one in fine.findings if one.code != ROCKS]
     for one in found:
@@ -283,7 +282,7 @@ def _against(fine: FineResult, coarse: Alignment | None) -> tuple[Finding | None
 def _aligned_anew(
     imu: pd.DataFrame, site: Site, sensors: ImuUncertainty, begin: float, end: float
 ) -> tuple[FineResult, Alignment]:
-    """A fine alignment of a rest, from its samples and its place alone."""
+    """Fine alignment of a rest, from its samples and its position alone."""
     time = index_of(imu)
     first, last = np.searchsorted(time, [begin - 1e-6, end + 1e-6])
     part = imu.iloc[first:last]
@@ -293,30 +292,30 @@ def _aligned_anew(
 
 
 def _site(record: NavigationRecord, time: float, ellipsoid: Ellipsoid) -> Site:
-    """Where a run says that it was."""
+    """Position by the run."""
     row = min(int(np.searchsorted(index_of(record.trajectory), time)), len(record.trajectory) - 1)
     lat_deg, lon_deg, alt = (float(record.trajectory[c].iloc[row]) for c in GEODETIC)
     return Site(lat_deg, lon_deg, alt, ellipsoid)
 
 
-# What a manoeuvre would do to a heading that is not known: by the filter's own covariance.
+# Effect of a maneuver on an unknown heading, by the filter's covariance.
 
 
-#: What is tried: m/s², s.
+#: Tried maneuver: m/s², s.
 HARD, LONG = 0.2 * STANDARD_GRAVITY, 5.0
-#: Slower than this it stands, m/s; nothing turns faster than so much, rad/s.
+#: Speed below which the vehicle is stationary, m/s; fastest turn, rad/s.
 STANDS, QUICKEST = 1.0, 0.5
 STEP = 0.1
 
 
 @dataclass(frozen=True)
 class Manoeuvre:
-    """Something that a driver could do.
+    """Maneuver of a driver.
 
     Attributes
     ----------
     what : str
-        In words, as they stand before "would bring".
+        In words, to precede "would bring".
     forward, aside : float, m/s²
         Horizontal acceleration along and across the way.
     duration : float, s
@@ -329,7 +328,7 @@ class Manoeuvre:
 
 
 def manoeuvres_from(speed: float) -> tuple[Manoeuvre, ...]:
-    """Return what can be done at a speed in m/s: 0.2 g for 5 s, or less where it would stop."""
+    """Return possible maneuvers at a speed in m/s: 0.2 g for 5 s, or until it would stop."""
     out = [Manoeuvre(f"speeding up at 0.2 g for {LONG:g} s", HARD, 0.0, LONG)]
     if speed >= STANDS:
         lasts = min(LONG, math.floor(10.0 * speed / HARD) / 10.0)
@@ -350,10 +349,10 @@ def sd_after(
     velocity_sd: Array | None,
     interval: float,
 ) -> float:
-    """Return the standard deviation of the heading after a manoeuvre, deg.
+    """Return the standard deviation of the heading after a maneuver, deg.
 
-    The filter goes on from a state over the motion, and takes fixes on its way; no number is
-    observed, for a covariance does not depend on it.
+    The filter propagates its covariance over the motion and processes fixes; measured values are
+    not needed, since a covariance does not depend on them.
 
     Parameters
     ----------
@@ -363,7 +362,7 @@ def sd_after(
         As `ErrorFilter.begin`.
     manoeuvre : Manoeuvre
     position_sd, velocity_sd : ndarray, (3,), or None
-        Of the fixes, north, east, down, m and m/s; None of what they do not tell.
+        Of the fixes, north, east, down, m and m/s; None for a missing quantity.
     interval : float, s
         Between two fixes.
 
@@ -404,7 +403,7 @@ def _row(filter_: ErrorFilter, start: NavState, m: Manoeuvre, begin: float, dt: 
         start.alt,
         ellipsoid=find_ellipsoid(filter_.mechanization.ellipsoid),
     )
-    # Attitude turns with the way; the force is that of the middle of the step, in its first axes.
+    # Attitude turns with the path; the force is that at mid-step, in its first axes.
     turned = np.degrees([roll, pitch, heading + rate * begin])
     C_bn = rotation.dcm_from_euler(turned).T
     force = C_bn @ (m.forward * ahead + m.aside * right - g)
@@ -415,7 +414,7 @@ def _row(filter_: ErrorFilter, start: NavState, m: Manoeuvre, begin: float, dt: 
 def _fixed(
     filter_: ErrorFilter, state: FilterState, position_sd: Array | None, velocity_sd: Array | None
 ) -> FilterState:
-    """The state after a fix; only the covariance is changed."""
+    """State after a fix; only the covariance is changed."""
     seen = []
     for first, sd in ((0, position_sd), (3, velocity_sd)):
         if sd is not None:

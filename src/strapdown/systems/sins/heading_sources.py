@@ -1,4 +1,4 @@
-"""Two sources of a heading that share nothing, and agree: neither bears itself out."""
+"""Agreement of independent heading sources: two or more confirm each other."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ __all__ = ["AgreeingSources", "agreeing_sources"]
 
 Array = NDArray[np.float64]
 
-#: Fewest readings that tell.
+#: Fewest readings of a source.
 FEWEST = 5
 
 
 @dataclass(frozen=True, eq=False)
 class AgreeingSources:
-    """What the second best of several sources tells, where all agree; as `heading_light.Heard`.
+    """Heading by the second-best of several agreeing sources; as `heading_light.Heard`.
 
     Attributes
     ----------
     since : float, s
     time : ndarray, (n,), s
-        Seconds at which there are two or more, and all agree.
+        Seconds with two or more sources, all of which agree.
     difference, sd : ndarray, (n,), deg
-        Heading of the run less that of the second best, and its standard deviation.
+        Heading of the run minus that of the second-best source, and its standard deviation.
     kind : str
     """
 
@@ -47,23 +47,24 @@ class AgreeingSources:
 def agreeing_sources(
     chain: NavigationPipeline, record: NavigationRecord, carried: Sequence[CarriedHeading]
 ) -> list[AgreeingSources]:
-    """Return what heading aids, and the gyros that found north, say together.
+    """Combine heading measurements and headings found by gyrocompassing.
 
-    A heading aid that is wrong by a constant says so nowhere, and a filter that takes it says that
-    it knows. Two that share nothing, as a magnetic compass and two antennas, or two antennas and
-    the gyros' north, are not wrong alike: what the worse of them allows holds, while all agree with
-    the run within 2.58 standard deviations. A misalignment that is estimated makes an aid none.
+    A constant error of a heading measurement is not observable from it alone, and the filter
+    becomes overconfident. Independent sources, such as a magnetic compass and two antennas, or two
+    antennas and the gyros' north, do not share it: the accuracy of the worse of them holds while
+    all agree with the run within 2.58 standard deviations. A measurement with an estimated
+    misalignment does not count as a source.
 
     Parameters
     ----------
-    chain : Chain
+    chain : NavigationPipeline
     record : NavigationRecord
     carried : sequence of CarriedHeading
 
     Returns
     -------
     list of AgreeingSources
-        One, or none.
+        One or none.
     """
     seconds = seconds_of(record)
     told = [
@@ -92,7 +93,7 @@ def agreeing_sources(
 
 
 def _of_aid(record: NavigationRecord, name: str, seconds: Array) -> tuple[Array, Array] | None:
-    """Run less an aid, and how well that is known: its readings may all be wrong alike."""
+    """Run minus measurement, and its standard deviation with a common error of all readings."""
     table = record.innovations.get(f"{name}.heading")
     if table is None or not len(table):
         return None
@@ -109,7 +110,7 @@ def _of_aid(record: NavigationRecord, name: str, seconds: Array) -> tuple[Array,
 
 
 def _of_gyros(carried: Sequence[CarriedHeading], seconds: Array) -> tuple[Array, Array]:
-    """Run less the newest rest that is carried on, by what is stated of the gyros."""
+    """Run minus the heading carried from the newest rest, by the stated gyro errors."""
     d, sd = np.full(len(seconds), np.nan), np.full(len(seconds), np.inf)
     for one in carried:
         at = np.searchsorted(seconds, one.time - 1e-6)

@@ -1,8 +1,8 @@
-"""A second reckoning of the heading that is not told what the first one assumed of it.
+"""Independent heading check: a second solution without the first one's heading assumptions.
 
-Beside a run small navigators go over the same record, each from some instant on, with a heading
-that is as good as unknown there, and with fixes of satellites alone. What such a witness says of
-the heading it has from the motion since then: from no start, no alignment, no heading aid.
+Small navigators process the same record in parallel, each from some instant on, with a heading
+that is practically unknown there, and GNSS fixes alone. The heading of such a check comes from
+the motion since then, not from the initial heading, an alignment or a heading measurement.
 """
 
 from __future__ import annotations
@@ -58,46 +58,47 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-#: Of a heading that is as good as unknown, deg: beyond it equations of the first order are none.
+#: Standard deviation of a practically unknown heading, deg; linearization fails beyond it.
 UNKNOWN = 20.0
-#: It knows a heading no better than this, deg: its steps are joined, its fixes thinned.
+#: Lower limit of the check's heading standard deviation, deg: its steps are joined, its fixes
+#: thinned.
 LEAST_HEADING = 0.03
-#: What the run says of everything but its heading is taken so many times less well.
+#: Factor on the run's standard deviations of all errors but the heading.
 LOOSER = 2.0
-#: Known no better than this at its start: m, m/s, deg of roll and pitch.
+#: Lower limits of the initial standard deviations: m, m/s, deg of roll and pitch.
 LEAST_PLACE, LEAST_VELOCITY, LEAST_TILT = 0.1, 0.05, 0.2
-#: The same of roll and pitch of a run that was doubted, deg: what a change of velocity by 0.2 g
-#: leaves in them where the heading is off by 10 deg.
+#: The same for roll and pitch after the run became doubtful, deg: the tilt that a velocity change
+#: at 0.2 g leaves where the heading is off by 10 deg.
 DOUBTED_TILT = 2.0
-#: A new witness begins so often, s, and so often where one knows enough; the record is gone over in
-#: parts of the last.
+#: Interval between checks, s; the same once one is accurate enough; length of the parts in which
+#: the record is processed.
 TURN, RENEWED, HEARD = 60.0, 180.0, 20.0
-#: Epochs over which the scatter of what a witness observes is judged, and fewest that tell.
+#: Epochs over which the scatter of the innovations is judged, and the fewest needed.
 JUDGED, FEWEST = 60, 8
-#: So large an innovation counts no more.
+#: Limit of a normalized innovation in the estimate of their scatter.
 CLIP = 3.0
-#: Stamps are the same within this, s.
+#: Stamps within this are equal, s.
 NEAR = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What one witness said.
+    """Result of one heading check.
 
     Attributes
     ----------
     since : float, s
-        When it began.
+        When the check began.
     time : ndarray, (n,), s
         Seconds of the run, after `since`.
     difference : ndarray, (n,), deg
-        Heading of the run less that of the witness.
+        Heading of the run minus that of the check.
     sd : ndarray, (n,), deg
-        Standard deviation of the heading of the witness, times `scale`.
+        Standard deviation of the check's heading, times `scale`.
     scale : ndarray, (n,)
-        By how much more its innovations scatter, and last, than it expected: 1 or more.
+        Factor by which its innovations scatter more than expected, correlation included: 1 or more.
     covariance : ndarray, (n, 9, 9)
-        As `NavigationRecord.covariance`, of the witness.
+        As `NavigationRecord.covariance`, of the check.
     kind : str
     """
 
@@ -111,27 +112,26 @@ class Evidence:
 
 
 def hear_witnesses(made: Witnesses, record: NavigationRecord, enough: float) -> list[Evidence]:
-    """Let witnesses go over a record, two at a time at most.
+    """Run heading checks over a record, two at a time at most.
 
-    A new one begins each minute, and each three minutes while one knows as much as is enough. The
-    older of two is heard on until the younger knows that by itself, or knows it better.
+    A new check begins each minute, and each three minutes while one is accurate enough. The older
+    of two continues until the younger is accurate enough, or more accurate.
 
-    What was wrong with a run stays in what it believes of its sensors and of its tilt, long after
-    its observations agree again. So once it was doubted, a new witness takes the sensors for what
-    they were at its start.
+    Sensor and tilt estimates of a faulty run stay wrong long after its innovations are consistent
+    again. So after a doubt, a new check starts from the sensor errors at the run's start.
 
     Parameters
     ----------
     made : Witnesses
     record : NavigationRecord
     enough : float, deg
-        Standard deviation of a heading from which on older evidence is not needed: a third of the
+        Standard deviation of a heading below which older evidence is not needed: a third of the
         limit.
 
     Returns
     -------
     list of Evidence
-        In the order of their begins.
+        In order of `since`.
     """
     end = float(made.time[-1])
     cuts = np.arange(made.begun, end, HEARD)
@@ -166,7 +166,7 @@ def hear_witnesses(made: Witnesses, record: NavigationRecord, enough: float) -> 
 
 
 class _Witness:
-    """One witness on its way."""
+    """Heading check in progress."""
 
     def __init__(
         self,
@@ -194,13 +194,13 @@ class _Witness:
 
     @property
     def sd(self) -> float:
-        """Standard deviation of the heading at the newest mark, deg, as it says itself."""
+        """Filter standard deviation of the heading at the newest snapshot, deg."""
         if not self.marks:
             return math.inf
         return math.degrees(math.sqrt(max(float(self.marks[-1].covariance[8, 8]), 0.0)))
 
     def over(self, time: Array, rows: Array) -> None:
-        """Go over steps; who is lost says nothing any more."""
+        """Process steps; a diverged check gives no more results."""
         try:
             self.state, piece = self.navigator.advance(self.state, time, rows.copy())
         except (DivergenceError, DataError):
@@ -213,12 +213,12 @@ class _Witness:
         self.times.append(piece.time)
         self.history.append(piece.history)
         for one in piece.seen:
-            # The vertical tells nothing of a heading.
+            # The vertical innovation does not observe the heading.
             nu, s = one.innovations.nu[:2], one.innovations.s[:2]
             self.seen.append((one.time, nu / np.sqrt(s)))
 
     def evidence(self) -> Evidence:
-        """What it said at each second."""
+        """Return the result at each second."""
         marked = np.array([mark.time for mark in self.marks])
         seconds = np.arange(math.ceil(self.since + NEAR), math.floor(marked[-1]) + 1.0)
         at = np.searchsorted(marked, seconds + NEAR, side="right") - 1
@@ -238,12 +238,12 @@ class _Witness:
         return Evidence(self.since, seconds, apart, sd, scale, covariance)
 
     def _scale(self, seconds: Array) -> Array:
-        """How much more than expected its newest innovations scatter and last."""
+        """Factor by which the newest innovations exceed their expected scatter and correlation."""
         if not self.seen:
             return np.ones(len(seconds))
         time = np.array([t for t, _ in self.seen])
         u = np.array([x for _, x in self.seen])
-        # As many epochs are looked at as there are, up to a full window.
+        # All available epochs, up to a full window.
         size = np.minimum(u.shape[0], JUDGED)
         upto = np.searchsorted(time, seconds + NEAR, side="right")
         out = np.ones(len(seconds))
@@ -257,7 +257,7 @@ class _Witness:
 
 
 def _scatter(u: Array) -> Array:
-    """Scatter of rows of normalised innovations, 1 or more; a few gross errors count little."""
+    """Scatter of rows of normalized innovations, 1 or more; a few gross errors count little."""
     whole = np.sqrt(np.minimum(u * u, CLIP**2).mean(axis=1))
     middle = MAD_TO_SD * np.median(np.abs(u), axis=1)
     return np.asarray(np.maximum(1.0, np.maximum(whole, middle)))
@@ -266,7 +266,7 @@ def _scatter(u: Array) -> Array:
 def _begin(
     filter_: ErrorFilter, record: NavigationRecord, run: pd.DataFrame, at: float, doubt: bool
 ) -> FilterState:
-    """State at an instant of a run, with a heading that is as good as unknown."""
+    """State at an instant of a run, with a practically unknown heading."""
     model = filter_.model
     row = run.iloc[int(np.searchsorted(index_of(run), at - NEAR))]
     lat, lon, alt = (float(row[c]) for c in GEODETIC)
@@ -308,18 +308,18 @@ def _ellipsoid(navigator: Navigator) -> Ellipsoid:
     return find_ellipsoid(navigator.filter.mechanization.ellipsoid)
 
 
-# What witnesses of a heading are made of: their filter, joined increments, thinned fixes.
+# Filter, joined increments and thinned fixes of the heading checks.
 
 
-#: Fixes are taken no denser, s.
+#: Least interval between fixes, s.
 FIXES_APART = 1.0
-#: Nearer to a pole the local north is none.
+#: Latitude beyond which the local north is not used, deg.
 POLAR = 85.0
 
 
 @dataclass(frozen=True, eq=False)
 class Witnesses:
-    """What witnesses are made of: their filter, their receivers, and the record.
+    """Filter, receivers and record of the heading checks.
 
     Attributes
     ----------
@@ -331,7 +331,7 @@ class Witnesses:
     tables : mapping of str to DataFrame
         Fixes, thinned.
     begun : float, s
-        Begin of the first step.
+        Start of the first step.
     """
 
     navigator: Navigator
@@ -349,27 +349,27 @@ def witnesses_of(
     record: NavigationRecord,
     consistency: Mapping[str, ObservationConsistency],
 ) -> Witnesses | None:
-    """Return what witnesses of a run are made of.
+    """Prepare the heading checks of a run.
 
     Parameters
     ----------
     filter_ : ErrorFilter
-        Of the run, without the states of its aids.
-    chain : Chain
-        Of the run.
+        Filter of the run, without the states of its measurements.
+    chain : NavigationPipeline
+        Pipeline of the run.
     imu : DataFrame
-        Its samples.
+        Samples of the run.
     tables : mapping of str to DataFrame
-        By name of the aid.
+        By name of the measurement.
     record : NavigationRecord
-        What came of it.
+        Result of the run.
     consistency : mapping of str to ObservationConsistency
-        Of its innovations.
+        Consistency of its innovations.
 
     Returns
     -------
     Witnesses or None
-        None where there is no satellite receiver: nothing else tells a direction of its own.
+        None without a GNSS receiver: no other measurement observes a direction independently.
     """
     receivers = [aid for aid in chain.navigator.aids if type(aid) is Gnss and aid.name in tables]
     if not receivers:
@@ -397,7 +397,7 @@ def witnesses_of(
 
 
 def _known(aid: Gnss, record: NavigationRecord, robust: bool) -> Gnss:
-    """A receiver with arm and time offset as the run found them in the end."""
+    """A receiver with the run's final lever arm and time offset."""
     found = record.sensors.iloc[-1]
     arm = list(aid.lever_arm)
     for k, axis in enumerate("xyz"):
@@ -417,7 +417,7 @@ def _known(aid: Gnss, record: NavigationRecord, robust: bool) -> Gnss:
 
 
 def _robust(aid: Gnss, consistency: Mapping[str, ObservationConsistency]) -> bool:
-    """Whether fixes of a receiver are to be believed with care."""
+    """Whether the fixes of a receiver need robust weighting."""
     return aid.rule is not None or any(
         one.gross
         for name, of in consistency.items()
@@ -427,7 +427,7 @@ def _robust(aid: Gnss, consistency: Mapping[str, ObservationConsistency]) -> boo
 
 
 def _thinned(table: pd.DataFrame) -> pd.DataFrame:
-    """Rows that are as far apart as fixes are taken."""
+    """Rows thinned to the least interval between fixes."""
     time = index_of(table)
     cell = np.floor(time / FIXES_APART + NEAR_FIXES)
     kept = np.concatenate([[True], np.diff(cell) > 0.0]) if len(time) else np.empty(0, bool)
@@ -436,33 +436,33 @@ def _thinned(table: pd.DataFrame) -> pd.DataFrame:
     return out
 
 
-# A heading that was found at rest, carried on by the gyros alone.
+# Heading found at rest and carried forward by the gyros alone.
 
 
-#: A gyro may have changed by so many standard deviations of its bias since, and nobody saw it.
+#: Assumed unobserved change of a gyro since, in standard deviations of its bias.
 UNSEEN = 30.0
-#: Longer than this nobody has looked at the gyros, s.
+#: Longest time without an observation of the gyros, s.
 LONGEST = 7200.0
-#: A step that is so long, or so much time between two, is a gap, s.
+#: Length of a step, or time between two, that counts as a gap, s.
 GAP = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class CarriedHeading:
-    """What one rest tells of the headings of a run after it; as `heading_light.Heard`.
+    """Headings of a run after one rest, carried by the gyros; as `heading_light.Heard`.
 
     Attributes
     ----------
     since : float, s
         When the rest ended.
     time : ndarray, (n,), s
-        Seconds of the run after it.
+        Seconds of the run after the rest.
     difference : ndarray, (n,), deg
-        Heading of the run less the carried one.
+        Heading of the run minus the carried one.
     sd : ndarray, (n,), deg
-        What bounds 99 of 100 of the errors of the carried one, over `heading_light.SURE`.
+        99 % bound of the error of the carried heading, divided by `heading_light.SURE`.
     plain : ndarray, (n,), deg
-        The same by what is stated of the gyros, without what the rest itself showed of them.
+        The same from the stated gyro errors, without the gyro errors observed during the rest.
     kind : str
     """
 
@@ -482,18 +482,18 @@ def carry_headings(
     sensors: ImuUncertainty,
     ellipsoid: Ellipsoid,
 ) -> list[CarriedHeading]:
-    """Carry headings on, each until a later one agrees with it.
+    """Carry headings forward, each until a later one agrees with it.
 
     Parameters
     ----------
     compasses : sequence of Compass
-        In the order of time.
+        In order of time.
     doubts : sequence of float, s
-        Instants at which gyros were found to have changed: nothing is carried beyond.
+        Instants at which a gyro change was detected; headings are not carried beyond them.
     steps : JoinedSteps
-        From the first of them on.
+        From the first of the compasses on.
     record : NavigationRecord
-        Of the run, which tells the place: a kilometre turns north by less than 0.02 deg.
+        Run that gives the position: a kilometer turns north by less than 0.02 deg.
     sensors : ImuUncertainty
     ellipsoid : Ellipsoid
 
@@ -503,10 +503,10 @@ def carry_headings(
 
     Notes
     -----
-    From one instant to another the gyros turn the body in inertial space, and the Earth and the way
-    over it turn north; nothing else is needed. The bound of such a heading is that of the rest, the
-    noise, the bias that the rest left and the scale factors since, and what a change of a gyro by
-    `UNSEEN` of its standard deviations adds, which nothing but another rest would show.
+    Between two instants the gyros give the rotation of the body in inertial space; the Earth's
+    rotation and the traveled path give that of north. The bound of such a heading combines that
+    of the rest, the noise, the residual bias and the scale factors since, and the effect of a gyro
+    change by `UNSEEN` standard deviations, which only another rest could reveal.
     """
     if not compasses or not len(steps.time):
         return []
@@ -534,7 +534,7 @@ def carry_headings(
 
 
 class _Carried:
-    """The attitude of one rest, at the end of each step after it."""
+    """Attitude of one rest, at the end of each step after it."""
 
     def __init__(
         self,
@@ -545,14 +545,14 @@ class _Carried:
         sensors: ImuUncertainty,
     ) -> None:
         self.compass, self.sensors = compass, sensors
-        # A rest that ends within a step: the body stands there.
+        # A rest that ends within a step: the body is stationary there.
         after = int(np.searchsorted(steps.time, compass.time + 1e-6))
         dt = np.ascontiguousarray(steps.rows[after:, 0])
         turns = np.ascontiguousarray(steps.rows[after:, 1:4] - dt[:, None] * compass.gyro_bias)
         turned = np.empty((len(dt), 4))
         quaternion_advance(np.array([1.0, 0.0, 0.0, 0.0]), dt, turns, turns, turned, 0.0, 1.0)
         self.time = np.concatenate([[compass.time], steps.time[after:]])
-        # Through a gap the gyros carry nothing.
+        # No heading is carried through a gap.
         gaps = np.flatnonzero((dt > GAP) | (np.diff(self.time) > dt + GAP))
         self.unbroken = float(self.time[gaps[0]]) if len(gaps) else math.inf
         turned = np.concatenate([[[1.0, 0.0, 0.0, 0.0]], turned])
@@ -568,11 +568,11 @@ class _Carried:
         self.turned = np.radians(np.maximum.accumulate(away))
 
     def heading(self, time: Array) -> Array:
-        """At some instants, deg."""
+        """Heading at some instants, deg."""
         return np.asarray(np.interp(time, self.time, self.unwrapped))
 
     def bounds(self, time: Array) -> tuple[Array, Array]:
-        """Of 99 of 100 headings at some instants, deg: by the rest, and by what is stated."""
+        """99 % bound of headings at some instants, deg: by the rest, and by the stated errors."""
         gyro, drift = self.sensors.gyro, self.sensors.gyro_drift
         since = np.maximum(time - self.compass.time, 0.0)
         bias = float(np.max(np.hypot(gyro.axis("bias"), drift.triad)))
@@ -585,7 +585,7 @@ class _Carried:
         return self.compass.bound + grown, SURE * self.compass.sd + grown
 
     def agrees(self, later: Compass) -> bool:
-        """Whether a later rest found what was carried to it."""
+        """Whether a later rest found the carried heading."""
         at = np.array([later.time])
         there = float(rotation.euler_from_quaternion(later.q_nb)[2])
         apart = abs(float(rotation.within_half_turn(self.heading(at)[0] - there)))
@@ -593,6 +593,6 @@ class _Carried:
 
 
 def _longitude(time: Array, rows: pd.DataFrame) -> Array:
-    """Longitude at some instants, deg, also over the date line."""
+    """Longitude at some instants, deg, also across the date line."""
     lon = np.degrees(np.unwrap(np.radians(rows["lon"].to_numpy(dtype=np.float64))))
     return np.asarray(np.interp(time, index_of(rows), lon))

@@ -1,4 +1,4 @@
-"""From samples of sensors to steps of a navigator: axes, holes, pre-filter, increments."""
+"""Preprocess sensor samples to navigation steps: axes, gaps, pre-filter, increments."""
 
 from __future__ import annotations
 
@@ -47,14 +47,14 @@ __all__ = [
 ]
 
 
-# The steps of a record, as they are or joined to tenths of a second.
+# The steps of a record, unchanged or joined to tenths of a second.
 
 
-#: Increments are joined to so much, s.
+#: Length of joined increments, s.
 JOINED = 0.1
-#: Of the record that is taken at a time, s.
+#: Length of a chunk of a record, s.
 AT_ONCE = 60.0
-#: Stamps are the same within this, s.
+#: Stamps within this are equal, s.
 NEAR = 1e-6
 
 
@@ -77,7 +77,7 @@ class JoinedSteps:
 def steps_of(
     intake: ImuPreprocessor, imu: pd.DataFrame, begin: float, end: float
 ) -> Iterator[JoinedSteps]:
-    """Give motion increments within a span as they are, a minute at a time."""
+    """Yield the motion increments within a span, a minute at a time."""
     time, values = index_of(imu), values_of(imu, [*GYRO, *ACCEL])
     state = intake.begin(imu.attrs["sampling"], None)
     cuts = np.searchsorted(
@@ -95,11 +95,11 @@ def steps_of(
 def joined_steps(
     intake: ImuPreprocessor, imu: pd.DataFrame, begin: float, end: float
 ) -> JoinedSteps:
-    """Return motion increments within a span, joined to a tenth of a second.
+    """Return the motion increments within a span, joined to a tenth of a second.
 
     Parameters
     ----------
-    intake : Intake
+    intake : ImuPreprocessor
     imu : DataFrame
         Imu table.
     begin, end : float, s
@@ -119,12 +119,12 @@ def joined_steps(
     return JoinedSteps(np.concatenate(ends), np.concatenate(joined))
 
 
-# A pre-filter within a chain: real stamps on its even grid, lost samples along lines.
+# Pre-filter of a pipeline: drifting stamps on its even grid, lost samples interpolated.
 
 
 @dataclass(frozen=True, eq=False)
 class FilteringState:
-    """Between pieces.
+    """State between chunks.
 
     Attributes
     ----------
@@ -133,7 +133,7 @@ class FilteringState:
     inner : object
         State of the pre-filter.
     numbers, stamps : ndarray, (k,)
-        Of samples around the next output: count of the grid, and stamp.
+        Grid index and stamp of the samples around the next output.
     newest : ndarray, (0 or 1, 6)
         The newest sample.
     """
@@ -147,15 +147,15 @@ class FilteringState:
 
 @dataclass(frozen=True, eq=False)
 class Filtered:
-    """What came out.
+    """Output of a pre-filter.
 
     Attributes
     ----------
     time : ndarray, (m,), s
-        On the clock of the samples: the delay of the filter is taken off.
+        On the clock of the samples, corrected for the delay of the filter.
     values : ndarray, (m, 6)
     rows : ndarray, (m, 10) or (0, 10)
-        Motion increments, of a pre-filter that makes them itself.
+        Motion increments, if the pre-filter computes them.
     """
 
     time: Array
@@ -165,7 +165,7 @@ class Filtered:
 
 @dataclass(frozen=True)
 class Filtering:
-    """A pre-filter of samples whose stamps may drift against an even grid.
+    """Pre-filter for samples whose stamps may drift against an even grid.
 
     Attributes
     ----------
@@ -180,7 +180,7 @@ class Filtering:
         Parameters
         ----------
         first : ndarray, s
-            Stamps that tell the step: the first ones of the record.
+            First stamps of the record, which give the step.
         means : bool
             Whether samples are means over the step before them.
         source : str, optional
@@ -189,7 +189,7 @@ class Filtering:
         Raises
         ------
         DataError
-            The stamps are not even.
+            The stamps are uneven.
         """
         try:
             grid = Grid(0.0, even_step(first), means)
@@ -212,7 +212,7 @@ class Filtering:
     def advance(
         self, state: FilteringState, time: Array, values: Array, last: bool, source: str | None
     ) -> tuple[FilteringState, Filtered]:
-        """Take further samples; `last` says that none follows."""
+        """Process further samples; `last` ends the input."""
         numbers = self._numbered(state, time, source)
         all_numbers = np.concatenate([state.numbers, numbers])
         all_stamps = np.concatenate([state.stamps, time])
@@ -225,7 +225,7 @@ class Filtering:
         inner, portion = self.prefilter.advance(
             state.inner, np.ascontiguousarray(nodes[known:]), last
         )
-        # Of means some filters answer between two samples.
+        # For means, some filters have outputs midway between two samples.
         wanted = np.rint(2.0 * portion.time / state.grid.step) / 2.0
         stamps = np.interp(wanted, all_numbers, all_stamps) if wanted.size else np.empty(0)
         keep = min(len(all_numbers), 1) - 1
@@ -242,7 +242,7 @@ class Filtering:
         return after, Filtered(stamps, portion.values, portion.rows)
 
     def _numbered(self, state: FilteringState, time: Array, source: str | None) -> Array:
-        """Places of stamps on the grid."""
+        """Grid indices of stamps."""
         stamps = np.concatenate([state.stamps[-1:], time])
         steps = np.rint(np.diff(stamps) / state.grid.step)
         if steps.size and not steps.min() >= 1.0:
@@ -260,26 +260,26 @@ class Filtering:
         return np.concatenate([np.zeros(min(1, len(time))), np.cumsum(steps)])
 
 
-# Holes in what the inertial sensors gave: what is done about them, and what is not known then.
+# Gaps in the inertial data: policy and added uncertainty.
 
 
 @dataclass(frozen=True)
 class GapPolicy:
-    """What is done where samples are missing.
+    """Policy for missing samples.
 
-    A step of more than `usual` times the usual one is a gap. Over it rate and force run along the
-    line between its sides, and the covariance takes that the body did there what it did over the
-    second before: see `hole_between`.
+    A step of more than `usual` times the usual one is a gap. Rate and force are interpolated
+    linearly over it, and the covariance assumes motion as over the second before: see
+    `hole_between`.
 
     Attributes
     ----------
     usual : float
-        Of the step that 95 % of the first 64 do not exceed.
+        Ratio to the step that 95 % of the first 64 do not exceed.
     coast : float, s
-        A longer gap is not bridged.
+        Longest gap that is bridged.
     beyond : {'refuse', 'align', 'coast'}
-        What a longer gap does: it ends the run with an error; it begins the first mode anew; or it
-        is bridged like a short one.
+        Action at a longer gap: end the run with an error; begin the first mode anew; or bridge it
+        like a short one.
     """
 
     usual: float = field(default=3.0, metadata={"unit": ""})
@@ -306,7 +306,7 @@ class Hole:
     begin, end : float, s
         Stamps of its two sides.
     rate_sd, force_sd : ndarray, (3,), rad/s and m/s²
-        By how much the mean over it may differ from that of the line between its sides.
+        Standard deviation of the mean over the gap from the linear interpolation.
     """
 
     begin: float
@@ -321,7 +321,7 @@ class Hole:
 
 
 def hole_between(before: Array, time: tuple[float, float], after: Array) -> Hole:
-    """Judge a gap by the samples beside it.
+    """Describe a gap by the samples beside it.
 
     Parameters
     ----------
@@ -335,9 +335,8 @@ def hole_between(before: Array, time: tuple[float, float], after: Array) -> Hole
     Returns
     -------
     Hole
-        The mean over it may differ from the mean of its sides by half of their difference, which
-        is where all of the change was at one of its ends, and by as much as the samples of the
-        second before differ from each other.
+        The uncertainty of the mean is half of the difference between the sides, as if all of the
+        change occurred at one end, combined with the scatter of the samples of the second before.
     """
     half = 0.5 * (after - before[-1])
     sd = np.sqrt(np.square(half) + before.var(axis=0))
@@ -345,7 +344,7 @@ def hole_between(before: Array, time: tuple[float, float], after: Array) -> Hole
 
 
 def widened(navigator: Navigator, state: NavigatorState, hole: Hole) -> NavigatorState:
-    """Return a state before a gap, with what is not known of the gap in its covariance.
+    """Return a state before a gap, with the gap's uncertainty added to its covariance.
 
     Parameters
     ----------
@@ -357,8 +356,9 @@ def widened(navigator: Navigator, state: NavigatorState, hole: Hole) -> Navigato
     Returns
     -------
     NavigatorState
-        A mean rate that is off by d turns the attitude by ``d length``, a mean force the velocity
-        by as much, and the place goes on with that velocity: twice what a constant one would do.
+        A mean rate error d turns the attitude by ``d length``, a mean force error changes the
+        velocity accordingly, and the position moves with that velocity: twice the effect of a
+        constant error.
     """
     filter_, model = navigator.filter, navigator.filter.model
     at = state.engine.filter
@@ -374,21 +374,21 @@ def widened(navigator: Navigator, state: NavigatorState, hole: Hole) -> Navigato
     return replace(state, engine=engine)
 
 
-# Sensors at the end of their range: what they cut off is not known from there on.
+# Saturated sensors: the lost part of the signal as uncertainty.
 
 
 @dataclass(frozen=True, eq=False)
 class RangeState:
-    """Between pieces.
+    """State between chunks.
 
     Attributes
     ----------
     time, values : ndarray, (m,) and (m, 6)
         The last samples, two at most.
     since : ndarray, (6,), s
-        Of each channel at its end, the last sample before it; NaN of the others.
+        For each saturated channel, the last sample before saturation; NaN for others.
     slope : ndarray, (6,)
-        By which it came there.
+        Slope at the begin of saturation.
     """
 
     time: Array = field(default_factory=lambda: np.empty(0))
@@ -399,20 +399,19 @@ class RangeState:
 
 @dataclass(frozen=True, eq=False)
 class RangeEnds:
-    """Ends of the ranges of six channels.
+    """Range ends of six channels.
 
-    What a channel would read beyond its end is taken for a parabola: it came there with a slope s,
-    the steepest of the two steps before, and were it to turn around midway and come back within a
-    time T, it would have been ``s T²/6`` above the end, as an integral. That is the standard
-    deviation of what is missing; as nobody knows T before the end, it grows over the samples: by
-    ``(s t²/6)²`` in variance after a time t, the steps on both sides of the end included. A turn of
-    which so large an angle is missing turns about the wrong axes, too: half its square is not known
-    about each.
+    The signal beyond the end of the range is modeled as a parabola: with a slope s at the begin,
+    the steepest of the two steps before, and a return within a time T, its integral above the end
+    is ``s T²/6``. That is the standard deviation of the lost part; as T is unknown before the end
+    of saturation, it grows over the samples: by ``(s t²/6)²`` in variance after a time t,
+    including the steps on both sides. After a lost angle this large the axes of rotation are
+    wrong, too: half its square is added about each.
 
     Attributes
     ----------
     least, most : ndarray, (6,), rad/s and m/s²
-        A reading of that size is at the end; what is larger belongs to another sensor.
+        Smallest and largest saturated reading; a larger one belongs to another sensor.
     """
 
     least: Array
@@ -421,7 +420,7 @@ class RangeEnds:
     def advance(
         self, state: RangeState, time: Array, values: Array
     ) -> tuple[RangeState, tuple[Hole, ...]]:
-        """Look at further samples; pieces of any length give the same as the whole.
+        """Process further samples; chunks of any length give the same as the whole.
 
         Parameters
         ----------
@@ -433,7 +432,7 @@ class RangeEnds:
         -------
         state : RangeState
         holes : tuple of Hole
-            A step each, with what it adds to what is not known.
+            One per step, with its added uncertainty.
         """
         size = np.abs(values)
         at = (size >= self.least) & (size <= self.most)
@@ -441,14 +440,14 @@ class RangeEnds:
         new, rows = len(state.time), np.atleast_1d(at.any(axis=1))
         holes = []
         if rows.any() or not np.isnan(state.since).all():
-            # A sample at an end, and the one after it.
+            # A saturated sample, and the one after it.
             after = ~np.isnan(state.since).all()
             open_ = rows | np.concatenate([[after], rows[:-1]])
             since, slope = state.since.copy(), state.slope.copy()
             for k in np.flatnonzero(open_).tolist():
                 i = new + k
                 if i == 0:
-                    # A record that begins at an end: how long it stood there is not in it.
+                    # A record that begins in saturation does not contain its begin.
                     since[at[0]] = t[0]
                     continue
                 begun = at[k] & np.isnan(since)
@@ -474,12 +473,12 @@ class RangeEnds:
 
 
 def ends_of(sensors: ImuUncertainty) -> RangeEnds | None:
-    """Return the ends of the ranges that are stated; None where none is.
+    """Return the stated range ends; None if none is stated.
 
     Parameters
     ----------
     sensors : ImuUncertainty
-        A reading within a step of the converter of the stated end is at it.
+        Readings within a converter step of the stated end count as saturated.
     """
     triads = (sensors.gyro, sensors.accel)
     full = np.concatenate([np.asarray(one.axis("full_scale"), dtype=float) for one in triads])
@@ -493,32 +492,32 @@ def ends_of(sensors: ImuUncertainty) -> RangeEnds | None:
 
 Array = NDArray[np.float64]
 
-#: Samples at the start that tell the step of a record.
+#: Number of first samples that give the usual step of a record.
 FIRST = 64
-#: Over which the motion before a gap is judged, s.
+#: Time over which the motion before a gap is assessed, s.
 BEFORE = 1.0
-# Stamps are rounded: a step of exactly so many usual ones is no gap.
+# Stamps are rounded: a step of exactly the limit is not a gap.
 ROUNDED = 1.01
 
 
 @dataclass(frozen=True, eq=False)
 class ImuIncrements:
-    """What the samples of a piece make.
+    """Navigation steps of a chunk of samples.
 
     Attributes
     ----------
     time : ndarray, (n,), s
         Ends of the steps.
     values : ndarray, (n, 6)
-        Rates and forces there, in body axes.
+        Rates and specific forces at them, in body axes.
     rows : ndarray, (n, 10)
         Motion increments.
     opening : tuple of (float, ndarray), or None
         Stamp and values of the sample at which the first step begins, once.
     holes : tuple of Hole
-        That were found; steps over them may still be to come.
+        Gaps found; steps over them may still follow.
     cut_off : tuple of Hole
-        Steps with a sensor at the end of its range; they may be to come, too.
+        Steps with a saturated sensor; they may follow later, too.
     """
 
     time: Array
@@ -539,7 +538,7 @@ def _no_values() -> Array:
 
 @dataclass(frozen=True, eq=False)
 class ImuPreprocessorState:
-    """Between pieces.
+    """State between chunks.
 
     Attributes
     ----------
@@ -549,23 +548,23 @@ class ImuPreprocessorState:
     count : int
         Samples so far.
     usual : float, s
-        Longest usual step; nought until it is known.
+        Longest usual step; 0 until it is known.
     newest : float, s
         Stamp of the newest sample.
     tail : GrowingRows
-        Stamp and values, in body axes, of the samples that wait for that; then of at least the
+        Stamp and values, in body axes, of the samples held until then; afterwards of at least the
         last second.
     filtering : FilteringState or None
     stream : IncrementStreamState or None
-        None where the pre-filter makes the increments, and until it is known whether it does.
+        None if the pre-filter computes the increments, and until this is known.
     own : bool
         Whether it does.
     first : tuple of (float, ndarray), or None
-        The first sample, until it is known who makes the increments.
+        The first sample, until it is known what computes the increments.
     waiting_time, waiting : ndarray
-        Samples that no step has ended at yet.
+        Samples after the end of the last step.
     ranges : RangeState
-        Which sensors are at the end of their range.
+        Saturation of the sensors.
     """
 
     sampling: str
@@ -585,19 +584,19 @@ class ImuPreprocessorState:
 
 @dataclass(frozen=True, eq=False)
 class ImuPreprocessor:
-    """Makes steps of samples; it holds no state.
+    """Convert samples to navigation steps; the state is kept by the caller.
 
     Attributes
     ----------
     gyro_axes, accel_axes : ndarray, (3, 3), optional
         From the axes of the sensors to those of the body (`sensors.axes_matrix`).
     prefilter : Prefilter, optional
-        Its delay is taken off by the stamps of what comes out; it comes later by that.
+        The stamps of its output are corrected for its delay; the output is later by it.
     stream : IncrementStream, optional
-        Linear for samples as they come, cubic after a pre-filter, if not given.
+        Linear for raw samples, cubic after a pre-filter, if not given.
     gaps : GapPolicy
     ends : RangeEnds, optional
-        Of the sensors, in the axes of the body.
+        Range ends of the sensors, in body axes.
     """
 
     gyro_axes: Array | None = None
@@ -609,13 +608,13 @@ class ImuPreprocessor:
 
     @property
     def increments(self) -> IncrementStream:
-        """The stream that is used."""
+        """The increment stream in use."""
         if self.stream is not None:
             return self.stream
         return IncrementStream("linear" if self.prefilter is None else "cubic")
 
     def sampling(self, state: ImuPreprocessorState) -> str:
-        """What the values of its steps are: 'instantaneous' or 'mean'."""
+        """Kind of the values of its steps: 'instantaneous' or 'mean'."""
         if self.prefilter is None or state.filtering is None:
             return state.sampling
         return self.prefilter.sampling(state.filtering.grid)
@@ -636,7 +635,7 @@ class ImuPreprocessor:
     def advance(
         self, state: ImuPreprocessorState, time: Array, values: Array, last: bool = False
     ) -> tuple[ImuPreprocessorState, ImuIncrements]:
-        """Take further samples.
+        """Process further samples.
 
         Parameters
         ----------
@@ -650,13 +649,13 @@ class ImuPreprocessor:
         Returns
         -------
         state : ImuPreprocessorState
-        steps : Steps
+        steps : ImuIncrements
 
         Raises
         ------
         DataError
-            Time does not advance, a value is not finite, or the stamps are not even where a
-            pre-filter needs them so.
+            Time does not advance, a value is not finite, or the stamps are uneven and a pre-filter
+            needs them even.
         """
         _check(state, time, values)
         values = self._turned(values)
@@ -686,13 +685,13 @@ class ImuPreprocessor:
         out = values.copy()
         for at, matrix in ((0, self.gyro_axes), (3, self.accel_axes)):
             if matrix is not None:
-                # Term by term: a product of matrices may add in an order that depends on its size.
+                # Term by term: the order of additions in a matrix product may depend on its size.
                 x, y, z = (values[:, at + k, None] for k in range(3))
                 out[:, at : at + 3] = x * matrix[:, 0] + y * matrix[:, 1] + z * matrix[:, 2]
         return out
 
     def _judged(self, state: ImuPreprocessorState, time: Array) -> ImuPreprocessorState:
-        """Learn the usual step from the first samples, and begin what needs it."""
+        """Determine the usual step from the first samples, and initialize what depends on it."""
         if len(time) < 2:
             raise DataError(
                 "navigation.sample-navigation-goes-sample-sample",
@@ -712,7 +711,7 @@ class ImuPreprocessor:
     def _holes(
         self, state: ImuPreprocessorState, known: int
     ) -> tuple[ImuPreprocessorState, tuple[Hole, ...]]:
-        """Find gaps after the `known` rows of the tail, and drop what is long past."""
+        """Find gaps after the `known` rows of the tail, and drop expired rows."""
         rows = state.tail.rows
         time, begin = rows[:, 0], max(known - 1, 0)
         found = []
@@ -722,7 +721,7 @@ class ImuPreprocessor:
             first = int(np.searchsorted(time, time[k] - BEFORE))
             sides = (float(time[k]), float(time[k + 1]))
             found.append(hole_between(rows[first : k + 1, 1:], sides, rows[k + 1, 1:]))
-        # Half of it at least is given back at a time: what is kept is seldom copied.
+        # Dropped in at least half of the buffer, so that it is seldom copied.
         past = int(time.searchsorted(time[-1] - BEFORE))
         if 2 * past > state.tail.count and state.tail.count > FIRST:
             state = replace(state, tail=state.tail.without_first(past))
@@ -736,7 +735,7 @@ class ImuPreprocessor:
         found: ImuIncrements,
         last: bool,
     ) -> tuple[ImuPreprocessorState, ImuIncrements]:
-        """Make the increments; to them comes what was found of the samples."""
+        """Compute the increments, and attach the gaps and saturations found."""
         if self.prefilter is not None:
             before = state.filtering
             assert before is not None
@@ -750,7 +749,7 @@ class ImuPreprocessor:
             if not len(time) and (state.stream is None or not last):
                 return state, found
             if len(out.rows):
-                # Rows that a pre-filter makes begin with the first sample.
+                # Increments by a pre-filter begin with the first sample.
                 opening = state.first
                 state = replace(state, own=True, first=None)
                 return state, ImuIncrements(
@@ -779,8 +778,8 @@ _NOTHING = ImuIncrements(_no_time(), _no_values(), np.empty((0, 10)), None, ())
 
 
 def _check(state: ImuPreprocessorState, time: Array, values: Array) -> None:
-    """Refuse samples that cannot be used; rows count from 1 over the whole record."""
-    # The sum of an infinity and its opposite is none, either.
+    """Refuse invalid samples; rows count from 1 over the whole record."""
+    # The sum of an infinity and its opposite is NaN, too.
     alone = len(time) == 1 and math.isfinite(sum(values[0].tolist()))
     if alone and state.newest < time[0] < math.inf:
         return

@@ -1,4 +1,4 @@
-"""The modes of a chain, one after the other, and what ends each."""
+"""Modes of a pipeline and their end conditions."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Command:
-    """A word to a chain.
+    """Command to a pipeline.
 
     Attributes
     ----------
     time : float, s
-        It holds from the first sample at or after it.
+        The command holds from the first sample at or after it.
     word : str
-        Name of the mode that is to begin: ``fine``, ``navigation``; or ``next``.
+        Name of the mode to begin: ``fine``, ``navigation``; or ``next``.
     """
 
     time: float
@@ -50,26 +50,26 @@ class Command:
 
 @dataclass(frozen=True)
 class Until:
-    """What ends a mode of alignment: what comes first of these, or a command.
+    """End condition of an alignment mode: the first of these, or a command.
 
-    Convergence is tried at whole seconds of the mode, each at least `pause` of the time so far
-    after the one before: an alignment is of the whole record of its mode.
+    Convergence is tried at whole seconds of the mode, each later than the one before by at least
+    `pause` of the elapsed time: an alignment uses the whole record of its mode.
 
     Attributes
     ----------
     duration : float, s
-        It ends then, and with an error if it found no attitude.
+        Longest duration; an error if no attitude was found.
     heading_sd_deg, tilt_sd_deg : float, deg, optional
-        It ends when the standard deviation of the heading, and of the worse of roll and pitch, are
-        no more than these; of both, if both are given.
+        Largest standard deviations of the heading, and of the worse of roll and pitch; both must
+        be met if both are given.
     least : float, s
-        No alignment is tried before.
+        Time before the first attempt.
     pause : float
 
     Raises
     ------
     ConfigError
-        A number means nothing, or nothing ends the mode.
+        A number is invalid, or the mode has no end condition.
     """
 
     duration: float = field(default=math.inf, metadata={"unit": "s"})
@@ -88,17 +88,17 @@ class Until:
 
     @property
     def converges(self) -> bool:
-        """Whether it may end by convergence."""
+        """Whether the mode may end by convergence."""
         return self.heading_sd_deg is not None or self.tilt_sd_deg is not None
 
     def next_try(self, elapsed: float) -> float:
-        """Time since the begin of the mode at which an alignment is tried next, s."""
+        """Time from the begin of the mode to the next attempt, s."""
         if not self.converges:
             return math.inf
         return max(self.least, float(math.ceil(elapsed * (1.0 + self.pause) + 1e-6)))
 
     def met(self, heading_sd_deg: float, tilt_sd_deg: float) -> bool:
-        """Whether an attitude is known as well as it was asked for."""
+        """Whether the attitude meets the required standard deviations."""
         heading, tilt = self.heading_sd_deg, self.tilt_sd_deg
         return (
             self.converges
@@ -109,7 +109,7 @@ class Until:
 
 @dataclass(frozen=True)
 class Mode:
-    """A time over which a chain does one thing.
+    """Mode of a pipeline.
 
     Attributes
     ----------
@@ -125,14 +125,14 @@ class Mode:
 
 @dataclass(frozen=True)
 class CoarseMode(Mode):
-    """Attitude by what the sensors read, and by fixes where the vehicle moves.
+    """Coarse alignment by the sensors, and by fixes if the vehicle moves.
 
     Attributes
     ----------
     way : CoarseAlignment
     window : float, s
-        The newest samples that are kept and aligned; all of the mode, if not given. A vehicle that
-        waits for an hour and then drives is aligned by its last minute.
+        Length of the newest samples to align; the whole mode, if not given. A vehicle that waits
+        for an hour and then drives is aligned by its last minute.
     """
 
     kind: ClassVar[str] = "coarse"
@@ -144,7 +144,7 @@ class CoarseMode(Mode):
 
 @dataclass(frozen=True)
 class FineMode(Mode):
-    """Attitude and biases by a filter over a rest; it begins with the attitude of the mode before.
+    """Fine alignment: attitude and biases by a filter at rest, after a coarse alignment.
 
     Attributes
     ----------
@@ -159,7 +159,7 @@ class FineMode(Mode):
 
 @dataclass(frozen=True)
 class Navigation(Mode):
-    """Navigation, to the end."""
+    """Navigation, to the end of the record."""
 
     kind: ClassVar[str] = "navigation"
 
@@ -167,19 +167,19 @@ class Navigation(Mode):
 
 
 def check_timeline(modes: tuple[Mode, ...], known_start: bool) -> None:
-    """Refuse modes that do not lead from one to the next.
+    """Refuse an invalid sequence of modes.
 
     Parameters
     ----------
     modes : tuple of Mode
     known_start : bool
-        Whether the state at the start is stated.
+        Whether the initial state is stated.
 
     Raises
     ------
     ConfigError
-        The last mode is not navigation, a name stands twice, a fine alignment has nothing before
-        it, a mode of alignment never ends, or there is neither an alignment nor a known state.
+        The last mode is not navigation, a name occurs twice, a fine alignment comes first, an
+        alignment mode never ends, or there is neither an alignment nor a known state.
     """
     names = [mode.name for mode in modes]
     for name in names:
@@ -205,7 +205,7 @@ def check_timeline(modes: tuple[Mode, ...], known_start: bool) -> None:
             )
 
 
-# Navigation from a state that is known, without an alignment.
+# Navigation from a known state, without an alignment.
 
 
 Array = NDArray[np.float64]
@@ -214,12 +214,12 @@ Three = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class KnownStart:
-    """The state at a start, with standard deviations.
+    """Initial state with standard deviations.
 
     Attributes
     ----------
     state : NavState
-        Navigation begins with the sample at its time; samples before are left out.
+        Navigation begins with the sample at its time; earlier samples are ignored.
     position_sd : tuple of float, (3,), m
         North, east, down.
     velocity_sd : tuple of float, (3,), m/s
@@ -231,7 +231,7 @@ class KnownStart:
     Raises
     ------
     ConfigError
-        A standard deviation is negative or no number.
+        A standard deviation is negative or not a number.
     """
 
     state: NavState
@@ -250,10 +250,10 @@ class KnownStart:
 
     @property
     def covariance(self) -> Array:
-        """Of displacement, velocity and rotation in north-east-down, (9, 9).
+        """Covariance of displacement, velocity and rotation in north-east-down, (9, 9).
 
-        Errors of roll, pitch and heading turn about the forward axis, about the level axis to its
-        right, and about down.
+        Errors of roll, pitch and heading are rotations about the forward axis, about the level axis
+        to its right, and about down.
         """
         _, pitch, heading = np.radians(euler_from_quaternion(self.state.q_nb)).tolist()
         sp, cp, sh, ch = math.sin(pitch), math.cos(pitch), math.sin(heading), math.cos(heading)
@@ -265,12 +265,12 @@ class KnownStart:
         return P
 
 
-# What a chain gives for a piece of its input.
+# Output of a pipeline for a chunk.
 
 
 @dataclass(frozen=True, eq=False)
 class Aligned:
-    """What a mode of alignment ended with.
+    """Result of an alignment mode.
 
     Attributes
     ----------
@@ -291,24 +291,24 @@ class Aligned:
 
 @dataclass(frozen=True, eq=False)
 class PipelineChunk:
-    """What came of a piece.
+    """Output of a pipeline for a chunk of input.
 
     Attributes
     ----------
     mode : str
-        At its end.
+        At the end of the chunk.
     time : float, s
-        To which the chain has come.
+        Time of the newest step.
     navigation : tuple of NavigationChunk
-        One after the other.
+        In order of time.
     aligned : tuple of Aligned
-        Modes of alignment that ended in it.
+        Alignment modes that ended.
     events : tuple of Event
-        That became known in it; some are of a time before.
+        Events found in the chunk; some occurred earlier.
     modes : tuple of Span
-        That ended in it.
+        Modes that ended.
     outages : tuple of (str, Span)
-        Of aids, that ended in it.
+        Outages of measurements that ended.
     """
 
     mode: str

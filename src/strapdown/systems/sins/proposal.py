@@ -1,4 +1,4 @@
-"""A chain for a log: what its samples and its fixes tell of sensor, rest, motion and alignment."""
+"""Propose a navigation pipeline from a log: sensor, rest, motion and alignment."""
 
 from __future__ import annotations
 
@@ -30,66 +30,66 @@ __all__ = ["CODE_RECEIVER", "Proposal", "propose"]
 
 Array = NDArray[np.float64]
 
-#: Windows in which noise is measured, s, and the share of them that is taken as the quiet one.
+#: Windows in which noise is measured, s, and the share taken as the quiet one.
 WINDOW, QUIET = 2.0, 0.05
-#: Beyond so many times the noise of its data sheet a triad shakes, and that is stated in its place.
+#: Ratio to the data-sheet noise beyond which a triad's measured noise is stated instead.
 LOUD = 3.0
 NOISE_KEYS = (
     ("gyro", "noise_density_deg_per_sqrt_h", math.radians(1.0) / 60.0),
     ("accel", "noise_density_ug_per_sqrt_hz", 1e-6 * STANDARD_GRAVITY),
 )
-#: Below it a vehicle stands, above the other its course can be seen, m/s.
+#: Speed below which a vehicle is stationary, and above which its course is observable, m/s.
 STANDS, DRIVES = 0.5, 3.0
-#: Beyond so many times its standard deviation no way is apparent only: of a hundred thousand pairs
-#: of places at rest four are, exp(-APPARENT**2 / 2).
+#: Distance between positions, in standard deviations, that proves motion: four of a hundred
+#: thousand pairs of positions at rest exceed it, exp(-APPARENT**2 / 2).
 APPARENT = 4.5
-#: A gyro bias that leaves north to be found, and the rest that it takes.
+#: Gyro bias that allows gyrocompassing, and the rest needed for it.
 NORTH, LEAST_REST = math.radians(2.0 / 3600.0), 60.0
-#: Coarse alignment of a rest takes no more than this of it, s.
+#: Longest rest used for a coarse alignment, s.
 COARSE = 100.0
-#: An alignment by a course ends when angles are known so well, deg.
+#: Standard deviation of the angles that ends an alignment by course, deg.
 WELL = 3.0
-#: Of the rules, those that give a gross error no weight keep their accuracy among them; with its
-#: scale this one cannot reject for ever. Errors that last make innovations small: they are no sign
-#: of a receiver that is better than it says.
+#: Rules that give gross errors zero weight keep their accuracy among them; with its scale this one
+#: cannot reject for ever. Time-correlated errors make innovations small, which does not show a
+#: receiver better than stated.
 RULE = {"kind": "adaptive", "influence": "igg3", "scale": {"lowest": 1.0}}
-#: Of fixes that do not say how well they know their places: a code receiver without corrections.
+#: Fixes without stated standard deviations: a code receiver without corrections.
 CODE_RECEIVER = GnssOptions(unstated_position_sd=5.0, unstated_velocity_sd=0.3)
-#: How far stamps of a receiver may be from the clock of the sensors, s: so much is looked for.
+#: Standard deviation of the offset between receiver stamps and sensor clock, s: search range.
 OFFSET_SD = 0.2
-#: What the motion tells of clocks is taken where it is so many standard deviations, and a delay
-#: where it is at least so long, s; an offset is left to the filter to find to this, s.
+#: Estimates of clocks from the motion are used beyond these standard deviations, and a delay
+#: beyond this time, s; the filter estimates an offset to this standard deviation, s.
 SURE, LEAST_DELAY, LEAST_OFFSET_SD = 4.0, 0.01, 0.05
-#: Stamps that are off are of another clock, and two quartz clocks run apart: by 50 ppm, which is
-#: what a walk of so many s/√s does in the 400 s in which nothing may tell their offset.
+#: Stamps with an offset come from another clock, and two quartz clocks drift apart by 50 ppm:
+#: a random walk of this many s/√s over 400 s, during which the offset may be unobservable.
 APART = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
-    """A configuration as plain data, and what it rests on.
+    """Proposed configuration as plain data, with its grounds.
 
     Attributes
     ----------
     table : dict
-        Of a run of navigation; where only the user knows, there is no key.
+        Of a navigation run; questions to the user have no key.
     recording : Recording
     imu : DataFrame
         Imu table, body axes.
     gnss : DataFrame or None
         Gnss table, on the clock of the samples.
     rest : float, s
-        How long the vehicle stands at the start, as far as it is known.
+        How long the vehicle is stationary at the start, as far as known.
     noise : tuple of float, (2,), or None
         Of the gyros in rad/s/√Hz, of the accelerometers in m/s²/√Hz, while it is quiet.
     guessed : bool
-        Whether the sensor is only the one of the catalogue that is nearest by its noise.
+        Whether the sensor is only the one of the catalogue with the nearest noise.
     drives : bool
         Whether it drives fast enough for a course, by the fixes.
     how : str
-        Why it is aligned so, in words.
+        Reason for the alignment, in words.
     findings : tuple of Finding
-        Of reading.
+        Findings of reading.
     """
 
     table: dict[str, Any]
@@ -114,23 +114,23 @@ def propose(
     heading_deg: float | None = None,
     fixes_as: GnssOptions | None = None,
 ) -> Proposal:
-    """Look through a log and the fixes beside it, and say how it can be navigated by.
+    """Propose how to navigate with a log and its fixes.
 
     Parameters
     ----------
     log : LogTable
         With a path that can be opened.
     axes : str, optional
-        How the sensor's axes lie, as `AxesTable.axes`.
+        Orientation of the sensor's axes, as `AxesTable.axes`.
     gnss : Path, optional
     sensor : str, optional
-        Of the catalogue, or a file; the nearest of the catalogue by its noise, if not given.
+        A sensor of the catalogue, or a file; the one with the nearest noise, if not given.
     site : tuple of float, optional
         Latitude and longitude in deg, height in m; that of the fixes, or of the log, if not given.
     heading_deg : float, optional
-        Of the body at the start.
+        Heading of the body at the start.
     fixes_as : GnssOptions, optional
-        How the fixes are read; as those of a code receiver, if not given.
+        How to read the fixes; as those of a code receiver, if not given.
 
     Returns
     -------
@@ -148,12 +148,12 @@ def propose(
         fixes, shifted = on_clock_of(read_gnss(gnss, fixes_as or CODE_RECEIVER), recording.imu)
         findings = (*findings, *fixes.attrs["findings"], *([shifted] if shifted else []))
     scatter = _scatter(imu)
-    # An engine shakes one axis more than another; the quietest one tells of the sensor.
+    # Engine vibration differs between axes; the quietest axis identifies the sensor.
     noise = None if scatter is None else tuple(scatter.quiet.min(axis=1).tolist())
     guessed = sensor is None
     named = sensor or (None if noise is None else _nearest(noise))
     if named is not None:
-        # Gyros that find north feel how a vehicle rocks: that is motion, and no noise of theirs.
+        # For gyrocompassing gyros the rocking of a vehicle is motion, not noise.
         shaken = {} if _finds_north(named) else _louder(scatter, named)
         table["sensors"] = {"sensor": named, **shaken}
     place = site or _place(recording.start)
@@ -186,7 +186,7 @@ class Scatter:
     quiet : ndarray, (2, 3)
         Of gyros in rad/s/√Hz and accelerometers in m/s²/√Hz, while it is quiet.
     usual : ndarray, (2, 3)
-        Half of the time, what shakes included.
+        Median, vibration included.
     """
 
     quiet: Array
@@ -205,8 +205,8 @@ def _scatter(imu: pd.DataFrame) -> Scatter | None:
         return None
     quiet, usual = np.empty((2, 2, 3))
     for k, columns in enumerate((GYRO, ACCEL)):
-        # Second differences leave out what turns and accelerates: of white noise they have six
-        # times its variance.
+        # Second differences remove rotation and acceleration: of white noise they have six times
+        # its variance.
         second = np.diff(values_of(imu, columns), n=2, axis=0)
         second = second[: (len(second) // size) * size].reshape(-1, size, 3)
         sd = np.sqrt(np.square(second).mean(axis=1) / 6.0) * math.sqrt(step)
@@ -215,7 +215,7 @@ def _scatter(imu: pd.DataFrame) -> Scatter | None:
 
 
 def _louder(scatter: Scatter | None, sensor: str | None) -> dict[str, dict[str, Any]]:
-    """Noise to state in place of a data sheet's, of triads that shake far beyond it."""
+    """Noise to state instead of the data sheet's, of triads with far larger vibration."""
     if scatter is None or sensor is None:
         return {}
     known = ImuUncertainty.of_sensor(load_sensor(sensor))
@@ -229,7 +229,7 @@ def _louder(scatter: Scatter | None, sensor: str | None) -> dict[str, dict[str, 
 
 
 def _nearest(noise: tuple[float, ...]) -> str:
-    """The sensor of the catalogue whose noise is nearest, by ratios."""
+    """Sensor of the catalogue with the nearest noise, by ratios."""
     best, least = "", math.inf
     for name in SENSORS:
         try:
@@ -256,7 +256,7 @@ def _place(start: StatedStart | None) -> tuple[float, float, float] | None:
 
 
 def _motion(imu: pd.DataFrame, fixes: pd.DataFrame | None) -> tuple[float, bool]:
-    """How long it stands at the start, and whether it then drives fast enough to see a course."""
+    """Length of the initial rest, and whether the vehicle then is fast enough for a course."""
     time = index_of(imu)
     if fixes is None:
         return float(time[-1] - time[0]), False
@@ -270,10 +270,10 @@ def _motion(imu: pd.DataFrame, fixes: pd.DataFrame | None) -> tuple[float, bool]
 
 
 def _moving(fixes: pd.DataFrame) -> tuple[int | None, float]:
-    """Where it first does not stand, and the greatest speed over ground that is sure.
+    """Begin of the first motion, and the greatest significant speed over ground.
 
-    Of places where the receiver measures no speed: the way between two of them less what their
-    errors make of it, over 1, 2, 4 … steps, since one step may be shorter than the errors.
+    Where the receiver measures no speed: the distance between two positions minus that explained
+    by their errors, over 1, 2, 4 … steps, since one step may be shorter than the errors.
     """
     measured = np.isfinite(values_of(fixes, VELOCITY_SD)).all(axis=1)
     speed = np.linalg.norm(values_of(fixes, VELOCITY_COLUMNS)[:, :2], axis=1)[measured]
@@ -293,7 +293,7 @@ def _moving(fixes: pd.DataFrame) -> tuple[int | None, float]:
         least = (np.hypot(north, east) - blur) / (time[steps:] - time[:-steps])
         fastest = max(fastest, float(least.max()))
         moving = np.flatnonzero(least > STANDS)
-        # What a shorter way has shown already, a longer one shows with some of the rest before it.
+        # Motion found over a shorter span is found by a longer one with some of the rest before it.
         if moving.size and (begins is None or moving[0] + steps <= begins):
             begins = int(moving[0])
         steps *= 2
@@ -301,7 +301,7 @@ def _moving(fixes: pd.DataFrame) -> tuple[int | None, float]:
 
 
 def _clock(fixes: pd.DataFrame, imu: pd.DataFrame, drives: bool) -> dict[str, float]:
-    """How late the receiver's velocities and stamps are, where the motion tells it."""
+    """Delays of the receiver's velocities and stamps, where the motion makes them observable."""
     late = velocity_delay(fixes)
     delay = 0.0 if late is None or late.delay < SURE * late.sd else late.delay
     found = time_offset(fixes, imu, delay)
@@ -318,7 +318,7 @@ def _clock(fixes: pd.DataFrame, imu: pd.DataFrame, drives: bool) -> dict[str, fl
 def _alignment(
     sensor: str | None, rest: float, drives: bool, heading_deg: float | None
 ) -> tuple[dict[str, Any], str]:
-    """Coarse and fine alignment that such a record allows, and why."""
+    """Coarse and fine alignment for such a record, and why."""
     if heading_deg is not None:
         coarse = {"kind": "known_heading", "heading_deg": heading_deg, "sd_deg": 2.0}
         length = min(max(rest, 1.0), 10.0)
@@ -356,7 +356,7 @@ def _alignment(
 
 
 def _tilt(sensor: str | None) -> float:
-    """A tilt that a course can find, deg: accelerometers leave one of their bias over g."""
+    """Tilt for an alignment by course, deg: accelerometer bias over g."""
     if sensor is None:
         return WELL
     bias = max(ImuUncertainty.of_sensor(load_sensor(sensor)).accel.axis("bias"))

@@ -1,4 +1,4 @@
-"""Whether a record and what aids it can be navigated by: told, or refused, before anything runs."""
+"""Check before a run whether a record and its measurements allow navigation."""
 
 from __future__ import annotations
 
@@ -27,28 +27,28 @@ from strapdown.tables.checks import index_of, source_of, values_of
 __all__ = ["channel_findings", "look_through", "saturated_findings"]
 
 
-#: A height that nothing aids multiplies its error by e over so long, s: sqrt(R / 2 g).
+#: Time in which the error of an unaided height grows by the factor e, s: sqrt(R / 2 g).
 VERTICAL = 570.0
-#: From here on that is told, s.
+#: Duration from which this is reported, s.
 LONG = 1800.0
-#: The first fix may be so far from a place that is stated: standard deviations, m, and m/s since.
+#: Tolerance of the first fix from a stated position: standard deviations, m, and m/s since.
 FAR_SD, FAR, FAST = 10.0, 1000.0, 340.0
-#: Aids that hold the height.
+#: Measurements that bound the height error.
 HOLDS_HEIGHT = ("gnss", "barometer", "no_slip", "body_velocity")
 
 
 def look_through(
     spec: NavigationSpec, imu: pd.DataFrame, tables: Mapping[str, pd.DataFrame]
 ) -> tuple[Finding, ...]:
-    """Look at what aids measured beside the record that they are to aid.
+    """Check measurements against the record.
 
     Parameters
     ----------
     spec : NavigationSpec
     imu : DataFrame
-        Imu table of the span that is used.
+        Imu table of the used span.
     tables : mapping of str to DataFrame
-        By name of the aid, on the clock of the samples.
+        By name of the measurement, on the clock of the samples.
 
     Returns
     -------
@@ -57,8 +57,8 @@ def look_through(
     Raises
     ------
     DataError
-        An aid is of another time than the record, or has nothing that can be used; the message
-        names file, row and remedy.
+        A measurement has no overlap in time with the record, or no usable row; the message names
+        file, row and remedy.
     """
     found: list[Finding] = []
     for aid in make_aids(spec):
@@ -89,7 +89,7 @@ def _refuse_apart(table: pd.DataFrame, imu: pd.DataFrame) -> None:
 
 
 def _refuse_far(spec: NavigationSpec, table: pd.DataFrame, imu: pd.DataFrame, aid: Gnss) -> None:
-    """A first fix that is nowhere near the place that is stated."""
+    """Refuse a first fix far from the stated position."""
     name, stated = ("start", spec.start) if spec.start is not None else ("site", spec.site)
     if stated is None or not aid.use_position:
         return
@@ -129,7 +129,7 @@ def _apart(one: np.ndarray, other: np.ndarray) -> float:
 
 
 def _height(spec: NavigationSpec, imu: pd.DataFrame) -> tuple[Finding, ...]:
-    """What becomes of a height that nothing holds."""
+    """Warn of the growing error of an unaided height."""
     if getattr(spec.mechanization, "height", "free") != "free":
         return ()
     length = float(imu.index[-1] - imu.index[0])
@@ -160,47 +160,46 @@ def _height(spec: NavigationSpec, imu: pd.DataFrame) -> tuple[Finding, ...]:
     )
 
 
-# Channels of a record that do not read what a body does: told, or refused, before it is used.
+# Channels that do not read the motion of the body: reported or refused before use.
 
 
-#: Faults after which a channel tells nothing, and the share of a record that may be without it.
+#: Faults that make a channel unusable, and their largest share of a record.
 SILENT, MOST = ("missing", "stuck", "saturated"), 0.5
-#: Turns that are cut off so often are lost: a linear filter does not know what it has missed.
+#: Largest share of saturated samples: a linear filter does not know the lost rotation.
 MOST_SATURATED = 0.15
-#: Of the largest reading of a saturated stretch, what is at the end of the range, too.
+#: Share of the largest reading of a saturated stretch that counts as saturated, too.
 AT_END = 0.999
-#: So many times as noisy as the data sheet are gyros in deg/s that are taken for rad/s, roughly.
+#: Approximate noise ratio to the data sheet of gyros in deg/s that are read as rad/s.
 DEGREES = (57.3 / 2.0, 57.3 * 2.0)
-#: A usual reading so near to gravity in another unit is that.
+#: Relative distance of the usual reading from gravity in another unit.
 NEAR = 0.05
-#: The first second is held beside a start that is stated; it may be so far off, deg.
+#: Length of the first interval compared with a stated start, s, and its tolerance, deg.
 FIRST, CHANNELS_FAR = 1.0, 60.0
 
 
 def channel_findings(
     imu: pd.DataFrame, sensors: ImuUncertainty, start: StartTable | None
 ) -> tuple[Finding, ...]:
-    """Look at the channels of a record.
+    """Check the channels of a record.
 
     Parameters
     ----------
     imu : DataFrame
-        Imu table as it was recorded, body axes.
+        Recorded Imu table, body axes.
     sensors : ImuUncertainty
     start : StartTable or None
-        A state that is known at its first sample.
+        Known state at its first sample.
 
     Returns
     -------
     tuple of Finding
-        Of each channel and kind of fault the longest stretch.
+        The longest stretch of each channel and kind of fault.
 
     Raises
     ------
     DataError
-        A channel reads nothing over half of the record, or is at the end of its range over 15 %
-        of it, gyros are in degrees, accelerometers in another unit, or gravity is not where the
-        stated attitude has it.
+        A channel is silent over half of the record or saturated over 15 %, gyros are in degrees,
+        accelerometers in another unit, or gravity contradicts the stated attitude.
     """
     _refuse_unit(imu)
     _refuse_gravity(imu, start)
@@ -211,7 +210,7 @@ def channel_findings(
 
 
 def _told(imu: pd.DataFrame, faults: Sequence[ChannelFault]) -> tuple[Finding, ...]:
-    """Of each channel and kind of fault the longest stretch."""
+    """The longest stretch of each channel and kind of fault."""
     worst: dict[tuple[str, str], ChannelFault] = {}
     lost: dict[tuple[str, str], int] = {}
     for fault in faults:
@@ -234,7 +233,7 @@ def _told(imu: pd.DataFrame, faults: Sequence[ChannelFault]) -> tuple[Finding, .
 
 
 def saturated_findings(imu: pd.DataFrame, sensors: ImuUncertainty) -> tuple[Finding, ...]:
-    """Return what is at the end of its range: of each channel the longest stretch.
+    """Find saturation: the longest stretch of each channel.
 
     Parameters
     ----------
@@ -249,7 +248,7 @@ def saturated_findings(imu: pd.DataFrame, sensors: ImuUncertainty) -> tuple[Find
     Raises
     ------
     DataError
-        A channel is there over 15 % of the record.
+        A channel is saturated over 15 % of the record.
     """
     if len(imu) < LEAST_SAMPLES:
         return ()
@@ -258,7 +257,7 @@ def saturated_findings(imu: pd.DataFrame, sensors: ImuUncertainty) -> tuple[Find
 
 
 def _without(imu: pd.DataFrame, fault: ChannelFault) -> int:
-    """Samples that tell nothing: of a stretch that is saturated now and then, those at the end."""
+    """Unusable samples; of an intermittently saturated stretch, the saturated ones."""
     if fault.kind != "saturated":
         return fault.last - fault.first + 1
     values = imu[fault.channel].to_numpy(dtype=np.float64)[fault.first : fault.last + 1]
@@ -278,14 +277,14 @@ def _counted(finding: Finding, lost: int, samples: int) -> Finding:
 
 
 def _refuse_degrees(imu: pd.DataFrame, sensors: ImuUncertainty) -> None:
-    """Gyros whose every axis is noisy by as much as deg/s are by rad/s."""
+    """Refuse gyros whose noise on every axis fits deg/s read as rad/s."""
     step = float(np.median(np.diff(index_of(imu))))
     density = np.asarray(sensors.gyro.axis("noise_density"))
     if not density.all():
         return
     second = np.diff(values_of(imu, GYRO), n=2, axis=0)
     times = np.sqrt(np.median(np.square(second), axis=0) / MEDIAN / 6.0 * step) / density
-    # A rate that turns a body around within a second is none of a vehicle.
+    # A vehicle does not turn around within a second.
     wild = float(np.quantile(np.abs(values_of(imu, GYRO)), 0.99)) > WILD
     if wild and ((times > DEGREES[0]) & (times < DEGREES[1])).all():
         raise DataError(
@@ -302,7 +301,7 @@ MEDIAN, WILD = 0.4549364, 6.0
 
 
 def _refuse_unit(imu: pd.DataFrame) -> None:
-    """Accelerometers whose usual reading is gravity in another unit."""
+    """Refuse accelerometers whose usual reading is gravity in another unit."""
     time, force = index_of(imu), values_of(imu, ACCEL)
     starts = np.unique(np.searchsorted(time, np.arange(time[0], time[-1], FIRST)))
     count = np.diff(np.append(starts, len(time)))[:, None]
@@ -321,7 +320,7 @@ def _refuse_unit(imu: pd.DataFrame) -> None:
 
 
 def _refuse_gravity(imu: pd.DataFrame, start: StartTable | None) -> None:
-    """The specific force of the first second, beside what a stated attitude makes of gravity."""
+    """Compare the specific force of the first second with gravity by a stated attitude."""
     if start is None:
         return
     time = index_of(imu)

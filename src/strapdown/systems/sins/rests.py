@@ -1,4 +1,4 @@
-"""When a vehicle stood, by the detectors of its aids and not by what was computed."""
+"""Stationary intervals of a vehicle, by the detectors of its measurements."""
 
 from __future__ import annotations
 
@@ -20,34 +20,34 @@ __all__ = ["SHORTEST", "seen_rests"]
 
 Array = NDArray[np.float64]
 
-#: A rest that is long enough to tell north, and the longest that is taken at once, s.
+#: Least length of a rest for gyrocompassing, and the longest used at once, s.
 SHORTEST, LONGEST = 60.0, 300.0
-#: Epochs of a rest are no farther apart, s.
+#: Longest interval between epochs of a rest, s.
 APART = 2.5
-#: A vehicle still brakes, or starts softly, so long within what a detector takes for a rest, s.
+#: Braking and soft starts within a detected rest, at either end, s.
 SOFT = 5.0
-#: What is computed to be faster glides, m/s. A run whose gyros changed may well be off by less, and
-#: then takes no zero velocity any more: its rests must be seen all the same.
+#: Computed speed that excludes a rest, m/s. A run whose gyros changed may have smaller errors
+#: and reject zero-velocity updates, and its rests must still be found.
 GLIDES = 5.0
 
 
 def seen_rests(
     chain: NavigationPipeline, imu: pd.DataFrame, record: NavigationRecord
 ) -> list[tuple[float, float]]:
-    """Return begins and ends of the rests of a run, in parts that are not too long, s.
+    """Return begins and ends of the rests of a run, split where too long, s.
 
     Parameters
     ----------
-    chain : Chain
+    chain : NavigationPipeline
     imu : DataFrame
-        Its samples.
+        Samples of the run.
     record : NavigationRecord
-        What came of it.
+        Result of the run.
 
     Returns
     -------
     list of (float, float)
-        None where no aid looks for a rest.
+        Empty if no measurement detects rests.
     """
     aids = [aid for aid in chain.navigator.aids if isinstance(aid, StandstillAid)]
     if not aids:

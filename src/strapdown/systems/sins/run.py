@@ -1,4 +1,4 @@
-"""A run of navigation, from its specification to everything that a report tells."""
+"""Navigation run from its specification to all results of a report."""
 
 from __future__ import annotations
 
@@ -59,16 +59,16 @@ from strapdown.systems.sins.withholding import Withheld, score_withholding
 __all__ = ["Drive", "NavigationResult", "make_chain", "run_navigation"]
 
 
-#: Runs a chain over samples and tables: with a recorder, and what is told of progress.
+#: Runs a pipeline over samples and tables, with a recorder and a progress callback.
 Drive = Callable[..., PipelineRun]
 
-#: Shares of a whole run at which its chain begins and ends.
+#: Shares of a whole run at which its pipeline begins and ends.
 BEGUN, ENDED = 0.15, 0.8
-#: Of the record that is taken at a time, s: so often progress is told.
+#: Length of a chunk of the record, and interval of progress reports, s.
 CHUNK = 20.0
 _AT_ONCE = partial(run_batch, chunk=CHUNK)
-#: Of a trajectory at least so much apart are the rows that are compared with the truth, s: errors
-#: change no faster than what the truth is worth.
+#: Least interval between the trajectory rows compared with the truth, s: errors change slowly
+#: relative to the accuracy of the truth.
 APART = 0.1
 
 
@@ -79,19 +79,19 @@ def run_navigation(
     progress: Progress = silent,
     drive: Drive = _AT_ONCE,
 ) -> NavigationResult:
-    """Read a record and its aids, align, and navigate.
+    """Read a record and its measurements, align, and navigate.
 
     Parameters
     ----------
     spec : NavigationSpec
         With absolute paths.
     file : Path, optional
-        Where it was read from: an input, too.
+        Configuration file, listed as an input.
     progress : callable, optional
         Called with a stage and the share that is done.
     drive : callable, optional
-        What runs the chain, called as `run_batch`: at a pace, or with what came already. The
-        numbers must be those of a run at once.
+        Runs the pipeline, called as `run_batch`: paced, or with earlier results. The numbers must
+        equal those of `run_batch`.
 
     Returns
     -------
@@ -100,12 +100,12 @@ def run_navigation(
     Raises
     ------
     ConfigError
-        A file is not there, or an option cannot be.
+        A file does not exist, or an option is invalid.
     DataError
-        A record cannot be read, or it cannot be navigated by; the message names file, row,
+        A record cannot be read or is not sufficient for navigation; the message names file, row,
         quantity and remedy.
     DivergenceError
-        The state left what the mechanization can do.
+        The state left the range of the mechanization.
     """
     progress("reading", 0.02)
     source = read_navigation_source(spec)
@@ -114,8 +114,7 @@ def run_navigation(
     tables = (source.imu, *source.tables.values())
     with said_of_file(*tables):
         looked = look_through(spec, source.imu, source.tables)
-        # What is simulated has the errors that it was told to have; but how it moves may be more
-        # than its sensors read.
+        # Simulated errors are as specified; but the motion may exceed the range of the sensors.
         if spec.log is None:
             channels = saturated_findings(source.imu, sensors)
         else:
@@ -201,44 +200,43 @@ def _against_truth(
 
 
 def _rows_compared(time: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Rows at a steady distance, from the last one back."""
+    """Rows at a constant interval, from the last one back."""
     step = float(np.median(np.diff(time))) if len(time) > 1 else APART
     each = max(1, round(APART / step)) if step > 0.0 else 1
     return np.arange(len(time) - 1, -1, -each)[::-1]
 
 
-# Everything that came of a run of navigation.
+# Result of a navigation run.
 
 
 @dataclass(frozen=True, eq=False)
 class NavigationResult:
-    """Everything that came of a run of navigation.
+    """Result of a navigation run.
 
     Attributes
     ----------
     spec : NavigationSpec
-        Resolved: every option of every module.
+        With every option of every module.
     source : NavigationSource
     ellipsoid : Ellipsoid
     sensors : ImuUncertainty
     coarse : Alignment or None
     fine : FineResult or None
     record : NavigationRecord
-        Smoothed, where the run was to be.
+        Smoothed, if specified.
     forward : NavigationRecord or None
-        What the filter alone said, of a run that was smoothed.
+        Filter solution of a smoothed run.
     differences : DataFrame or None
         From the truth, where it is known (`trajectory_differences`), ten times a second at most.
     errors : DifferenceSummary or None
         Of these.
     forward_differences : DataFrame or None
-        Of what the filter alone said, of a run that was smoothed.
+        Of the filter solution of a smoothed run.
     points : ControlPointScore or None
         The path at its control points.
     withheld : tuple of Withheld
-        Stretches over which fixes were kept back, and how far it then was from them.
-    trust : Trust
-        How far it can be trusted.
+        Test outages and their errors.
+    trust : IntegrityReport
     inputs : tuple of InputFiles
     findings : tuple of Finding
     """
@@ -262,38 +260,38 @@ class NavigationResult:
 
     @property
     def filtered(self) -> NavigationRecord:
-        """What the filter alone said: what was known at each instant then."""
+        """Filter solution: the estimate at each instant without later measurements."""
         return self.forward or self.record
 
     @property
     def filtered_differences(self) -> pd.DataFrame | None:
-        """From the truth, of what the filter alone said."""
+        """Differences of the filter solution from the truth."""
         return self.differences if self.forward is None else self.forward_differences
 
 
-# A chain made of its configuration.
+# The pipeline of a configuration.
 
 
 Three = tuple[float, float, float]
 
 
 def make_chain(spec: NavigationSpec, sensors: ImuUncertainty) -> NavigationPipeline:
-    """Make the chain of a specification.
+    """Build the pipeline of a specification.
 
     Parameters
     ----------
     spec : NavigationSpec
-        Samples and tables are given to the chain in body axes and on one clock.
+        Its pipeline takes samples and tables in body axes and on one clock.
     sensors : ImuUncertainty
 
     Returns
     -------
-    Chain
+    NavigationPipeline
 
     Raises
     ------
     ConfigError
-        A module refuses an option, or its parts do not go together.
+        A module refuses an option, or parts are incompatible.
     """
     given = given_of(spec)
     aids = make_aids(spec)

@@ -1,4 +1,4 @@
-"""What a run of navigation takes: samples in body axes, a table for each aid, and what is known."""
+"""Input of a navigation run: body-axis samples, measurement tables and reference."""
 
 from __future__ import annotations
 
@@ -72,13 +72,13 @@ __all__ = [
 ]
 
 
-#: Stream of the fixes below the seed of a simulation; those of the sensors are counted from zero.
+#: Random stream of the fixes under a simulation's seed; those of the sensors count from zero.
 _FIXES = 1000
 
 
 @dataclass(frozen=True, eq=False)
 class NavigationSource:
-    """A record to navigate by.
+    """Input of a navigation run.
 
     Attributes
     ----------
@@ -86,15 +86,15 @@ class NavigationSource:
     imu : DataFrame
         Imu table, body axes, of the span that is used.
     tables : mapping of str to DataFrame
-        By name of the aid, what it measured.
+        By name of the measurement.
     truth : DataFrame or None
-        Trajectory table: of the simulation, or the reference that is given.
+        Trajectory table: of the simulation, or the given reference.
     truth_name : str
-        In words, as they stand after "error against".
+        In words, to follow "error against".
     points : DataFrame or None
         Control points (`read_control_points`), on the clock of the samples.
     start : StatedStart or None
-        What the file says of its place and attitude.
+        Position and attitude stated in the file.
     readings : tuple of Reading
     inputs : tuple of InputFiles
     findings : tuple of Finding
@@ -114,7 +114,7 @@ class NavigationSource:
 
 
 def read_navigation_source(spec: NavigationSpec) -> NavigationSource:
-    """Read the log, the aids and the reference of a specification, or simulate them.
+    """Read the log, the measurements and the reference of a specification, or simulate them.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def read_navigation_source(spec: NavigationSpec) -> NavigationSource:
     Raises
     ------
     DataError, ConfigError
-        One cannot be used; the message names file, row and remedy.
+        An input cannot be used; the message names file, row and remedy.
     """
     tables: dict[str, pd.DataFrame] = {}
     inputs: list[InputFiles] = []
@@ -225,11 +225,11 @@ def _simulated(
     )
 
 
-# The file of an aid, as the table that it takes.
+# The file of a measurement, as its table.
 
 
-#: Units of the columns of aids, as `read_aid_table` has them; of a column that is not here, and of
-#: which its aid says nothing, the number is taken as it stands.
+#: Units of the columns of measurements, as in `read_aid_table`; columns without an entry here or
+#: in the measurement keep their unit.
 COLUMN_UNITS = {
     "speed": "m/s",
     "height": "m",
@@ -241,7 +241,7 @@ COLUMN_UNITS = {
 
 
 def read_aid(given: AidSpec) -> pd.DataFrame:
-    """Read what an aid measured.
+    """Read the table of a measurement.
 
     Parameters
     ----------
@@ -251,12 +251,12 @@ def read_aid(given: AidSpec) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        By time as it stands in the file; ``attrs`` say its clock, ``source`` and ``findings``.
+        By the time in the file; ``attrs`` hold its clock, ``source`` and ``findings``.
 
     Raises
     ------
     DataError, ConfigError
-        It cannot be used; the message names file, row and remedy.
+        The file cannot be used; the message names file, row and remedy.
     """
     assert given.path is not None  # checked with the specification
     entry = SLOTS["aiding"].entries[given.kind]
@@ -276,27 +276,27 @@ def read_aid(given: AidSpec) -> pd.DataFrame:
     return read_aid_table(given.path, units, names=given.columns, repair=given.repair)
 
 
-# Where a body is while it is aligned: the site that is stated, or the fixes of a receiver.
+# Position during an alignment: the stated site, or the fixes of a receiver.
 
 
 Array = NDArray[np.float64]
 
-# A vehicle changes its velocity by so much, m/s², as one standard deviation.
+# Standard deviation of a vehicle's acceleration, m/s².
 MANOEUVRE = 1.0
-# Fixes among which one stands out, of how long, s, and how few tell it.
+# Fixes considered for outliers: most, longest time, s, and fewest.
 LOOKED_AT, LOOKED_BACK, LEAST_LOOKED_AT = 9, 10.0, 4
-# It stands out by so many standard deviations.
+# Standard deviations that make a fix an outlier.
 CLEAR = 5.0
 
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """Place and velocity of the sensors at an instant.
+    """Position and velocity of the sensors at an instant.
 
     Attributes
     ----------
     state : NavState
-        Its attitude is the one that was given.
+        With the given attitude.
     covariance : ndarray, (6, 6)
         Displacement and velocity, north-east-down.
     """
@@ -308,7 +308,7 @@ class Place:
 def fixes_until(
     tables: Sequence[pd.DataFrame], time: float, offset: float = 0.0
 ) -> pd.DataFrame | None:
-    """Return the fixes up to an instant as one table.
+    """Concatenate the fixes up to an instant.
 
     Parameters
     ----------
@@ -316,12 +316,12 @@ def fixes_until(
         Gnss tables, one after the other.
     time : float, s
     offset : float, s
-        Stamps less the time of the inertial sensors.
+        Stamps minus the time of the inertial sensors.
 
     Returns
     -------
     DataFrame or None
-        By the time of the inertial sensors; None where there is none.
+        By the time of the inertial sensors; None without fixes.
     """
     if not tables:
         return None
@@ -339,26 +339,26 @@ def fixes_until(
 def site_of_fixes(
     fixes: pd.DataFrame | None, begin: float, time: float, ellipsoid: Ellipsoid
 ) -> tuple[Site, Array]:
-    """Return where a body stands, by the median of its fixes.
+    """Return the position of a stationary body, by the median of its fixes.
 
     Parameters
     ----------
     fixes : DataFrame or None
-        Until `time`.
+        Fixes until `time`.
     begin, time : float, s
-        Of the rest. Without a fix in it the newest one before is taken.
+        Of the rest. If it holds no fix, the newest one before is taken.
     ellipsoid : Ellipsoid
 
     Returns
     -------
     site : Site
     sd : ndarray, (3,), m
-        The least that a fix states: what stays the same from fix to fix is not averaged away.
+        The smallest stated by a fix: correlated errors do not average out.
 
     Raises
     ------
     DataError
-        There is no fix with a place.
+        No fix has a position.
     """
     place, sd, stamps = _good(fixes, POSITION_SD, time)
     first = min(int(np.searchsorted(stamps, begin)), len(stamps) - 1)
@@ -375,31 +375,31 @@ def here_by_fix(
     velocity: Array,
     velocity_covariance: Array,
 ) -> Place:
-    """Return where a vehicle is, by its newest fix that agrees with those before.
+    """Return the position of a vehicle, by its newest fix that agrees with those before.
 
     Parameters
     ----------
     fixes : DataFrame or None
-        Until `time`.
+        Fixes until `time`.
     time : float, s
     q_nb : ndarray, (4,)
     lever_arm : ndarray, (3,), m
-        Of the antenna, body axes.
+        Lever arm of the antenna, body axes.
     ellipsoid : Ellipsoid
     velocity : ndarray, (3,), m/s
-        Of the sensors at `time`, north, east, down.
+        Velocity of the sensors at `time`, north, east, down.
     velocity_covariance : ndarray, (3, 3), (m/s)²
 
     Returns
     -------
     Place
-        Carried from the fix by the velocity; an acceleration of 1 m/s² is taken as unknown. By
-        which a wrong instant of the fix moves it is left to `by_antenna.errors_by_antenna`.
+        Propagated from the fix by the velocity; the acceleration is unknown, 1 m/s². The effect of
+        a wrong stamp of the fix is left to `by_antenna.errors_by_antenna`.
 
     Raises
     ------
     DataError
-        There is no fix with a place.
+        No fix has a position.
     """
     place, sd, stamps = _good(fixes, POSITION_SD, time)
     assert fixes is not None
@@ -419,10 +419,10 @@ def here_by_fix(
 def _newest_that_agrees(
     fixes: pd.DataFrame, place: Array, sd: Array, stamps: Array, ellipsoid: Ellipsoid
 ) -> int:
-    """The newest place that is where the places before it, carried by velocities, say.
+    """Newest position that agrees with the positions before it, propagated by velocities.
 
-    Places are carried by velocities of which each is the middle one of three; where they should
-    be is the middle of what the newest ones say.
+    Each velocity is the median of three; the expected position is the median of the predictions
+    by the newest fixes.
     """
     rows = np.flatnonzero(stamps >= stamps[-1] - LOOKED_BACK)[-LOOKED_AT:]
     told = np.isfinite(values_of(fixes, VELOCITY_SD)).all(axis=1)
@@ -445,7 +445,7 @@ def _newest_that_agrees(
 def _good(
     fixes: pd.DataFrame | None, columns: Sequence[str], time: float
 ) -> tuple[Array, Array, Array]:
-    """Places, standard deviations and stamps of the fixes that have them."""
+    """Positions, standard deviations and stamps of the fixes that have them."""
     if fixes is not None:
         sd = values_of(fixes, columns)
         good = np.isfinite(sd).all(axis=1) & (values_of(fixes, ["quality"])[:, 0] > 0.0)
@@ -459,31 +459,31 @@ def _good(
     )
 
 
-# Fixes of a receiver that is simulated, with the outages and outliers that it is told to have.
+# Fixes of a simulated receiver, with specified outages and outliers.
 
 
-# Streams below the seed; those of the receiver itself are counted from zero.
+# Random streams under the seed; those of the receiver itself count from zero.
 _STRUCK, _WAY = 100, 101
 
 
 def simulated_fixes(
     motion: EarthMotion, asked: ReceiverTable, seed: np.random.SeedSequence, name: str
 ) -> pd.DataFrame:
-    """Simulate a receiver over a motion.
+    """Simulate a receiver along a motion.
 
     Parameters
     ----------
     motion : EarthMotion
     asked : ReceiverTable
     seed : SeedSequence
-        Of everything that is random.
+        Seed of all random numbers.
     name : str
-        Of the aid, for messages.
+        Name of the measurement, for messages.
 
     Returns
     -------
     DataFrame
-        Gnss table: without the fixes of the outages; outliers claim the precision of the others.
+        Gnss table without the fixes of outages; outliers state the precision of the others.
     """
     receiver = GnssReceiver(
         rate=asked.rate_hz,
@@ -521,19 +521,19 @@ def _uniform(seed: np.random.SeedSequence, count: int) -> Array:
     return np.random.Generator(np.random.PCG64(seed)).random(count)
 
 
-# What is said of a row of a table, said of the row of the file that it was read from.
+# Findings with table rows converted to file rows.
 
 
 def in_file(findings: Iterable[Finding], *tables: pd.DataFrame) -> tuple[Finding, ...]:
-    """Count rows as their file does.
+    """Convert rows of findings from table to file.
 
     Parameters
     ----------
     findings : iterable of Finding
         Their rows count from 1 in a table.
     *tables : DataFrame
-        Tables whose ``attrs`` may have a ``first_row``: the row of the file in which their first
-        one stands, or None where rows between were left out.
+        Tables whose ``attrs`` may hold ``first_row``: the file row of their first row, or None
+        where rows between were omitted.
 
     Returns
     -------
@@ -555,7 +555,7 @@ def _moved(row: int, first: int | None) -> int | None:
 
 @contextmanager
 def said_of_file(*tables: pd.DataFrame) -> Iterator[None]:
-    """Errors that are raised within name rows of the file, and the first table's file at least."""
+    """Errors raised within name file rows, and at least the first table's file."""
     try:
         yield
     except DivergenceError as error:

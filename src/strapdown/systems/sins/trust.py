@@ -1,4 +1,4 @@
-"""How far a run of navigation can be trusted: its heading, its innovations, and the first doubt."""
+"""Integrity of a navigation run: heading, innovations, and the first inconsistency."""
 
 from __future__ import annotations
 
@@ -64,29 +64,29 @@ __all__ = ["Advice", "IntegrityReport", "Repeated", "repeat_without", "trust_of"
 
 Array = NDArray[np.float64]
 
-#: Spans that advice is given for, and how long one must be for it, s.
+#: Most spans with advice, and their least length, s.
 MOST_ADVISED, LEAST_ADVISED = 4, 5.0
-#: A heading that is known no better is not known, deg.
+#: Standard deviation beyond which a heading counts as unknown, deg.
 NO_NORTH = 45.0
-#: Between states from which a witness can begin, s.
+#: Interval between states from which a check can begin, s.
 LONGEST_STEP = 0.25
 NO_FIXES = "navigation.no-receiver-fixes"
 
 
 @dataclass(frozen=True)
 class Advice:
-    """What would have helped at an instant at which the heading was not to be trusted.
+    """Maneuvers that would have improved an untrusted heading.
 
     Attributes
     ----------
     span : LightSpan
     time : float, s
-        Its last second.
+        Last second of the span.
     sd : float, deg
-        Of the heading then, without what was assumed of it.
+        Standard deviation of the heading then, without assumptions about it.
     options : tuple of (Manoeuvre, float)
-        Each with the standard deviation after it, deg; the best first. Empty where no fixes of a
-        receiver could observe one.
+        Each with the standard deviation after it, deg; the best first. Empty without fixes of a
+        receiver to observe one.
     """
 
     span: LightSpan
@@ -97,21 +97,21 @@ class Advice:
 
 @dataclass(frozen=True, eq=False)
 class IntegrityReport:
-    """How far a run can be trusted.
+    """Integrity of a run.
 
     Attributes
     ----------
     light : HeadingIntegrity
     unwitnessed : tuple of Finding
-        Why nothing could tell a heading by itself; empty where something could.
+        Why no independent heading check was possible; empty where one was.
     north_sd : float, deg
-        To how much these gyros find north at rest, one standard deviation.
+        Standard deviation of north found by these gyros at rest.
     advice : tuple of Advice
-        Of the longest spans that are not green.
+        For the longest spans that are not green.
     consistency : mapping of str to ObservationConsistency
         By name of the observation.
     inconsistencies : tuple of Inconsistency
-        The first in time first.
+        In order of time.
     repeated : Repeated or None
         The run without the first of them.
     """
@@ -126,12 +126,12 @@ class IntegrityReport:
 
     @property
     def first(self) -> Inconsistency | None:
-        """The first that is not as expected."""
+        """The first inconsistency."""
         return self.inconsistencies[0] if self.inconsistencies else None
 
     @property
     def against_bounds(self) -> Inconsistency | None:
-        """The first but for gross errors: these alone are none of the filter's."""
+        """The first inconsistency other than gross errors, which do not question the filter."""
         return next((one for one in self.inconsistencies if one.kind != "gross"), None)
 
 
@@ -145,27 +145,27 @@ def trust_of(
     aligned: Sequence[Aligned],
     progress: Progress,
 ) -> IntegrityReport:
-    """Judge a run.
+    """Assess the integrity of a run.
 
     Parameters
     ----------
     spec : NavigationSpec
-    chain : Chain
-        That was run.
+    chain : NavigationPipeline
+        Pipeline of the run.
     sensors : ImuUncertainty
     imu : DataFrame
     tables : mapping of str to DataFrame
-        By name of the aid.
+        By name of the measurement.
     record : NavigationRecord
-        What came of it.
+        Result of the run.
     aligned : sequence of Aligned
         Its alignments.
     progress : callable
-        Told a stage, and the share of it that is done.
+        Called with a stage and the share of it that is done.
 
     Returns
     -------
-    Trust
+    IntegrityReport
     """
     asked = spec.trust
     progress("judging the heading", 0.0)
@@ -179,7 +179,7 @@ def trust_of(
         if made is not None:
             evidence = hear_witnesses(made, record, asked.heading_limit_deg / 3.0)
     except StrapdownError as error:
-        # Where a second reckoning is not possible, the first one stands without it.
+        # Where an independent solution is not possible, the run is reported without it.
         made, evidence = None, []
         why = Finding("navigation.no-second-solution", severity="note", reason=error.finding)
     carried, no_north = _carried(spec, chain, sensors, imu, record, aligned)
@@ -225,7 +225,7 @@ def _carried(
     record: NavigationRecord,
     aligned: Sequence[Aligned],
 ) -> tuple[list[CarriedHeading], tuple[Finding, ...]]:
-    """What rests tell of the headings after them, or why they tell nothing."""
+    """Headings carried from rests, or why there are none."""
     ellipsoid = find_ellipsoid(spec.ellipsoid)
     north = _north_sd(spec, sensors, record)
     if not SURE * north <= spec.trust.heading_limit_deg:
@@ -251,7 +251,7 @@ def _north_sd(spec: NavigationSpec, sensors: ImuUncertainty, record: NavigationR
 
 
 def _unable(chain: NavigationPipeline, record: NavigationRecord) -> Finding | None:
-    """Why witnesses by fixes cannot be begun from a record."""
+    """Why a record does not allow heading checks by fixes."""
     if not any(type(aid) is Gnss for aid in chain.navigator.aids):
         return Finding(NO_FIXES, severity="note")
     time = record.trajectory.index.to_numpy(dtype=np.float64)
@@ -266,7 +266,7 @@ def _advice(
     made: Witnesses | None,
     record: NavigationRecord,
 ) -> tuple[Advice, ...]:
-    """What would help, for the longest spans that are not green."""
+    """Advice for the longest spans that are not green."""
     spans = [s for s in light.spans if s.colour != "green" and s.end - s.begin >= LEAST_ADVISED]
     longest = sorted(spans, key=lambda s: s.begin - s.end)[:MOST_ADVISED]
     out = []
@@ -274,7 +274,7 @@ def _advice(
         if made is None:
             out.append(Advice(span, span.end - 1.0, math.nan, ()))
             continue
-        # The newest instant at which one was heard: none is at the very end of a run.
+        # The newest instant with a check: there is none at the very end of a run.
         times = [e.time[(e.time >= span.begin) & (e.time < span.end)] for e in evidence]
         heard = np.concatenate([*times, []])
         if heard.size:
@@ -298,7 +298,7 @@ def _advised(
     names = list(filter_.model.layout.labels())[9:]
     sd = record.sensors_sd[names].iloc[mark].to_numpy(dtype=np.float64)
     P = np.diag(np.concatenate([np.zeros(9), np.square(sd)]))
-    # By the factor that its innovations scatter more than it expected.
+    # By the factor by which its innovations exceed their expected scatter.
     P[:9, :9] = best.covariance[at] * best.scale[at] ** 2
     aid = made.navigator.aids[0]
     assert isinstance(aid, Gnss)
@@ -332,34 +332,34 @@ def _state(record: NavigationRecord, time: float) -> NavState:
     )
 
 
-# A run of navigation again, without what in it was not as expected.
+# Re-run of the navigation without the inconsistent measurements.
 
 
-#: Rows a second at which the two runs are held beside each other.
+#: Rate at which the two runs are compared, Hz.
 RATE = 1.0
-#: Epochs are of rows within this, s.
+#: Tolerance between the stamps of epochs and rows, s.
 SAME = 1e-3
-#: What a receiver tells, in words.
+#: Measured quantities of a receiver, in words.
 PARTS = {"position": "places", "velocity": "velocities"}
-#: Where less than this share of its fixes would be left to a run that has no others, they are
-#: believed less instead.
+#: Where less than this share of the fixes would remain in a run without others, their standard
+#: deviations are increased instead.
 LEAST_LEFT = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class Repeated:
-    """A run without what was not as expected, beside the run itself.
+    """Re-run excluding an inconsistency, compared with the run itself.
 
     Attributes
     ----------
     without : str
-        What was changed, in words.
+        The change, in words.
     record : NavigationRecord or None
         None where it could not be run.
     differences : DataFrame or None
-        Run less repeated run (`trajectory_differences`), once a second.
+        Run minus re-run (`trajectory_differences`), once a second.
     left : tuple of Inconsistency
-        What is not consistent in the repeated run.
+        Inconsistencies of the re-run.
     failed : Finding or None
         Why it could not be run; None where it could.
     """
@@ -380,21 +380,21 @@ def repeat_without(
     ellipsoid: Ellipsoid,
     progress: Progress,
 ) -> Repeated:
-    """Run a chain again, without the measurement, epochs or stretch that were not as expected.
+    """Re-run a pipeline excluding an inconsistent measurement, its epochs or a stretch of it.
 
-    Gross errors are left out epoch by epoch, a change over its stretch. What holds throughout
-    is left out altogether, if another observation of places or velocities is left; else it is
-    believed less, by the factor that would make it as expected.
+    Gross errors are excluded epoch by epoch, a change over its stretch. A measurement that is
+    inconsistent throughout is excluded if another one observes position or velocity; otherwise its
+    standard deviation is increased by the factor that makes it consistent.
 
     Parameters
     ----------
-    chain : Chain
+    chain : NavigationPipeline
     imu : DataFrame
     tables : mapping of str to DataFrame
     record : NavigationRecord
-        Of the run.
+        Result of the run.
     found : sequence of Inconsistency
-        The first of which is left out; of gross errors all those of the same aid.
+        The first is excluded; of gross errors all those of the same measurement.
     ellipsoid : Ellipsoid
     progress : callable
 
@@ -424,7 +424,7 @@ def _changed(
     tables: Mapping[str, pd.DataFrame],
     found: Sequence[Inconsistency],
 ) -> tuple[tuple[Measurement, ...], dict[str, pd.DataFrame], str]:
-    """Aids and tables without something, and it in words."""
+    """Measurements and tables after an exclusion, and its description."""
     one = found[0]
     aid = next(a for a in aids if a.name == one.aid)
     told = dict(tables)
@@ -477,7 +477,7 @@ def _swapped(
 
 
 def _has_both(table: pd.DataFrame | None) -> bool:
-    """Whether fixes tell places and velocities."""
+    """Whether fixes hold positions and velocities."""
     return table is not None and all(
         bool(np.isfinite(values_of(table, sd)).all(axis=1).any())
         for sd in (POSITION_SD, VELOCITY_SD)
@@ -485,7 +485,7 @@ def _has_both(table: pd.DataFrame | None) -> bool:
 
 
 def _kept(table: pd.DataFrame, one: Inconsistency, aid: Measurement) -> NDArray[np.bool_]:
-    """Rows of a table that are none of the epochs."""
+    """Rows of a table other than the given epochs."""
     time = index_of(table) - float(getattr(aid, "time_offset", 0.0))
     if one.name.endswith(".velocity"):
         time = time - float(getattr(aid, "velocity_delay", 0.0))

@@ -1,4 +1,4 @@
-"""A chain scored by fixes that are kept from it."""
+"""GNSS outage test: score a pipeline by fixes withheld from it."""
 
 from __future__ import annotations
 
@@ -36,20 +36,20 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-#: A filter has settled so long after navigation began, s.
+#: Time after the begin of navigation until the filter has settled, s.
 SETTLED = 30.0
 
 
 @dataclass(frozen=True, eq=False)
 class Withheld:
-    """One stretch without fixes.
+    """Score of one test outage.
 
     Attributes
     ----------
     forward : WithheldScore
-        By what came before it.
+        By the measurements before it.
     smoothed : WithheldScore or None
-        By what came after it, too, where the navigator has a smoother.
+        By the measurements after it, too, where the navigator has a smoother.
     """
 
     forward: WithheldScore
@@ -57,12 +57,12 @@ class Withheld:
 
     @property
     def told(self) -> WithheldScore:
-        """What the run is scored by."""
+        """Score of the run: smoothed if available."""
         return self.smoothed or self.forward
 
 
 def withheld_aid(spec: NavigationSpec) -> str:
-    """The aid whose fixes a specification keeps back."""
+    """Name of the measurement whose fixes a specification withholds."""
     assert spec.withhold is not None
     named = spec.withhold.aid
     return named or next(name for name, aid in aids_of(spec).items() if aid.kind == "gnss")
@@ -75,26 +75,26 @@ def score_withholding(
     record: NavigationRecord,
     progress: Progress,
 ) -> tuple[Withheld, ...]:
-    """Run a chain with all fixes up to each stretch, and through it with none.
+    """Run a pipeline with all fixes up to each test outage, and through it with none.
 
     Parameters
     ----------
     spec : NavigationSpec
-    chain : Chain
+    chain : NavigationPipeline
     source : NavigationSource
     record : NavigationRecord
-        Of the whole run: when navigation began.
+        Record of the whole run, for the begin of navigation.
     progress : callable
 
     Returns
     -------
     tuple of Withheld
-        In the order of the stretches; empty where nothing is to be kept back.
+        In the order of the outages; empty if none is specified.
 
     Raises
     ------
     ConfigError
-        A stretch is not within the run, or has no fixes.
+        An outage is not within the run, or has no fixes.
     """
     asked = spec.withhold
     if asked is None:
@@ -138,16 +138,16 @@ def score_withholding(
 
 @dataclass(frozen=True, eq=False)
 class WithheldRun:
-    """A run over a stretch in which an aid was looked at and not used.
+    """Run over a test outage in which a measurement is compared and not processed.
 
     Attributes
     ----------
     number : int
-        Of the stretch.
+        Of the outage.
     state : PipelineState
-        Where it begins: with all that was observed before.
+        At its begin, with all earlier measurements processed.
     through : PipelineState
-        Where it ends.
+        At its end.
     rows : slice
         Of its samples.
     pieces : tuple of NavigationChunk
@@ -168,24 +168,24 @@ def withheld_runs(
     values: Array,
     spans: Sequence[Span],
 ) -> Iterator[WithheldRun]:
-    """Go over samples with every fix up to each stretch, and through it with none.
+    """Process samples with every fix up to each test outage, and through it with none.
 
     Parameters
     ----------
-    chain : Chain
-    blind : Chain
-        The same, but that it does not use what is withheld (`blinded`).
+    chain : NavigationPipeline
+    blind : NavigationPipeline
+        The same without use of the withheld fixes (`blinded`).
     state : PipelineState
         Before the first of the samples.
     time : ndarray, (n,), s
     values : ndarray, (n, 6)
     spans : sequence of Span
-        Within the samples. Each is by itself: what follows it has had the fixes.
+        Within the samples. Each is tested separately: later ones have had its fixes.
 
     Yields
     ------
     WithheldRun
-        In the order of their begins.
+        In order of time.
     """
     at = 0
     for number in sorted(range(len(spans)), key=lambda k: spans[k].begin):
