@@ -456,7 +456,7 @@ def prepare_together(
 
 
 def _turns(unit: SynchronisedUnit) -> bool:
-    """Whether the unit has a gyro that measures, not one that stands in for an assumption."""
+    """Whether the unit has a gyro that measures, not a substitute for an assumption."""
     gyro = unit.unit.gyro
     return gyro is not None and len(gyro.absent) < 3
 

@@ -24,7 +24,7 @@ __all__ = ["AssumedEffect", "assumed_effects"]
 
 Array = NDArray[np.float64]
 
-# Prefix of unknowns common to all units of one vehicle.
+# Contributors common to all units of one vehicle.
 VEHICLE = "vehicle"
 # Signal parts faster than this count as vibration.
 VIBRATION = 0.025  # s
