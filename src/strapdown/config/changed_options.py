@@ -25,8 +25,8 @@ def changed_options(
     -------
     tuple of str
         Such as ``entry, speed_m_per_s: 7.1 before, 8.1 now``, in the order of `after`. Tables in a
-        list are matched by name at any position, otherwise by number. A missing key equals None, and
-        a list equals a tuple.
+        list are matched by name at any position, otherwise by number. A missing key equals None,
+        and a list equals a tuple.
     """
     return tuple(_changed(_plain(before), _plain(after), ()))
 

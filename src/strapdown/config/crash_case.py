@@ -184,7 +184,7 @@ class OptionsSpec(TableSpec):
     zero_at: Literal["interval", "threshold"] = "interval"
     monte_carlo_runs: StrictInt = Field(default=2000, ge=0, le=100_000)
     seed: StrictInt = Field(default=0, ge=0)
-    #: Names of severity models; None takes those that fit the type of the crash.
+    #: Names of severity models; None selects those that apply to the crash type.
     severity: Annotated[tuple[Word, ...] | None, Listed] = None
     severity_inputs: dict[Word, Input] = Field(default_factory=dict)
     formats: Annotated[tuple[Literal["csv", "mme"], ...], Listed] = ("csv",)

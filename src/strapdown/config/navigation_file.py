@@ -366,7 +366,7 @@ class _Checks(SourceChecks):
         self.told((name,), partial(make_choice, getattr(spec, name), SLOTS[name], given_of(spec)))
 
     def height(self, spec: NavigationSpec) -> None:
-        """Reject a height measurement together with a mechanization that damps the height itself."""
+        """Reject a damped height in the mechanization: its loop has no filter states."""
         if getattr(spec.mechanization, "height", "") == "damped":
             raise self.refuse(("mechanization", "height"), "config.damped-height-without-states")
 
