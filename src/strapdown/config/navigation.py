@@ -250,7 +250,7 @@ class TrustTable(TableSpec):
 
     #: Error limit for heading status green (trusted).
     heading_limit_deg: Positive = 3.0
-    #: Standard deviation from which the status is red (rejected).
+    #: 95 % bound beyond which the heading status is red.
     heading_red_deg: Positive = 10.0
     #: Whether to re-run excluding the first inconsistent measurement.
     repeat: StrictBool = True

@@ -63,7 +63,7 @@ def pdof_by_window(
     -------
     DataFrame
         Index ``window``, s; ``dv_x dv_y dv_z``, m/s, ``horizontal_deg``, ``vertical_deg``; NaN
-        without a change of velocity. Windows that extend beyond the record are left out.
+        for a zero change of velocity. Windows that extend beyond the record are left out.
 
     Raises
     ------

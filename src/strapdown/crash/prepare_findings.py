@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 # A number contradicts its stated value beyond this many standard deviations.
 SIGMAS = 4.0
-# Fraction of the range: interpolation and decimation of two ranges clipped at other positions.
+# Fraction of the range: differences from interpolation and decimation of two clipped ranges.
 LEAST_STEP = 1e-3
 # A record that begins less than this before the impact has no interval before it.
 SHORTEST = 0.05  # s

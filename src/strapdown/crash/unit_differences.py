@@ -87,7 +87,7 @@ class VelocityIncrements:
         )
 
     def borrows(self, other: VelocityIncrements) -> bool:
-        """Whether both share one gyro, so that agreement of their rates is no confirmation."""
+        """Whether both share one gyro, so that their rates agree by construction."""
         return self.noise.gyro == other.noise.gyro
 
 

@@ -565,7 +565,7 @@ class SampleEffects:
     rate : ndarray, (p, n, 3), rad/s
         Added to the rate of the vehicle.
     rest_force : ndarray, (p, 3), m/s²
-        Added to the mean of the specific force at rest.
+        Added to the mean stationary specific force.
     tilt : ndarray, (p, 3), rad
         Rotation vector of the effect on the leveled attitude, in local level with forward as
         north.

@@ -119,7 +119,7 @@ class Kernels:
         return self._made[key]
 
     def named(self, name: str) -> Function | None:
-        """Return the specialised function of that name."""
+        """Return the specialized function of that name."""
         return next((f for f in self.functions if f.name == name), None)
 
     def is_kernel(self, name: str) -> bool:
