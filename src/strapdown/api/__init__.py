@@ -1,1 +1,1 @@
-"""The Python front door: tables, arrays and files in, data out; `strapdown` exports all of it."""
+"""Public Python interface, exported by `strapdown`: tables, arrays and files in, data out."""

@@ -1,4 +1,4 @@
-"""Alignment, and the drift of an outage, from Python."""
+"""Alignment and predicted GNSS outage drift from Python."""
 
 from __future__ import annotations
 
@@ -51,11 +51,11 @@ __all__ = [
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AlignmentRun(AlignmentResult):
-    """An alignment: everything that was computed, as data.
+    """Result of an alignment.
 
-    `attitude` is the answer over the record by time (deg), `start` and `end` are the answers at
-    its ends, each with `sd` and `covariance`; `readiness` says after how long they were known.
-    Nothing is written until `save` is called.
+    `attitude` is the attitude over the record by time (deg); `start` and `end` are the attitudes at
+    its ends, each with `sd` and `covariance`; `readiness` gives the time until they were known.
+    `save` writes the result; until then it is in memory only.
     """
 
     memory: Memory = field(default=Memory({}))
@@ -74,12 +74,12 @@ class AlignmentRun(AlignmentResult):
         Returns
         -------
         matplotlib.figure.Figure
-            Its ``axes`` are the panels. It belongs to no window and to no global state.
+            Its ``axes`` are the panels. Independent of windows and global state.
 
         Raises
         ------
         ConfigError
-            There is no such chart.
+            The chart does not exist.
         """
         from matplotlib.figure import Figure
 
@@ -107,13 +107,13 @@ class AlignmentRun(AlignmentResult):
         Parameters
         ----------
         out : str or Path
-            Folder to make. Tables that were given in memory become input files in it.
+            New folder. Tables given in memory become input files in it.
         report : bool
-            Whether the page and the figures are written, too.
+            Whether to write the page and the figures as well.
         force : bool
             Overwrite an existing bundle.
         progress : callable, optional
-            Called with a stage and the share that is done.
+            Called with a stage and the completed fraction.
 
         Returns
         -------
@@ -165,16 +165,16 @@ def align(
     prefilter: str | Mapping[str, Any] = "none",
     progress: Progress = silent,
 ) -> AlignmentRun:
-    """Find roll, pitch and heading of a body that stays at its position, with their bounds.
+    """Find roll, pitch and heading of a body at a fixed position, with their uncertainty.
 
     Parameters
     ----------
     imu : Imu, DataFrame, (t, gyro, accel), str or Path
         Samples: s, rad/s (n, 3), m/s² (n, 3), body axes forward-right-down. A path is that of a
-        log, or of a configuration (``.toml``), which then says everything.
+        log, or of a configuration (``.toml``), which then replaces the other arguments.
     site : mapping or sequence of float
-        ``lat_deg``, ``lon_deg``, ``alt_m``: deg, deg, m over the ellipsoid; as the log says, if
-        not given.
+        ``lat_deg``, ``lon_deg``, ``alt_m``: deg, deg, m over the ellipsoid; by default as stated
+        in the log.
     sensor : str or Path
         Data sheet: a name of the catalogue, or a ``.toml`` file.
     method : str or mapping
@@ -185,9 +185,9 @@ def align(
     gnss : GnssFixes, DataFrame, str or Path, optional
         Fixes, for ``gnss_course``.
     prefilter : str or mapping
-        What the samples pass first: ``{"kind": "robust_fir", "rate_hz": 100.0}``.
+        Filter applied to the samples first: ``{"kind": "robust_fir", "rate_hz": 100.0}``.
     progress : callable, optional
-        Called with a stage and the share that is done.
+        Called with a stage and the completed fraction.
 
     Returns
     -------
@@ -196,11 +196,11 @@ def align(
     Raises
     ------
     ConfigError
-        Something that is needed was not given, or does not fit; the message names the argument.
+        A required argument is missing or does not fit; the message names the argument.
     DataError
-        The record cannot be used, or cannot give the attitude.
+        The record cannot be used, or does not determine the attitude.
     DivergenceError
-        The filter left what a body at rest can do.
+        The filter left the range possible for a stationary body.
     """
     if isinstance(imu, str | Path) and Path(imu).suffix.lower() == ".toml":
         if any(one is not None for one in (site, sensor, gnss)):
@@ -257,7 +257,7 @@ def run_specified(
     ----------
     spec : AlignmentSpec
     file : Path, optional
-        Where it was read from: an input, too.
+        File it was read from, also an input.
     progress : callable, optional
 
     Returns
@@ -279,7 +279,7 @@ def specify_alignment(
     prefilter: Mapping[str, Any] | None = None,
     called: Callable[[str], str] = str,
 ) -> AlignmentSpec:
-    """The specification of an alignment; its position may come from the log.
+    """Build the specification of an alignment; its position may come from the log.
 
     Parameters
     ----------
@@ -287,9 +287,9 @@ def specify_alignment(
     site, sensor, fine, gnss
         As `align`.
     coarse, prefilter : mapping
-        The module with its options, ``kind`` among them.
+        The module with its options, including ``kind``.
     called : callable
-        How the interface calls an argument, for messages: ``sensor`` as ``--sensor``.
+        Name of an argument in the interface, for messages: ``sensor`` as ``--sensor``.
 
     Returns
     -------
@@ -298,7 +298,7 @@ def specify_alignment(
     Raises
     ------
     ConfigError
-        What is needed is not given; the message names the argument.
+        A required argument is missing; the message names it.
     DataError
         The log cannot be read.
     """
@@ -338,15 +338,15 @@ def _site(log: str, known: Mapping[str, float], called: Callable[[str], str]) ->
     return {key: float(value) for key, value in known.items()}
 
 
-# --- the drift of an outage ---------------------------------------------------------------
+# --- predicted drift in a GNSS outage -----------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class OutageRun(CoastResult):
-    """The predicted drift of an outage of GNSS: everything that was computed, as data.
+    """Predicted drift in a GNSS outage.
 
-    `forecast` has the covariance over the outage and the shares of its sources; `recorded`, of a
-    run of navigation, what the drift was. Nothing is written until `save` is called.
+    `forecast` has the covariance over the outage and the shares of its sources; `recorded`, for a
+    navigation run, the actual drift. `save` writes the result; until then it is in memory only.
     """
 
     memory: Memory = field(default=Memory({}))
@@ -359,7 +359,7 @@ class OutageRun(CoastResult):
         )
 
     def to_pandas(self) -> pd.DataFrame:
-        """The bound, and the motion over the outage, by time since it began."""
+        """The 95 % bound, and the motion over the outage, by time since it began."""
         table = self.bound_m.to_frame()
         return table.join(self.forecast.trajectory)
 
@@ -369,7 +369,7 @@ class OutageRun(CoastResult):
         Returns
         -------
         matplotlib.figure.Figure
-            Of no window and no global state.
+            Independent of windows and global state.
         """
         from matplotlib.figure import Figure
 
@@ -393,9 +393,9 @@ class OutageRun(CoastResult):
         Parameters
         ----------
         out : str or Path
-            Folder to make.
+            New folder.
         report : bool
-            Whether the page and the figures are written, too.
+            Whether to write the page and the figures as well.
         force : bool
             Overwrite an existing bundle.
         progress : callable, optional
@@ -439,19 +439,19 @@ def coast(
     progress: Progress = silent,
     **options: Any,
 ) -> OutageRun:
-    """Predict how far a sensor, or a run of navigation, drifts in an outage of GNSS.
+    """Predict the drift of a sensor, or of a navigation run, in a GNSS outage.
 
     Parameters
     ----------
     source : str, Path or NavigationRun
-        A sensor of the catalogue or its file, along a stated motion; or a run of navigation, its
-        bundle or its configuration, whose receivers are taken away.
+        A sensor of the catalogue or its file, along a stated motion; or a navigation run, its
+        bundle or its configuration, whose receivers are switched off.
     outage_s : float, s
     progress : callable, optional
-        Called with a stage and the share that is done.
+        Called with a stage and the completed fraction.
     **options
-        Tables and keys of a forecast: ``motion={"speed_m_per_s": 15.0}``,
-        ``start={"heading_sd_deg": 1.0}``, ``aiding={"no_slip": {}}``; of a run ``places``,
+        Tables and keys of the configuration: ``motion={"speed_m_per_s": 15.0}``,
+        ``start={"heading_sd_deg": 1.0}``, ``aiding={"no_slip": {}}``; for a run ``places``,
         ``at_s``, ``from_s``, ``to_s``, ``duration_s``.
 
     Returns
@@ -461,9 +461,9 @@ def coast(
     Raises
     ------
     ConfigError
-        There is no such sensor, or an option does not fit.
+        The sensor does not exist, or an option does not fit.
     DataError
-        The record of the run is not there any more.
+        The record of the run no longer exists.
     """
     with _run_of(source) as (navigation, file, memory, folder):
         sensor = None if navigation is not None else str(source)
@@ -479,7 +479,7 @@ def coast(
 def _run_of(
     source: str | Path | NavigationRun,
 ) -> Iterator[tuple[NavigationSpec | None, Path | None, Memory, Path]]:
-    """The run that a source names, with every input a file."""
+    """The navigation run that a source names, with every input a file."""
     if not isinstance(source, NavigationRun):
         yield (*read_coasting_run(source), Memory({}), NOWHERE)
         return
@@ -494,7 +494,7 @@ def run_outage(
     file: Path | None = None,
     progress: Progress = silent,
 ) -> OutageRun:
-    """Run a specification of a forecast; as `run_coast`.
+    """Run a specification of an outage prediction; as `run_coast`.
 
     Parameters
     ----------

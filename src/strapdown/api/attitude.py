@@ -1,4 +1,4 @@
-"""Attitude from Python: one algorithm over samples, sample by sample, and algorithms compared."""
+"""Attitude from Python: one algorithm over a record or sample by sample, and comparisons."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-#: The algorithms that are compared where none is named.
+#: Algorithms that are compared by default.
 COMPARED = ("naive", "euler", "dcm", "quaternion", "rk4", "rotvec")
 
 
@@ -76,7 +76,7 @@ class Attitude(pd.DataFrame):
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What a person should know about it."""
+        """Warnings and notes."""
         return tuple(self.attrs.get("findings", ()))
 
 
@@ -93,43 +93,43 @@ def attitude(
 ) -> Attitude:
     """Integrate gyro samples to attitude with one algorithm.
 
-    The accelerometer is used for the initial attitude alone. The rotation of the Earth is
-    neglected (15 deg/h).
+    The accelerometer is used only for the initial attitude. Earth rotation (15 deg/h) is
+    neglected.
 
     Parameters
     ----------
     t : array_like, (n,), s; or Imu, DataFrame, str or Path
-        Increasing stamps; or samples of all sensors, and then nothing is given for the next two.
+        Increasing stamps; or samples of all sensors, and then the next two are omitted.
     gyro : array_like, (n, 3), rad/s
         Body rates, forward-right-down.
     accel : array_like, (n, 3), m/s², optional
         Specific force, forward-right-down.
     algorithm : str
-        A name with its options, as ``rotvec:samples=3`` (`strapdown modules`), or of an installed
-        plug-in (entry points ``strapdown.attitude``).
+        A name with its options, such as ``rotvec:samples=3`` (`strapdown modules`), or the name of
+        an installed plug-in (entry points ``strapdown.attitude``).
     initial : str or array_like
-        ``auto``: levelled where the samples begin at rest with an accelerometer, else zero;
+        ``auto``: leveled if the samples begin stationary with an accelerometer, else zero;
         ``level``; ``zero``; roll, pitch, heading in deg; or a quaternion ``q_nb``.
     gyro_bias : array_like, (3,), rad/s, or str, optional
-        Subtracted from the rates; ``rest``: the mean over the first stationary stretch.
+        Subtracted from the rates; ``rest``: the mean over the first stationary interval.
     sampling : {'instantaneous', 'mean'}
-        Of arrays: the rate at the stamp, or its mean over the interval that ends there.
+        For arrays: the rate at the stamp, or its mean over the interval that ends there.
     interpolation : {'linear', 'cubic'}
-        How rates at the stamps run between them.
+        Interpolation of rates between their stamps.
 
     Returns
     -------
     Attitude
-        One row a sample.
+        One row per sample.
 
     Raises
     ------
     DataError
-        The samples cannot be used, or there is no rest to level or take a bias from.
+        The samples cannot be used, or have no stationary interval for leveling or bias.
     ConfigError
-        The algorithm or an option is not known.
+        The algorithm or an option is unknown.
     DivergenceError
-        The algorithm left the range of floating point.
+        The algorithm left the floating-point range.
     """
     chosen = make_algorithm(algorithm)
     if gyro is None:
@@ -163,7 +163,7 @@ def attitude(
 
 
 def _given(initial: ArrayLike) -> Array:
-    """An initial attitude that is stated: three angles in deg, or a quaternion."""
+    """A stated initial attitude: three angles in deg, or a quaternion."""
     values = np.asarray(initial, dtype=np.float64).ravel()
     if values.size == 3 and np.isfinite(values).all():
         return rotation.quaternion_from_euler(values)
@@ -195,33 +195,33 @@ def _three(values: ArrayLike, quantity: str) -> Array:
 
 
 class OrientationFilter:
-    """Attitude sample by sample, as on a device: gyros integrated from a levelled start.
+    """Attitude sample by sample, as on a device: gyros integrated from a leveled start.
 
-    Roll and pitch are levelled once, from the mean specific force of the first `level_samples`
-    samples, over which the body must be at rest; heading starts at zero. From then on the chosen
-    algorithm integrates the gyros alone: there is no feedback from the accelerometer, so that
-    errors of the gyros accumulate (a bias of 1 deg/min is 1 deg after a minute), and accelerations
-    of the body disturb nothing. `attitude` over the same samples gives the same bits.
+    Roll and pitch are leveled once, from the mean specific force of the first `level_samples`
+    samples, over which the body must be stationary; heading starts at zero. From then on the chosen
+    algorithm integrates the gyros alone. Without feedback from the accelerometer, gyro errors
+    accumulate (a bias of 1 deg/min is 1 deg after a minute), and accelerations of the body have
+    no effect. `attitude` over the same samples gives bitwise the same result.
 
     Parameters
     ----------
     rate_hz : float
-        Sample rate; sample k is of the instant ``k / rate_hz``.
+        Sample rate; sample k belongs to the instant ``k / rate_hz``.
     algorithm : str
         As in `attitude`.
     initial : array_like, optional
-        Roll, pitch, heading in deg, or a quaternion ``q_nb``: nothing is then levelled.
+        Roll, pitch, heading in deg, or a quaternion ``q_nb``; replaces the leveling.
     gyro_bias : array_like, (3,), rad/s
         Subtracted from every sample.
     level_samples : int
-        Over which the accelerometer is averaged at the start.
+        Number of accelerometer samples averaged at the start.
     sampling : {'instantaneous', 'mean'}
-        What a gyro sample is.
+        Meaning of a gyro sample.
 
     Raises
     ------
     ConfigError
-        The rate, the algorithm or an option cannot be.
+        The rate, the algorithm or an option is not valid.
     """
 
     def __init__(
@@ -252,14 +252,14 @@ class OrientationFilter:
         )
 
     def update(self, gyro: ArrayLike, accel: ArrayLike | None = None) -> Array:
-        """Take one sample.
+        """Process one sample.
 
         Parameters
         ----------
         gyro : array_like, (3,), rad/s
             Body rate, forward-right-down.
         accel : array_like, (3,), m/s², optional
-            Specific force; needed while the start is levelled, and not used afterwards.
+            Specific force; required during the leveling, and not used afterwards.
 
         Returns
         -------
@@ -269,8 +269,8 @@ class OrientationFilter:
         Raises
         ------
         DataError
-            The sample is not three finite numbers, or its specific force is not that of a body at
-            rest while the start is levelled. It is then not taken.
+            The sample is not three finite numbers, or its specific force is not that of a
+            stationary body during the leveling. The sample is then not processed.
         """
         rate = _three(gyro, "gyro") - self._bias
         if self._samples < self._level_samples:
@@ -319,11 +319,11 @@ class OrientationFilter:
 
 @dataclass(frozen=True, repr=False)
 class AttitudeComparison(AttitudeBench):
-    """Attitude algorithms compared on one record: everything that was computed, as data.
+    """Result of a comparison of attitude algorithms on one record.
 
     `answer` names the simplest algorithm and the lowest rate that are accurate enough; `summary`,
-    `sweep`, `shares` and `costs` are what it rests on. `plot` draws a chart, `to_pandas` gives one
-    row an algorithm. Nothing is written until `save` is called.
+    `sweep`, `shares` and `costs` are the basis. `plot` draws a chart, `to_pandas` gives one row
+    per algorithm. `save` writes the result; until then it is in memory only.
     """
 
     memory: Memory = field(default=Memory({}))
@@ -336,13 +336,13 @@ class AttitudeComparison(AttitudeBench):
         Parameters
         ----------
         out : str or Path
-            Folder to make. Tables that were given in memory become input files in it.
+            New folder. Tables given in memory become input files in it.
         report : bool
-            Whether the page and the figures are written, too.
+            Whether to write the page and the figures as well.
         force : bool
             Overwrite an existing bundle.
         png : bool
-            Write each figure as PNG, too.
+            Write each figure as PNG as well.
 
         Returns
         -------
@@ -366,7 +366,7 @@ class AttitudeComparison(AttitudeBench):
 
 
 def _moved(result: AttitudeComparison, old: Path, new: Path) -> AttitudeComparison:
-    """The comparison with its inputs of one folder in another."""
+    """The comparison with its input paths moved from one folder to another."""
     if not result.memory.tables or old == new:
         return result
     return replace(
@@ -376,7 +376,7 @@ def _moved(result: AttitudeComparison, old: Path, new: Path) -> AttitudeComparis
     )
 
 
-#: Further keywords, as `systems.attitude_bench.bench_attitude` has them.
+#: Further keywords of `systems.attitude_bench.bench_attitude`.
 _OPTIONS = set(inspect.signature(bench_attitude).parameters) - {
     *("source", "algorithms", "rates", "tolerance_deg", "reference", "gyro_bias", "progress")
 }
@@ -393,7 +393,7 @@ def compare_attitude(
     options: Mapping[str, Any] | None = None,
     progress: Progress = silent,
 ) -> AttitudeComparison:
-    """Compare attitude algorithms at several rates with what is known of the attitude.
+    """Compare attitude algorithms at several rates with a reference attitude.
 
     Parameters
     ----------
@@ -402,24 +402,24 @@ def compare_attitude(
         (`strapdown modules`). Several paths or names are trials of one question: the first is
         shown, and the answer holds for all of them.
     algorithms : sequence of str
-        Names with their options, as ``quaternion:order=3``, or ``all``.
+        Names with their options, such as ``quaternion:order=3``, or ``all``.
     rates_hz : sequence of float
-        Lower rates to try; the full rate and its halves, if none is given.
+        Lower rates to try; by default the full rate and its halves.
     tolerance_deg : float
-        What is accurate enough: the largest known error, in deg.
+        Required accuracy: limit of the largest known error, in deg.
     reference : str or sequence of str
-        What is known: ``end same as start``, ``12.5 roll 0 pitch 0 heading 90``, ``rests``, or the
-        path of such lines or of an attitude truth.
+        The reference: ``end same as start``, ``12.5 roll 0 pitch 0 heading 90``, ``rests``, or the
+        path of a file with such lines or of an attitude truth.
     gyro_bias : str or array_like, (3,), rad/s
         ``none``, ``rest``, ``rests`` (its course through all of them), the path of a log of the
-        sensor lying still, or the bias.
+        stationary sensor, or the bias.
     options : mapping, optional
-        ``initial``, ``interpolation``, ``peers``, ``reference_log``; of a scenario ``rate`` (Hz),
-        ``sampling``, ``seed``, ``sensor``, ``trials``; of paths how they are read: ``axes``,
+        ``initial``, ``interpolation``, ``peers``, ``reference_log``; for a scenario ``rate`` (Hz),
+        ``sampling``, ``seed``, ``sensor``, ``trials``; for paths the reading options: ``axes``,
         ``columns``, ``gyro_unit``, ``accel_unit``, ``time_unit``, ``repair``, ``from_s``,
         ``to_s``, ``duration_s``.
     progress : callable, optional
-        Called with a stage and the share that is done.
+        Called with a stage and the completed fraction.
 
     Returns
     -------
@@ -430,11 +430,11 @@ def compare_attitude(
     DataError
         The samples or a reference cannot be used; the message names file, row and remedy.
     ConfigError
-        Something that was asked for is not known, or cannot be had from these samples.
+        A requested item is unknown, or not available from these samples.
 
     Notes
     -----
-    Alexiev (2021). The rotation of the Earth is neglected, as in the paper: 15 deg/h.
+    Alexiev (2021). Earth rotation is neglected, as in the paper: 15 deg/h.
     """
     asked = dict(options or {})
     for name in asked:
@@ -473,7 +473,7 @@ def _names(source: Any) -> bool:
 
 
 def _reading(file: ImuFile) -> dict[str, Any]:
-    """How a file was read, as the comparison reads it again."""
+    """Options with which a file was read, for the comparison to read it again."""
     told = file.log.model_dump(exclude_none=True, exclude={"path"})
     told["rate"] = told.pop("rate_hz", None)
     return {**told, "axes": file.axes}

@@ -1,4 +1,4 @@
-"""Crash reconstruction from Python: a case file in, the answers of its vehicle as data out."""
+"""Crash reconstruction from Python: from a case file to the results of its vehicle."""
 
 from __future__ import annotations
 
@@ -28,24 +28,24 @@ __all__ = ["CrashRun", "reconstruct"]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CrashRun(CaseResult):
-    """A reconstructed crash: everything that was computed, as data.
+    """Result of a crash reconstruction.
 
-    Beside the attributes of `CaseResult` it has the properties below. Nothing is written until
-    `save` is called.
+    It adds the properties below to the attributes of `CaseResult`. `save` writes the result; until
+    then it is in memory only.
     """
 
     @property
     def vehicles(self) -> Mapping[str, UnitReconstruction]:
-        """The answers of each vehicle by its number; a case has one today, ``"1"``.
+        """Results of each vehicle by its number; currently a case has one, ``"1"``.
 
-        Of several recorders these are the answers of their mean, where they agree, else of the
+        With several recorders, these are the results of their mean if they agree, else of the
         first. ``vehicles["1"].delta_v`` is the change of velocity of its severest event.
         """
         return MappingProxyType({"1": self.reconstruction.main})
 
     @property
     def recorders(self) -> Mapping[str, UnitReconstruction]:
-        """The answers of each recorder by itself, by name."""
+        """Results of each recorder by itself, by name."""
         return MappingProxyType({unit.name: unit for unit in self.reconstruction.units})
 
     def to_pandas(self) -> pd.DataFrame:
@@ -54,8 +54,8 @@ class CrashRun(CaseResult):
         Returns
         -------
         DataFrame
-            By recorder, event and quantity (with its unit): ``value``, and ``low`` and ``high``
-            of 95 %.
+            By recorder, event and quantity (with its unit): ``value``, and the 95 % bounds ``low``
+            and ``high``.
         """
         return self.reconstruction.summary()
 
@@ -65,17 +65,17 @@ class CrashRun(CaseResult):
         Parameters
         ----------
         kind : str
-            A name of a figure in the report's folder ``figures``.
+            Name of a figure in the report's folder ``figures``.
 
         Returns
         -------
         matplotlib.figure.Figure
-            Its ``axes`` are the panels. It belongs to no window and to no global state.
+            Its ``axes`` are the panels. Independent of windows and global state.
 
         Raises
         ------
         ConfigError
-            There is no such chart of this case.
+            The chart does not exist for this case.
         """
         from strapdown.report.crash_document import crash_document
         from strapdown.report.crash_figures import crash_figures
@@ -104,13 +104,13 @@ class CrashRun(CaseResult):
         Parameters
         ----------
         out : str or Path
-            Folder to make.
+            New folder.
         report : bool
-            Whether page, PDF and figures are written, too.
+            Whether to write page, PDF and figures as well.
         force : bool
             Overwrite an existing bundle.
         progress : callable, optional
-            Called with a stage and the share that is done.
+            Called with a stage and the completed fraction.
 
         Returns
         -------
@@ -138,14 +138,14 @@ def reconstruct(
     *,
     progress: Progress = silent,
 ) -> CrashRun:
-    """Reconstruct a crash: delta-V, direction of force, severity and path, with their bounds.
+    """Reconstruct a crash: delta-V, direction of force, severity and path, with 95 % bounds.
 
     Parameters
     ----------
     case : str, Path or CaseSpec
-        The case file, in TOML (``strapdown init crash`` writes one); or its specification.
+        Case file in TOML (``strapdown init crash`` writes one), or its specification.
     progress : callable, optional
-        Called with a stage and the share that is done.
+        Called with a stage and the completed fraction.
 
     Returns
     -------
@@ -154,11 +154,11 @@ def reconstruct(
     Raises
     ------
     ConfigError
-        The case does not hold together; the message names the line.
+        The case is inconsistent; the message names the line.
     DataError
         A record cannot be used.
     DivergenceError
-        A path left what a vehicle can do.
+        A path left the range possible for a vehicle.
     """
     file = None if isinstance(case, CaseSpec) else Path(case)
     spec = case if isinstance(case, CaseSpec) else read_case_spec(Path(case))

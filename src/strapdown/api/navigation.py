@@ -1,4 +1,4 @@
-"""Navigation from Python: samples and measurements in any form, and a run that is data."""
+"""Navigation from Python: samples and measurements in any form, and the run as data."""
 
 from __future__ import annotations
 
@@ -62,19 +62,19 @@ __all__ = [
 
 @dataclass(frozen=True, init=False, eq=False)
 class Measurement:
-    """A measurement that aids the navigator: its kind, what it measured, and its options.
+    """A measurement for the navigation filter: its kind, its data, and its options.
 
     Parameters
     ----------
     kind : str
-        As `strapdown modules` lists it, or of an installed plug-in (entry points
+        As listed by `strapdown modules`, or of an installed plug-in (entry points
         ``strapdown.measurements``).
     data : DataFrame, str or Path, optional
-        What it measured, by time in s on the clock of the inertial sensors; a table that
-        `read_gnss` returned, or a file. None for a measurement that is derived from the inertial
-        sensors themselves.
+        Measured data by time in s on the clock of the inertial sensors; a table from
+        `read_gnss`, or a file. None for a measurement derived from the inertial sensors
+        themselves.
     name : str, optional
-        Of its observations (``gnss.position``) and states; its kind, if not given.
+        Name of its observations (``gnss.position``) and states; by default its kind.
     **options
         Keys of its table in a configuration, with their units: ``lever_arm_m=(0.3, 0, -1.2)``,
         ``position_sd_m=1.5``.
@@ -121,7 +121,7 @@ class Gnss(Measurement):
 
 
 class _OfKind(Measurement):
-    """A measurement whose kind is its class."""
+    """A measurement whose kind is given by its class."""
 
     KIND = ""
 
@@ -179,17 +179,17 @@ class Heading(_OfKind):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class NavigationRun(NavigationResult):
-    """A run of navigation: everything that it computed, as data.
+    """Result of a navigation run.
 
-    Beside the attributes of `NavigationResult` it has the properties below. Nothing is written
-    until `save` is called.
+    It adds the properties below to the attributes of `NavigationResult`. `save` writes the result;
+    until then it is in memory only.
     """
 
     memory: Memory = field(default=Memory({}))
 
     @property
     def trajectory(self) -> pd.DataFrame:
-        """Trajectory table by time in s; smoothed, where the run is.
+        """Trajectory table by time in s; smoothed if the run is.
 
         ``lat lon`` in deg, ``alt`` in m over the ellipsoid, ``VN VE VD`` in m/s, ``roll pitch
         heading`` in deg.
@@ -217,12 +217,12 @@ class NavigationRun(NavigationResult):
         return self.trust
 
     def to_pandas(self) -> pd.DataFrame:
-        """The trajectory with its standard deviations, at the instants that both have.
+        """The trajectory with its standard deviations, at their common instants.
 
         Returns
         -------
         DataFrame
-            Columns of `trajectory`, and those of `sd` with the ending ``_sd``.
+            Columns of `trajectory`, and those of `sd` with the suffix ``_sd``.
         """
         return self.trajectory.join(self.sd.add_suffix("_sd"), how="inner")
 
@@ -238,12 +238,12 @@ class NavigationRun(NavigationResult):
         Returns
         -------
         matplotlib.figure.Figure
-            Its ``axes`` are the panels. It belongs to no window and to no global state.
+            Its ``axes`` are the panels. Independent of windows and global state.
 
         Raises
         ------
         ConfigError
-            There is no such chart of this run.
+            The chart does not exist for this run.
         """
         from strapdown.report.navigation_view import plot
 
@@ -262,13 +262,13 @@ class NavigationRun(NavigationResult):
         Parameters
         ----------
         out : str or Path
-            Folder to make. Tables that were given in memory become input files in it.
+            New folder. Tables given in memory become input files in it.
         report : bool
-            Whether its pages and figures are written, too.
+            Whether to write its pages and figures as well.
         force : bool
             Overwrite an existing bundle.
         progress : callable, optional
-            Called with a stage and the share that is done.
+            Called with a stage and the completed fraction.
 
         Returns
         -------
@@ -311,7 +311,7 @@ class NavigationRun(NavigationResult):
 
 
 def _moved(run: NavigationRun, old: Path, new: Path) -> NavigationRun:
-    """The run with its inputs of one folder in another."""
+    """The run with its input paths moved from one folder to another."""
     if not run.memory.tables or old == new:
         return run
     return replace(
@@ -337,29 +337,29 @@ def navigate(
 ) -> NavigationRun:
     """Navigate over samples of an inertial sensor, aided by measurements.
 
-    How the run is aligned follows from the record, as with ``strapdown navigate``: from a rest
-    where the gyros find north, else from the course of a drive with fixes, else from the heading
-    that is given.
+    The alignment is selected from the record, as in ``strapdown navigate``: from a stationary
+    interval if the gyros can find north, else from the course of a drive with fixes, else from the
+    given heading.
 
     Parameters
     ----------
     imu : Imu, DataFrame, (t, gyro, accel), str or Path
         Samples: s, rad/s (n, 3), m/s² (n, 3), body axes forward-right-down. A path is that of a
-        log, or of a configuration (``.toml``), which then says everything but `smooth`.
+        log, or of a configuration (``.toml``), which then replaces all arguments except `smooth`.
     measurements : sequence of Measurement
         `Gnss`, `NonHolonomic`, `ZeroVelocity`, `Odometer` …
     sensor : str or Path
         Data sheet: a name of the catalogue, or a ``.toml`` file.
     start : mapping of str to float, optional
-        ``lat_deg``, ``lon_deg``, ``alt_m``, ``heading_deg`` where the record does not tell them.
+        ``lat_deg``, ``lon_deg``, ``alt_m``, ``heading_deg`` where not given by the record.
     smooth : bool
-        Run the Rauch-Tung-Striebel smoother back over the record.
+        Whether to run the Rauch-Tung-Striebel smoother (RTS) backward over the record.
     reference : DataFrame, str or Path, optional
-        A Trajectory table or file to compare with.
+        Trajectory table or file to compare with.
     options : mapping, optional
         Further tables of a configuration: ``{"gaps": {"beyond": "coast"}}``.
     progress : callable, optional
-        Called with a stage and the share that is done.
+        Called with a stage and the completed fraction.
 
     Returns
     -------
@@ -368,11 +368,11 @@ def navigate(
     Raises
     ------
     ConfigError
-        Something that is needed was not given, or does not fit; the message names the argument.
+        A required argument is missing or does not fit; the message names the argument.
     DataError
         The record or a measurement cannot be used.
     DivergenceError
-        The state left what the mechanization can do.
+        The state left the range of the mechanization.
     """
     if isinstance(imu, str | Path) and Path(imu).suffix.lower() == ".toml":
         if len(measurements) or any(one is not None for one in (sensor, start, reference, options)):
@@ -414,10 +414,10 @@ def run_specified(
     ----------
     spec : NavigationSpec
     file : Path, optional
-        Where it was read from: an input, too.
+        File it was read from, also an input.
     progress : callable, optional
     **drive : callable
-        ``drive``: what runs the chain in place of one run at once.
+        ``drive``: function that runs the chain, instead of one run at once.
 
     Returns
     -------
@@ -428,7 +428,7 @@ def run_specified(
 
 
 def smoothed_too(spec: NavigationSpec) -> NavigationSpec:
-    """A run that is smoothed when it has ended, whatever its file says of that.
+    """Return the specification with smoothing, whatever its file says.
 
     Parameters
     ----------
@@ -448,17 +448,17 @@ def specify_navigation(
     options: Mapping[str, Any] | None = None,
     called: Callable[[str], str] = str,
 ) -> NavigationSpec:
-    """The specification of a run over a log, with what the log and the fixes tell.
+    """Build the specification of a run over a log, completed from the log and the fixes.
 
     Parameters
     ----------
     log : ImuFile
     aids : mapping of str to mapping
-        By name, the table of each in a configuration.
+        By name, the configuration table of each measurement.
     sensor, start, options
         As `navigate`.
     called : callable
-        How the interface calls an argument, for messages: ``sensor`` as ``--sensor``.
+        Name of an argument in the interface, for messages: ``sensor`` as ``--sensor``.
 
     Returns
     -------
@@ -467,7 +467,7 @@ def specify_navigation(
     Raises
     ------
     ConfigError
-        What is needed is not given; the message names the argument.
+        A required argument is missing; the message names it.
     DataError
         A file cannot be read.
     """
@@ -542,7 +542,7 @@ def _site(
 
 
 def _memory(imu: Any, measurements: Sequence[Measurement], reference: Any) -> Memory:
-    """Every table that is in no file, by the name of the file that a bundle makes of it."""
+    """Every table that is not a file, by the file name that a bundle gives it."""
     tables: dict[str, pd.DataFrame] = {}
     samples = imu_input(imu)
     if isinstance(samples, pd.DataFrame):
@@ -558,7 +558,7 @@ def _memory(imu: Any, measurements: Sequence[Measurement], reference: Any) -> Me
     if isinstance(reference, pd.DataFrame):
         tables["reference.csv"] = reference
     if isinstance(samples, pd.DataFrame):
-        # A table of samples has the clock of its attributes; its file begins a clock of its own.
+        # Samples keep the clock in their attributes; a file has a clock of its own.
         tables = {
             name: table
             if name == "imu.npz"
@@ -585,7 +585,7 @@ def _log_in(imu: Any, memory: Memory, folder: Path) -> ImuFile:
 
 
 def _aid_in(one: Measurement, memory: Memory, folder: Path) -> dict[str, Any]:
-    """The table of a measurement in a configuration."""
+    """The configuration table of a measurement."""
     table = {"kind": one.kind, **one.options}
     if one.data is None:
         return table
@@ -602,7 +602,7 @@ def _path_in(data: Any, name: str, memory: Memory, folder: Path) -> str:
 
 
 def refused_value(error: ValidationError) -> ConfigError:
-    """What pydantic finds in the arguments of a run."""
+    """Convert a pydantic error in the arguments of a run."""
     first = error.errors()[0]
     context = first.get("ctx", {})
     place = [str(p) for p in first["loc"]] + ([context["key"]] if context.get("key") else [])

@@ -1,9 +1,9 @@
-"""Tables from files, arrays and DataFrames, and tables in memory as the input files of a bundle.
+"""Tables from files, arrays and DataFrames, and tables in memory as input files of a bundle.
 
-A function of the front door takes its samples as a path, as the table that `read_imu` returned,
-as a DataFrame, or as arrays. A table that was read and not changed since stands for its file: the
-file is what a bundle seals. Everything else is in memory, and a bundle keeps it as a file that
-gives back each number to the bit.
+Functions of the public interface take samples as a path, as a table from `read_imu`, as a
+DataFrame, or as arrays. An unchanged table that was read from a file is represented by that file,
+which the bundle seals. Everything else is in memory, and a bundle stores it as a file that
+restores each number bitwise.
 """
 
 from __future__ import annotations
@@ -50,22 +50,22 @@ __all__ = [
 
 @dataclass(frozen=True)
 class ImuFile:
-    """A recorded log that has not been read yet, and how it is read.
+    """A recorded log that has not been read yet, and its reading options.
 
     Attributes
     ----------
     log : LogTable
-        Path, columns, units, sampling, and the part that is used.
+        Path, columns, units, sampling, and the part to use.
     axes : str or None
-        Sensor axes that point forward, right, down (``x,-y,-z``), or where the sensor's x, y and
-        z point (``forward-left-up``).
+        Sensor axes that point forward, right, down (``x,-y,-z``), or directions of the sensor's x,
+        y and z axes (``forward-left-up``).
     """
 
     log: LogTable
     axes: str | None = None
 
     def read(self) -> Imu:
-        """Read the part of the log that is used into body axes and SI."""
+        """Read the used part of the log into body axes and SI."""
         recording, table, findings = body_record(self.log, AxesTable(axes=self.axes))
         imu = Imu(table)
         imu.attrs = {**table.attrs, "findings": findings, "readings": recording.readings}
@@ -80,7 +80,7 @@ class ImuFile:
 
 @dataclass(frozen=True)
 class GnssFile:
-    """A file of fixes, and how it is read.
+    """A file of fixes, and its reading options.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class GnssFile:
     options: GnssOptions
 
     def keys(self) -> dict[str, Any]:
-        """The keys of a measurement's table in a configuration that say the same."""
+        """The equivalent keys of a measurement's configuration table."""
         told = {
             "columns": dict(self.options.columns) or None,
             "position_sd_m": self.options.position_sd,
@@ -103,20 +103,20 @@ class GnssFile:
 
 
 class _Table(pd.DataFrame):
-    """A DataFrame that carries what was found when it was read."""
+    """A DataFrame with the findings from reading it."""
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What a person should know about it."""
+        """Warnings and notes."""
         return tuple(self.attrs.get("findings", ()))
 
 
 class Imu(_Table):
     """Samples of an inertial sensor: a DataFrame with `findings`.
 
-    Index ``time`` in s; columns ``gyro_x gyro_y gyro_z`` in rad/s and, where there is an
+    Index ``time`` in s; columns ``gyro_x gyro_y gyro_z`` in rad/s and, with an
     accelerometer, ``accel_x accel_y accel_z`` in m/s² (specific force), in body axes
-    forward-right-down. ``attrs["sampling"]`` says whether a row holds the value at its stamp
+    forward-right-down. ``attrs["sampling"]``: whether a row is the value at its stamp
     (``instantaneous``) or the mean over the interval that ends there (``mean``).
     """
 
@@ -133,7 +133,7 @@ class Imu(_Table):
         *,
         sampling: str = "instantaneous",
     ) -> Imu:
-        """Make a table of arrays.
+        """Create a table from arrays.
 
         Parameters
         ----------
@@ -152,7 +152,7 @@ class Imu(_Table):
         Raises
         ------
         DataError
-            Shapes disagree, a value is not finite, or time does not advance.
+            Shapes disagree, a value is not finite, or time does not increase.
         """
         table = imu_of_arrays(t, gyro, accel, sampling)
         out = cls(table)
@@ -165,7 +165,7 @@ class GnssFixes(_Table):
 
     Index ``time`` in s; columns ``lat lon`` in deg, ``alt`` in m over the ellipsoid, ``VN VE VD``
     in m/s, of the antenna; ``north_sd east_sd down_sd`` in m, ``VN_sd VE_sd VD_sd`` in m/s, inf
-    where not measured; ``quality`` as NMEA 0183 GGA has it.
+    where not measured; ``quality`` as in NMEA 0183 GGA.
     """
 
     @property
@@ -207,7 +207,7 @@ class Streams(Mapping[str, pd.DataFrame]):
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """Of all streams."""
+        """Findings of all streams."""
         return tuple(f for t in self._tables.values() for f in t.attrs.get("findings", ()))
 
 
@@ -229,22 +229,22 @@ def read_imu(
     path : str or Path
         A file of a known format, or the folder of a known recording.
     axes : str, optional
-        Where the sensor's x, y and z point (``forward-left-up``), or which sensor axes point
-        forward, right, down (``x,-y,-z``); as the file says, if not given.
+        Directions of the sensor's x, y and z (``forward-left-up``), or the sensor axes that point
+        forward, right, down (``x,-y,-z``); by default as stated in the file.
     columns : mapping of str to str, optional
         Quantity (``time``, ``gyro_x`` …, or ``gyro``, ``accel`` for three) to the name of its
         column, or its number counted from 1.
     units : mapping of str to str, optional
-        Of ``gyro`` (``deg/s``), ``accel`` (``g``) and ``time`` (``ms``), where the file does not
-        state them.
+        Of ``gyro`` (``deg/s``), ``accel`` (``g``) and ``time`` (``ms``), if not stated in the
+        file.
     sampling : {'instantaneous', 'mean'}, optional
-        Whether a row holds the value at its stamp, or the mean over the interval that ends there.
+        Whether a row is the value at its stamp, or the mean over the interval that ends there.
     rate_hz : float, optional
         Sample rate of a log without a time column.
     span_s : tuple of float or None
-        First and last stamp that are used.
+        First and last stamp to use.
     repair : bool
-        Leave out rows that cannot be used, and report them, instead of refusing the file.
+        Leave out unusable rows, and report them, instead of refusing the file.
 
     Returns
     -------
@@ -256,7 +256,7 @@ def read_imu(
     DataError
         The file cannot be used; the message names file, row, quantity and remedy.
     ConfigError
-        There is no such file, or an option does not fit it.
+        The file does not exist, or an option does not fit it.
     """
     unknown = set(units or {}) - {"gyro", "accel", "time"}
     if unknown:
@@ -293,14 +293,14 @@ def read_gnss(
     columns : mapping of str to str, optional
         Quantity (``time``, ``lat`` …) to the name of its column, or its number counted from 1.
     position_sd_m, velocity_sd_m_per_s : float or tuple of float, optional
-        Standard deviations north, east, down of each fix, in place of those of the file.
+        Standard deviations north, east, down of each fix, replacing those of the file.
     repair : bool
-        Leave out rows that cannot be used, and report them, instead of refusing the file.
+        Leave out unusable rows, and report them, instead of refusing the file.
 
     Returns
     -------
     GnssFixes
-        Time as it stands in the file; with `findings`.
+        Time as in the file; with `findings`.
 
     Raises
     ------
@@ -321,7 +321,7 @@ def read_gnss(
 
 
 def read(path: str | Path) -> Streams:
-    """Read all streams of a recording that a reader knows.
+    """Read all streams of a recording in a known format.
 
     Parameters
     ----------
@@ -330,13 +330,13 @@ def read(path: str | Path) -> Streams:
     Returns
     -------
     Streams
-        ``imu``; ``reference``, an Attitude table, where the recording has a truth; ``gnss``,
-        where it has fixes.
+        ``imu``; ``reference``, an Attitude table, if the recording has a truth; ``gnss``, if it
+        has fixes.
 
     Raises
     ------
     DataError, ConfigError
-        There is neither a log of an inertial sensor nor fixes in it.
+        The recording has neither a log of an inertial sensor nor fixes.
     """
     from strapdown.tables import attitude_table
 
@@ -354,8 +354,8 @@ def read(path: str | Path) -> Streams:
         try:
             tables["gnss"] = read_gnss(path)
         except StrapdownError as error:
-            # A log of inertial sensors need not have fixes; where it is neither, say why it is
-            # no log.
+            # A log of inertial sensors may have no fixes; if it is neither, report why it is not a
+            # log.
             refused = refused or error
     if not tables:
         assert refused is not None  # one of the two failed
@@ -364,13 +364,13 @@ def read(path: str | Path) -> Streams:
 
 
 def imu_input(source: Any) -> ImuFile | pd.DataFrame:
-    """Samples in any form: a file that is still to be read, or a checked Imu table.
+    """Samples in any form as a file still to be read, or as a checked Imu table.
 
     Parameters
     ----------
     source : str, Path, ImuFile, DataFrame, or (t, gyro, accel)
-        An Imu of `read_imu` that was not changed is its file. A DataFrame has the columns of an
-        Imu table, and its time in s as index or in a column ``time``.
+        An unchanged Imu from `read_imu` is represented by its file. A DataFrame has the columns of
+        an Imu table, and its time in s as index or in a column ``time``.
 
     Returns
     -------
@@ -381,7 +381,7 @@ def imu_input(source: Any) -> ImuFile | pd.DataFrame:
     DataError
         A column is missing, or a value cannot be used.
     ConfigError
-        It is none of these.
+        The argument is none of these.
     """
     if isinstance(source, ImuFile):
         return source
@@ -396,7 +396,7 @@ def imu_input(source: Any) -> ImuFile | pd.DataFrame:
 
 
 def table_input(data: Any, quantity: str) -> str | GnssFile | pd.DataFrame:
-    """What a measurement was made of: a path, a file with its options, or a table by time.
+    """Source of a measurement: a path, a file with its options, or a table by time.
 
     Parameters
     ----------
@@ -407,7 +407,7 @@ def table_input(data: Any, quantity: str) -> str | GnssFile | pd.DataFrame:
     Raises
     ------
     ConfigError
-        It is none of these.
+        The argument is none of these.
     """
     if isinstance(data, str | Path):
         return str(data)
@@ -430,7 +430,7 @@ def imu_of(source: Any) -> pd.DataFrame:
 
 
 def by_time(table: pd.DataFrame) -> pd.DataFrame:
-    """A table by its time in s, whether that is its index or its column ``time``."""
+    """A table indexed by time in s, from its index or its column ``time``."""
     if "time" not in table.columns:
         return table
     out = table.set_index("time")
@@ -439,7 +439,7 @@ def by_time(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def _imu_of(source: pd.DataFrame) -> pd.DataFrame:
-    """A checked copy with the columns of an Imu table alone."""
+    """A checked copy with only the columns of an Imu table."""
     given = by_time(source)
     triads = [*GYRO, *(ACCEL if ACCEL[0] in given.columns else [])]
     missing = [c for c in triads if c not in given.columns]
@@ -464,9 +464,9 @@ def imu_of_arrays(
     sampling: str = "instantaneous",
     source: str | None = None,
 ) -> pd.DataFrame:
-    """An Imu table of arrays, laid out column by column as one that is read.
+    """An Imu table from arrays, stored column by column like one that is read.
 
-    The last bit of a sum over a column depends on how the table lies in memory.
+    The last bit of a sum over a column depends on the memory layout.
     """
     made = imu_table(t, gyro, accel, sampling=sampling, source=source)
     out = pd.DataFrame(
@@ -477,7 +477,7 @@ def imu_of_arrays(
 
 
 def _digest(table: pd.DataFrame) -> str:
-    """Of stamps, names, values and sampling: whether a table is still what was read."""
+    """Hash of stamps, names, values and sampling, to detect changes of a table."""
     digest = hashlib.sha256(repr([*table.columns, table.attrs.get("sampling")]).encode())
     for array in (table.index.to_numpy(), table.to_numpy()):
         digest.update(np.ascontiguousarray(array).tobytes())
@@ -485,18 +485,18 @@ def _digest(table: pd.DataFrame) -> str:
 
 
 def _unchanged(table: pd.DataFrame) -> ImuFile | GnssFile | None:
-    """The file that a table was read from, where the table is still what was read."""
+    """The file that a table was read from, if the table is unchanged."""
     file, digest = table.attrs.get("file", (None, ""))
     return file if file is not None and _digest(table) == digest else None
 
 
-#: Stands for the folder of the files that a bundle will make of tables in memory.
+#: Stands for the folder of the files that a bundle makes of tables in memory.
 NOWHERE = Path("memory")
 
 
 @dataclass(frozen=True)
 class Memory:
-    """Tables in memory, by the names that they have as input files.
+    """Tables in memory, by their names as input files.
 
     Attributes
     ----------
@@ -508,7 +508,7 @@ class Memory:
 
     @contextmanager
     def as_files(self) -> Iterator[Path]:
-        """Write each table to the bit into a folder of its own, which is removed at the end."""
+        """Write each table exactly into a temporary folder, which is removed at the end."""
         with tempfile.TemporaryDirectory(prefix="strapdown-") as name:
             folder = Path(name).resolve()
             for file, table in self.tables.items():
@@ -520,7 +520,7 @@ class Memory:
 
 
 def _write_csv(path: Path, table: pd.DataFrame) -> None:
-    """Columns as they are named, with the unit that their quantity has in a table."""
+    """Write the named columns, with the unit that their quantity has in a table."""
     clock = clock_of(table).name
     name = {GPS: "gps_sow_s", UNIX: "unix_time_s"}.get(clock, "time_s")
     columns = {name: table.index.to_numpy(dtype=np.float64)}
@@ -543,14 +543,14 @@ _UNITS = {
 def moved_inputs(
     inputs: tuple[InputFiles, ...], old: Path, new: Path, *, copied: bool = False
 ) -> tuple[InputFiles, ...]:
-    """The inputs, those of one folder as of another.
+    """Move inputs from one folder to another.
 
     Parameters
     ----------
     inputs : tuple of InputFiles
     old, new : Path
     copied : bool
-        Whether a bundle copies those of `new`, whatever their size.
+        Whether a bundle copies the inputs in `new`, whatever their size.
     """
     return tuple(
         replace(
@@ -566,7 +566,7 @@ def moved_inputs(
 
 
 def moved_paths(configuration: Any, old: Path, new: Path) -> Any:
-    """A configuration as plain data, the paths of one folder as of another."""
+    """A configuration as plain data, with paths moved from one folder to another."""
 
     def change(path: str) -> str:
         given = Path(path)

@@ -1,4 +1,4 @@
-"""What was asked for, as frozen specifications: sealed with every result, and run again from."""
+"""Frozen specifications of runs: stored with every result, so that it can be run again."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ __all__ = [
 
 
 class ScenarioSpec(Spec):
-    """A simulated log; `sensor` takes the place of the scenario's own errors."""
+    """A simulated log; `sensor` replaces the scenario's own errors."""
 
     kind: Literal["scenario"] = "scenario"
     name: str
@@ -38,7 +38,7 @@ class ScenarioSpec(Spec):
 
 
 class LogSpec(Spec):
-    """A recorded log and how to read it; None is left to the log itself."""
+    """A recorded log and how to read it; None means as stated in the log."""
 
     kind: Literal["log"] = "log"
     path: str

@@ -1,4 +1,4 @@
-"""An alignment, as a person writes it: every key with its unit."""
+"""Configuration of an alignment: every key with its unit."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ Matrix = tuple[Triple, Triple, Triple]
 
 
 class LogTable(TableSpec):
-    """A recorded log, how to read it, and the part of it that is used."""
+    """A recorded log, how to read it, and the part to use."""
 
     path: FileName
     columns: dict[Word, Word] = Field(default_factory=dict)
@@ -56,13 +56,13 @@ class LogTable(TableSpec):
 
 
 class GnssTable(TableSpec):
-    """Fixes of a satellite receiver, for an alignment while moving."""
+    """GNSS fixes for an alignment in motion."""
 
     path: FileName
 
 
 class SimulationTable(TableSpec):
-    """A record that is simulated at the site: at rest, or rocking about it."""
+    """A simulated record at the site: stationary, or rocking about it."""
 
     duration_s: Positive
     rate_hz: Positive = 100.0
@@ -74,12 +74,12 @@ class SimulationTable(TableSpec):
     roll_waves: tuple[AngleWaveSpec, ...] = ()
     pitch_waves: tuple[AngleWaveSpec, ...] = ()
     heading_waves: tuple[AngleWaveSpec, ...] = ()
-    #: The catalogue's, or a file; that of [sensors], if not given.
+    #: Catalogue name or file; by default that of [sensors].
     sensor: FileName | None = None
 
 
 class AxesTable(TableSpec):
-    """How the sensor's axes lie in the body: in letters or words, by a name, or as matrices."""
+    """Sensor axes relative to the body: as letters or words, by a name, or as matrices."""
 
     axes: Word | None = None
     design: Word | None = None
@@ -101,7 +101,7 @@ class AxesTable(TableSpec):
 
 
 class SiteTable(TableSpec):
-    """Where the body stands."""
+    """Position of the body."""
 
     lat_deg: Number
     lon_deg: Number
@@ -110,7 +110,7 @@ class SiteTable(TableSpec):
 
 
 class SensorsTable(TableSpec):
-    """What is not known of the sensors: a data sheet, and what replaces it."""
+    """Sensor uncertainty: a data sheet, and values that replace it."""
 
     sensor: FileName | None = None
     gyro: dict[Word, OneOrThree] = Field(default_factory=dict)
@@ -118,27 +118,27 @@ class SensorsTable(TableSpec):
 
 
 class CoarseSpec(ChoiceSpec):
-    """The coarse alignment, over the first part of the record, or over all of it."""
+    """Coarse alignment over the first part of the record, or over all of it."""
 
     kind: str = "inertial_frame"
     duration_s: Positive | None = None
 
 
 class PrefilterSpec(ChoiceSpec):
-    """What the samples pass before they are aligned."""
+    """Filter applied to the samples before the alignment."""
 
     kind: str = "none"
 
 
 class FineSpec(ChoiceSpec):
-    """The fine alignment: after the coarse one where that has an end of its own, else over all."""
+    """Fine alignment: after the coarse alignment if that ends by itself, else over the record."""
 
     kind: str = "filter"
     duration_s: Positive | None = None
 
 
 class ReferenceTable(TableSpec):
-    """An attitude that is known from elsewhere, to hold the answer beside."""
+    """Independent reference attitude to compare the result with."""
 
     source: Words = ""
     roll_deg: Number | None = None
@@ -149,9 +149,9 @@ class ReferenceTable(TableSpec):
 
 
 class OutputTable(TableSpec):
-    """What is written."""
+    """Output files."""
 
-    #: Of attitude.csv; every sample, if not given.
+    #: Rate of attitude.csv; by default every sample.
     rate_hz: Positive | None = 10.0
 
 

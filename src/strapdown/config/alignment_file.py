@@ -1,4 +1,4 @@
-"""An alignment read from its file, or from what is sealed: the forms that its kinds have."""
+"""Read an alignment configuration from a file or plain data, and check it."""
 
 from __future__ import annotations
 
@@ -46,24 +46,24 @@ __all__ = [
 ]
 
 
-#: Stages that are modules, by table: what the table has beside the options, and the kind that
-#: stands there where none is named.
+#: Module stages by table: base form of the table without the module's options, and default
+#: kind.
 STAGES: dict[str, tuple[type[ChoiceSpec], str]] = {
     "prefilter": (PrefilterSpec, "none"),
     "coarse": (CoarseSpec, "inertial_frame"),
     "fine": (FineSpec, "filter"),
 }
-#: Stages that a chain can do without, by the kind ``none``.
+#: Stages that may be left empty with the kind ``none``.
 MAY_BE_EMPTY = ("prefilter", "fine")
 
 
 def alignment_form(table: Mapping[str, Any], file: TomlFile | None = None) -> type[AlignmentSpec]:
-    """The specification with the options of the kinds that a table names.
+    """Return the specification with the options of the kinds that a table names.
 
     Raises
     ------
     ConfigError
-        There is no such kind.
+        A kind is unknown.
     """
     stages: dict[str, Any] = {}
     for name, (base, default) in STAGES.items():
@@ -83,7 +83,7 @@ def alignment_form(table: Mapping[str, Any], file: TomlFile | None = None) -> ty
 
 
 def alignment_spec(table: Mapping[str, Any]) -> AlignmentSpec:
-    """Make a specification of plain data, as a command or a sealed folder has it.
+    """Create a specification from plain data, as from a command or a sealed folder.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def alignment_spec(table: Mapping[str, Any]) -> AlignmentSpec:
     Raises
     ------
     ConfigError
-        There is no such kind, or a module refuses its options.
+        A kind is unknown, or a module refuses its options.
     ValidationError
         The table has another form.
     """
@@ -107,13 +107,13 @@ def alignment_spec(table: Mapping[str, Any]) -> AlignmentSpec:
 
 
 def read_alignment_spec(path: str | Path, *, files: bool = True) -> AlignmentSpec:
-    """Read the file of an alignment.
+    """Read an alignment configuration file.
 
     Parameters
     ----------
     path : str or Path
     files : bool
-        Whether the files that it names must be there, and become absolute paths; else only the
+        Whether the files that it names must exist and become absolute paths; otherwise only the
         form is checked.
 
     Returns
@@ -124,8 +124,8 @@ def read_alignment_spec(path: str | Path, *, files: bool = True) -> AlignmentSpe
     Raises
     ------
     ConfigError
-        There is no such file, it is no TOML, a key is not known, missing or still ``"?"``, a value
-        does not fit, or the parts do not go together; the message names the line.
+        The file is missing or not TOML; a key is unknown, missing or still ``"?"``; a value does
+        not fit, or the parts are incompatible. The message names the line.
     """
     file = read_named_toml(Path(path), "alignment", ALIGNMENT_WANTED)
     file = replace(file, table=_with_kinds(file.table))
@@ -143,7 +143,7 @@ def _with_kinds(table: Mapping[str, Any]) -> dict[str, Any]:
     return out
 
 
-# What a configuration says of a record, its sensors and its place, as far as it can be wrong.
+# Checks of record, sensors and position, shared by alignment and navigation.
 
 
 #: An hour at 4 kHz.
@@ -151,12 +151,12 @@ MOST_SAMPLES = 1.5e7
 
 
 class SourceChecks:
-    """Checks that alignments and runs of navigation share.
+    """Checks that alignments and navigation runs share.
 
     Parameters
     ----------
     written : Written or None
-        The file, for lines in messages.
+        The file, for line numbers in messages.
     """
 
     def __init__(self, written: Written | None) -> None:
@@ -169,7 +169,7 @@ class SourceChecks:
         return self._written.refuse(path, code, **data)
 
     def told(self, path: tuple[str, ...], make: Callable[[], Any]) -> Any:
-        """Make something; what it refuses is told at a key."""
+        """Call `make`; report a refusal at a key."""
         try:
             return make()
         except ConfigError as error:
@@ -186,7 +186,7 @@ class SourceChecks:
         return self._written is None or self._written.has(*path)
 
     def place(self, table: str, lat_deg: float, lon_deg: float, alt_m: float) -> None:
-        """Whether there is such a place."""
+        """Check that the position is valid."""
         if abs(lat_deg) > 90.0:
             exchanged = abs(lon_deg) <= 90.0
             code = "config.latitude-longitude-exchanged" if exchanged else "config.latitude-beyond"
@@ -197,7 +197,7 @@ class SourceChecks:
             raise self.refuse((table, "alt_m"), "config.height-out-of-range")
 
     def axes(self, axes: AxesTable) -> None:
-        """Whether axes are those of a sensor."""
+        """Check that the axes are valid sensor axes."""
         if axes.axes is not None:
             self.told(("axes", "axes"), lambda: parse_axes(axes.axes or ""))
         if axes.design is not None and axes.design not in NAMED_AXES:
@@ -210,22 +210,22 @@ class SourceChecks:
                 self.told(("axes", name), partial(check_axes_matrix, matrix, name))
 
     def log(self, log: LogTable | None) -> None:
-        """Whether there are such units."""
+        """Check that the units of the log are known."""
         for kind in ("gyro", "accel", "time"):
             unit = getattr(log, f"{kind}_unit", None)
             if unit is not None:
                 self.told(("log", f"{kind}_unit"), partial(parse_unit, unit, kind))
 
     def sensors(self, given: SensorsTable, simulation: Any, missing: str) -> None:
-        """Whether something says how good the sensors are.
+        """Check that the sensor uncertainty is stated.
 
         Parameters
         ----------
         given : SensorsTable
         simulation : table or None
-            With a sensor of its own, or none.
+            With or without a sensor of its own.
         missing : str
-            Code of the error where nothing does.
+            Error code if the uncertainty is not stated.
         """
         from strapdown.sensors.catalogue import load_sensor
         from strapdown.sensors.uncertainty import stated_imu
@@ -244,7 +244,7 @@ class SourceChecks:
             raise self.refuse(("simulation", "sensor"), "config.no-sensor-to-simulate")
 
     def span(self, log: LogTable | None) -> float | None:
-        """Length of the part of a log that is used, s; None where it does not say it."""
+        """Length of the used part of a log, s; None if not stated."""
         if log is None:
             return None
         if log.to_s is not None and log.duration_s is not None:
@@ -256,23 +256,23 @@ class SourceChecks:
         return log.duration_s
 
 
-# What an alignment says against itself, or a module refuses: told before anything runs.
+# Consistency checks of an alignment, made before anything runs.
 
 
 def check_alignment(spec: AlignmentSpec, written: Written | None = None) -> None:
-    """Refuse what cannot be meant.
+    """Refuse an inconsistent alignment.
 
     Parameters
     ----------
     spec : AlignmentSpec
     written : Written, optional
-        The file that it was read from, for lines in messages.
+        The file it was read from, for line numbers in messages.
 
     Raises
     ------
     ConfigError
-        A module refuses an option, the place is none, a matrix is no rotation, a sensor is not
-        known or says too little, or times contradict one another.
+        A module refuses an option, the position is not valid, a matrix is not a rotation, a sensor
+        is unknown or incomplete, or times are inconsistent.
     """
     check = _Checks(written)
     site = spec.site
@@ -313,7 +313,7 @@ class _Checks(SourceChecks):
             self.told((name,), partial(make_choice, getattr(spec, name), SLOTS[name], given))
 
     def chain(self, spec: AlignmentSpec) -> None:
-        """What one stage leaves, and another needs."""
+        """Check that each stage provides the input of the next."""
         kind = spec.coarse.kind
         if kind in NEEDS_GNSS and spec.gnss is None:
             raise self.refuse(("coarse", "kind"), "config.course-without-fixes")
@@ -331,21 +331,21 @@ class _Checks(SourceChecks):
 
 
 def _begun(spec: AlignmentSpec) -> None:
-    """Begin the filter of a fine alignment, which refuses parts that do not go together."""
+    """Initialize the filter of a fine alignment, which refuses incompatible parts."""
     site = Site(
         spec.site.lat_deg, spec.site.lon_deg, spec.site.alt_m, find_ellipsoid(spec.site.ellipsoid)
     )
     way: FineAlignment = make_choice(spec.fine, SLOTS["fine"], {"ellipsoid": spec.site.ellipsoid})
     if abs(spec.site.lat_deg) > way.mechanization.latitude_limit_deg:
-        # Whether north can be found there is told by the alignments themselves.
+        # The alignments themselves report whether north can be found there.
         return
     filter_ = ErrorFilter(way.mechanization, way.model(), way.form, way.rule)
     filter_.begin(home_of(site, 0.0), np.zeros((filter_.model.physical_size,) * 2))
 
 
-#: Coarse alignments that need satellite fixes.
+#: Coarse alignments that need GNSS fixes.
 NEEDS_GNSS = ("gnss_course",)
-#: Coarse alignments that a filter over a rest cannot begin from, and the code that says why.
+#: Coarse alignments that cannot start a stationary fine filter, and the code of the reason.
 NOT_BEFORE_FINE = {
     "gnss_course": "config.course-before-fine",
     "levelling": "config.levelling-before-fine",

@@ -1,4 +1,4 @@
-"""The keys of a table that a person wrote, as those of its specification."""
+"""Map the keys of a user's table to the fields of its specification."""
 
 from __future__ import annotations
 
@@ -17,30 +17,30 @@ __all__ = ["canonical"]
 def canonical(
     file: TomlFile, form: type[TableSpec]
 ) -> tuple[dict[str, Any], dict[KeyPath, KeyPath]]:
-    """Put every quantity in the unit of its field.
+    """Convert every quantity to the unit of its field.
 
     Parameters
     ----------
     file : TomlFile
     form : type
-        The specification that it is one of.
+        Specification class of the table.
 
     Returns
     -------
     table : dict
         With the names of the fields.
     written : dict
-        By the path of a field, its path in the file, where the file has another unit.
+        Path of a field to its path in the file, where the file has another unit.
 
     Raises
     ------
     ConfigError
-        A key is not known or lacks its unit, or two give one quantity.
+        A key is unknown or lacks its unit, or two keys give one quantity.
     """
     return _Keys(file, form).read()
 
 
-#: In place of a header: keys before the first one.
+#: Used instead of a header for keys before the first one.
 TOP = "the top of the file"
 
 
@@ -78,7 +78,7 @@ class _Keys:
         return found
 
     def _part(self, value: Any, form: type[TableSpec], name: str, path: KeyPath) -> Any:
-        """One table of a field; of several that it may be the one that its tag names."""
+        """Table of a field; for a union, the member that the tag names."""
         if not isinstance(value, dict):
             return value
         forms = list(_forms_of(form.model_fields[name].annotation))
@@ -133,7 +133,7 @@ def _below(form: type[TableSpec], prefix: str) -> Iterator[tuple[str, type[Table
 
 
 def table_of(form: type[TableSpec], name: str) -> type[TableSpec] | None:
-    """The specification of a field that is a table, or a list of them."""
+    """Specification class of a field that is a table, or a list of tables."""
     return _inner(form.model_fields[name].annotation)
 
 
@@ -150,7 +150,7 @@ def _forms_of(annotation: Any) -> Iterator[type[TableSpec]]:
 
 
 def _has_tag(form: type[TableSpec], value: dict[str, Any]) -> bool:
-    """Whether a table says by one of its keys that it is of this form."""
+    """Whether a tag key shows that a table is of this form."""
     return any(
         get_origin(field.annotation) is Literal and value.get(name) in get_args(field.annotation)
         for name, field in form.model_fields.items()
@@ -162,6 +162,6 @@ def _is_list(annotation: Any) -> bool:
 
 
 def _known(form: type[TableSpec]) -> dict[str, str]:
-    """By every key that is understood, its field."""
+    """Field name by accepted key."""
     fields = [name for name in form.model_fields if name not in form.unwritten]
     return {key: name for name in fields for key in keys_of(name)}

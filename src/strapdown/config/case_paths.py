@@ -1,4 +1,4 @@
-"""The files that a case names, found from its folder."""
+"""Resolve the files that a case names, relative to its folder."""
 
 from __future__ import annotations
 
@@ -13,29 +13,29 @@ from strapdown.config.toml_file import KeyPath, TomlFile, shown
 __all__ = ["beside_sealed_case", "with_absolute_paths"]
 
 
-#: Names of a folder that are looked through for one that is near.
+#: Largest number of names in a folder that are searched for a similar one.
 MOST_NAMES = 10_000
 
 
 def with_absolute_paths(file: TomlFile, table: dict[str, Any]) -> dict[str, Any]:
-    """Find the files that a case names.
+    """Resolve the files that a case names.
 
     Parameters
     ----------
     file : TomlFile
     table : dict
-        Of the case, already found to be of its form.
+        Table of the case, already checked against its form.
 
     Returns
     -------
     dict
-        With every ``path``, and every ``sensor`` that is a file, as an absolute path. Of a case
-        that is a copy in a sealed folder, the copies in that folder.
+        With every ``path``, and every ``sensor`` that is a file, as an absolute path. For a case
+        copied into a sealed folder, these are the copies in that folder.
 
     Raises
     ------
     ConfigError
-        One is not there; the message names the line.
+        A file does not exist; the message names the line.
     """
     found: dict[str, Any] = _resolved(file, table, ())
     return found
@@ -84,10 +84,10 @@ def _near(wanted: Path) -> str:
     return close[0] if close and close[0].isprintable() else ""
 
 
-# The copy of a case in a sealed folder: where the folder keeps what the case names.
+# Copies of a case's files in a sealed folder.
 
 
-# A manifest of hundreds of records is shorter.
+# Upper limit of the manifest size, bytes: one with hundreds of records is smaller.
 LARGEST = 50_000_000
 
 
@@ -106,8 +106,8 @@ def beside_sealed_case(case: Path, key: KeyPath, given: str) -> Path | None:
     Returns
     -------
     Path or None
-        None where the case stands in no sealed folder, or the folder keeps no copy under this key
-        with this last name.
+        None if the case is not in a sealed folder, or the folder has no copy for this key with
+        this file name.
     """
     home = case.absolute().parent
     if home.parent.name != "inputs":
@@ -127,6 +127,6 @@ def beside_sealed_case(case: Path, key: KeyPath, given: str) -> Path | None:
             return None
     except (OSError, ValueError, KeyError, IndexError, TypeError, RecursionError):
         return None
-    # A case that was changed may name another record under this key.
+    # An edited case may name another record under this key.
     named = PurePosixPath(given.replace("\\", "/")).name
     return kept if kept.name in (named, PurePosixPath(given).parent.name) else None

@@ -1,4 +1,4 @@
-"""What differs between two specifications, in words."""
+"""Differences between two specifications, as text."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ __all__ = ["changed_options"]
 def changed_options(
     before: Spec | Mapping[str, Any], after: Spec | Mapping[str, Any]
 ) -> tuple[str, ...]:
-    """Name each option that differs.
+    """List the options that differ.
 
     Parameters
     ----------
     before, after : Spec or dict
-        Specifications, or what was sealed of them.
+        Specifications, or their stored plain data.
 
     Returns
     -------
     tuple of str
-        Such as ``entry, speed_m_per_s: 7.1 before, 8.1 now``, in the order of `after`. Tables of a
-        list are told apart by their names, wherever each stands; others by their numbers. A key
-        that is left out is as one that is None, and a list as a tuple.
+        Such as ``entry, speed_m_per_s: 7.1 before, 8.1 now``, in the order of `after`. Tables in a
+        list are matched by name at any position, otherwise by number. A missing key equals None,
+        and a list equals a tuple.
     """
     return tuple(_changed(_plain(before), _plain(after), ()))
 
@@ -76,14 +76,14 @@ def _changed_list(
             yield from _changed(old[name], new[name], (*place[:-1], said))
     kept = [name for name in new if name in old]
     if kept != [name for name in old if name in new]:
-        # The first unit's answer is the main one where the units are not combined.
+        # Without combination, the first unit gives the main result.
         was = ", ".join(shown(name) for name in old if name in new)
         now = ", ".join(shown(name) for name in kept)
         yield f"order of {', '.join(place)}: {was} before, {now} now"
 
 
 def _by_name(tables: list[dict[str, Any]]) -> dict[str | int, dict[str, Any]] | None:
-    """None where one has no name, or two have one."""
+    """Tables by name; None if a name is missing or repeated."""
     named = {table["name"]: table for table in tables if isinstance(table.get("name"), str)}
     return dict(named) if len(named) == len(tables) and "" not in named else None
 
@@ -93,7 +93,7 @@ def _tables(given: Any) -> bool:
 
 
 def _same(before: Any, after: Any) -> bool:
-    # True is 1 for Python, and for nobody else.
+    # Python treats True as 1; a configuration does not.
     if isinstance(before, bool) != isinstance(after, bool):
         return False
     return bool(before == after)

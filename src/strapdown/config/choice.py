@@ -1,4 +1,4 @@
-"""A module chosen for a slot, as a person writes it: its kind, and its options with their units."""
+"""Configuration of a module in a slot: its kind, and its options with units."""
 
 from __future__ import annotations
 
@@ -59,26 +59,26 @@ def choice_form(
     file: TomlFile | None = None,
     path: KeyPath = (),
 ) -> type[ChoiceSpec]:
-    """The form of what is written for a slot: the options of the kind that it names.
+    """Form of the table of a slot, with the options of the kind that it names.
 
     Parameters
     ----------
     slot : Slot
     given : mapping
-        Its table.
+        Table of the slot.
     base : type
-        What the table has beside the module's options.
+        Fields of the table besides the module's options.
     default : str
-        Kind where the table names none.
+        Kind if the table names none.
     empty : bool
-        Whether the slot may stay empty, by the kind ``none``.
+        Whether the slot may stay empty, with the kind ``none``.
     file, path : TomlFile, tuple
-        Where the table stands, for messages.
+        Position of the table, for messages.
 
     Raises
     ------
     ConfigError
-        There is no such kind.
+        The kind is unknown.
     """
     kind = given.get("kind", default)
     if kind == NONE and empty and NONE not in slot.entries:
@@ -132,13 +132,13 @@ def _field(
 
 
 def group_form(group: type) -> type[TableSpec]:
-    """The form of a table of options that belong together."""
+    """Form of a table of grouped options."""
     known: dict[str, Any] = {o.key: (strict(o.hint), o.default) for o in options_of(group)}
     return create_model(group.__name__, __base__=TableSpec, **known)
 
 
 def strict(hint: Any) -> Any:
-    """The hint with numbers that are numbers, and no text or truth that looks like one."""
+    """Type hint that accepts numbers only as numbers, not as text or booleans."""
     if hint in _STRICT:
         return _STRICT[hint]
     origin, parts = get_origin(hint), get_args(hint)
@@ -150,7 +150,7 @@ def strict(hint: Any) -> Any:
 
 
 def with_kinds(slot: Slot, given: Any, default: str = "") -> Any:
-    """A table in which a module that is named by its kind alone is a table, too."""
+    """Replace modules given by kind alone with tables."""
     if not isinstance(given, dict):
         return given
     entry = slot.entries.get(given.get("kind", default))
@@ -165,18 +165,18 @@ def with_kinds(slot: Slot, given: Any, default: str = "") -> Any:
 
 
 def as_table(slot: Slot, given: Any, default: str) -> Any:
-    """As `with_kinds`, of a module that may itself be named by its kind alone."""
+    """As `with_kinds`, also for the slot's own module."""
     return with_kinds(slot, {"kind": given} if isinstance(given, str) else given, default)
 
 
 def field_of(form: type[TableSpec], usual: Mapping[str, Any]) -> tuple[Any, Any]:
-    """A field of a form, which may be left out where nothing in it must be written."""
+    """Field of a form, optional if none of its own fields is required."""
     needed = any(one.is_required() for name, one in form.model_fields.items() if name not in usual)
     return form, ... if needed else form.model_validate(usual)
 
 
 def make_choice(spec: ChoiceSpec, slot: Slot, given: Mapping[str, Any]) -> Any:
-    """Make the module that a specification names.
+    """Create the module that a specification names.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def make_choice(spec: ChoiceSpec, slot: Slot, given: Mapping[str, Any]) -> Any:
     Returns
     -------
     object
-        An instance of the slot's base; None where the slot stays empty.
+        An instance of the slot's base; None for an empty slot.
 
     Raises
     ------
@@ -237,28 +237,28 @@ def _inside(error: ConfigError, key: str) -> ConfigError:
 
 
 def _keyed(error: ConfigError, entry: type) -> ConfigError:
-    """The error with the key of the configuration in place of the field."""
+    """The error with the key of the configuration instead of the field."""
     f = error.finding
     keys = {o.field: o.key for o in options_of(entry)}
     quantity = keys.get(f.quantity or "", f.quantity)
     return error.replaced(quantity=quantity)
 
 
-# Slots of a chain, and the modules that can stand in each: from their own literal tables.
+# Slots of a chain and the modules for each, from their own literal tables.
 
 
 @dataclass(frozen=True)
 class Slot:
-    """A place of a chain that a module stands in.
+    """Slot of a chain, filled by a module.
 
     Attributes
     ----------
     name : str
-        The table, or the key, of a configuration.
+        Table or key in a configuration.
     title : str
-        For people.
+        Title for users.
     base : type
-        What every module of it is.
+        Base class of its modules.
     entries : dict of str to type
         By ``kind``: dataclasses, whose fields are the options.
     """
@@ -288,11 +288,11 @@ SLOTS: dict[str, Slot] = {
     "recorder": Slot("recorder", "Recorders", Recorder, RECORDERS),
 }
 
-#: Fields that a chain fills by itself, and no person writes.
+#: Fields that the chain fills; users do not write them.
 GIVEN = ("ellipsoid", "gyro_noise", "accel_noise", "name")
 _PLAIN = (float, int, bool, str)
-#: Units of options whose names do not have them, as the endings of keys; another module's option
-#: is named with its unit, or has it in its field's metadata: ``metadata={"unit": "s"}``.
+#: Units of options without a unit in their name, as the endings of keys; options of other modules
+#: have the unit in their name or in the field's metadata: ``metadata={"unit": "s"}``.
 UNITS = {
     "RobustWd.bandwidth": "hz",
     "attenuation": "db",
@@ -315,16 +315,16 @@ class Option:
     Attributes
     ----------
     field : str
-        Of the module's dataclass.
+        Field of the module's dataclass.
     key : str
-        Of a configuration: the field with its unit (``metadata={"unit": "s"}``), or the name of
+        Configuration key: the field with its unit (``metadata={"unit": "s"}``), or the name of
         the slot whose module it takes.
     hint : type
     default : object
-        `dataclasses.MISSING` where it must be written.
+        `dataclasses.MISSING` if required.
     slot : Slot or None
     takes_class : bool
-        Whether the field takes a module's class, and no instance.
+        Whether the field takes a module's class instead of an instance.
     group : type or None
         Of a field that takes a dataclass of further options.
     """
@@ -339,7 +339,7 @@ class Option:
 
     @property
     def has_default(self) -> bool:
-        """Whether it may be left out."""
+        """Whether the option may be omitted."""
         return self.default is not MISSING
 
 
@@ -354,7 +354,7 @@ def options_of(module: type) -> tuple[Option, ...]:
     Returns
     -------
     tuple of Option
-        Fields that neither a person writes nor a slot fills are left out.
+        Without fields that are set neither by users nor by a slot.
     """
     hints = get_type_hints(module)
     found = []
@@ -375,7 +375,7 @@ def options_of(module: type) -> tuple[Option, ...]:
 
 
 def _unit(module: type, one: Field[Any]) -> str | None:
-    """The unit of an option whose name does not have it."""
+    """Unit of an option without a unit in its name."""
     own = UNITS.get(f"{module.__name__}.{one.name}")
     return one.metadata.get("unit") or own or UNITS.get(one.name)
 
@@ -419,7 +419,7 @@ def _default(one: Field[Any]) -> Any:
 
 
 def _kind(one: Field[Any], slot: Slot) -> Any:
-    """The kind of the module that stands there if nothing is written; None for no module."""
+    """Default kind of the module; None for no module."""
     default = _default(one)
     if default is None or default is MISSING:
         return default

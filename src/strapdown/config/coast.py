@@ -1,4 +1,4 @@
-"""A forecast of coasting, as a person asks for it: every key with its unit."""
+"""Configuration of the predicted drift in a GNSS outage: every key with its unit."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from strapdown.errors import ConfigError
 
 __all__ = ["CoastMotionTable", "CoastSpec", "CoastStartTable", "coast_spec"]
 
-#: Longest outage that is asked for, s: beyond a day nothing is coasting any more.
+#: Longest outage, s: predictions beyond a day are not meaningful.
 LONGEST = 86_400.0
 
 
 class CoastStartTable(TableSpec):
-    """What is known when the aids go away: what a drive with fixes leaves, or what is stated."""
+    """State at the start of the outage: after a drive with fixes, or as stated."""
 
-    #: Length of the drive with fixes before it; 0 leaves what an alignment ends with.
+    #: Length of the preceding drive with fixes; 0 starts from the end of an alignment.
     aided_s: float = Field(default=600.0, ge=0.0, le=36_000.0, strict=True)
-    #: Of the fixes, one a second.
+    #: Of the fixes, one per second.
     fix_position_sd_m: Positive = 1.5
     fix_velocity_sd_m_per_s: Positive = 0.05
-    #: In place of what the drive leaves, each axis, and then bound to nothing else.
+    #: Replaces the result of the drive, on each axis, without correlation with other states.
     position_sd_m: NotNegative | None = None
     velocity_sd_m_per_s: NotNegative | None = None
     #: Of roll and pitch.
@@ -37,11 +37,11 @@ class CoastStartTable(TableSpec):
 
 
 class CoastMotionTable(TableSpec):
-    """How it moves while it coasts, level, and where."""
+    """Level motion during the outage, and its position."""
 
-    #: It stands, if zero.
+    #: Stationary if zero.
     speed_m_per_s: NotNegative = 0.0
-    #: To which it comes over the outage, with least jerk.
+    #: Final speed, reached over the outage with minimum jerk.
     to_speed_m_per_s: NotNegative | None = None
     #: Positive to the right.
     turn_rate_deg_per_s: Number = 0.0
@@ -50,30 +50,30 @@ class CoastMotionTable(TableSpec):
 
 
 class CoastSpec(TableSpec):
-    """One forecast of coasting: of a sensor along a stated motion, or of a run of navigation."""
+    """Predicted outage drift of a sensor along a stated motion, or of a navigation run."""
 
     outage_s: float = Field(gt=0.0, le=LONGEST, strict=True)
-    #: Of the catalogue, or a file; none where a run of navigation says it.
+    #: Catalogue name or file; omitted if a navigation run states it.
     sensor: FileName | None = None
     start: CoastStartTable = CoastStartTable()
     motion: CoastMotionTable = CoastMotionTable()
-    #: Aids that stay, by their kinds.
+    #: Measurements that remain available, by kind.
     aiding: TableSpec = TableSpec()
-    #: Of a run of navigation: where the outage begins; even places, if not given.
+    #: For a navigation run: start of the outage; by default at evenly spaced instants.
     at_s: Number | None = None
-    #: In its place the part of the log that they lie in; all of it, if not given.
+    #: Alternatively the part of the log that contains them; by default all of it.
     from_s: Number | None = None
     to_s: Number | None = None
     duration_s: Positive | None = None
     places: StrictInt = Field(default=10, ge=1, le=100)
 
 
-#: Aids that can be kept along a stated motion: each tells what it would at the truth.
+#: Measurements that can remain along a stated motion: each is evaluated at the true state.
 KEPT = ("no_slip", "odometer", "zero_velocity", "zero_rate")
 
 
 def coast_spec(table: Mapping[str, Any]) -> CoastSpec:
-    """Make a specification of plain data, as a command or a sealed folder has it.
+    """Create a specification from plain data, as from a command or a sealed folder.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def coast_spec(table: Mapping[str, Any]) -> CoastSpec:
     Raises
     ------
     ConfigError
-        An aid cannot be kept, or a value does not fit; the quantity names table and key.
+        A measurement cannot remain, or a value does not fit; the quantity names table and key.
     """
     aiding = table.get("aiding") or {}
     forms: dict[str, Any] = {}
@@ -104,7 +104,7 @@ def coast_spec(table: Mapping[str, Any]) -> CoastSpec:
 
 
 def _refused(error: Any) -> ConfigError:
-    """Return what pydantic finds, at the table and key."""
+    """Return a pydantic error as an error at the table and key."""
     place = [str(part) for part in error["loc"]]
     if error["type"] == "refused":
         place += [error["ctx"]["key"]]

@@ -1,4 +1,4 @@
-"""A crash case, as a person writes it: every key with its unit."""
+"""Configuration of a crash case: every key with its unit."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from pydantic import AfterValidator, BeforeValidator, Field, StrictBool, StrictI
 from strapdown.config.spec import TableSpec, file_name, refuse, word, words
 from strapdown.config.toml_file import shown
 
-# A number in quotation marks, or true for 1, is a slip and not a number.
+# A number in quotation marks, or true for 1, is rejected.
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[Number, Field(gt=0.0)]
 NotNegative = Annotated[Number, Field(ge=0.0)]
 Pair = tuple[Number, Number]
 Triple = tuple[Number, Number, Number]
-#: Text of one line, that titles, tables and names of files can show.
+#: One line of text, suitable for titles, tables and file names.
 Words = Annotated[str, AfterValidator(words)]
 Word = Annotated[str, AfterValidator(word)]
 FileName = Annotated[str, AfterValidator(file_name)]
@@ -27,7 +27,7 @@ def _listed(value: Any) -> Any:
 
 
 def _text(value: Any) -> Any:
-    # Curves of some records are numbered.
+    # Channels of some records are numbered.
     return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
 
@@ -60,7 +60,7 @@ def _is_number(value: Any) -> bool:
         return False
 
 
-#: Of a model of injury risk.
+#: Of an injury-risk model.
 Input = Annotated[float | str, BeforeValidator(_number_or_words)]
 OneOrThree = Annotated[float | Triple, BeforeValidator(_one_or_three)]
 Listed = BeforeValidator(_listed)
@@ -68,10 +68,10 @@ Channel = Annotated[Word, BeforeValidator(_text)]
 
 
 class VehicleSpec(TableSpec):
-    """The vehicle, as far as a report draws and speaks of it.
+    """The vehicle, as a report draws and describes it.
 
-    Its front is `front_m` ahead of the origin of all positions, in the middle where that is not
-    given; `outline_m` takes the place of length, width and front: corners from above, forward and
+    Its front is `front_m` ahead of the origin of all positions; by default the origin is in the
+    middle. `outline_m` replaces length, width and front: corners seen from above, forward and
     right, in order around it.
     """
 
@@ -84,14 +84,14 @@ class VehicleSpec(TableSpec):
 
 
 class PointSpec(TableSpec):
-    """The point whose motion is told."""
+    """The point whose motion is reconstructed."""
 
     name: Words = "reference point"
     position_m: Triple = (0.0, 0.0, 0.0)
 
 
 class EntrySpec(TableSpec):
-    """How the vehicle moved at one instant, and how that is known."""
+    """Motion of the vehicle at one instant, and its uncertainty."""
 
     kind: Literal["speed", "standstill", "gnss"] = "speed"
     source: str = ""
@@ -109,10 +109,10 @@ class EntrySpec(TableSpec):
 
 
 class TriadSpec(TableSpec):
-    """One triad of sensors: where its channels stand, and what is not known of it.
+    """One triad of sensors: its channels and their uncertainty.
 
-    A channel is the name of a column or channel of the record, with a minus before it where it
-    points the other way; an axis that is left out is missing.
+    A channel is the name of a column or channel of the record, with a minus sign if it points
+    the other way; an omitted axis is missing.
     """
 
     name: Words = ""
@@ -124,12 +124,12 @@ class TriadSpec(TableSpec):
     unit: Word | None = None
     sampling: Literal["instantaneous", "mean"] | None = None
     sensor: FileName | None = None
-    #: Replaces the sensor's: keys of the catalogue of sensors, each with its unit.
+    #: Replaces the sensor's: keys of the sensor catalogue, each with its unit.
     uncertainty: dict[Word, OneOrThree] = Field(default_factory=dict)
 
 
 class AssumedSpec(TableSpec):
-    """What is taken for axes and gyros that are not there, with its standard deviation."""
+    """Assumed values for missing axes and gyros, with standard deviations."""
 
     turn_sd_deg: Annotated[OneOrThree, AfterValidator(_sizes)] | None = None
     delta_v_sd_m_per_s: Annotated[OneOrThree, AfterValidator(_sizes)] | None = None
@@ -157,14 +157,14 @@ class UnitSpec(TableSpec):
 
 
 class ReferenceSpec(TableSpec):
-    """Something else that is known of the crash, beside which the answers are held."""
+    """Other known data of the crash, for comparison with the results."""
 
     kind: Literal["path", "delta_v"]
     name: Word
     source: str = ""
-    #: Of a path: time, north, east, down of the reference point, with or without their sd.
+    #: Of a path: time, north, east, down of the reference point, with or without sd.
     path: FileName | None = None
-    #: Of a change of velocity: along the axis, over the span; over the event, if not given.
+    #: Of a change of velocity: along the axis, over the span; by default over the event.
     delta_v_m_per_s: Number | None = None
     delta_v_sd_m_per_s: NotNegative = 0.0
     axis: Literal["forward", "right", "resultant"] = "forward"
@@ -172,7 +172,7 @@ class ReferenceSpec(TableSpec):
 
 
 class OptionsSpec(TableSpec):
-    """How it is computed."""
+    """Options of the computation."""
 
     window_s: Pair | None = None
     rate_hz: Positive = 200.0
@@ -184,7 +184,7 @@ class OptionsSpec(TableSpec):
     zero_at: Literal["interval", "threshold"] = "interval"
     monte_carlo_runs: StrictInt = Field(default=2000, ge=0, le=100_000)
     seed: StrictInt = Field(default=0, ge=0)
-    #: Names of severity models; None takes those that fit the type of the crash.
+    #: Names of severity models; None selects those that apply to the crash type.
     severity: Annotated[tuple[Word, ...] | None, Listed] = None
     severity_inputs: dict[Word, Input] = Field(default_factory=dict)
     formats: Annotated[tuple[Literal["csv", "mme"], ...], Listed] = ("csv",)

@@ -1,4 +1,4 @@
-"""A crash case read from its file."""
+"""Read a crash case from its file."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ def read_case_spec(path: str | Path, *, files: bool = True) -> CaseSpec:
     ----------
     path : str or Path
     files : bool
-        Whether the files that it names must be there, and become absolute paths; else only the
+        Whether the files that it names must exist and become absolute paths; otherwise only the
         form is checked.
 
     Returns
     -------
     CaseSpec
-        Named after the file; every quantity in the unit of its field, every file that it names as
-        an absolute path, found from the folder of the case.
+        Named after the file; every quantity in the unit of its field, every file name as an
+        absolute path, resolved from the folder of the case.
 
     Raises
     ------
     ConfigError
-        There is no such file, it is no TOML, a key is not known, missing or still ``"?"``, a value
-        does not fit, or two contradict each other; the message names the line, or both.
+        The file is missing or not TOML; a key is unknown, missing or still ``"?"``; a value does
+        not fit, or two are contradictory. The message names the line, or both lines.
     """
     path = Path(path)
     file = read_toml(path)

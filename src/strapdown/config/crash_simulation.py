@@ -1,4 +1,4 @@
-"""The records of a simulated crash, as they are asked for."""
+"""Configuration of the records of a simulated crash."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["CrashSimulationSpec"]
 
 
 class CrashSimulationSpec(Spec):
-    """One crash, the recorders that write it, and how; no rate leaves each its own."""
+    """One crash and its recorders; without a rate each recorder uses its own."""
 
     name: str
     units: tuple[str, ...] = ()

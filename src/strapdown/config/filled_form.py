@@ -1,4 +1,4 @@
-"""The file of a chain as its specification: quantities in their units, paths found, lines named."""
+"""Build a specification from a file: units converted, paths resolved, errors with lines."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Form = TypeVar("Form", bound=TableSpec)
 
 
 def read_named_toml(path: Path, kind: str, wanted: Wanted) -> TomlFile:
-    """Read a file that has nothing open, and leaves its name to be that of the file.
+    """Read a complete file that leaves the name to be that of the file.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def read_named_toml(path: Path, kind: str, wanted: Wanted) -> TomlFile:
     Raises
     ------
     ConfigError
-        There is no such file, it is no TOML, has a name, or a value is still ``"?"``.
+        The file is missing or not TOML, has a name, or a value is still ``"?"``.
     """
     file = read_toml(path)
     if "name" in file.table:
@@ -61,7 +61,7 @@ def filled_form(
     place: Callable[[KeyPath], str] = place_of,
     tags: Mapping[str, Sequence[str]] | None = None,
 ) -> tuple[Form, Written]:
-    """Fill a form with what a file has.
+    """Fill a form with the values of a file.
 
     Parameters
     ----------
@@ -70,22 +70,22 @@ def filled_form(
         The specification.
     wanted : Wanted
     files : bool
-        Whether the files that it names must be there, and become absolute paths.
+        Whether the files that it names must exist and become absolute paths.
     place, tags
-        As `explained` takes them.
+        As in `explained`.
 
     Returns
     -------
     spec : TableSpec
         Named after the file.
     written : Written
-        The file, asked by the names of fields.
+        The file, looked up by the names of fields.
 
     Raises
     ------
     ConfigError
-        A key is not known or missing, a value does not fit, or a file is not there; the message
-        names the line, or those of all.
+        A key is unknown or missing, a value does not fit, or a file does not exist; the message
+        names the line, or all lines.
     """
     table, names = canonical(file, form)
     try:
@@ -103,24 +103,24 @@ def filled_form(
     return spec, Written(file, names)
 
 
-# What a case leaves open: values that only the user can know, written as a question mark.
+# Open values of a case: known only to the user, written as a question mark.
 
 
-#: Stands where only the user can know.
+#: Placeholder for a value that only the user knows.
 PLACEHOLDER = "?"
-#: More of them are counted, not listed.
+#: Above this number they are counted, not listed.
 MOST = 60
 
 
 def refuse_placeholders(file: TomlFile, wanted_of: Callable[[KeyPath], str] = wanted_at) -> None:
-    """Name every value that is still open.
+    """Report every value that is still open.
 
     Raises
     ------
     ConfigError
-        There are some; the message has the line of each, and what is wanted there.
+        Some values are open; the message has the line and the meaning of each.
     """
-    # A vector that is open in each component is one.
+    # A vector with all components open counts as one.
     open_keys = list(dict.fromkeys(_open(file.table, ())))
     if not open_keys:
         return
@@ -161,7 +161,7 @@ def _open(node: Any, path: KeyPath) -> Iterator[KeyPath]:
         yield path
 
 
-# What pydantic finds in a file, in our words and with its line.
+# Convert pydantic errors to errors with a line and this package's messages.
 
 
 def explained(
@@ -173,7 +173,7 @@ def explained(
     written: Mapping[KeyPath, KeyPath] | None = None,
     wanted: Callable[[KeyPath], str] | None = None,
 ) -> ConfigError:
-    """Turn an error of pydantic into one of ours.
+    """Convert a pydantic error.
 
     Parameters
     ----------
@@ -181,16 +181,16 @@ def explained(
         One of `ValidationError.errors`.
     file : TomlFile
     place : callable
-        Says where a path is, as a person counts.
+        Describes the position of a path for users.
     tags : dict
-        By the key that tells what a table is, what it may be.
+        By tag key, the possible values.
     written : dict
-        By the path of a field, the path under which the file has it, where it is another.
+        Path of a field to its path in the file, where they differ.
     wanted : callable
-        Says of a path what is wanted there, for a key that is missing.
+        Describes the expected value of a missing key, by path.
     """
     path, context = tuple(error["loc"]), error.get("ctx", {})
-    # What was converted is told as the file has it.
+    # A converted value is reported as written in the file.
     converted = _renamed(path, written or {}) != path
     given = _given(file, path, written or {}) if converted else error["input"]
     if error["type"] == "refused" and error["ctx"]["key"]:
@@ -215,7 +215,7 @@ def _found(
     tags: Mapping[str, Sequence[str]],
     wanted: Callable[[KeyPath], str] | None,
 ) -> Finding:
-    """Return what is wrong, without a location."""
+    """Return the finding without a location."""
     context, name = error.get("ctx", {}), str(path[-1]) if path else ""
     match error["type"]:
         case "missing":
@@ -265,7 +265,7 @@ def _renamed(path: KeyPath, written: Mapping[KeyPath, KeyPath]) -> KeyPath:
 
 
 def _in_file(file: TomlFile, path: KeyPath, written: Mapping[KeyPath, KeyPath]) -> KeyPath:
-    """The path without what pydantic puts into it: tags that tell which of several it is."""
+    """Path without pydantic's union tags."""
     kept: list[str | int] = []
     node: Any = file.table
     renamed = _renamed(path, written)
@@ -281,7 +281,7 @@ def _in_file(file: TomlFile, path: KeyPath, written: Mapping[KeyPath, KeyPath]) 
 
 
 def _given(file: TomlFile, path: KeyPath, written: Mapping[KeyPath, KeyPath]) -> Any:
-    """What the file has there, in its own unit."""
+    """The value as the file has it, in its own unit."""
     node: Any = file.table
     for part in _in_file(file, path, written):
         try:
@@ -291,7 +291,7 @@ def _given(file: TomlFile, path: KeyPath, written: Mapping[KeyPath, KeyPath]) ->
     return node
 
 
-# Several faults of one file as one error.
+# Combine several errors of one file.
 
 
 def together(found: Sequence[ConfigError]) -> ConfigError:
@@ -305,7 +305,7 @@ def together(found: Sequence[ConfigError]) -> ConfigError:
     Returns
     -------
     ConfigError
-        In the order of the lines; a single one as it is.
+        In the order of the lines; a single one is returned unchanged.
     """
     if len(found) == 1:
         return found[0]

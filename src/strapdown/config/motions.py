@@ -1,4 +1,4 @@
-"""Motions on the Earth, as a person writes them: every key with its unit."""
+"""Configuration of motions on the Earth: every key with its unit."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Triple = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 
 
 class PlaceSpec(TableSpec):
-    """Where a motion begins; the range of the angles is looked at where the place is made."""
+    """Initial position of a motion; the range of the angles is checked on use."""
 
     lat_deg: FiniteFloat
     lon_deg: FiniteFloat
@@ -24,7 +24,7 @@ class PlaceSpec(TableSpec):
 
 
 class AngleWaveSpec(TableSpec):
-    """One sine of an angle."""
+    """One sine component of an angle."""
 
     amplitude_deg: FiniteFloat
     period_s: Positive
@@ -32,7 +32,7 @@ class AngleWaveSpec(TableSpec):
 
 
 class HeaveWaveSpec(TableSpec):
-    """One sine of the height, downward."""
+    """One sine component of the height, positive downward."""
 
     amplitude_m: FiniteFloat
     period_s: Positive
@@ -40,7 +40,7 @@ class HeaveWaveSpec(TableSpec):
 
 
 class WavesSpec(TableSpec):
-    """Sines of the three angles."""
+    """Sine components of the three angles."""
 
     roll_waves: tuple[AngleWaveSpec, ...] = ()
     pitch_waves: tuple[AngleWaveSpec, ...] = ()
@@ -48,7 +48,7 @@ class WavesSpec(TableSpec):
 
 
 class StationarySpec(PlaceSpec):
-    """Rest."""
+    """Stationary."""
 
     kind: Literal["stationary"]
     duration_s: Positive
@@ -58,7 +58,7 @@ class StationarySpec(PlaceSpec):
 
 
 class RockingStandSpec(PlaceSpec, WavesSpec):
-    """Rocking about a fixed place."""
+    """Rocking about a fixed position."""
 
     kind: Literal["rocking_stand"]
     duration_s: Positive
@@ -68,7 +68,7 @@ class RockingStandSpec(PlaceSpec, WavesSpec):
 
 
 class SineVelocitySpec(PlaceSpec):
-    """A velocity of a mean and a sine in each of north, east, down."""
+    """Mean velocity plus a sine in each of north, east, down."""
 
     kind: Literal["sine_velocity"]
     duration_s: Positive
@@ -79,12 +79,12 @@ class SineVelocitySpec(PlaceSpec):
 
 
 class WalkingSpec(PlaceSpec):
-    """A unit on a shoe, around blocks."""
+    """A foot-mounted unit, walking around blocks."""
 
     kind: Literal["walking"]
     gait: Literal["walk", "run", "shuffle"] = "walk"
     strides: int = Field(ge=1, le=100_000, strict=True)
-    #: After so many strides it turns; never, if zero.
+    #: Number of strides between turns; zero for none.
     corner_each: int = Field(default=10, ge=0, strict=True)
     corner_deg: FiniteFloat = 90.0
     #: Strides that climb two stairs each, counted from zero.
@@ -98,7 +98,7 @@ class WalkingSpec(PlaceSpec):
 
 
 class SpeedSpec(TableSpec):
-    """Another speed."""
+    """Change to another speed."""
 
     do: Literal["accelerate", "brake"]
     to_m_per_s: NotNegative
@@ -106,7 +106,7 @@ class SpeedSpec(TableSpec):
 
 
 class StopSpec(TableSpec):
-    """Brake to a stop, and stay."""
+    """Brake to a stop, and remain stationary."""
 
     do: Literal["stop"]
     braking_s: Positive
@@ -114,7 +114,7 @@ class StopSpec(TableSpec):
 
 
 class StraightSpec(TableSpec):
-    """Go on, for a time or a distance."""
+    """Continue straight, for a time or a distance."""
 
     do: Literal["straight"]
     duration_s: Positive | None = None
@@ -128,7 +128,7 @@ class StraightSpec(TableSpec):
 
 
 class TurnSpec(TableSpec):
-    """A turn on a radius."""
+    """Turn with a radius."""
 
     do: Literal["turn_left", "turn_right"]
     angle_deg: Positive = 90.0
@@ -137,7 +137,7 @@ class TurnSpec(TableSpec):
 
 
 class BankedTurnSpec(TableSpec):
-    """A turn at a bank."""
+    """Turn with a bank angle."""
 
     do: Literal["turn_left", "turn_right"]
     angle_deg: Positive = 90.0
@@ -146,7 +146,7 @@ class BankedTurnSpec(TableSpec):
 
 
 class LaneChangeSpec(TableSpec):
-    """Over to the lane beside."""
+    """Change to the neighboring lane."""
 
     do: Literal["lane_change"]
     offset_m: FiniteFloat
@@ -154,7 +154,7 @@ class LaneChangeSpec(TableSpec):
 
 
 class ClimbSpec(TableSpec):
-    """Up or down, on or by a height."""
+    """Climb or descend, to or by a height."""
 
     do: Literal["climb", "descend"]
     angle_deg: Positive
@@ -163,13 +163,13 @@ class ClimbSpec(TableSpec):
 
 
 class LevelSpec(TableSpec):
-    """Out of a climb."""
+    """Level off after a climb."""
 
     do: Literal["level"]
     ramp_s: Positive | None = None
 
 
-#: Any of the manoeuvres.
+#: Any of the maneuvers.
 Step = (
     SpeedSpec
     | StopSpec
@@ -183,7 +183,7 @@ Step = (
 
 
 class VehicleSpec(PlaceSpec):
-    """What all vehicles begin with."""
+    """Common part of all vehicles."""
 
     heading_deg: FiniteFloat = 0.0
     speed_m_per_s: NotNegative = 0.0
@@ -236,14 +236,14 @@ class ShipSpec(VehicleSpec, WavesSpec):
 
 
 class WaypointSpec(PlaceSpec):
-    """A place on the way, with its time or the speed of the leg that leads to it."""
+    """Waypoint, with its time or the speed of the leg that leads to it."""
 
     time_s: NotNegative | None = None
     speed_m_per_s: Positive | None = None
 
 
 class WaypointsSpec(TableSpec):
-    """A path through places."""
+    """A path through waypoints."""
 
     kind: Literal["waypoints"]
     speed_m_per_s: Positive | None = None
@@ -277,7 +277,7 @@ MotionSpec = Annotated[
     Field(discriminator="kind"),
 ]
 
-#: What `kind` of a motion may be.
+#: Values of `kind` of a motion.
 KINDS = (
     "stationary",
     "rocking_stand",
@@ -288,7 +288,7 @@ KINDS = (
     "ship",
     "waypoints",
 )
-#: What `do` of a manoeuvre may be, for one vehicle or another.
+#: Values of `do` of a maneuver, for one vehicle or another.
 MANOEUVRES = (
     "accelerate",
     "brake",

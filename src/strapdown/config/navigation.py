@@ -1,4 +1,4 @@
-"""A run of navigation, as a person writes it: every key with its unit."""
+"""Configuration of a navigation run: every key with its unit."""
 
 from __future__ import annotations
 
@@ -56,50 +56,50 @@ __all__ = [
 
 
 class ReceiverTable(TableSpec):
-    """A satellite receiver that is simulated: the fixes of the aid of its name."""
+    """A simulated GNSS receiver: the fixes of the measurement with its name."""
 
     rate_hz: Positive = 1.0
     position_noise_m: OneOrThree = 1.0
-    #: Of a process that orbits, clocks and atmosphere make, correlated over the time below.
+    #: Time-correlated error from orbits, clocks and atmosphere; correlation time below.
     position_drift_m: OneOrThree = 0.0
     correlation_time_s: Positive = 60.0
     velocity_noise_m_per_s: OneOrThree = 0.05
-    #: Whether it tells velocities, too.
+    #: Whether it also measures velocity.
     velocity: StrictBool = True
-    #: Of the antenna from the inertial sensors, body axes.
+    #: Antenna from the inertial sensors, body axes.
     antenna_m: Triple = (0.0, 0.0, 0.0)
-    #: A fix that is stamped t is of the instant t less this.
+    #: A fix stamped t belongs to the instant t minus this.
     time_offset_s: Number = 0.0
-    #: Begin and end of spans without fixes.
+    #: Start and end of spans without fixes.
     outages_s: tuple[Pair, ...] = ()
-    #: Of the fixes, and how many of their standard deviations such a one is off.
+    #: Fraction of fixes that are outliers, and their size in standard deviations.
     outlier_share: float = Field(default=0.0, ge=0.0, le=0.9, strict=True)
     outlier_size: Positive = 50.0
 
 
 class NavigationSimulationTable(TableSpec):
-    """A drive, flight or voyage that is simulated, with its sensors and receivers."""
+    """A simulated drive, flight or voyage, with its sensors and receivers."""
 
     motion: MotionSpec
     rate_hz: Positive = 100.0
     seed: StrictInt = Field(default=0, ge=0)
     sampling: Literal["instantaneous", "mean"] = "mean"
-    #: The catalogue's, or a file; that of [sensors], if not given.
+    #: Catalogue name or file; by default that of [sensors].
     sensor: FileName | None = None
-    #: By name of the aid, whose fixes they are.
+    #: By name of the measurement that they feed.
     gnss: TableSpec = TableSpec()
 
 
 class LiveTable(TableSpec):
-    """Samples that come while it runs, and what aids send: `strapdown navigate --live`."""
+    """Samples processed as they arrive, with measurements: `strapdown navigate --live`."""
 
     sampling: Literal["instantaneous", "mean"] = "instantaneous"
-    #: A sample waits until one comes that is so much later: what aids send late is still in time.
+    #: Delay of each sample, so that late measurements are still in time.
     hold_s: NotNegative = 0.2
 
 
 class StartTable(TableSpec):
-    """A state that is known where navigation begins, and how well it is known."""
+    """Known initial state of the navigation, with standard deviations."""
 
     lat_deg: Number
     lon_deg: Number
@@ -116,7 +116,7 @@ class StartTable(TableSpec):
 
 
 class NavigationSiteTable(TableSpec):
-    """Where the body stands while it is aligned; the first fix of a receiver, if left out."""
+    """Position of the body during alignment; by default a receiver's first fix."""
 
     lat_deg: Number
     lon_deg: Number
@@ -126,27 +126,27 @@ class NavigationSiteTable(TableSpec):
 
 
 class NavigationSensorsTable(SensorsTable):
-    """What is not known of the sensors, and which of it the filter estimates."""
+    """Sensor uncertainty, and the sensor errors that the filter estimates."""
 
-    #: Names of blocks of states; biases, drifts, and scale factors and misalignments that are
-    #: stated, if not given.
+    #: Names of blocks of states; by default biases, drifts, and the stated scale factors and
+    #: misalignments.
     states: tuple[Word, ...] | None = None
 
 
 class CoarseModeSpec(ChoiceSpec):
-    """The coarse alignment, and what ends it: what comes first."""
+    """Coarse alignment; it ends at the first condition met."""
 
     kind: str = "inertial_frame"
     duration_s: Positive | None = None
     until_heading_sd_deg: Positive | None = None
     #: Of the worse of roll and pitch.
     until_tilt_sd_deg: Positive | None = None
-    #: The newest part that is aligned; all of it, if not given.
+    #: Length of the latest part to align; by default all of it.
     window_s: Positive | None = None
 
 
 class FineModeSpec(ChoiceSpec):
-    """The fine alignment after it, and what ends it: what comes first."""
+    """Fine alignment after it; it ends at the first condition met."""
 
     kind: str = "filter"
     duration_s: Positive | None = None
@@ -156,117 +156,117 @@ class FineModeSpec(ChoiceSpec):
 
 
 class CommandTable(TableSpec):
-    """A word to the chain: which mode begins with the first sample at or after an instant."""
+    """Mode command: the mode that begins with the first sample at or after an instant."""
 
     time_s: Number
     mode: Literal["fine", "navigation", "next"]
 
 
 class GapsTable(TableSpec):
-    """What is done where samples are missing."""
+    """Treatment of missing samples."""
 
-    #: A step of more than so many of the usual ones is a gap.
+    #: A step longer than so many usual steps is a gap.
     usual: float = Field(default=3.0, gt=1.0, strict=True)
-    #: A longer gap is not bridged.
+    #: Longer gaps are not bridged.
     coast_s: NotNegative = 1.0
-    #: What such a one does: ends the run, begins the alignment anew, or is bridged all the same.
+    #: Action after such a gap: end the run, restart the alignment, or bridge it all the same.
     beyond: Literal["refuse", "align", "coast"] = "refuse"
 
 
 class MechanizationSpec(ChoiceSpec):
-    """How place, velocity and attitude are reckoned."""
+    """Integration of position, velocity and attitude."""
 
     kind: str = "ned"
 
 
 class FilterSpec(ChoiceSpec):
-    """The filter around it."""
+    """The estimation filter."""
 
     kind: str = "error_state"
 
 
 class DampingSpec(ChoiceSpec):
-    """What becomes of the estimated errors."""
+    """Treatment of the estimated errors (closed-loop or open-loop correction)."""
 
     kind: str = "feedback"
 
 
 class SmootherSpec(ChoiceSpec):
-    """What a run is smoothed by when it has ended."""
+    """Smoother applied after the end of a run."""
 
     kind: str = "none"
 
 
 class RecorderSpec(ChoiceSpec):
-    """What of the run is kept."""
+    """Which data of the run are kept."""
 
     kind: str = "interval"
 
 
 class AidSpec(ChoiceSpec):
-    """What tells more than the inertial sensors do, under a name of the user's."""
+    """A measurement besides the inertial sensors, under a name chosen by the user."""
 
-    #: What it measured; where the record is simulated, that is simulated, too.
+    #: Measured data; simulated if the record is simulated.
     path: FileName | None = None
-    #: By quantity the name of its column, where the names do not say it.
+    #: Column name by quantity, where it differs.
     columns: dict[Word, Word] = Field(default_factory=dict)
-    #: Of fixes, in place of what the file states.
+    #: Of fixes, replacing the values of the file.
     position_sd_m: OneOrThree | None = None
     velocity_sd_m_per_s: OneOrThree | None = None
-    #: Leave out rows that cannot be used, and say so.
+    #: Leave out unusable rows, and report them.
     repair: StrictBool = False
 
 
 class TruthTable(TableSpec):
-    """A reference trajectory that is known from elsewhere, to hold the answer beside."""
+    """Independent reference trajectory to compare the result with."""
 
     path: FileName
 
 
 class ControlPointsTable(TableSpec):
-    """Where the body was at instants, north and east of a mark of one's own."""
+    """Known positions of the body at instants, north and east of a local mark."""
 
     path: FileName
-    #: By quantity (time, north, east) the name of its column, where the names do not say it.
+    #: Column name by quantity (time, north, east), where it differs.
     columns: dict[Word, Word] = Field(default_factory=dict)
 
 
 class WithholdTable(TableSpec):
-    """Fixes that are kept from the navigator, stretch by stretch, to score it by."""
+    """GNSS outage test: fixes withheld span by span, to score the navigation."""
 
-    #: The aid whose fixes they are; the first of kind gnss, if not given.
+    #: Measurement whose fixes are withheld; by default the first of kind gnss.
     aid: Word | None = None
-    #: Begin and end of each stretch, on the clock of the samples; each is tried by itself.
+    #: Start and end of each span, on the clock of the samples; each is tested by itself.
     spans_s: tuple[Pair, ...] = ()
-    #: Or lengths, each at so many places, spread evenly.
+    #: Alternatively lengths, each tested at so many evenly spaced instants.
     lengths_s: tuple[Positive, ...] = ()
     places: StrictInt = Field(default=5, ge=1, le=100)
-    #: Of the first one; half a minute after navigation begins, if not given.
+    #: Of the first one; by default half a minute after the start of navigation.
     from_s: Number | None = None
 
 
 class TrustTable(TableSpec):
-    """What is asked of the heading, and of what does not agree."""
+    """Limits of the heading integrity, and re-runs without outliers."""
 
-    #: What a green light promises: the error is below it.
+    #: Error limit for heading status green (trusted).
     heading_limit_deg: Positive = 3.0
-    #: Known no better than this the light is red.
+    #: 95 % bound beyond which the heading status is red.
     heading_red_deg: Positive = 10.0
-    #: Whether a run is repeated without the first measurement that is not as it was expected.
+    #: Whether to re-run excluding the first inconsistent measurement.
     repeat: StrictBool = True
 
 
 class NavigationOutputTable(TableSpec):
-    """What is written beside the report."""
+    """Output besides the report."""
 
-    #: Forms of the trajectory.
+    #: Formats of the trajectory.
     files: tuple[Word, ...] = ("csv", "kml", "geojson")
-    #: Whether every chart is drawn as a picture, too: for print, and for a page without scripts.
+    #: Whether charts are also written as images, for print and pages without scripts.
     figures: StrictBool = True
 
 
 class NavigationSpec(TableSpec):
-    """One run of navigation; the stages, and each aid, are of the kinds that they name."""
+    """One navigation run; stages and measurements are of the kinds that they name."""
 
     unwritten: ClassVar[tuple[str, ...]] = ("name",)
 
@@ -311,12 +311,12 @@ class NavigationSpec(TableSpec):
 
 
 def aids_of(spec: NavigationSpec) -> dict[str, AidSpec]:
-    """The aids of a specification, by their names."""
+    """Measurements of a specification, by name."""
     return {name: getattr(spec.aiding, name) for name in type(spec.aiding).model_fields}
 
 
 def receivers_of(spec: NavigationSpec) -> dict[str, ReceiverTable]:
-    """The simulated receivers of a specification, by the names of their aids."""
+    """Simulated receivers of a specification, by name of their measurement."""
     if spec.simulation is None:
         return {}
     tables = spec.simulation.gnss

@@ -1,4 +1,4 @@
-"""A run of navigation read from its file, or from what is sealed: the forms that its kinds have."""
+"""Read a navigation configuration from a file or plain data, and check it."""
 
 from __future__ import annotations
 
@@ -70,8 +70,8 @@ __all__ = [
 ]
 
 
-#: Stages that are modules, by table: what the table has beside the options, the kind that stands
-#: there where none is named, and whether a chain can do without it, by the kind ``none``.
+#: Module stages by table: base form of the table without the module's options, default kind, and
+#: whether the stage may be left empty with the kind ``none``.
 NAVIGATION_STAGES: dict[str, tuple[type[ChoiceSpec], str, bool]] = {
     "prefilter": (PrefilterSpec, "none", True),
     "coarse": (CoarseModeSpec, "inertial_frame", True),
@@ -82,25 +82,25 @@ NAVIGATION_STAGES: dict[str, tuple[type[ChoiceSpec], str, bool]] = {
     "smoother": (SmootherSpec, "none", True),
     "recorder": (RecorderSpec, "interval", False),
 }
-#: Of a start that is known nothing is aligned.
+#: With a known start there is no alignment.
 ALIGNMENTS = ("coarse", "fine")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
 def stage_default(name: str, table: Mapping[str, Any]) -> str:
-    """The kind of a stage where its table names none."""
+    """Default kind of a stage."""
     if name in ALIGNMENTS and table.get("start") is not None:
         return "none"
     return NAVIGATION_STAGES[name][1]
 
 
 def navigation_form(table: Mapping[str, Any], file: TomlFile | None = None) -> type[NavigationSpec]:
-    """The specification with the options of the kinds that a table names.
+    """Return the specification with the options of the kinds that a table names.
 
     Raises
     ------
     ConfigError
-        There is no such kind, or an aid has no name that can be used.
+        A kind is unknown, or a measurement has an invalid name.
     """
     parts: dict[str, Any] = {}
     for name, (base, _, empty) in NAVIGATION_STAGES.items():
@@ -142,7 +142,7 @@ def _aiding_form(table: Mapping[str, Any], file: TomlFile | None) -> type[TableS
 
 
 def _simulation_form(table: Mapping[str, Any], file: TomlFile | None) -> type[TableSpec]:
-    """The simulation with a receiver for each aid that takes fixes and names no file."""
+    """The simulation with a receiver for each measurement that takes fixes and names no file."""
     aiding = table.get("aiding")
     names = {
         name
@@ -175,7 +175,7 @@ def _refuse_name(name: Any, path: KeyPath, file: TomlFile | None) -> None:
 
 
 def navigation_spec(table: Mapping[str, Any]) -> NavigationSpec:
-    """Make a specification of plain data, as a command or a sealed folder has it.
+    """Create a specification from plain data, as from a command or a sealed folder.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def navigation_spec(table: Mapping[str, Any]) -> NavigationSpec:
     Raises
     ------
     ConfigError
-        There is no such kind, or the parts do not go together.
+        A kind is unknown, or the parts are incompatible.
     ValidationError
         The table has another form.
     """
@@ -199,13 +199,13 @@ def navigation_spec(table: Mapping[str, Any]) -> NavigationSpec:
 
 
 def read_navigation_spec(path: str | Path, *, files: bool = True) -> NavigationSpec:
-    """Read the file of a run of navigation.
+    """Read a navigation configuration file.
 
     Parameters
     ----------
     path : str or Path
     files : bool
-        Whether the files that it names must be there, and become absolute paths; else only the
+        Whether the files that it names must exist and become absolute paths; otherwise only the
         form is checked.
 
     Returns
@@ -216,8 +216,8 @@ def read_navigation_spec(path: str | Path, *, files: bool = True) -> NavigationS
     Raises
     ------
     ConfigError
-        There is no such file, it is no TOML, a key is not known, missing or still ``"?"``, a value
-        does not fit, or the parts do not go together; the message names the line.
+        The file is missing or not TOML; a key is unknown, missing or still ``"?"``; a value does
+        not fit, or the parts are incompatible. The message names the line.
     """
     file = read_named_toml(Path(path), "run", NAVIGATION_WANTED)
     file = replace(file, table=_with_kinds(file.table))
@@ -234,14 +234,14 @@ def read_navigation_spec(path: str | Path, *, files: bool = True) -> NavigationS
 
 
 def _place(parts: KeyPath) -> str:
-    """Where it stands; which of the motions it is goes without saying."""
+    """Position of a path for users, without the kind of the motion."""
     if parts[:2] == ("simulation", "motion") and len(parts) > 3 and parts[2] in KINDS:
         parts = (*parts[:2], *parts[3:])
     return place_of(parts)
 
 
 def _with_kinds(table: Mapping[str, Any]) -> dict[str, Any]:
-    """A table in which a module that is named by its kind alone is a table, too."""
+    """Replace modules given by kind alone with tables."""
     out = dict(table)
     for name in NAVIGATION_STAGES:
         if name in out:
@@ -255,14 +255,14 @@ def _with_kinds(table: Mapping[str, Any]) -> dict[str, Any]:
     return out
 
 
-# What a run of navigation says against itself, or a module refuses: told before anything runs.
+# Consistency checks of a navigation run, made before anything runs.
 #
-# Everything is looked at, and everything that does not fit is told at once.
+# All errors are collected and reported together.
 
 
-#: Forms of a trajectory that a run can write.
+#: Trajectory formats that a run can write.
 TRAJECTORY_FILES = tuple(TRAJECTORY_WRITERS)
-#: Stages that are modules.
+#: Stages filled by modules.
 STAGES = (
     "prefilter",
     "coarse",
@@ -275,24 +275,24 @@ STAGES = (
 )
 #: Keys that end an alignment.
 ENDS = ("duration_s", "until_heading_sd_deg", "until_tilt_sd_deg", "window_s")
-#: Aids that observe a height.
+#: Measurements of height.
 HEIGHTS = ("barometer",)
 
 
 def check_navigation(spec: NavigationSpec, written: Written | None = None) -> None:
-    """Refuse what cannot be meant.
+    """Refuse an inconsistent navigation run.
 
     Parameters
     ----------
     spec : NavigationSpec
     written : Written, optional
-        The file that it was read from, for lines in messages.
+        The file it was read from, for line numbers in messages.
 
     Raises
     ------
     ConfigError
-        A module refuses an option, modules do not go together, the place is none, or a sensor is
-        not known or says too little: all of it in one message, each with its line.
+        A module refuses an option, modules are incompatible, the position is not valid, or a sensor
+        is unknown or incomplete: all errors in one message, each with its line.
     """
     check = _Checks(written)
     found: list[ConfigError] = []
@@ -343,7 +343,7 @@ class _Checks(SourceChecks):
                 )
 
     def begins(self, spec: NavigationSpec) -> None:
-        """Where it begins."""
+        """Check the initial state."""
         for name in ("start", "site"):
             table = getattr(spec, name)
             if table is not None:
@@ -366,12 +366,12 @@ class _Checks(SourceChecks):
         self.told((name,), partial(make_choice, getattr(spec, name), SLOTS[name], given_of(spec)))
 
     def height(self, spec: NavigationSpec) -> None:
-        """A height that is damped has a loop of its own."""
+        """Reject a damped height in the mechanization: its loop has no filter states."""
         if getattr(spec.mechanization, "height", "") == "damped":
             raise self.refuse(("mechanization", "height"), "config.damped-height-without-states")
 
     def modes(self, spec: NavigationSpec) -> None:
-        """What ends each alignment, and what is said of one that is not there."""
+        """Check the end conditions of each alignment, and options of stages that are absent."""
         if spec.start is not None:
             return
         for stage in ("coarse", "fine"):
@@ -386,7 +386,7 @@ class _Checks(SourceChecks):
                 raise self.refuse((stage, "duration_s"), "config.alignment-never-ends")
 
     def alignment(self, spec: NavigationSpec) -> None:
-        """What coarse and fine alignment need of one another, and of the aids."""
+        """Check the requirements of coarse and fine alignment on each other and on measurements."""
         kind = spec.coarse.kind
         if kind in NEEDS_GNSS and not _fixes(spec):
             raise self.refuse(("coarse", "kind"), "config.course-without-fixes-in-run")
@@ -396,7 +396,7 @@ class _Checks(SourceChecks):
             raise self.refuse(("site", "lat_deg"), "config.no-initial-position")
 
     def aid(self, spec: NavigationSpec, name: str) -> None:
-        """One aid: its options, and whether it has what it observes by."""
+        """Check one measurement: its options, and whether its data are available."""
         given = aids_of(spec)[name]
         entry = SLOTS["aiding"].entries[given.kind]
         self.told(("aiding", name), partial(make_aid, spec, name))
@@ -424,7 +424,7 @@ class _Checks(SourceChecks):
             raise self.refuse(("gaps", "beyond"), "config.no-alignment-to-repeat")
 
     def receiver(self, name: str, receiver: ReceiverTable) -> None:
-        """A receiver that is simulated."""
+        """Check a simulated receiver."""
         for key in ("position_noise_m", "position_drift_m", "velocity_noise_m_per_s"):
             if np.min(getattr(receiver, key)) < 0.0:
                 raise self.refuse(("simulation", "gnss", name, key), "config.negative-receiver-sd")
@@ -438,7 +438,7 @@ class _Checks(SourceChecks):
                 )
 
     def withhold(self, spec: NavigationSpec) -> None:
-        """Which fixes are kept back, and when."""
+        """Check the fixes and spans of a GNSS outage test."""
         given = spec.withhold
         if given is None:
             return
@@ -478,12 +478,12 @@ class _Checks(SourceChecks):
             raise self.refuse(("simulation", "rate_hz"), "config.rate-too-high")
 
     def chain(self, spec: NavigationSpec) -> None:
-        """Begin the filter, which refuses parts that do not go together."""
+        """Initialize the filter, which refuses incompatible parts."""
         try:
             made = make_filter(spec, sensors_of(spec))
             aids = make_aids(spec)
         except ConfigError as error:
-            # Options of modules are told by themselves, and with their own keys.
+            # Errors in options of modules are reported separately, with their own keys.
             about = error.finding.quantity or ""
             if about == "states":
                 self.told(("sensors",), partial(_raise, error))
@@ -498,7 +498,7 @@ def _raise(error: ConfigError) -> None:
 
 
 def _fixes(spec: NavigationSpec) -> list[str]:
-    """Names of the aids that give fixes."""
+    """Names of the measurements that give fixes."""
     return [name for name, aid in aids_of(spec).items() if aid.kind == "gnss"]
 
 

@@ -1,4 +1,4 @@
-"""The modules that the specification of a run of navigation names, made."""
+"""Create the modules that a navigation specification names."""
 
 from __future__ import annotations
 
@@ -35,17 +35,17 @@ __all__ = [
 
 
 def given_of(spec: NavigationSpec) -> dict[str, Any]:
-    """Fields of modules that the chain fills."""
+    """Module fields that the chain fills."""
     return {"ellipsoid": spec.ellipsoid}
 
 
 def sensors_of(spec: AlignmentSpec | NavigationSpec) -> ImuUncertainty:
-    """What is not known of the sensors of a specification.
+    """Sensor uncertainty of a specification.
 
     Raises
     ------
     ConfigError
-        The sensor is unknown, or says too little.
+        The sensor is unknown or incomplete.
     """
     stated = spec.sensors
     sensor = None if stated.sensor is None else load_sensor(stated.sensor)
@@ -53,7 +53,7 @@ def sensors_of(spec: AlignmentSpec | NavigationSpec) -> ImuUncertainty:
 
 
 def make_filter(spec: NavigationSpec, sensors: ImuUncertainty) -> ErrorFilter:
-    """Make the filter of a specification, without the states of its aids.
+    """Create the filter of a specification, without measurement states.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def make_filter(spec: NavigationSpec, sensors: ImuUncertainty) -> ErrorFilter:
 
 
 def make_aid(spec: NavigationSpec, name: str) -> Measurement:
-    """Make the aid of a name; as `make_aids`."""
+    """Create the measurement of a name; as `make_aids`."""
     made: Measurement = make_choice(
         aids_of(spec)[name], SLOTS["aiding"], {**given_of(spec), "name": name}
     )
@@ -95,27 +95,27 @@ def make_aid(spec: NavigationSpec, name: str) -> Measurement:
 
 
 def make_aids(spec: NavigationSpec) -> tuple[Measurement, ...]:
-    """Make the aids of a specification.
+    """Create the measurements of a specification.
 
     Raises
     ------
     ConfigError
-        One refuses an option.
+        A measurement refuses an option.
     """
     return tuple(make_aid(spec, name) for name in aids_of(spec))
 
 
-# [states.NAME]: how large an error of the sensors may be, and how it changes in time.
+# [states.NAME]: size of a sensor error, and its change in time.
 
 
-#: From a walk an hour's root to one a second's.
+#: Random walk per root hour to per root second.
 ROOT_HOUR = 60.0
 
 
 class StateTable(TableSpec):
-    """Of one block of states."""
+    """One block of states."""
 
-    #: It comes back to zero within about this; constant, if neither is given.
+    #: Correlation time of a Gauss-Markov process; without it and a walk, the error is constant.
     correlation_time_s: Positive | None = None
 
 
@@ -145,12 +145,12 @@ StatesTable: type[TableSpec] = create_model("States", __base__=TableSpec, **_TAB
 
 
 def processes_of(table: TableSpec) -> dict[str, StateProcess]:
-    """What a table states, by name of the block, in SI.
+    """State processes of a table, by name of the block, in SI.
 
     Raises
     ------
     ConfigError
-        A size is stated twice, or both a walk and a correlation time.
+        A size is stated twice, or both a walk and a correlation time are.
     """
     out = {}
     for name in STATED_STATES:

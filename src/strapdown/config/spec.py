@@ -1,4 +1,4 @@
-"""What all specifications share: their form, and what is said where one does not fit."""
+"""Base classes of the specifications, and their validation errors."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ __all__ = ["Spec", "TableSpec", "file_name", "misfit", "refuse", "specify", "wor
 
 
 class Spec(BaseModel):
-    """Frozen, and strict about names."""
+    """Frozen specification that rejects unknown names."""
 
-    # A command uses a few of the specifications: each is built when it is first used.
+    # A command uses few of the specifications: each is built on first use.
     model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     def plain(self) -> dict[str, Any]:
-        """Return it as plain data, as it is sealed: what is not stated is left out."""
+        """Return the plain data for storage, without unstated values."""
         return self.model_dump(mode="json", exclude_none=True, serialize_as_any=True)
 
 
 class TableSpec(Spec):
-    """A table that a person writes: a key that is not known is answered with the nearest."""
+    """A table written by a user; an error on an unknown key suggests the nearest."""
 
-    #: Fields that no person writes.
+    #: Fields that users do not write.
     unwritten: ClassVar[tuple[str, ...]] = ()
 
     @model_validator(mode="before")
@@ -48,7 +48,7 @@ def refuse(key: str, code: str, /, **data: Any) -> PydanticCustomError:
     )
 
 
-#: Codes of misfits, by the word of pydantic.
+#: Codes of type errors, by pydantic's name.
 _MISFITS = {
     "string_type": "config.not-text",
     "float_type": "config.not-a-number",
@@ -56,7 +56,7 @@ _MISFITS = {
     "bool_type": "config.not-true-or-false",
     "finite_number": "config.not-finite",
 }
-#: Codes of numbers that are out of range, by the word of pydantic for the limit.
+#: Codes of range errors, by pydantic's name of the limit.
 _LIMITS = {
     "gt": "config.not-above",
     "ge": "config.below-least",
@@ -66,7 +66,7 @@ _LIMITS = {
 
 
 def misfit(error: Any, given: Any = None) -> Finding:
-    """Return what pydantic finds wrong with a value, as a finding without a location.
+    """Return a pydantic error about a value as a finding without a location.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ S = TypeVar("S", bound=Spec)
 
 
 def specify(form: type[S], **values: Any) -> S:
-    """Make a specification, or say which value does not fit.
+    """Create a specification, or report the value that does not fit.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def specify(form: type[S], **values: Any) -> S:
     Raises
     ------
     ConfigError
-        A value is of the wrong kind or out of range.
+        A value is of the wrong type or out of range.
     """
     try:
         return form(**values)
@@ -117,15 +117,15 @@ def specify(form: type[S], **values: Any) -> S:
         raise ConfigError(misfit(first), quantity=place) from None
 
 
-# Text that stands in a title, a table or the name of a file, and what may not be in it.
+# Text for titles, tables and file names, and the characters excluded from it.
 
 
-#: Characters that a title or a name, and the path of a file, may have.
+#: Maximum length of a title, a name, or the path of a file.
 LONGEST_NAME = 200
 LONGEST_PATH = 4096
-# Control characters, halves of pairs, ends of lines and of paragraphs.
+# Control characters, surrogates, line and paragraph separators.
 _CONTROL = {"Cc", "Cs", "Zl", "Zp"}
-# They turn the order of what follows: a name could show as another one.
+# Bidirectional controls: they could make a name look like another.
 _TURNING = frozenset("\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
 
 

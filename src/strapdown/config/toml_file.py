@@ -1,4 +1,4 @@
-"""A specification in TOML, as it is read from a file: its table, and the line of each key."""
+"""A TOML file: its table, and the line of each key."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ __all__ = [
 
 
 _PLACE = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)$")
-# Codes of what people write, by what a line that is not TOML looks like.
+# Codes of common slips, by the pattern of a line that is not TOML.
 _SLIPS = (
     (r"=\s*\?", "config.toml-open-value"),
     (r"=\s*-?[\d.]+\s*,\s*-?[\d.]+\s*,", "config.toml-list-without-brackets"),
@@ -42,13 +42,13 @@ _SLIPS = (
 )
 
 
-#: Characters of a line that are looked at for a slip.
+#: Number of characters of a line that are searched for a slip.
 LONG = 500
 
 
 @dataclass(frozen=True)
 class TomlFile:
-    """What a file says, and where.
+    """Content of a file, with the lines of its keys.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class TomlFile:
     lines: Mapping[KeyPath, list[int]] = field(repr=False)
 
     def line(self, path: KeyPath) -> int | None:
-        """Line of a key, or of what is nearest around it."""
+        """Line of a key, or of the nearest enclosing one."""
         return line_of(self.lines, path)
 
     def refuse(self, path: KeyPath, code: str | Finding, /, **data: Any) -> ConfigError:
@@ -73,7 +73,7 @@ class TomlFile:
 
 
 def read_toml(path: Path) -> TomlFile:
-    """Read a file that a person wrote.
+    """Read a file written by a user.
 
     Parameters
     ----------
@@ -82,11 +82,11 @@ def read_toml(path: Path) -> TomlFile:
     Raises
     ------
     ConfigError
-        There is no such file, it cannot be read, or it is no TOML; the message names the line.
+        The file is missing, cannot be read, or is not TOML; the message names the line.
     """
     text = _text(path)
     try:
-        # Lines first: it is quick to see a depth that takes long to be read.
+        # Lines first: this detects excessive nesting quickly, before the slow parse.
         lines = key_lines(text)
         if max(map(len, lines), default=0) > DEEPEST:
             raise RecursionError
@@ -102,7 +102,7 @@ def _text(path: Path) -> str:
         if not path.is_file():
             code = "config.not-a-file" if path.exists() else "config.no-such-file"
             raise ConfigError(code, file=str(path))
-        # With the mark that some editors on Windows begin a file with, or without.
+        # With or without a byte-order mark.
         return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         before = error.object[: error.start]
@@ -118,7 +118,7 @@ def _text(path: Path) -> str:
         raise ConfigError("config.not-a-file-name", file=shown(str(path)), reason=error) from None
 
 
-#: Endings of tables, which are no configurations.
+#: File name endings of data tables, which are not configurations.
 RECORDS = (".csv", ".tsv", ".txt", ".dat")
 
 
@@ -131,10 +131,10 @@ def _no_toml(path: Path, text: str, said: str) -> ConfigError:
     if number is None:
         number = text.rstrip("\n").count("\n") + 1 if found else None
     rows = text.split("\n")
-    # Of a long line the beginning: patterns take time.
+    # Only the beginning of a long line: patterns take time.
     line = rows[number - 1][:LONG] if number is not None and number <= len(rows) else ""
     if number is not None:
-        # What stands twice is known only once all of the line is read.
+        # A duplicate key is found only after the whole line has been read.
         twice = _twice("\n".join(rows[:number]), number)
         if what.startswith(("Cannot", "Duplicate")) and twice:
             key, first = twice
@@ -152,7 +152,7 @@ def _no_toml(path: Path, text: str, said: str) -> ConfigError:
 
 
 def _twice(text: str, line: int) -> tuple[KeyPath, int] | None:
-    """The key of this line that stood before, and where."""
+    """Find the earlier occurrence of this line's key, with its line."""
     for key, lines in key_lines(text).items():
         if len(lines) > 1 and lines[-1] == line:
             return key, lines[0]
@@ -160,13 +160,13 @@ def _twice(text: str, line: int) -> tuple[KeyPath, int] | None:
 
 
 def place_of(path: KeyPath) -> str:
-    """Where it stands, as a person counts: ``manoeuvre 3, radius_m``."""
+    """Position of a path for users: ``manoeuvre 3, radius_m``."""
     words: list[str] = []
     for part in path:
         if isinstance(part, int):
             if not words:
                 words.append("element")
-            # Of lists one is named, of vectors a component.
+            # Lists are shown by element, vectors by component.
             of = words[-1] if words[-1].endswith("_s") else words[-1].removesuffix("s")
             words[-1] = f"{of} {part + 1}"
         else:
@@ -174,20 +174,20 @@ def place_of(path: KeyPath) -> str:
     return ", ".join(words)
 
 
-# Where each key of a TOML file stands.
+# Line numbers of the keys of a TOML file.
 
 
 #: Keys and numbers of elements, from the root: ``("units", 1, "accelerometers", 0, "unit")``.
 KeyPath = tuple[str | int, ...]
 
-#: Levels of a file that a person writes.
+#: Maximum nesting of a user's file.
 DEEPEST = 50
 
 _BLANK = re.compile(r"[ \t]*")
 _BETWEEN = re.compile(r"(?:[ \t\n]|#[^\n]*)*")
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
-# Longest first: a string of three quotation marks begins like an empty one of one. Up to two
-# further marks belong to the string before the three that end it.
+# Longest first: a triple-quoted string begins like an empty one. Up to two further marks belong to
+# the string before the three that end it.
 _STRINGS = tuple(
     re.compile(pattern)
     for pattern in (
@@ -206,20 +206,20 @@ def key_lines(text: str) -> dict[KeyPath, list[int]]:
     Parameters
     ----------
     text : str
-        TOML that `tomllib` reads, with ``\n`` at the ends of its lines. Of other text, the keys
-        up to where it stops to be TOML.
+        TOML that `tomllib` reads, with ``\n`` at the ends of its lines. For other text, the keys
+        up to the first error.
 
     Returns
     -------
     dict
-        By path, the lines from 1 where it is written: more than one for a key that stands twice,
-        or a table that is opened again. What contains others and is not written itself, such as
-        ``a`` of ``[a.b]``, stands where the first of them does.
+        By path, the lines from 1 on which it is written: more than one for a duplicate key or a
+        reopened table. A table that only contains others and is not written itself, such as ``a``
+        of ``[a.b]``, has the line of its first member.
 
     Raises
     ------
     RecursionError
-        It is nested deeper than a person would write.
+        The text is nested too deeply.
     """
     scan = _Scan(text)
     scan.document()
@@ -227,7 +227,7 @@ def key_lines(text: str) -> dict[KeyPath, list[int]]:
 
 
 def line_of(lines: Mapping[KeyPath, list[int]], path: KeyPath) -> int | None:
-    """Line of a path, or of what is nearest around it; None for the file as a whole."""
+    """Line of a path, or of the nearest enclosing one; None for the file as a whole."""
     for end in range(len(path), 0, -1):
         if path[:end] in lines:
             return lines[path[:end]][0]
@@ -235,7 +235,7 @@ def line_of(lines: Mapping[KeyPath, list[int]], path: KeyPath) -> int | None:
 
 
 class _Stop(Exception):  # noqa: N818
-    """Here it is no TOML."""
+    """The text is not TOML from here on."""
 
 
 class _Scan:
@@ -271,7 +271,7 @@ class _Scan:
             last = k == len(parts) - 1
             if last and counted:
                 if path in self.lines and path not in self.elements:
-                    # One table before, and now several.
+                    # A single table so far, now a list of tables.
                     self.lines[path].append(line)
                 self.elements[path] = self.elements.get(path, 0) + 1
                 self.lines.setdefault(path, [line])
@@ -375,7 +375,7 @@ class _Scan:
         return bisect_right(self.starts, at)
 
 
-# What a file says, in a message: short, and without what a terminal would obey.
+# Short display of values in messages, without control characters.
 
 
 #: Longer values are cut in a message.
@@ -383,7 +383,7 @@ LONGEST = 80
 
 
 def shown(value: Any) -> str:
-    """A value as a file would write it, cut where it is long."""
+    """A value as a file would write it, shortened if long."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):
@@ -401,6 +401,6 @@ def shown(value: Any) -> str:
 
 
 def shown_key(key: str) -> str:
-    """A key as it is, but for what cannot be printed."""
+    """A key without unprintable characters."""
     text = key if key.isprintable() and key else repr(key[: LONGEST + 1])
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…"

@@ -1,4 +1,4 @@
-"""Lines of a TOML file with comments: text of any origin comes back from it as it was."""
+"""Write the lines of a TOML file with comments; any text survives the round trip."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = [
     "string",
 ]
 
-#: What stands where only a person knows the value.
+#: Placeholder for a value that only the user knows.
 ASK = '"?"'
 WIDTH = 100
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
@@ -31,12 +31,12 @@ LONGEST = 300
 
 
 def string(text: str) -> str:
-    """A basic string of TOML.
+    """Return a TOML basic string.
 
     Parameters
     ----------
     text : str
-        Of any characters; halves of surrogate pairs, which no UTF-8 holds, become U+FFFD.
+        Any characters; unpaired surrogates, which UTF-8 cannot encode, become U+FFFD.
     """
     return '"' + "".join(_escaped(c) for c in text) + '"'
 
@@ -53,10 +53,10 @@ def _escaped(c: str) -> str:
 
 
 def named_from(path: Path, folder: Path) -> str:
-    """How a file in a folder names another, with slashes.
+    """Path of one file relative to the folder of another, with slashes.
 
-    From there, that both may be moved together; as a whole where they share no folder but the
-    root, for such a way tells a reader nothing.
+    Relative, so that both may be moved together; absolute where they share only the root, since a
+    relative path is then not helpful.
     """
     whole, start = path.absolute(), folder.absolute()
     try:
@@ -69,25 +69,25 @@ def named_from(path: Path, folder: Path) -> str:
 
 
 def plain(text: str) -> str:
-    """Text for a comment: one line, no control characters, no longer than 300."""
+    """Text for a comment: one line, no control characters, at most 300 characters."""
     one = "".join(c if c.isprintable() else " " for c in text)
     return one if len(one) <= LONGEST else one[: LONGEST - 1] + "…"
 
 
 def number(value: float, digits: int = 6) -> str:
-    """A float of TOML, in no more digits than it is known to."""
+    """Return a TOML float with no more digits than are known."""
     text = f"{value:.{digits}g}"
     return text if any(c in text for c in ".en") else f"{text}.0"
 
 
 def instant(value: float) -> str:
-    """An instant of a clock, s: to 10 µs, however far it counts from."""
+    """An instant of a clock, s: to 10 µs, for any clock origin."""
     text = f"{value:.5f}".rstrip("0")
     return f"{text}0" if text.endswith(".") else text
 
 
 def array(values: Sequence[float | None]) -> str:
-    """Numbers, with a question where one is not known."""
+    """Return an array of numbers, with a question mark for each unknown one."""
     return "[" + ", ".join(ASK if v is None else number(v) for v in values) + "]"
 
 
@@ -99,12 +99,12 @@ def inline(table: Mapping[str, str]) -> str:
 
 @dataclass(frozen=True)
 class Asked:
-    """A value that is left to the user.
+    """A value left to the user.
 
     Attributes
     ----------
     line : int
-        Of the file, counted from 1.
+        In the file, counted from 1.
     key : str
     what : str
     """
@@ -116,14 +116,14 @@ class Asked:
 
 @dataclass
 class Page:
-    """A file as it is written, line by line."""
+    """A file under construction, line by line."""
 
     lines: list[str] = field(default_factory=list)
     asked: list[Asked] = field(default_factory=list)
     to_check: list[Asked] = field(default_factory=list)
 
     def say(self, *paragraphs: str) -> None:
-        """Comment lines, wrapped; text in them is made harmless."""
+        """Add comment lines, wrapped; control characters are removed."""
         for text in paragraphs:
             shown = "".join(c if c.isprintable() else " " for c in text)
             if len(shown) > 6 * LONGEST:
@@ -132,25 +132,25 @@ class Page:
             self.lines += [f"# {line}".rstrip() for line in wrapped or [""]]
 
     def table(self, header: str, *remarks: str) -> None:
-        """A blank line, comments, and the header of a table."""
+        """Add a blank line, comments, and the header of a table."""
         self.blank()
         self.say(*remarks)
         self.lines.append(header)
 
     def blank(self) -> None:
-        """A blank line, never two."""
+        """Add a blank line, never two."""
         if self.lines and self.lines[-1]:
             self.lines.append("")
 
     def path(self, name: str, path: Path, folder: Path) -> None:
-        """A key that names a file; its remark is above, that lines stay where they are.
+        """Add a key that names a file; its remark is above, so that lines do not move.
 
         Parameters
         ----------
         name : str
         path : Path
         folder : Path
-            Of the file that is written.
+            Folder of the file being written.
         """
         self.say("from the folder of this file, or whole")
         self.key(name, string(named_from(path, folder)))
@@ -158,7 +158,7 @@ class Page:
     def key(
         self, name: str, value: str, remark: str = "", *, what: str = "", check: str = ""
     ) -> None:
-        """One key with its remark, beside it where it fits, else above.
+        """Add a key with its remark, on the same line if it fits, else above.
 
         Parameters
         ----------
@@ -166,9 +166,9 @@ class Page:
             The value as TOML.
         remark : str
         what : str
-            Short, for the list of what is left to the user; the remark, if not given.
+            Short text for the list of open values; by default the remark.
         check : str
-            What follows from the value, for a person to confirm who knows of the crash.
+            Consequence of the value, for a user to confirm.
         """
         text = f"{name} = {value}"
         remark = "".join(c if c.isprintable() else " " for c in remark)
@@ -185,5 +185,5 @@ class Page:
 
     @property
     def text(self) -> str:
-        """The whole file."""
+        """Return the whole file."""
         return "\n".join(self.lines) + "\n"

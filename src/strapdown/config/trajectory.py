@@ -1,4 +1,4 @@
-"""A trajectory to simulate, as a file in TOML."""
+"""Configuration of a simulated trajectory, from a TOML file."""
 
 from __future__ import annotations
 
@@ -38,23 +38,23 @@ class TrajectorySpec(TableSpec):
 
 
 def read_trajectory_spec(path: Path, **instead: Any) -> TrajectorySpec:
-    """Read a trajectory's file.
+    """Read a trajectory file.
 
     Parameters
     ----------
     path : Path
     **instead
-        Values that take the place of the file's own; None leaves them.
+        Values that replace those of the file; None keeps them.
 
     Returns
     -------
     TrajectorySpec
-        Named after the file. A sensor's file is looked for beside it.
+        Named after the file. A sensor file is resolved relative to it.
 
     Raises
     ------
     ConfigError
-        There is no such file, it is no TOML, or a value does not fit; the message names the key.
+        The file is missing or not TOML, or a value does not fit; the message names the key.
     """
     file = read_toml(path)
     table = dict(file.table)
@@ -73,7 +73,7 @@ def read_trajectory_spec(path: Path, **instead: Any) -> TrajectorySpec:
 
 
 def _place(parts: KeyPath) -> str:
-    """Where it stands; the motion itself, and which it is, go without saying."""
+    """Position of a path for users, without the motion and its kind."""
     if len(parts) > 1 and parts[0] == "motion":
         parts = parts[1 + (parts[1] in KINDS and len(parts) > 2) :]
     return place_of(parts)

@@ -1,4 +1,4 @@
-"""What the keys of a file want, in a few words: for what is missing or still open."""
+"""Short descriptions of configuration keys, for messages on missing or open values."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Wanted:
-    """What each key of one kind of file wants.
+    """Descriptions of the keys of one kind of file.
 
     Attributes
     ----------
     words : dict
-        By table and field without its unit; a field alone where it means the same everywhere.
+        By table and field without its unit; a field alone where the meaning is the same everywhere.
     """
 
     words: Mapping[str, str]
 
     def at(self, path: KeyPath) -> str:
-        """Say what is wanted at a key; empty where nothing is known of it."""
+        """Describe the value of a key; empty if unknown."""
         keys = [part for part in path if isinstance(part, str)]
         if not keys:
             return ""
@@ -47,7 +47,7 @@ class Wanted:
         return ""
 
     def remedy(self, path: KeyPath) -> str:
-        """The remedy for a key that is missing: how it is written, and what it is."""
+        """Remedy for a missing key: how to write it, and its meaning."""
         name = path[-1] if isinstance(path[-1], str) else ""
         said = self.at(path)
         if said.startswith("["):
@@ -57,12 +57,12 @@ class Wanted:
         return f"{form} ({said})" if said else form
 
 
-# What each key of a crash case wants, in a few words: for what is missing or still open.
+# Descriptions of the keys of a crash case.
 
 
 AXES = "forward, right, down"
 FROM = "from the origin that all positions share"
-# By table and field without its unit; a field alone where it means the same everywhere.
+# By table and field without its unit; a field alone where the meaning is the same everywhere.
 WANTED: dict[str, str] = {
     "title": "what the case is called in the report",
     "number": "the number or sign of the case",
@@ -129,7 +129,7 @@ WANTED: dict[str, str] = {
 
 
 def wanted_at(path: KeyPath) -> str:
-    """Say what is wanted at a key; empty where nothing is known of it."""
+    """Describe the value of a key; empty if unknown."""
     keys = [part for part in path if isinstance(part, str)]
     if not keys:
         return ""
@@ -141,7 +141,7 @@ def wanted_at(path: KeyPath) -> str:
 
 
 def what_to_write(path: KeyPath) -> str:
-    """The remedy for a key that is missing: how it is written, and what it is."""
+    """Remedy for a missing key: how to write it, and its meaning."""
     name = path[-1] if isinstance(path[-1], str) else ""
     said = wanted_at(path)
     keys = [key for key in keys_of(name) if not key.endswith(("_in", "_ft", "_lb", "_g"))]
@@ -152,7 +152,7 @@ def what_to_write(path: KeyPath) -> str:
     return f"{form} ({said})" if said else form
 
 
-# What each key of an alignment wants, in a few words: for what is missing or still open.
+# Descriptions of the keys of an alignment.
 
 
 _WORDS = {
@@ -173,7 +173,7 @@ _WORDS = {
 ALIGNMENT_WANTED = Wanted(_WORDS)
 
 
-# What each key of a run of navigation wants, in a few words: for what is missing or still open.
+# Descriptions of the keys of a navigation run.
 
 
 _NAVIGATION_WANTED_WORDS = {
@@ -200,11 +200,11 @@ _NAVIGATION_WANTED_WORDS = {
 NAVIGATION_WANTED = Wanted(_NAVIGATION_WANTED_WORDS)
 
 
-# Quantities whose keys tell their unit: which units there are, and what they are in ours.
+# Units of keys, and conversion to the unit of the field.
 
 
-# By the ending of a key of a specification, the endings that are understood in its place, and the
-# number to multiply with and the one to divide by: 600 mm are 0.6 m to the last bit.
+# By the unit ending of a specification key, the accepted endings, with the number to multiply with
+# and the one to divide by: 600 mm are 0.6 m to the last bit.
 UNITS: dict[str, dict[str, tuple[float, float]]] = {
     "_m_per_s2": {"_m_per_s2": (1.0, 1.0), "_g": (STANDARD_GRAVITY, 1.0)},
     "_m_per_s": {"_m_per_s": (1.0, 1.0), "_km_per_h": (1.0, 3.6), "_mph": (0.44704, 1.0)},
@@ -226,7 +226,7 @@ UNITS: dict[str, dict[str, tuple[float, float]]] = {
 def _ending(name: str) -> str | None:
     fits = [ending for ending in UNITS if name.endswith(ending)]
     found = max(fits, key=len, default=None)
-    # The s of a rate or of a square root is no time.
+    # The s of a rate or of a square root is not a time unit.
     of_another = found is not None and name.removesuffix(found).endswith(("_per", "_sqrt"))
     return None if of_another else found
 
@@ -237,7 +237,7 @@ def base_of(name: str) -> str:
 
 
 def keys_of(name: str) -> tuple[str, ...]:
-    """The keys under which a person may give a field, the field's own first."""
+    """Accepted keys of a field, the field's own first."""
     ending = _ending(name)
     if ending is None:
         return (name,)
@@ -245,16 +245,16 @@ def keys_of(name: str) -> tuple[str, ...]:
 
 
 def converted(value: Any, key: str, name: str) -> Any:
-    """A value as a key gives it, in the unit of a field.
+    """Convert a value from the unit of a key to that of a field.
 
     Parameters
     ----------
     value : object
-        A number, or lists of them; what is none is returned as it is.
+        A number, or lists of numbers; other values are returned unchanged.
     key : str
         One of `keys_of` the field.
     name : str
-        Of the field.
+        Name of the field.
     """
     ending = _ending(name)
     if key == name or ending is None:

@@ -1,4 +1,4 @@
-"""Acceleration free of gravity: what events, delta-V and direction of force are computed from."""
+"""Acceleration without gravity: input of events, delta-V and direction of force."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from strapdown.tables.imu import SAMPLINGS
 
 Array = NDArray[np.float64]
 
-#: What the three components are. ``body``: forward, right, down, turning with the vehicle, as a
+#: Frame of the three components. ``body``: forward, right, down, rotating with the vehicle, as a
 #: recorder integrates them; ``ned``: north, east, down; ``impact``: forward, right, down of a
 #: level vehicle at one heading, that of the impact.
 FRAMES = ("body", "ned", "impact")
@@ -46,7 +46,7 @@ class Acceleration:
     frame : {'body', 'ned', 'impact'}
         As in `FRAMES`.
     sampling : {'instantaneous', 'mean'}
-        The value at the stamp, or the mean over the interval that ends there.
+        Value at the stamp, or mean over the interval that ends there.
     source : str, optional
         Name of the unit or file, for messages.
 
@@ -55,7 +55,7 @@ class Acceleration:
     ConfigError
         `frame` or `sampling` is unknown.
     DataError
-        Shapes disagree, a value is not finite, time does not advance, or there are fewer than
+        Shapes disagree, a value is not finite, time does not increase, or there are fewer than
         two samples.
     """
 
@@ -102,11 +102,11 @@ class Acceleration:
         return float(self.time[-1])
 
     def gaps(self, start: float, end: float) -> list[Gap]:
-        """Holes of the record that reach into an interval."""
+        """Gaps of the record that overlap an interval."""
         return [g for g in find_gaps(self.time) if g.start < end and g.end > start]
 
     def along(self, heading_deg: float) -> Acceleration:
-        """Return a north-east-down record along and across one heading.
+        """Return a north-east-down record resolved along and across one heading.
 
         Parameters
         ----------
@@ -144,23 +144,23 @@ def _force_of(imu: pd.DataFrame) -> tuple[Array, str, str | None]:
 
 
 def body_acceleration(imu: pd.DataFrame, at_rest: Sequence[float]) -> Acceleration:
-    """Take the resting value off the specific force, as recorders do.
+    """Subtract the stationary mean from the specific force, as recorders do.
 
     Parameters
     ----------
     imu : DataFrame
         Imu table in vehicle axes at the reference point.
     at_rest : sequence of float, (3,), m/s²
-        Mean specific force at rest before the crash, in vehicle axes
-        (`RestStretch.accel_mean`): gravity and bias together. A vehicle on level ground without
+        Mean specific force while stationary before the crash, in vehicle axes
+        (`RestStretch.accel_mean`), gravity and bias included. A vehicle on level ground without
         bias has (0, 0, -9.8).
 
     Returns
     -------
     Acceleration
-        In turning body axes. Exact while the vehicle keeps its attitude; a vehicle that has
-        pitched or rolled by the angle d since then has g sin(d) of gravity left in it, 0.17 m/s²
-        a degree. `resolved_acceleration` has not.
+        In rotating body axes. Exact while the vehicle keeps its attitude; after a change of pitch
+        or roll by the angle d, g sin(d) of gravity remains, 0.17 m/s² per degree.
+        `resolved_acceleration` does not have this error.
 
     Raises
     ------
@@ -177,7 +177,7 @@ def body_acceleration(imu: pd.DataFrame, at_rest: Sequence[float]) -> Accelerati
 
 
 def force_at_rest(roll_deg: float, pitch_deg: float, gravity: float) -> Array:
-    """Specific force at rest of an unbiased sensor, from the levelling.
+    """Specific force of an unbiased stationary sensor, from the leveling.
 
     Parameters
     ----------
@@ -187,35 +187,35 @@ def force_at_rest(roll_deg: float, pitch_deg: float, gravity: float) -> Array:
     Returns
     -------
     ndarray, (3,), m/s²
-        For `body_acceleration`, where a record has no rest to take the mean of.
+        For `body_acceleration`, where a record has no stationary interval.
     """
     q = rotation.conjugate(rotation.quaternion_from_euler([roll_deg, pitch_deg, 0.0]))
     return rotation.rotate(q, np.array([0.0, 0.0, -gravity]))
 
 
 def resolved_acceleration(imu: pd.DataFrame, q_nb: ArrayLike, gravity: float) -> Acceleration:
-    """Resolve the specific force in north-east-down and take gravity off.
+    """Resolve the specific force in north-east-down and subtract gravity.
 
     Parameters
     ----------
     imu : DataFrame
-        Imu table in vehicle axes at the reference point, biases taken off.
+        Imu table in vehicle axes at the reference point, biases removed.
     q_nb : array_like, (n, 4)
         Attitude at every stamp.
     gravity : float, m/s²
-        Downward, with the centrifugal part (`strapdown.earth.gravity`).
+        Downward, including the centrifugal part (`strapdown.earth.gravity`).
 
     Returns
     -------
     Acceleration
-        In the frame ``ned``. Means are turned by the attitude in the middle of their interval,
-        which leaves an error of the second order in the turn over a sample. The Coriolis
-        acceleration (1 mm/s² at 7 m/s) is left in it.
+        In the frame ``ned``. Means are rotated by the attitude in the middle of their interval,
+        with an error of second order in the rotation over a sample. The Coriolis acceleration
+        (1 mm/s² at 7 m/s) is not removed.
 
     Raises
     ------
     DataError
-        As `Acceleration`; or the attitudes are not one a sample, or no rotations.
+        As `Acceleration`; or there is not one valid rotation per sample.
     """
     force, sampling, source = _force_of(imu)
     q = attitude_of_samples(q_nb, sampling, len(force), source)
@@ -226,7 +226,7 @@ def resolved_acceleration(imu: pd.DataFrame, q_nb: ArrayLike, gravity: float) ->
 def attitude_of_samples(
     q_nb: ArrayLike, sampling: str, samples: int, source: str | None = None
 ) -> Array:
-    """Attitude that turns each sample: at its stamp, or in the middle of its interval.
+    """Attitude for rotating each sample: at its stamp, or in the middle of its interval.
 
     Parameters
     ----------
@@ -234,7 +234,7 @@ def attitude_of_samples(
         At the stamps.
     sampling : {'instantaneous', 'mean'}
     samples : int
-        How many there are.
+        Number of samples.
     source : str, optional
         Name for messages.
 
@@ -245,7 +245,7 @@ def attitude_of_samples(
     Raises
     ------
     DataError
-        There is not one rotation a sample.
+        There is not one rotation per sample.
     """
     q = rotation.normalise(q_nb)
     if q.shape != (samples, 4):
@@ -257,7 +257,7 @@ def attitude_of_samples(
             samples=samples,
         )
     if sampling == "mean":
-        # Half the turn of the step, from its start.
+        # Half the rotation of the step, from its start.
         turn = rotation.rotation_vector_from_quaternion(
             rotation.compose(rotation.conjugate(q[:-1]), q[1:])
         )

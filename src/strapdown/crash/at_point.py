@@ -1,4 +1,4 @@
-"""What a unit says at a point of the vehicle, with everything that is not known of it."""
+"""Kinematics of a unit at a point of the vehicle, with the effects of its unknowns."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from strapdown.tables import ACCEL, GYRO
 
 Array = NDArray[np.float64]
 
-#: Of units that have none, in place of the name of the one that has.
+#: Name that units without gyro have instead of that of a gyro's owner.
 NO_GYRO = "no gyro"
 
 
 @dataclass(frozen=True, eq=False)
 class PointKinematics:
-    """What a unit, or the mean of several, says at a point.
+    """Kinematics from a unit, or the mean of several, at a point of the vehicle.
 
     Attributes
     ----------
@@ -37,14 +37,14 @@ class PointKinematics:
     levelling : Levelling
     rest : RestStretch, optional
     rest_accel_sd : float, m/s²
-        What is not known of the vehicle's own acceleration over the rest.
+        Standard deviation of the vehicle's own acceleration over the stationary interval.
     prepared : PreparedUnit, optional
-        What it is of; None for a mean of several.
+        The source unit; None for a mean of several.
     moved : MovedImu, optional
-        How it came to the point.
+        Data of the move to the point.
     unmeasured, unmeasured_turns : ndarray, (3, 3), optional
         Projections onto the directions, in vehicle axes, along which the specific force, and
-        about which the turning, is assumed and not measured; None where all are measured.
+        about which the rotation, is assumed instead of measured; None where all are measured.
     """
 
     name: str
@@ -60,7 +60,7 @@ class PointKinematics:
 
     @property
     def assumed_axes(self) -> tuple[str, ...]:
-        """What is assumed: of ``forward right down`` and ``roll pitch heading``."""
+        """Assumed axes: of ``forward right down`` and ``roll pitch heading``."""
         none = np.zeros((3, 3))
         return axis_names(
             none if self.unmeasured is None else self.unmeasured,
@@ -84,16 +84,16 @@ class PointKinematics:
 
     @property
     def gyro(self) -> str:
-        """Name of the unit that has the gyro, which others may borrow; or that there is none."""
+        """Name of the unit that has the gyro, which others may borrow; or `NO_GYRO`."""
         if self.unmeasured_turns is not None and np.trace(self.unmeasured_turns) > 2.5:
             return NO_GYRO
         lender = None if self.prepared is None else self.prepared.unit.lender
         return self.name if lender is None else lender.name
 
     def resting_force(self, gravity: float) -> tuple[Array, Array]:
-        """Mean specific force before the crash and how well it is known, (3,) each, m/s².
+        """Mean specific force before the crash and its standard deviation, (3,) each, m/s².
 
-        Where there is no rest, gravity in the attitude that was stated.
+        Without a stationary interval, gravity in the stated attitude.
 
         Parameters
         ----------
@@ -117,7 +117,7 @@ def at_point(
     time_sd: float | None = None,
     window: float | None = None,
 ) -> PointKinematics:
-    """Move a prepared unit to a point and list what is not known of it.
+    """Move a prepared unit to a point and list its unknowns there.
 
     Parameters
     ----------
@@ -125,10 +125,10 @@ def at_point(
     point : sequence of float, (3,), m
         Vehicle axes, from the vehicle's origin.
     time_sd : float, s, optional
-        How well the unit's clock is known against the common one; that of its trigger, if not
-        given.
+        Standard deviation of the unit's clock relative to the common one; by default that of its
+        trigger.
     window : float, s, optional
-        Of the derivative, as `move_imu`.
+        Of the derivative, as in `move_imu`.
 
     Returns
     -------
@@ -154,7 +154,7 @@ def at_point(
 
 
 def _but_along(axes: Array, moved: MovedImu, prepared: PreparedUnit) -> MovedImu:
-    """What is assumed along an axis is assumed of the point, and no arm adds to it."""
+    """Remove the lever-arm terms along assumed axes: the assumption holds at the point itself."""
     kept, imu = np.eye(3) - axes, moved.imu.copy()
     force = moved.imu[ACCEL].to_numpy(dtype=np.float64) @ kept
     imu[ACCEL] = force + prepared.imu[ACCEL].to_numpy(dtype=np.float64) @ axes

@@ -1,4 +1,4 @@
-"""One record from several units at a common point."""
+"""Combination of several units at a common point into one record."""
 
 from __future__ import annotations
 
@@ -45,19 +45,19 @@ def combine_units(units: Sequence[PointKinematics], method: str = "weighted") ->
         Of one vehicle, at one point; the stamps of the first are kept, where all have samples,
         and the others are interpolated linearly.
     method : {'weighted', 'median'}
-        One weight a unit and axis for the whole record, by what each states of its change of
-        velocity over the crash (`force_weights`): such a change of the mean lies between those of
-        the units. Or, of three units or more, the median of each axis and sample, which one unit
-        gone astray does not move far.
+        One weight per unit and axis for the whole record, from the stated uncertainty of its
+        change of velocity over the crash (`force_weights`): the mean's change of velocity then
+        lies between those of the units. Or, for three units or more, the median of each axis and
+        sample, which a single outlying unit hardly moves.
 
     Returns
     -------
     PointKinematics
-        With the unknowns of all its parts, each with the weight of its unit: one that two units
-        share, as the bias of a borrowed gyro, is one. Rates are weighed by how well they tell the
-        turn from 0.1 s before to 0.75 s after the trigger. It is
-        level where the mean of its specific force at rest is, over what all have in common of
-        their rests; without such, and where an attitude was stated, at the mean of theirs.
+        With the unknowns of all units, each scaled by the weight of its unit; an unknown that two
+        units share, such as the bias of a borrowed gyro, is one. Rates are weighted by the
+        uncertainty of the rotation from 0.1 s before to 0.75 s after the trigger. The combination
+        is leveled from its mean specific force over the common stationary interval; without one,
+        or where an attitude was stated, its level is the mean of theirs.
 
     Raises
     ------
@@ -68,9 +68,9 @@ def combine_units(units: Sequence[PointKinematics], method: str = "weighted") ->
 
     Notes
     -----
-    Any weights that sum to one are right, with the effects of the mean made with them. Samples of
-    a combination are taken for independent, though what the noise of the gyros does through a
-    lever arm is not: this states more than there is.
+    Any weights that sum to one are valid, since the effects of the mean use the same weights.
+    Samples of a combination are treated as independent, although gyro noise through a lever arm
+    is not: this is conservative.
     """
     if method not in COMBINATIONS:
         raise ConfigError(
@@ -113,7 +113,7 @@ def combine_units(units: Sequence[PointKinematics], method: str = "weighted") ->
     else:
         rest = rest_between(imu, *common, grade=units[0].rest.grade if units[0].rest else "stated")
         at_rest = weights[:, (time >= rest.start) & (time <= rest.end)].mean(axis=1)
-    # A third of the trace: one number a unit that sums to one.
+    # A third of the trace: one number per unit; they sum to one.
     share = np.trace(at_rest, axis1=1, axis2=2) / 3.0
     levelled = rest is not None and all(u.levelling.from_rest for u in units)
     parts = [_without_own_tilt(u) if levelled else u.effects for u in at]
@@ -136,7 +136,7 @@ def combine_units(units: Sequence[PointKinematics], method: str = "weighted") ->
         effects,
         mean,
         rest,
-        # The vehicle's own, which all units feel alike.
+        # The vehicle's own acceleration, common to all units.
         float(share @ [u.rest_accel_sd for u in units]),
         unmeasured=by_none([u.unmeasured for u in units]),
         unmeasured_turns=by_none(
@@ -146,7 +146,7 @@ def combine_units(units: Sequence[PointKinematics], method: str = "weighted") ->
 
 
 def _turning_measured(units: Sequence[PointKinematics]) -> NDArray[np.bool_]:
-    """Which units measure the turning about the most axes: what others assume does not count."""
+    """Units that measure rotation about the most axes; assumed axes do not count."""
     assumed = [0.0 if u.unmeasured_turns is None else np.trace(u.unmeasured_turns) for u in units]
     return np.asarray(np.round(assumed) == np.round(min(assumed)))
 
@@ -162,7 +162,7 @@ def _common_stamps(units: Sequence[PointKinematics]) -> Array:
 
 
 def _at(unit: PointKinematics, time: Array) -> PointKinematics:
-    """A unit at other stamps, on straight lines between its own."""
+    """Interpolate a unit linearly to other stamps."""
     own = unit.time
     if own.size == time.size and np.array_equal(own, time):
         return unit
@@ -182,7 +182,7 @@ def _at(unit: PointKinematics, time: Array) -> PointKinematics:
             sampling=str(unit.imu.attrs["sampling"]),
             source=unit.name,
         ),
-        # The noise of a value between two samples is less than theirs; theirs is kept.
+        # The noise of an interpolated value is smaller; that of the samples is kept.
         effects=replace(
             effects,
             force=at(effects.force),
@@ -219,14 +219,14 @@ def _level(levelling: Levelling) -> Array:
 
 
 def _without_own_tilt(unit: PointKinematics) -> SampleEffects:
-    """Effects without the tilt that follows from the force at rest: it is that of the mean."""
+    """Effects without the tilt from the stationary force, which is that of the mean."""
     effects = unit.effects
     tilt = level_turned_by(effects.rest_force, _level(unit.levelling))
     return replace(effects, tilt=effects.tilt - tilt)
 
 
 def _median_weights(force: Array) -> Array:
-    """One for the unit in the middle, a half for each of two in the middle; per sample and axis."""
+    """One for the middle unit, a half for each of two middle units; per sample and axis."""
     count = len(force)
     order = np.argsort(force, axis=0, kind="stable")
     weights = np.zeros((*force.shape, 3))
@@ -238,7 +238,7 @@ def _median_weights(force: Array) -> Array:
 
 
 def _rate_weights(units: Sequence[PointKinematics], counted: NDArray[np.bool_]) -> Array:
-    """One number a unit; a gyro that several have counts once."""
+    """One weight per unit; a gyro shared by several units counts once."""
     steps = crash_steps(units[0].time)
     known, weights = set(), []
     for u, counts in zip(units, counted, strict=True):
@@ -250,21 +250,21 @@ def _rate_weights(units: Sequence[PointKinematics], counted: NDArray[np.bool_]) 
     return np.asarray(np.array(weights) / np.sum(weights))
 
 
-# What the unknowns of several units do to a weighted mean of them.
+# Effect of the unknowns of several units on their weighted mean.
 
 
 @dataclass(frozen=True, eq=False)
 class SampleWeights:
-    """The part of a mean that is one unit's.
+    """Weights of one unit in a mean.
 
     Attributes
     ----------
     force : ndarray, (n, 3, 3) or (3, 3)
-        Of each sample of the specific force, vehicle axes.
+        For each sample of the specific force, vehicle axes.
     rest : ndarray, (3, 3)
-        Of the mean specific force at rest.
+        For the mean stationary specific force.
     tilt : float
-        Of the attitude at rest, as far as it does not follow from that force.
+        For the stationary attitude, as far as it does not follow from that force.
     rate : float
     """
 
@@ -275,7 +275,7 @@ class SampleWeights:
 
     @classmethod
     def alike(cls, weight: float) -> SampleWeights:
-        """One number for all."""
+        """The same weight for all quantities."""
         whole = weight * np.eye(3)
         return cls(whole, whole, weight, weight)
 
@@ -288,15 +288,15 @@ def combine_effects(
     Parameters
     ----------
     parts : sequence of SampleEffects
-        Of units on the same stamps and at the same point. Unknowns of one name are one unknown,
-        as of a gyro that two units share; the others are independent.
+        Of units at the same stamps and the same point. Unknowns of the same name are one unknown,
+        such as those of a gyro that two units share; the others are independent.
     weights : sequence of float or SampleWeights
-        Summing to one.
+        Sum of one.
 
     Returns
     -------
     SampleEffects
-        The attitude at rest is the mean of theirs. Noise is that of independent units.
+        The stationary attitude is the mean of theirs. Noise is that of independent units.
     """
     rows: dict[str, int] = {}
     contributors: list[str] = []
@@ -330,17 +330,17 @@ def combine_effects(
     )
 
 
-# Weights of units in their mean: one number an axis for the whole record.
+# Weights of units in their mean: one number per axis for the whole record.
 
 
-# What is weighed: the change of velocity from shortly before the impact to the end of the path.
+# Window whose change of velocity is weighted: from before the impact to the end of the path.
 CRASH_WINDOW = (-0.1, 0.75)  # s
-# Of squared cosines.
+# Rounding of squared cosines.
 ROUNDING = 1e-9
 
 
 def force_weights(units: Sequence[PointKinematics]) -> Array:
-    """Weights of the specific forces of units in their mean.
+    """Weights of the units' specific forces in their mean.
 
     Parameters
     ----------
@@ -350,20 +350,20 @@ def force_weights(units: Sequence[PointKinematics]) -> Array:
     Returns
     -------
     ndarray, (k, 3, 3)
-        Of vehicle axes, summing to the identity. Diagonal and from zero to one, where every axis
-        that a unit lacks is one of the vehicle's: then a change of velocity of the mean lies
-        between those of the units, axis by axis, over every window.
+        In vehicle axes, summing to the identity. Diagonal with values from zero to one where every
+        axis that a unit lacks is a vehicle axis: the mean's change of velocity then lies between
+        those of the units, axis by axis, over every window.
 
     Notes
     -----
-    In each axis the weights w of sum one, none negative, with the least ``wᵀ C w``, where C is the
+    In each axis the nonnegative weights w of sum one that minimize ``wᵀ C w``, where C is the
     joint covariance of the units' changes of velocity along it from 0.1 s before to 0.75 s after
-    the trigger (`velocity_covariance`). They depend on the samples through the size of the stated
-    errors over the whole crash alone. Weights of each sample would not do: the stated error of a
-    scale factor or of a misalignment grows with the reading, so that the unit that reads less
-    would always count for more, and a mean of units that ring or disagree would be less than any
-    of them. Nor would weights that change in time, as with the range that speaks: a change of
-    velocity could lie outside.
+    the trigger (`velocity_covariance`). They depend on the samples only through the stated errors
+    over the whole crash. Weights per sample would bias the mean: the stated error of a scale factor
+    or a misalignment grows with the reading, so that the unit with the smaller reading would always
+    count for more, and the mean of units that ring or disagree would be smaller than each unit.
+    Weights that change in time, such as with the active range, could give a change of velocity
+    outside those of the units.
 
     Where one unit was clipped along an axis and another was not, it does not count there.
     """
@@ -388,7 +388,7 @@ def force_weights(units: Sequence[PointKinematics]) -> Array:
 
 
 def crash_steps(time: Array) -> Array:
-    """Steps of the crash window, zero outside of it; all, where no stamp lies in it.
+    """Steps of the crash window, zero outside; all steps where no stamp lies in the window.
 
     Parameters
     ----------
@@ -415,8 +415,8 @@ def velocity_covariance(units: Sequence[PointKinematics]) -> Array:
     Returns
     -------
     ndarray, (3, k, k), (m/s)²
-        Of the integral of the specific force along each vehicle axis. Unknowns of one name are one
-        unknown; noise is that of independent samples.
+        Of the integral of the specific force along each vehicle axis. Unknowns of the same name are
+        one unknown; noise is independent from sample to sample.
     """
     steps = crash_steps(units[0].time)
     columns: dict[str, int] = {}
@@ -434,7 +434,7 @@ def velocity_covariance(units: Sequence[PointKinematics]) -> Array:
 
 
 def least_variance(covariance: Array) -> Array:
-    """Weights of sum one, none negative, with which a mean has the least variance.
+    """Nonnegative weights of sum one that minimize the variance of a mean.
 
     Parameters
     ----------
@@ -447,8 +447,8 @@ def least_variance(covariance: Array) -> Array:
     Notes
     -----
     ``min |Lᵀ w|² + (1 - 1ᵀ w)²`` over ``w >= 0``, with ``C = L Lᵀ``: for every direction of w the
-    best length gives ``q / (1 + q)``, q the variance of the weights of that direction whose sum is
-    one, so that the direction is the one wanted.
+    best length gives ``q / (1 + q)``, where q is the variance of the weights of that direction
+    with sum one; the minimum is therefore in the wanted direction.
     """
     from scipy.optimize import nnls
 
@@ -470,7 +470,7 @@ def by_none(projections: Sequence[Array | None]) -> Array | None:
 
 
 def _turned_weights(covariance: Array, missing: Sequence[Array | None]) -> Array:
-    """Where a missing axis is none of the vehicle's it cannot be had by axis."""
+    """Weights where a missing axis is not a vehicle axis, so that axes do not separate."""
     information = []
     for k, unmeasured in enumerate(missing):
         own = floored(np.diag(covariance[:, k, k]))
@@ -479,7 +479,7 @@ def _turned_weights(covariance: Array, missing: Sequence[Array | None]) -> Array
         information.append(kept @ np.linalg.inv(kept @ own @ kept + gone) @ kept)
     none = by_none(missing)
     if none is not None:
-        # Along what none measures all are as good as one another.
+        # Along directions that no unit measures all units are equally good.
         size = float(np.mean(np.trace(information, axis1=-2, axis2=-1)))
         information = [i + size * none for i in information]
     total = np.linalg.inv(np.sum(information, axis=0))

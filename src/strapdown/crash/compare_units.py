@@ -1,4 +1,4 @@
-"""Several units on one vehicle: whether they agree within what they state, and why not."""
+"""Comparison of several units on one vehicle: whether they agree within stated uncertainty."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 AXES = ("forward", "right", "down")
-# Variance of what a unit assumes, of the largest there is: none beside what is measured.
+# Variance of assumed axes, relative to the largest: no weight beside measured ones.
 NO_WEIGHT = 1e8
 
 
@@ -62,20 +62,19 @@ def compare_units(
     pieces: int = 20,
     level: float = 1e-3,
 ) -> UnitComparison:
-    """Compare units pairwise and against their combination.
+    """Compare units pairwise and against their weighted combination.
 
     Parameters
     ----------
     units : sequence of PointKinematics
         Two or more, of one rigid vehicle, at one point.
     window : (start, end), s, optional
-        What is compared; -0.1 to 0.75 s, as far as all have samples, if not given.
+        Window to compare; by default -0.1 to 0.75 s, as far as all units have samples.
     pieces : int
-        The forces are compared as means over so many equal pieces, or as many as have two
-        samples each. The test of the pieces is one of the delta-V curve at their edges, too:
-        either follows from the other.
+        Number of equal intervals over which mean forces are compared, reduced so that each has
+        two samples. The test is equivalent to one of the delta-V curve at the interval edges.
     level : float
-        Probability below which a difference is a disagreement.
+        Probability below which a difference counts as a disagreement.
 
     Returns
     -------
@@ -83,18 +82,17 @@ def compare_units(
 
     Notes
     -----
-    Only directions that both units measure are compared: what one assumes of an axis says nothing
-    of the other. With the difference d of the increments of velocity and its covariance C from
-    all that both units state, ``dᵀ C⁻¹ d`` is chi-square. What they share (a borrowed gyro, the
-    attitude that all were levelled at) cancels in d and in C. Ringing that the structure has at
-    one place and not at the other, and whatever else was not stated, shows as a disagreement; its
-    words say where it is largest. Pieces in which either unit was at the end of its range, with
-    nothing behind, are left out of everything, and a finding says so. Swapped axes, a turned
-    mounting and wrong positions are looked for in each pair.
+    Only directions that both units measure are compared; assumed axes are excluded. With the
+    difference d of the velocity increments and its covariance C from all stated uncertainties,
+    ``dᵀ C⁻¹ d`` is chi-square distributed. Common errors (a shared gyro, the common leveling
+    attitude) cancel in d and in C. Structural ringing at one position only, and any other unstated
+    error, shows as a disagreement; the message gives the interval where it is largest. Intervals
+    in which either unit was clipped without a wider range are left out, and a finding reports it.
+    Each pair is checked for swapped axes, a rotated mounting and wrong positions.
 
     Raises
     ------
-    DataError
+    There are fewer than two units, or they do not cover the window.
         There are fewer than two units, or they do not cover the window.
     ConfigError
         The window is too short, or an option is out of range.
@@ -156,7 +154,7 @@ def _pair(
     if whole:
         axes, turned, lever = match_axes(a, b), mounting_rotation(a, b), check_lever_arm(a, b)
     else:
-        # Three axes and the turning of both are needed to say how they lie to one another.
+        # The checks of relative mounting need three measured axes and a gyro on both units.
         axes, turned, lever = AxisMatch.untold(), MountingRotation.untold(), LeverArmCheck.untold()
     agree = probability >= level
     if not kept.any():
@@ -167,7 +165,7 @@ def _pair(
         findings.append(_disagreement(first, second, edges, curve, sd, chi, freedom, probability))
     found = axis_findings(axes, first.name, second.name)
     if whole and not found and first.prepared is not None and second.prepared is not None:
-        # A small rotation or a wrong place means nothing where an axis is another.
+        # A small rotation or a wrong position is not meaningful while axes are swapped.
         mounted = first.prepared.unit.mounting, second.prepared.unit.mounting
         angles = math.radians(math.hypot(*(m.angles_sd_deg for m in mounted)))
         found = rotation_findings(turned, angles, first.name, second.name)
@@ -212,7 +210,7 @@ class _Together:
 def _against_all(
     units: Sequence[PointKinematics], increments: Sequence[VelocityIncrements], kept: Flags
 ) -> _Together:
-    """`increments` are those of the pieces that are kept."""
+    """Combine `increments` of the kept intervals and compare each unit with the combination."""
     size = increments[0].values.size
     if size == 0:
         return _nothing_together(units, kept)
@@ -221,7 +219,7 @@ def _against_all(
     bases = [measured_by_all((u,)) for u in units]
     for k, basis in enumerate(bases):
         if basis.shape[1] < 3:
-            # What a unit assumes has no weight beside what others measure.
+            # Assumed axes get no weight beside measured ones.
             rows = slice(k * size, (k + 1) * size)
             unmeasured = np.eye(3) - basis @ basis.T
             joint[rows, rows] += NO_WEIGHT * largest * np.kron(np.eye(pieces), unmeasured)
@@ -234,7 +232,7 @@ def _against_all(
     against = []
     for k, (u, basis) in enumerate(zip(units, bases, strict=True)):
         rows = slice(k * size, (k + 1) * size)
-        # The unit is part of the combination: their covariance is the combination's.
+        # The unit is part of the combination: their covariance is that of the combination.
         own = joint[rows, rows] - covariance
         chi, freedom = chi_square_along(basis, left[rows], own)
         told = np.where(measured_axes(basis), 0.0, np.nan)
@@ -265,7 +263,7 @@ def _square(difference: Array, covariance: Array) -> float:
 
 
 def _nothing_together(units: Sequence[PointKinematics], kept: Flags) -> _Together:
-    """All pieces were left out."""
+    """Return the result where all intervals were left out."""
     none = np.full((kept.size + 1, 3), np.nan)
     return _Together(
         np.zeros(0),
@@ -278,7 +276,7 @@ def _nothing_together(units: Sequence[PointKinematics], kept: Flags) -> _Togethe
 
 
 def _curve(increments: Array, kept: Flags) -> Array:
-    """Sums at all edges: what was left out adds nothing."""
+    """Cumulative sums at all edges; left-out intervals contribute zero."""
     whole = np.zeros((kept.size, 3))
     whole[kept] = increments.reshape(-1, 3)
     return np.vstack([np.zeros(3), np.cumsum(whole, axis=0)])
@@ -348,7 +346,7 @@ def _nothing_in_common(first: PointKinematics, second: PointKinematics) -> Findi
 
 
 def _odd_one(units: Sequence[PointKinematics], pairs: Sequence[UnitPair]) -> list[Finding]:
-    """Of three or more, the one without which the others agree."""
+    """Of three or more units, find the one without which the others agree."""
     if len(units) < 3 or all(p.agree for p in pairs):
         return []
     odd = [
@@ -359,34 +357,34 @@ def _odd_one(units: Sequence[PointKinematics], pairs: Sequence[UnitPair]) -> lis
     return [Finding("crash.others-agree-another-not", file=odd[0], quantity="delta-V")]
 
 
-# How units on one vehicle compare: what a comparison found.
+# Results of a comparison of units.
 
 
 @dataclass(frozen=True, eq=False)
 class UnitPair:
-    """Two units at their common point.
+    """Comparison of two units at their common point.
 
     Attributes
     ----------
     first, second : str
     edges : ndarray, (m + 1,), s
     difference : ndarray, (m + 1, 3), m/s
-        Integral of the first one's specific force minus that of the second's, vehicle axes,
-        from the first edge; pieces in which either was at the end of its range add nothing.
+        Integral of the first unit's specific force minus the second's, vehicle axes, from the
+        first edge; intervals in which either was clipped contribute zero.
     sd : ndarray, (m + 1, 3), m/s
-        As both state it. NaN along axes that either assumes, here and in what follows.
+        From the uncertainty stated for both. NaN along axes that either assumes, here and below.
     force_difference, force_sd : ndarray, (m, 3), m/s²
-        Means over each piece; NaN in pieces in which either was at the end of its range.
+        Means over each interval; NaN where either was clipped.
     chi_square, freedom : float, int
-        Of all other pieces and axes together, with their covariance; of those axes that both
-        measure. Zero, where there is none.
+        Over the remaining intervals and the axes that both measure, with their covariance.
+        Zero if none remain.
     probability : float
-        Of a chi-square as large or larger, where the statements are right.
+        Probability of a chi-square at least this large if the stated uncertainty is right.
     agree : bool
     axes : AxisMatch
     turned : MountingRotation
     lever_arm : LeverArmCheck
-        These three tell nothing where either assumes an axis or the turning.
+        These three are not meaningful where either assumes an axis or the rates.
     findings : tuple of Finding
     """
 
@@ -415,8 +413,8 @@ class UnitAgainstAll:
     ----------
     name : str
     difference, sd : ndarray, (m + 1, 3), m/s
-        Its delta-V minus the combination's, and as stated: what it shares with the combination
-        is taken into account. NaN along axes that it, or that all, assume.
+        Its delta-V minus that of the combination, and the stated standard deviation of the
+        difference, which accounts for common errors. NaN along axes that it, or all, assume.
     chi_square, freedom, probability
         As `UnitPair`.
     """
@@ -431,19 +429,19 @@ class UnitAgainstAll:
 
 @dataclass(frozen=True, eq=False)
 class UnitComparison:
-    """All units of a vehicle at one point.
+    """Comparison of all units of a vehicle at one point.
 
     Attributes
     ----------
     edges : ndarray, (m + 1,), s
     pairs : tuple of UnitPair
     combined : ndarray, (m + 1, 3), m/s
-        Delta-V of the best weighted combination, gravity still in it, body axes; NaN along axes
-        that all units assume.
+        Delta-V of the optimally weighted combination, gravity included, body axes; NaN along
+        axes that all units assume.
     combined_sd : ndarray, (m + 1, 3), m/s
     against : tuple of UnitAgainstAll
     chi_square, freedom, probability
-        Of all units against the combination.
+        All units against the combination.
     agree : bool
     findings : tuple of Finding
     """
@@ -460,17 +458,17 @@ class UnitComparison:
     findings: tuple[Finding, ...]
 
 
-# Directions that units measure, where some of them assume others.
+# Directions measured by units of which some assume axes.
 
 
-# Of squared cosines: a direction is within what is measured, or has nothing of it.
+# Squared cosines closer to 0 or 1 than this are rounding.
 ROUNDING = 1e-9
-# An axis is measured where so much of it is (squared cosine): 18 deg.
+# A vehicle axis counts as measured from this squared cosine on: 18 deg.
 MOST = 0.9
 
 
 def measured_by_all(units: Sequence[PointKinematics]) -> Array:
-    """Orthonormal columns of the directions along which each of the units measures, (3, r)."""
+    """Orthonormal columns spanning the directions that every unit measures, (3, r)."""
     total = sum((_unmeasured(u) for u in units), np.zeros((3, 3)))
     if not total.any():
         return np.eye(3)
@@ -479,7 +477,7 @@ def measured_by_all(units: Sequence[PointKinematics]) -> Array:
 
 
 def measured_by_any(units: Sequence[PointKinematics]) -> Array:
-    """Orthonormal columns of the directions along which at least one of them measures, (3, r)."""
+    """Orthonormal columns spanning the directions that at least one unit measures, (3, r)."""
     measured = np.mean([np.eye(3) - _unmeasured(u) for u in units], axis=0)
     values, vectors = np.linalg.eigh(measured)
     return np.asarray(vectors[:, values > ROUNDING])
@@ -498,7 +496,7 @@ def chi_square_along(basis: Array, difference: Array, covariance: Array) -> tupl
     basis : ndarray, (3, r)
         Orthonormal columns.
     difference : ndarray, (3 m,)
-        By piece, then axis.
+        By interval, then axis.
     covariance : ndarray, (3 m, 3 m)
     """
     if basis.shape[1] < 3:
@@ -513,10 +511,10 @@ def _unmeasured(unit: PointKinematics) -> Array:
     return np.zeros((3, 3)) if unit.unmeasured is None else unit.unmeasured
 
 
-# Where a unit was at the end of its range with nothing behind it.
+# Intervals in which a unit was clipped without a wider range.
 
 
-# Of a squared cosine: an axis of the sensor within 6 deg of across does not count in one.
+# Squared cosine below which a sensor axis does not count: within 6 deg of perpendicular.
 LEAST_SHARE = 0.01
 
 
@@ -531,7 +529,7 @@ def clipped_axes(unit: PointKinematics, window: tuple[float, float]) -> Flags:
     Returns
     -------
     ndarray of bool, (3,)
-        False all, for a mean of several. A clipped gyro turns all axes, and is not told here.
+        All False for a mean of several units. A clipped gyro affects all axes and is not included.
     """
     prepared = unit.prepared
     if prepared is None:
@@ -544,7 +542,7 @@ def clipped_axes(unit: PointKinematics, window: tuple[float, float]) -> Flags:
 
 
 def clipped_pieces(unit: PointKinematics, edges: Array) -> Flags:
-    """In which pieces of time a unit's readings are not what it felt.
+    """In which time intervals the readings of a unit are affected by clipping.
 
     Parameters
     ----------
@@ -554,9 +552,9 @@ def clipped_pieces(unit: PointKinematics, edges: Array) -> Flags:
     Returns
     -------
     ndarray of bool, (m,)
-        Whether a clipped sample of the accelerometers or the gyro, or a neighbour of one, counts
-        in a piece. Neighbours: as many as make an angular acceleration of the gyro's samples, and
-        the one into which a line is drawn of the accelerometers'.
+        Whether a clipped sample of accelerometers or gyro, or a neighbor of one, contributes to
+        the interval. Neighbors: the gyro samples that form one angular acceleration, and the
+        accelerometer sample up to which the line between samples extends.
     """
     prepared = unit.prepared
     if prepared is None:
@@ -565,7 +563,7 @@ def clipped_pieces(unit: PointKinematics, edges: Array) -> Flags:
     arm = unit.moved is not None and bool(unit.moved.lever_arm.any())
     wide = unit.moved.slope.slope.shape[1] // 2 if arm and unit.moved is not None else 0
     cut = _spread(_any(prepared.clipped), 1)
-    # What one reads along axes that turned unseen is not affected, but where an arm moves it.
+    # A clipped gyro affects the accelerometer readings only through a lever arm.
     cut |= _spread(_any(prepared.gyro_clipped), wide + 1) if arm else False
     at = time[cut]
     return np.asarray(
@@ -578,5 +576,5 @@ def _any(flags: Flags) -> Flags:
 
 
 def _spread(flags: Flags, by: int) -> Flags:
-    """Flags and so many neighbours on either side."""
+    """Flags extended by so many neighbors on either side."""
     return np.asarray(np.convolve(flags, np.ones(2 * by + 1), mode="same") > 0.5)

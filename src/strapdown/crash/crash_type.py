@@ -1,4 +1,4 @@
-"""Front, side, rear or rollover: by the direction of force and the rates of roll."""
+"""Crash type (front, side, rear, rollover) from the direction of force and the roll rate."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ __all__ = [
 ]
 
 
-# Whether a roll tips a vehicle over: a rigid body about the wheels on one side.
+# Rollover criterion: a rigid body about the wheels on one side.
 
 
 Array = NDArray[np.float64]
@@ -37,23 +37,23 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class RollMotion:
-    """Roll of a vehicle, and how far it went towards tipping over.
+    """Roll of a vehicle relative to tipping over.
 
     Attributes
     ----------
     share : float
-        Largest energy of the roll over that which tips the body over; from 1 on it does.
+        Largest roll energy divided by the energy for tipping over; it tips from 1 on.
     low, high : float
-        95 % bound of `share`, from the stated errors of the rate and of the first roll.
+        95 % bound of `share`, from the stated errors of the rate and of the initial roll.
     time : float, s
-        When `share` was reached.
+        Instant at which `share` was reached.
     peak_rate_deg_s : float, deg/s
         Signed, positive to the right.
     peak_roll_deg : float, deg
         Largest roll, signed.
     quarter_turns : int
-        Whole quarter turns of `peak_roll_deg`; one or more is a rollover to NHTSA (rotation of
-        90 deg or more about the longitudinal or lateral axis).
+        Complete quarter turns of `peak_roll_deg`; one or more is a rollover by NHTSA's definition
+        (rotation of 90 deg or more about the longitudinal or lateral axis).
     """
 
     share: float
@@ -73,11 +73,11 @@ class TippingBody:
     ----------
     half_track : float, m
     stability_factor : float
-        Static stability factor: half the track over the height of the centre of mass (49 CFR
-        575, NCAP). 1.41 is the sales-weighted mean of passenger cars of 2003, 1.17 of sport
+        Static stability factor: half the track divided by the height of the center of mass (49
+        CFR 575, NCAP). 1.41 is the sales-weighted mean of passenger cars of 2003, 1.17 of sport
         utility vehicles (NHTSA, DOT HS 809 868).
     roll_radius : float, m
-        Radius of gyration about the longitudinal axis through the centre of mass.
+        Radius of gyration about the longitudinal axis through the center of mass.
 
     Raises
     ------
@@ -86,14 +86,14 @@ class TippingBody:
 
     Notes
     -----
-    The criterion is ours. About the wheels at the distance ``r = hypot(c, h)`` (half track,
-    height) from the centre of mass, the body is at its highest at the roll ``tip = atan(c / h)``.
-    It goes over that if the energy of the roll, by mass,
+    The criterion is this package's own. About the wheels at the distance ``r = hypot(c, h)``
+    (half track, height) from the center of mass, the body is at its highest at the roll
+    ``tip = atan(c / h)``. It tips over if the energy of the roll, per mass,
     ``g r (cos(tip - |roll|) - cos tip) + (k² + r²) rate² / 2``, reaches ``g r (1 - cos tip)``; the
-    rate counts only while it turns away from level. Suspension, tyres and whatever still pushes
-    are left out, so that a share near one is no certainty either way. A level passenger car
-    needs 141 deg/s. Half track and radius of gyration are round numbers for a passenger car,
-    and are ours.
+    rate counts only while it turns away from level. Suspension, tires and continuing external
+    forces are neglected, so that a ratio near one decides neither way. A level passenger car
+    requires 141 deg/s. Half track and radius of gyration are rounded values for a passenger car,
+    chosen for this package.
     """
 
     half_track: float = 0.75
@@ -107,12 +107,12 @@ class TippingBody:
                 raise ConfigError("crash.no-dimension-vehicle", quantity=f.name, value=value)
 
     def energy_share(self, roll: ArrayLike, rate: ArrayLike) -> Array:
-        """Energy of a roll over that which tips the body over.
+        """Energy of a roll divided by the energy for tipping over.
 
         Parameters
         ----------
         roll, rate : array_like, (n,), rad and rad/s
-            From level; to the right positive.
+            From level; positive to the right.
 
         Returns
         -------
@@ -138,20 +138,20 @@ class TippingBody:
         start_sd_deg: float = 0.0,
         since: float | None = None,
     ) -> RollMotion:
-        """Follow the roll of a record.
+        """Compute the roll of a record and its ratio to tipping over.
 
         Parameters
         ----------
         time, roll_rate : array_like, (n,), s and rad/s
-            Rate about the forward axis, bias taken off. Its integral is the roll while the pitch
-            is small: at 10 deg of pitch and 100 deg/s of yaw, 17 deg/s of roll are not seen.
+            Rate about the forward axis, bias removed. Its integral is the roll while the pitch is
+            small: at 10 deg of pitch and 100 deg/s of yaw, 17 deg/s of roll are missed.
         start_roll_deg : float, deg
             Roll at the first sample.
         rate_sd : float, rad/s
-            Of an error of the rate that stays the same.
+            Of a constant error of the rate.
         start_sd_deg : float, deg
         since : float, s, optional
-            What is before is followed and does not count.
+            Earlier samples are integrated but not counted.
 
         Returns
         -------
@@ -160,7 +160,7 @@ class TippingBody:
         Raises
         ------
         DataError
-            Stamps and rates do not go together, or nothing is left after `since`.
+            Stamps and rates differ in length, or no sample is left after `since`.
         """
         stamps, rate = as_array(time, None, "time"), as_array(roll_rate, None, "roll_rate")
         check_same_length(None, time=stamps, roll_rate=rate)
@@ -196,10 +196,10 @@ class TippingBody:
 PASSENGER_CAR = TippingBody()
 
 
-#: The types that a direction of force tells apart, clockwise, each from its border to the next,
+#: Crash types by direction of force, clockwise, each from its border to the next,
 #: deg: three hours of the clock of SAE J224 each, front 11 to 1, right 2 to 4, rear 5 to 7, left
-#: 8 to 10. They are about the direction of force; the damaged side (SAE J224, column 3) may be
-#: another.
+#: 8 to 10. They refer to the direction of force; the damaged side (SAE J224, column 3) may
+#: differ.
 BORDERS: dict[str, tuple[float, float]] = {
     "front": (-45.0, 45.0),
     "right": (45.0, 135.0),
@@ -212,26 +212,26 @@ ROLLOVER = "rollover"
 
 @dataclass(frozen=True)
 class CrashType:
-    """Type of one event, and how near it is to another.
+    """Type of one event, and its margin to the next type.
 
     Attributes
     ----------
     name : {'front', 'right', 'rear', 'left', 'rollover', 'undetermined'}
-        'undetermined' where a bound spans a border: of the direction of force, or of tipping
-        over.
+        'undetermined' where a 95 % bound, of the direction of force or of tipping over, spans
+        a border.
     side : {'front', 'right', 'rear', 'left'}
-        By the estimated direction alone.
+        From the estimated direction alone.
     direction : Pdof
     interval : AngleInterval or None
-        Of the horizontal direction, 95 %; None where no covariance was given.
+        Of the horizontal direction, 95 %; None without a covariance.
     margin_deg : float, deg
         From the direction to the border of the next type.
     next_type : str
-        What lies beyond that border.
+        Type beyond that border.
     roll : RollMotion or None
-        None where no rates were given: a rollover is then not looked for.
+        None without rates: rollover is then not examined.
     reason : str
-        Why, in a sentence.
+        Explanation in one sentence.
     """
 
     name: str
@@ -245,7 +245,7 @@ class CrashType:
 
 
 def side_of(horizontal_deg: float) -> tuple[str, float, str]:
-    """Type by a direction, the distance to the nearest border, and the type beyond it.
+    """Type by direction, the distance to the nearest border, and the type beyond it.
 
     Parameters
     ----------
@@ -255,7 +255,7 @@ def side_of(horizontal_deg: float) -> tuple[str, float, str]:
     Returns
     -------
     name : str
-        A direction on a border belongs to the type clockwise of it.
+        A direction on a border belongs to the type clockwise from the border.
     margin_deg : float, deg
     next_type : str
     """
@@ -288,14 +288,14 @@ def classify_crash(
     covariance : array_like, (3, 3), m²/s², optional
         Of its error.
     event : CrashEvent, optional
-        With the rates: roll is looked at from its time zero on. Without, over all that is given.
+        With the rates: roll is examined from its time zero on. Without, over all samples given.
     time, roll_rate : array_like, (n,), s and rad/s, optional
-        Rate about the forward axis (``gyro_x``, bias taken off). A rollover goes on after the
-        event that began it; give what there is, up to the next event.
+        Rate about the forward axis (``gyro_x``, bias removed). A rollover continues after its
+        event; give all samples up to the next event.
     start_roll_deg : float, deg
         Roll at the first of these.
     roll_rate_sd : float, rad/s
-        Of an error of the rate that stays the same over the record (bias).
+        Of a constant error of the rate over the record (bias).
     start_roll_sd_deg : float, deg
     body : TippingBody
         Dimensions of the vehicle.
@@ -303,13 +303,13 @@ def classify_crash(
     Returns
     -------
     CrashType
-        'rollover' goes before the side that was struck. 'undetermined' where the 95 % bound of
-        what decides holds both answers.
+        'rollover' takes precedence over the side of the impact. 'undetermined' where the 95 %
+        bound of the deciding quantity spans both types.
 
     Raises
     ------
     ConfigError
-        One of `time` and `roll_rate` is missing, or they do not go together.
+        One of `time` and `roll_rate` is missing, or their lengths differ.
     DataError
         As `pdof` and `pdof_interval`.
     """
@@ -377,24 +377,24 @@ def classify_crashes(
     Parameters
     ----------
     changes : sequence of DeltaV
-        One an event.
+        One per event.
     covariances : sequence of array_like, (3, 3), m²/s², optional
-        One an event.
+        One per event.
     events : sequence of CrashEvent
         In order of time.
     time, roll_rate, start_roll_deg, roll_rate_sd, start_roll_sd_deg, body
         As `classify_crash`, over the whole record. The roll before an event is carried over to
-        it; each looks at the roll from its own time zero to that of the next.
+        it; each event uses the roll from its own time zero to that of the next.
 
     Returns
     -------
     tuple of CrashType
-        One an event.
+        One per event.
 
     Raises
     ------
     ConfigError
-        There is not one change (and covariance) an event; or as `classify_crash`.
+        The number of changes or covariances differs from that of events; or as `classify_crash`.
     DataError
         As `classify_crash`.
     """

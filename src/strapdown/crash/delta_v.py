@@ -49,11 +49,11 @@ class DeltaV:
     frame : {'body', 'ned', 'impact'}
         As `strapdown.crash.acceleration.FRAMES`.
     weights : ndarray, (n,), s
-        ``vector = weights @ values`` of the acceleration; of a trajectory, the weights of its
-        velocities, without unit.
+        ``vector = weights @ values`` of the acceleration; for a trajectory, the dimensionless
+        weights of its velocities.
     start_rate, end_rate : ndarray, (3,), m/s²
-        Acceleration at the two ends: what an error of `end` moves the vector by, and, with the
-        other sign, one of `start`.
+        Acceleration at the two ends: the change of the vector per error of `end` and, with the
+        opposite sign, of `start`.
     """
 
     start: float
@@ -85,8 +85,8 @@ class DeltaV:
         Returns
         -------
         ndarray, (3, 3), m²/s²
-            Diagonal: ``sum(weights² noise²)``. Everything else that is not known of a sensor is
-            the error budget's.
+            Diagonal: ``sum(weights² noise²)``. The error budget holds all other errors of a
+            sensor.
         """
         sds = np.broadcast_to(np.asarray(noise, dtype=np.float64), (len(self.weights), 3))
         return np.diag(self.weights**2 @ sds**2)
@@ -100,10 +100,10 @@ class TrailingDeltaV:
     ----------
     window : float, s
     time : ndarray, (m,), s
-        Ends of the windows: the samples for which the record reaches back that far.
+        Ends of the windows: samples with a full window before them.
     vector : ndarray, (m, 3), m/s
     peak : DeltaV
-        The window in which the resultant is largest, wherever it ends: between samples too.
+        The window with the largest resultant; it may end between samples.
     frame : {'body', 'ned', 'impact'}
     """
 
@@ -122,12 +122,12 @@ def delta_v(
     Parameters
     ----------
     acceleration : Acceleration
-        `body_acceleration` for what a recorder gives (integrated along the turning axes), or
+        `body_acceleration` for the recorder's result (integrated along the rotating axes), or
         `resolved_acceleration` for the change in north-east-down.
     start, end : float, s
-        Anywhere within the record; between samples as `window_weights` says.
+        Anywhere within the record; interpolated between samples as in `window_weights`.
     across_gaps : bool
-        Bridge holes of the record by a straight line.
+        Bridge gaps of the record by linear interpolation.
 
     Returns
     -------
@@ -136,7 +136,7 @@ def delta_v(
     Raises
     ------
     DataError
-        The window is empty, reaches beyond the record, or has a hole in it.
+        The window is empty, extends beyond the record, or contains a gap.
     """
     time, source = acceleration.time, acceleration.source
     check_within(time, start, end, source)
@@ -195,7 +195,7 @@ def event_delta_v(
 def cumulative_delta_v(
     acceleration: Acceleration, start: float, end: float, every: float | None = None
 ) -> pd.DataFrame:
-    """Course of the change of velocity since an instant.
+    """Change of velocity since an instant, over time.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ def cumulative_delta_v(
     start, end : float, s
         Within the record.
     every : float, s, optional
-        Step of the course; by default the samples and the two ends. Recorders give 0.010 s.
+        Output step; by default the samples and the two ends. Recorders use 0.010 s.
 
     Returns
     -------
@@ -223,7 +223,7 @@ def cumulative_delta_v(
         time = acceleration.time
         at = np.r_[start, time[(time > start) & (time < end)], end]
     elif every > 0.0:
-        # A step that falls on the end but for rounding is the end.
+        # A step that equals the end up to rounding is the end.
         at = np.minimum(start + np.arange(int((end - start) / every + 1e-9) + 1) * every, end)
     else:
         raise ConfigError("crash.no-step", quantity="every", every=every)
@@ -251,10 +251,10 @@ def trailing_delta_v(
     ----------
     acceleration : Acceleration
     window : float, s
-        By default the 30 ms of Tadic and Vukajlovic (2016), section 4; where it is no whole
+        By default the 30 ms of Tadic and Vukajlovic (2016), section 4; if not an integer
         number of samples, its start is interpolated.
     start, end : float, s, optional
-        Where windows may end; by default wherever the record reaches back far enough.
+        Range of the window ends; by default wherever the record reaches back far enough.
 
     Returns
     -------
@@ -265,12 +265,12 @@ def trailing_delta_v(
     ConfigError
         The window is not positive.
     DataError
-        The record, or what was asked of it, is shorter than the window.
+        The record, or the requested range, is shorter than the window.
     """
     if not (math.isfinite(window) and window > 0.0):
         raise ConfigError("crash.peak-window-not-positive", quantity="window", window=window)
     time = acceleration.time
-    # A record of just the window's length may lack a rounding of it.
+    # A record exactly as long as the window may be shorter by rounding.
     slack = 8.0 * float(np.spacing(np.abs(time[[0, -1]]).max()))
     low = max(acceleration.begin + window, acceleration.begin if start is None else start)
     high = acceleration.end if end is None else min(end, acceleration.end)
@@ -295,7 +295,7 @@ def trailing_delta_v(
     return TrailingDeltaV(window, at, vector, peak, acceleration.frame)
 
 
-# Velocity at any instant of a record, and where its change is largest.
+# Velocity at any instant of a record, and the window with the largest change.
 
 
 #: Value, slope and half the curvature of each component at some instants, (m, k) each.
@@ -308,8 +308,8 @@ class VelocityCourse:
     Parameters
     ----------
     acceleration : Acceleration
-        Between instantaneous samples it is a line, over the interval of a mean a constant; so is
-        the velocity here the same as `window_weights` gives.
+        Linear between instantaneous samples, constant over the interval of a mean; the velocity
+        is then the same as from `window_weights`.
     """
 
     def __init__(self, acceleration: Acceleration) -> None:
@@ -358,7 +358,7 @@ class VelocityCourse:
                 0.5 * (self.slope(at) - self.slope(before))[:, columns],
             )
 
-        # Between these the change is one polynomial.
+        # Between these breaks the change is a single polynomial.
         return _largest(course, np.r_[time, time + window], low, high)
 
     def largest_since(self, start: float, end: float, axes: Sequence[int]) -> float:
@@ -379,7 +379,7 @@ class VelocityCourse:
 def _largest(
     course: Callable[[Array], Polynomials], breaks: Array, low: float, high: float
 ) -> float:
-    """Where the length of a vector of quadratics is largest in an interval.
+    """Instant in an interval at which the length of a vector of quadratics is largest.
 
     Parameters
     ----------
@@ -394,11 +394,11 @@ def _largest(
     at, most = float(nodes[best]), float(sizes[best])
     if len(nodes) < 2:
         return at
-    # About the middles, where no rounding of a break takes the neighbour's polynomial.
+    # Expanded about midpoints, where rounding of a break cannot select the neighboring polynomial.
     middle, half = 0.5 * (nodes[1:] + nodes[:-1]), 0.5 * np.diff(nodes)
     c0, c1, c2 = course(middle)
-    # No point of a piece is further from one of its ends than half its length times the
-    # greatest slope, and that is at an end.
+    # Within an interval the length exceeds that at the nearer end by at most half the interval
+    # times the greatest slope, which is at an end.
     steep = np.sqrt(
         np.maximum(
             ((c1 - 2.0 * c2 * half[:, None]) ** 2).sum(axis=1),
@@ -414,17 +414,17 @@ def _largest(
         for u in roots[np.abs(roots.imag) <= 1e-6 * half[k]].real:
             if abs(u) <= half[k]:
                 found = float(np.sqrt((((c * u + b) * u + a) ** 2).sum()))
-                # A plateau is met where it begins, whatever its rounding.
+                # On a plateau its beginning is taken, independent of rounding.
                 if found > most * (1.0 + 1e-12):
                     at, most = float(middle[k] + u), found
     return at
 
 
-# What 49 CFR Part 563 has a recorder say of an event's change of velocity.
+# Change of velocity of an event as 49 CFR Part 563 requires of a recorder.
 
 
 #: 563.7, Table I: delta-V every 10 ms, for 250 ms or to 30 ms after the end of the event, whichever
-#: is shorter; its maximum is looked for over 300 ms or the same (563.8, Table III).
+#: is shorter; its maximum is searched over 300 ms or the same (563.8, Table III).
 RECORDED, SEARCHED, BEYOND_END, EVERY = 0.250, 0.300, 0.030, 0.010
 
 
@@ -441,7 +441,7 @@ class MaximumDeltaV:
     longitudinal_time, lateral_time, resultant_time : float, s
         From time zero.
     searched : float, s
-        How far from time zero was looked.
+        Searched time from time zero.
     """
 
     longitudinal: float
@@ -454,7 +454,7 @@ class MaximumDeltaV:
 
 
 def recorder_delta_v(acceleration: Acceleration, event: CrashEvent) -> pd.DataFrame:
-    """Cumulative change of velocity as a recorder keeps it.
+    """Cumulative change of velocity as a recorder stores it.
 
     Parameters
     ----------
@@ -466,7 +466,7 @@ def recorder_delta_v(acceleration: Acceleration, event: CrashEvent) -> pd.DataFr
     -------
     DataFrame
         As `cumulative_delta_v`, every 10 ms from time zero: for 250 ms, to 30 ms after the end of
-        the event, or to the end of the record, whichever is least. Unrounded, where a recorder
+        the event, or to the end of the record, whichever is least. Not rounded; a recorder
         rounds to 1 km/h.
 
     Raises
@@ -491,7 +491,7 @@ def maximum_delta_v(acceleration: Acceleration, event: CrashEvent) -> MaximumDel
     Returns
     -------
     MaximumDeltaV
-        Looked for over 300 ms, to 30 ms after the end of the event, or to the end of the
+        Searched over 300 ms, to 30 ms after the end of the event, or to the end of the
         record, whichever is least (49 CFR 563.5(b), 563.8 Table III).
 
     Raises
@@ -525,9 +525,9 @@ def trajectory_delta_v(trajectory: pd.DataFrame, start: float, end: float) -> De
     Parameters
     ----------
     trajectory : DataFrame
-        Trajectory table, at the reference point; gravity is out of its velocities already.
+        Trajectory table at the reference point; its velocities do not contain gravity.
     start, end : float, s
-        Within it; between stamps the velocity is taken for a line.
+        Within the trajectory; the velocity is interpolated linearly.
 
     Returns
     -------
@@ -537,7 +537,7 @@ def trajectory_delta_v(trajectory: pd.DataFrame, start: float, end: float) -> De
     Raises
     ------
     DataError
-        The window is empty or reaches beyond the trajectory.
+        The window is empty or extends beyond the trajectory.
     """
     check_trajectory(trajectory)
     time, source = index_of(trajectory), source_of(trajectory)

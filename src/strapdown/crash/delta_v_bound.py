@@ -1,4 +1,4 @@
-"""How well a change of velocity is known, from the same unknowns as the path."""
+"""Uncertainty of a change of velocity, from the same unknowns as the path."""
 
 from __future__ import annotations
 
@@ -48,23 +48,23 @@ class DeltaVBound:
 
     @property
     def half_width(self) -> Triple:
-        """Half widths of the intervals that hold 95 %, m/s."""
+        """Half widths of the 95 % intervals, m/s."""
         x, y, z = (TWO_SIDED_95 * s for s in self.sd)
         return x, y, z
 
     def along(self, direction: ArrayLike) -> float:
-        """Standard deviation along a direction, m/s: of the resultant, along the vector itself.
+        """Standard deviation along a direction, m/s; along the vector itself, of the resultant.
 
         Raises
         ------
         DataError
-            The direction has no length.
+            The direction has zero length.
         """
         d = _direction(direction)
         return float(np.sqrt(d @ self.covariance @ d))
 
     def shares(self, direction: ArrayLike) -> pd.Series:
-        """Part of the variance along a direction that each contributor has; their sum is one."""
+        """Fraction of the variance along a direction from each contributor; the sum is one."""
         d = _direction(direction)
         parts = self.by_contributor.to_numpy().reshape(-1, 3, 3) @ d @ d
         total = parts.sum()
@@ -80,18 +80,18 @@ def body_delta_v_bound(
     rest_sd: ArrayLike = (0.0, 0.0, 0.0),
     at_ends: ArrayLike | None = None,
 ) -> DeltaVBound:
-    """Bound of a change of velocity that was integrated along the turning axes of the body.
+    """Uncertainty of a change of velocity integrated along the rotating body axes.
 
     Parameters
     ----------
     effects : SampleEffects
-        At the point whose change of velocity it is.
+        At the point of the change of velocity.
     weights : array_like, (n,), s
-        Of each sample: the change is their product with the specific force less that at rest.
+        Of each sample: the change is their product with specific force minus stationary force.
     rest_sd : array_like, (3,), m/s²
-        How well the noise lets the mean at rest be known, which was taken off.
+        Standard deviation from noise of the stationary mean that was subtracted.
     at_ends : array_like, (e, 3), m/s, optional
-        What one standard deviation of each instant that bounds the window does to the change.
+        Effect on the change of one standard deviation of each instant that bounds the window.
 
     Returns
     -------
@@ -109,21 +109,21 @@ def body_delta_v_bound(
 def resolved_delta_v_bound(
     path: CrashPath, start: float, end: float, *, at_ends: ArrayLike | None = None
 ) -> DeltaVBound:
-    """Bound of a change of velocity in local level, gravity taken away by the attitude.
+    """Uncertainty of a change of velocity in local level, gravity subtracted by the attitude.
 
     Parameters
     ----------
     path : CrashPath
     start, end : float, s
-        Within the path; between samples, errors run on straight lines.
+        Within the path; errors are interpolated linearly between samples.
     at_ends : array_like, (e, 3), m/s, optional
         As `body_delta_v_bound`.
 
     Returns
     -------
     DeltaVBound
-        North, east, down in the axes of the path. What the entry speed is wrong by does not
-        matter to it.
+        North, east, down in the axes of the path. Independent of the error of the entry
+        speed.
 
     Raises
     ------
@@ -153,11 +153,11 @@ def _at(time: Array, values: Array, instant: float) -> Array:
 
 
 def _noise_between(path: CrashPath, start: float, end: float) -> Array:
-    """Covariance of the change of velocity that noise makes between two instants.
+    """Covariance of the change of velocity between two instants from noise.
 
-    Noise on the force is independent from step to step, so that its variances subtract; what
-    noise of the gyros before the window has done to the attitude acts on through it. A window
-    before the entry is the same, met backward.
+    Noise on the force is independent from step to step, so that its variances subtract; the
+    attitude error from gyro noise before the window still acts within it. A window before the
+    entry is treated alike, in reverse order.
     """
     noise, entry = path.noise_covariance[None], path.time[path.anchor]
     if end <= entry + 1e-9:
@@ -169,15 +169,15 @@ def _noise_between(path: CrashPath, start: float, end: float) -> Array:
         # var(v1 - v0) = P11 + P00 - P10 - P01, with v1 = v0 + tilt phi0 + new noise.
         both = here[VELOCITY, VELOCITY] + carried
         return np.asarray(there[VELOCITY, VELOCITY] + here[VELOCITY, VELOCITY] - both - both.T)
-    # The two sides of the entry have noise of their own.
+    # The two sides of the entry have independent noise.
     return np.asarray(there[VELOCITY, VELOCITY] + here[VELOCITY, VELOCITY])
 
 
 def _turn_effect(path: CrashPath, start: float, end: float) -> Array:
-    """What a turn of the attitude at `start` does to the velocity at `end`: (3, 3), m/s per rad."""
+    """Effect of a rotation of the attitude at `start` on the velocity at `end`: (3, 3), m/s/rad."""
     gained = path.table[["VN", "VE", "VD"]].to_numpy()[None]
     felt = (_at(path.time, gained, end) - _at(path.time, gained, start))[0]
-    # Gravity is not turned by the attitude; what was felt is.
+    # The attitude rotates the measured specific force, not gravity.
     felt[2] -= GRAVITY * (end - start)
     return -cross_matrix(felt)
 
@@ -203,24 +203,24 @@ def _direction(given: ArrayLike) -> Array:
     return np.asarray(d / size)
 
 
-# A change of velocity with its direction of force, both with their bounds.
+# A change of velocity with its direction of force, both with 95 % bounds.
 
 
 @dataclass(frozen=True, eq=False)
 class VelocityChange:
-    """What changed over a window.
+    """Change of velocity over a window, with its direction of force.
 
     Attributes
     ----------
     window : {'peak', 'event'}
         The trailing window in which the change is largest, or the whole event.
     delta_v : DeltaV
-        In its frame: ``body``, as recorders integrate, or ``ned``, gravity taken off through
-        the attitude.
+        In its frame: ``body``, as recorders integrate, or ``ned``, gravity subtracted by the
+        attitude.
     bound : DeltaVBound
     pdof : Pdof or NedPdof
     interval : PdofInterval
-        Of the direction, 95 %; of north-east-down, of the azimuth.
+        Of the direction, 95 %; for north-east-down, of the azimuth.
     """
 
     window: str
@@ -239,13 +239,13 @@ class VelocityChange:
 
     @property
     def resultant_bound(self) -> float:
-        """Half width of the interval that holds 95 % of the resultant, m/s."""
+        """Half width of the 95 % interval of the resultant, m/s."""
         return TWO_SIDED_95 * self.bound.along(self.delta_v.vector)
 
 
 @dataclass(frozen=True, eq=False)
 class EventChanges:
-    """The changes of one event.
+    """Changes of velocity of one event.
 
     Attributes
     ----------
@@ -262,7 +262,7 @@ class EventChanges:
 def velocity_change(
     window: str, change: DeltaV, bound: DeltaVBound, heading_deg: float = 0.0
 ) -> VelocityChange:
-    """Put a change, its bound and its direction together.
+    """Combine a change of velocity, its uncertainty and its direction.
 
     Parameters
     ----------

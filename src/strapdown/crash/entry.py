@@ -1,4 +1,4 @@
-"""How the vehicle moved at one instant before or at the impact: where a path is tied to."""
+"""Entry state: motion of the vehicle at one instant before or at the impact."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ OTHERS = ("attitude_deg", "lat_deg", "lon_deg", "alt", "source")
 
 @dataclass(frozen=True, eq=False)
 class Entry:
-    """Velocity, heading and place at an instant, and how they are known.
+    """Velocity, heading and position at an instant, with their uncertainty.
 
-    The place of the reference point at that instant is the origin of the path, and without error.
+    The position of the reference point at that instant is the origin of the path, without error.
 
     Attributes
     ----------
@@ -41,18 +41,18 @@ class Entry:
     velocity : tuple of float, m/s
         North, east, down, of the reference point.
     heading_deg : float, deg
-        Of the vehicle, clockwise from north. Where the path is told in axes of the vehicle at
-        the entry, zero: "north" is then forward at the entry, "east" right of it.
+        Of the vehicle, clockwise from north. Zero where the path is expressed in axes of the
+        vehicle at the entry: "north" is then forward at the entry, "east" right.
     unknowns : tuple of (name, contributor, nine or fifteen numbers)
-        What one standard deviation of each independent unknown does to attitude (rotation vector
-        in local level, rad), velocity (m/s) and place (m); and, for what was estimated with them,
-        to every sample of the rates (rad/s) and of the specific force (m/s²), vehicle axes.
+        Effect of one standard deviation of each independent unknown on attitude (rotation vector
+        in local level, rad), velocity (m/s) and position (m); and, for quantities estimated
+        jointly, on every sample of the rates (rad/s) and specific force (m/s²), vehicle axes.
     attitude_deg : tuple of float, deg, optional
-        Roll and pitch at that instant, where they are known from elsewhere than the rest.
+        Roll and pitch at that instant, where known from a source other than leveling.
     lat_deg, lon_deg, alt : float, deg, m
-        Of the origin; they matter to gravity alone.
+        Of the origin; used only for gravity.
     source : str
-        Where the velocity is from, for a report.
+        Source of the velocity, for a report.
 
     Raises
     ------
@@ -96,7 +96,7 @@ class Entry:
         climb_sd: float = 0.0,
         **others: Any,
     ) -> Entry:
-        """Make one of a speed over ground along the vehicle.
+        """Create an entry from a speed over ground along the vehicle.
 
         Parameters
         ----------
@@ -104,9 +104,9 @@ class Entry:
             Horizontal; negative for a vehicle that rolls backward.
         time : float, s
         heading_deg, heading_sd_deg : float, deg
-            Zero without uncertainty, where the path is told in axes of the entry.
+            Zero without uncertainty, where the path is expressed in axes of the entry.
         slip_deg, slip_sd_deg : float, deg
-            Direction of travel less heading, clockwise.
+            Direction of travel minus heading, clockwise.
         climb_sd : float, m/s
             Of the vertical velocity, which is taken as zero.
         **others
@@ -115,8 +115,8 @@ class Entry:
         Raises
         ------
         ConfigError
-            A number is not finite, a standard deviation is negative, or the speed is no speed of
-            a road vehicle (more than 150 m/s).
+            A number is not finite, a standard deviation is negative, or the speed exceeds
+            150 m/s, which is not possible for a road vehicle.
         """
         numbers = {
             "speed": speed,
@@ -167,7 +167,7 @@ class Entry:
         contributor: str = "entry state",
         **others: Any,
     ) -> Entry:
-        """Make one of a state with a joint covariance, as an estimator gives it.
+        """Create an entry from a state with a joint covariance, as from an estimator.
 
         Parameters
         ----------
@@ -216,10 +216,10 @@ def _times(size: float, direction: Triple) -> Triple:
     return (size * direction[0], size * direction[1], size * direction[2])
 
 
-# A vehicle's state before it is struck, with its covariance and what it was made of.
+# Vehicle state at the impact, with covariance and the fixes used.
 
 
-#: Places in the covariance: m north, east, down; m/s north, east, down; rad about north, east,
+#: Slices of the covariance: m north, east, down; m/s north, east, down; rad about north, east,
 #: down; rad/s and m/s² of the biases, forward, right, down.
 POSITION, VELOCITY, ATTITUDE = slice(0, 3), slice(3, 6), slice(6, 9)
 GYRO_BIAS, ACCEL_BIAS = slice(9, 12), slice(12, 15)
@@ -228,7 +228,7 @@ STATES = 15
 
 @dataclass(frozen=True, eq=False)
 class EntryState:
-    """Place, velocity, attitude and biases at an instant, from fixes before it.
+    """Position, velocity, attitude and biases at an instant, from earlier fixes.
 
     Attributes
     ----------
@@ -236,22 +236,22 @@ class EntryState:
         Of the vehicle's reference point, at a sample of the Imu table.
     gyro_bias : triple, rad/s
     accel_bias : triple, m/s²
-        What the Imu table reads too much at its mean rate and mean specific force over the
-        window: with what scale, misalignment and g-sensitivity make of these, of which gravity
-        is most. To be taken off the table.
+        Excess of the Imu table at its mean rate and mean specific force over the window,
+        including the effect of scale, misalignment and g-sensitivity at these (mostly on
+        gravity). To be subtracted from the table.
     covariance : ndarray, (15, 15)
         Of `POSITION`, `VELOCITY`, `ATTITUDE`, `GYRO_BIAS`, `ACCEL_BIAS`. The attitude's error is
         the rotation vector phi about north, east, down of ``C_true = exp([phi x]) C_estimate``.
     mean_rate, mean_specific_force : triple, rad/s, m/s²
-        At which the biases hold.
+        Values at which the biases hold.
     fixes : DataFrame
-        Every fix from the beginning of the window on, by its stamp: ``used``; ``why`` not, or
-        why with less weight; ``position_weight``, ``velocity_weight`` from 0 to 1; and
-        ``position_misfit``, ``velocity_misfit``: how far it is from what all others together
-        say, in standard deviations of that difference (root of the squared Mahalanobis
-        distance; NaN where it was not measured or used).
+        Every fix from the beginning of the window on, by its stamp: ``used``; ``why`` it was
+        rejected or down-weighted; ``position_weight``, ``velocity_weight`` from 0 to 1; and
+        ``position_misfit``, ``velocity_misfit``: difference from the prediction by all others,
+        in standard deviations of that difference (root of the squared Mahalanobis distance; NaN
+        where not measured or not used).
     chi_square : float
-        Of the misfit of all fixes that were used, with their weights, and the priors.
+        Of the residuals of all used fixes, with their weights, and the priors.
     degrees_of_freedom : int
     iterations : int
     findings : tuple of Finding
@@ -281,7 +281,7 @@ class EntryState:
 
     @property
     def speed_sd(self) -> float:
-        """Standard deviation of the speed, m/s; at a stand that of any direction at most."""
+        """Standard deviation of the speed, m/s; when stationary, the largest of any direction."""
         block = self.covariance[VELOCITY, VELOCITY]
         if self.speed == 0.0:
             return float(np.sqrt(np.linalg.eigvalsh(block)[-1]))
@@ -290,7 +290,7 @@ class EntryState:
 
     @property
     def course_sd_deg(self) -> float:
-        """Standard deviation of the course, deg; infinite at a stand."""
+        """Standard deviation of the course, deg; infinite when stationary."""
         north, east, _ = self.state.v_n
         level = math.hypot(north, east)
         if level == 0.0:
@@ -312,7 +312,7 @@ class EntryState:
         return np.asarray(angles_sd(self.state.roll_pitch_heading[None], block[None])[0])
 
     def with_biases_off(self, imu: pd.DataFrame) -> pd.DataFrame:
-        """Return an Imu table without the biases that were found."""
+        """Return an Imu table corrected for the estimated biases."""
         return biases_off(imu, np.array(self.gyro_bias), np.array(self.accel_bias))
 
 
@@ -326,11 +326,11 @@ def biases_off(imu: pd.DataFrame, gyro_bias: Array, accel_bias: Array) -> pd.Dat
 
 
 def rotated(q_nb: Array, phi: Array) -> Array:
-    """Attitude that is turned by a rotation vector in local level axes."""
+    """Attitude rotated by a rotation vector in local level axes."""
     return rotation.compose(rotation.quaternion_from_rotation_vector(phi), q_nb)
 
 
-# How a small turn in local level changes roll, pitch and heading.
+# Effect of a small rotation in local level on roll, pitch and heading.
 
 
 def angle_rates(roll_pitch_heading: ArrayLike) -> Array:
@@ -343,8 +343,8 @@ def angle_rates(roll_pitch_heading: ArrayLike) -> Array:
     Returns
     -------
     ndarray, (n, 3, 3), rad per rad
-        Of roll, pitch, heading for a turn about north, east, down with
-        ``C' = (I + [phi x]) C``. Not near a pitch of 90 deg, where it is infinite.
+        Of roll, pitch, heading for a rotation about north, east, down with
+        ``C' = (I + [phi x]) C``. Not valid near a pitch of 90 deg, where it is infinite.
     """
     angles = np.radians(np.asarray(roll_pitch_heading, dtype=np.float64))
     pitch, heading = angles[:, 1], angles[:, 2]

@@ -1,4 +1,4 @@
-"""Iterated least squares of an entry state from believed fixes."""
+"""Iterated least squares of an entry state from accepted GNSS fixes."""
 
 from __future__ import annotations
 
@@ -33,29 +33,29 @@ from strapdown.tables.checks import values_of
 Array = NDArray[np.float64]
 
 MOST_ITERATIONS = 30
-# Steps below this share of a standard deviation change nothing.
+# Convergence: steps below this fraction of a standard deviation.
 CONVERGED = 1e-3
-# And for data without noise, m, m/s, rad.
+# Convergence for data without noise, m, m/s, rad.
 _TINY = 1e-10
-# Of a heading of which nothing is known: a uniform one over the circle.
+# Standard deviation of an unknown heading: uniform over the circle.
 ANY_HEADING = 180.0 / math.sqrt(3.0)  # deg
-# Sensitivities are made anew when the attitude has turned by this since, rad: they are wrong by
-# that share.
+# Sensitivities are recomputed when the attitude has changed by this, rad: their relative error is
+# of that size.
 STALE = 0.01
-# Of weights.
+# Limits of the weight iteration.
 MOST_WEIGHINGS, SAME_WEIGHT = 15, 0.01
-# What is not known before, in standard deviations of the fixes: no more than rounding bears, and
-# about the parameters as they are, so that it draws them nowhere.
+# Prior standard deviation of unknowns, in standard deviations of the fixes: limited by rounding,
+# and centered on the current parameters so that it does not bias them.
 UNKNOWN = 1e3
-# Where the side slip is looked at.
+# Conditions for using the side-slip constraint.
 LEAST_SLIP_SPEED, MOST_LATERAL = 3.0, 2.0  # m/s, m/s²
-# A longer step of attitude is cut, rad: beyond, the linear model says nothing.
+# Attitude steps are limited to this, rad: beyond it the linear model does not hold.
 LONGEST_TURN = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class Fixes:
-    """Fixes that are believed.
+    """Accepted GNSS fixes.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class Fixes:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """What came of a guess; attributes as of `EntryState`, weights and misfits (m, 2)."""
+    """Result from one guess; attributes as of `EntryState`, weights and misfits (m, 2)."""
 
     state: NavState
     gyro_bias: Array
@@ -98,7 +98,7 @@ def estimate(
     priors: EntryPriors,
     arm: Array,
 ) -> Estimate:
-    """Search the state at the end of a record, and what else is unknown, from a guess.
+    """Estimate the state at the end of a record and the other unknowns from a guess.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def estimate(
         At the anchor.
     priors : EntryPriors
     arm : ndarray, (3,), m
-        Of the antenna.
+        Lever arm of the antenna.
 
     Returns
     -------
@@ -120,15 +120,15 @@ def estimate(
     Raises
     ------
     DivergenceError
-        The search does not come to rest, or a run diverges.
+        The iteration does not converge, or a run diverges.
     """
     search = _Search(mechanization, imu, fixes, guess, priors, arm)
     weights, settled = np.ones((len(fixes.instants), 2)), 0
     for iteration in range(1, MOST_ITERATIONS + 1):
         problem = search.problem()
         step = adjust(problem, weights)
-        # Far from the solution weights only keep gross errors out; those at the brink of another
-        # are kept as they are after a while.
+        # Far from the solution weights only reject gross errors; weights that oscillate are frozen
+        # after a while.
         changed = not search.near
         if not search.near or settled < MOST_WEIGHINGS:
             found, _ = weigh(problem, step, weights)
@@ -148,7 +148,7 @@ def estimate(
 
 
 class _Search:
-    """The parameters as they are, and what follows from them."""
+    """Current parameters and the quantities derived from them."""
 
     def __init__(
         self,
@@ -160,7 +160,7 @@ class _Search:
         arm: Array,
     ) -> None:
         self.mechanization, self.imu = mechanization, imu
-        # From the anchor backward, as the errors grow.
+        # From the anchor backward, in the direction in which errors grow.
         self.fixes = Fixes(
             *(x[::-1] for x in (fixes.instants, fixes.place, fixes.velocity, fixes.sd))
         )
@@ -173,7 +173,7 @@ class _Search:
         self._moved = math.inf
 
     def problem(self) -> Problem:
-        """Rows and priors at the parameters as they are."""
+        """Rows and priors at the current parameters."""
         course, now = self._run()
         if self._moved > STALE:
             self._linearise(course, now)
@@ -187,7 +187,7 @@ class _Search:
         return replace(self.linear, residuals=residuals, prior_residuals=before)
 
     def take(self, adjustment: Adjustment) -> bool:
-        """Add a step; return whether it was too small to go on."""
+        """Add a step; return whether it was below the convergence limit."""
         step = adjustment.step.copy()
         turn = float(np.linalg.norm(step[6:9]))
         if turn > LONGEST_TURN:
@@ -212,7 +212,7 @@ class _Search:
         return bool((np.abs(step) <= np.maximum(CONVERGED * sd, _TINY)).all())
 
     def result(self, weights: Array, iterations: int) -> Estimate:
-        """Return what was found; biases at the mean rate and force."""
+        """Return the estimate; biases at the mean rate and force."""
         self._moved = math.inf
         problem = self.problem()
         last = adjust(problem, weights)
@@ -253,7 +253,7 @@ class _Search:
             sensed[:, :3],
             sensed[:, 3:],
         )
-        # A mean is, on average, what was half a step before its stamp.
+        # A mean sample belongs on average to half a step before its stamp.
         late = 0.5 * float(np.median(np.diff(run.time))) * (imu.attrs["sampling"] == "mean")
         return course, state_at_fixes(run, course, self.fixes.instants, late)
 
@@ -269,7 +269,7 @@ class _Search:
         )
 
     def _linearise(self, course: Course, now: AtFixes) -> None:
-        """Sensitivities, noise and priors at the parameters as they are."""
+        """Sensitivities, noise and priors at the current parameters."""
         p, fixes = self.priors, self.fixes
         self.errors = sensor_errors(p.gyro, p.accel, course)
         q, m = len(self.errors.sd), len(fixes.instants)
@@ -281,7 +281,7 @@ class _Search:
             np.einsum("mij,mj->mi", C_nb, np.cross(now.rate, self.arm))
         )
         look[:, 6] = by_state(now, C_nb, p)
-        # Of the antenna, of the clock, and the side slip that stays.
+        # Derivatives by antenna position, time offset and constant side slip.
         own = np.zeros((m, 7, STATES + q + 5))
         own[:, :, : STATES + q] = look @ at_fixes(course, self.errors, fixes.instants)
         own[:, 3:6, GYRO_BIAS] += C_nb @ rotation.cross_matrix(self.arm)
@@ -297,7 +297,7 @@ class _Search:
         share = np.array([c.share for c in spec])
         noise = sd**2
         noise[:, :6] *= 1.0 - share
-        # The gyro sample beside a fix moves the antenna, too.
+        # The gyro sample beside a fix also moves the antenna.
         swing = (max(p.gyro.axis("noise_density")) * float(np.linalg.norm(self.arm))) ** 2
         noise[:, 3:6] += swing / float(np.median(np.diff(course.time)))
         by_states = np.concatenate([look, np.zeros((m, 7, 6))], axis=2)
@@ -341,33 +341,33 @@ class _Search:
         )
 
     def _slides(self, now: AtFixes) -> NDArray[np.bool_]:
-        """Where the vehicle travels along its axis."""
+        """Where the vehicle travels along its axis, so that the side-slip constraint holds."""
         speed = np.linalg.norm(now.velocity, axis=1)
         steady = (speed > LEAST_SLIP_SPEED) & (np.abs(speed * now.rate[:, 2]) < MOST_LATERAL)
         return np.asarray(steady & (self.priors.side_slip_sd_deg is not None))
 
 
-# Generalised least squares over fixes whose errors are correlated, fix by fix.
+# Generalized least squares over correlated fixes, fix by fix.
 #
-# The unknown constants and the two processes that join the errors of the fixes, what the noise of
-# the inertial sensors has added since and what wanders in the receiver, are one state of a linear
-# filter, which goes from the last fix to the first. For normal errors that is the batch solution
-# with the full covariance of all rows, at a cost that grows with their number instead of its cube.
+# The unknown constants and the two processes that correlate the fixes (accumulated inertial sensor
+# noise and wander of the receiver) form one state of a linear filter, which runs from the last fix
+# to the first. For normal errors this equals the batch solution with the full covariance of all
+# rows, at a cost linear in their number instead of cubic.
 
 
-#: A block keeps its weight where chance alone puts it farther off with more than this
-#: probability, and has none where with less than the other.
+#: A block keeps full weight while the probability of its misfit is above the first value, and
+#: gets zero weight below the second.
 KEPT, DROPPED = 1e-3, 1e-6
-# The variance of a block without weight is so many times its own.
+# Variance factor of a block with zero weight.
 _LARGEST = 1e8
-# Blocks lose weight together whose misfits are no smaller than this share of the largest: the
-# others may be misled by it.
+# Blocks whose misfits are at least this fraction of the largest are down-weighted together: the
+# others may be affected by them.
 _TOGETHER = 0.7
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Fixes and priors about parameters as they are.
+    """Linearized fixes and priors at the current parameters.
 
     m fixes in the order of the filter, with up to w rows each; p constants, s states.
 
@@ -379,22 +379,22 @@ class Problem:
     by_states : ndarray, (m, w, s)
         And by the states.
     noise : ndarray, (m, w)
-        Variances of what is new with each fix.
+        Variances of the independent noise of each fix.
     variance : ndarray, (m, w)
-        Of the whole error of the fix, of which weights make more.
+        Total error variance of the fix, which the weights scale.
     there : ndarray of bool, (m, w)
-        What was measured.
+        Which components were measured.
     groups : ndarray of int, (w,)
-        0 or more for rows that keep or lose their weight together, -1 for those that keep it.
+        0 or more for rows that are weighted together, -1 for rows that keep full weight.
     carry : ndarray, (m, s, s)
-        From the state at the fix before to that at this one; of the first from zero time.
+        Transition from the state at the preceding fix to this one; of the first from zero time.
     driven : ndarray, (m, s, s)
-        Covariance of what is added on the way.
+        Covariance of the process noise added over the interval.
     first : ndarray, (s, s)
         Covariance of the states at zero time.
     prior_sd : ndarray, (p,)
     prior_residuals : ndarray, (p,)
-        Where the prior is, from the parameters as they are.
+        Prior minus current parameters.
     """
 
     residuals: Array
@@ -413,7 +413,7 @@ class Problem:
 
 @dataclass(frozen=True, eq=False)
 class Adjustment:
-    """A step of least squares.
+    """One least-squares step.
 
     Attributes
     ----------
@@ -421,10 +421,11 @@ class Adjustment:
         To be added to the constants.
     covariance : ndarray, (p, p)
     chi_square : float
-        Of all rows and the priors; of as many degrees of freedom as there are rows more than
+        Over all rows and the priors; degrees of freedom: number of rows less number of
         constants without prior.
     apart : ndarray, (m, w)
-        How far each row is from what all others and the priors say, times `certainty`.
+        Difference of each row from the prediction by all others and the priors, times
+        `certainty`.
     certainty : ndarray, (m, w, w)
         Inverse of the covariance of that difference.
     """
@@ -437,13 +438,13 @@ class Adjustment:
 
 
 def adjust(problem: Problem, weights: Array) -> Adjustment:
-    """Solve for a step of the constants.
+    """Solve for one step of the constants.
 
     Parameters
     ----------
     problem : Problem
     weights : ndarray, (m, g)
-        A group of weight w has independent noise of ``1/w - 1`` times its variances added.
+        A group of weight w gets additional independent noise of ``1/w - 1`` times its variances.
 
     Returns
     -------
@@ -451,8 +452,8 @@ def adjust(problem: Problem, weights: Array) -> Adjustment:
 
     Notes
     -----
-    Filter in the form of covariances; `apart` and `certainty` by the backward recursion of the
-    smoothations (de Jong 1989, Journal of the American Statistical Association 84, 1085): with
+    Covariance filter; `apart` and `certainty` by the backward recursion of the smoothations
+    (de Jong 1989, Journal of the American Statistical Association 84, 1085): with
     innovation v of covariance F, gain K and ``L = I - K H``,
     ``u = F^-1 v - K^T r``, ``M = F^-1 + K^T N K``, ``r <- H^T F^-1 v + L^T r``,
     ``N <- H^T F^-1 H + L^T N L``, r and N carried back by the transposed transition.
@@ -492,7 +493,7 @@ def adjust(problem: Problem, weights: Array) -> Adjustment:
         apart[k, rows] = u
         certainty[k, rows[:, None], rows] = inverse + K.T @ N @ K
         r = r + H.T @ u
-        # In the form that cannot lose its sign.
+        # This symmetric form keeps N positive semidefinite.
         L = np.eye(p + s) - K @ H
         N = L.T @ N @ L + H.T @ inverse @ H
         T = problem.carry[k]
@@ -503,29 +504,29 @@ def adjust(problem: Problem, weights: Array) -> Adjustment:
 
 
 def weigh(problem: Problem, adjustment: Adjustment, weights: Array) -> tuple[Array, Array]:
-    """Find the weights of the groups.
+    """Compute the robust weights of the groups.
 
     Parameters
     ----------
     problem : Problem
     adjustment : Adjustment
-        With the weights so far.
+        With the current weights.
     weights : ndarray, (m, g)
 
     Returns
     -------
     weights : ndarray, (m, g)
-        To be used for the next step; they are final when they do not change any more.
+        For the next step; final when they no longer change.
     misfits : ndarray, (m, g)
-        Root of the squared Mahalanobis distance of each group, with full weight, from what all
-        others say with theirs; NaN where nothing was measured.
+        Root of the squared Mahalanobis distance of each group, at full weight, from the
+        prediction by all others at theirs; NaN where not measured.
 
     Notes
     -----
     The scheme IGG III (Yang, Song and Xu 2002, Journal of Geodesy 76, 353),
     ``k0/t ((k1 - t)/(k1 - k0))²`` from k0 to k1, with chi-square quantiles as k0 and k1. A group
-    that lost no weight yet loses some only if none is much farther off: so a false fix does not
-    take its neighbours with it.
+    still at full weight loses weight only if no other has a much larger misfit, so that a false
+    fix does not take its neighbors with it.
     """
     from scipy.stats import chi2
 
@@ -541,7 +542,7 @@ def weigh(problem: Problem, adjustment: Adjustment, weights: Array) -> tuple[Arr
             continue
         spread = np.linalg.inv(adjustment.certainty[k][np.ix_(rows, rows)])
         off = spread @ adjustment.apart[k, rows]
-        # Without the noise that its own weight has added.
+        # Without the noise added by its own weight.
         t = float(np.sqrt(off @ np.linalg.solve(spread - np.diag(more[k, rows]), off)))
         k0, k1 = kept[rows.size - 1], dropped[rows.size - 1]
         misfits[k, g], excess[k, g] = t, t / k0
@@ -559,12 +560,12 @@ def extra_noise(groups: NDArray[np.int64], weights: Array) -> Array:
     return np.asarray(np.where(groups >= 0, more[:, np.maximum(groups, 0)], 0.0))
 
 
-# The state of a run at the instants of fixes, and the side slip there.
+# State and side slip of a run at the instants of the fixes.
 
 
 @dataclass(frozen=True, eq=False)
 class AtFixes:
-    """The vehicle's point at the instants of the fixes."""
+    """The vehicle's reference point at the instants of the fixes."""
 
     place: Array
     velocity: Array
@@ -574,8 +575,8 @@ class AtFixes:
 
 
 def state_at_fixes(run: NavigationRun, course: Course, instants: Array, late: float) -> AtFixes:
-    """Between two samples: place by Hermite's cubic, velocity and attitude by their rates."""
-    # Instants must increase there.
+    """Interpolate position by Hermite cubics, velocity and attitude by their rates."""
+    # Interpolation requires increasing instants.
     there = trajectory_at(
         run.trajectory, instants[::-1], find_ellipsoid(run.mechanization.ellipsoid)
     )[::-1]
@@ -590,7 +591,7 @@ def state_at_fixes(run: NavigationRun, course: Course, instants: Array, late: fl
 
 
 def side_slips(now: AtFixes, priors: EntryPriors) -> Array:
-    """Side-slip angle at the point that does not slip, (m,), rad."""
+    """Side-slip angle at the point without side slip, (m,), rad."""
     v = _point_velocity(now, priors)
     return np.asarray(np.arctan2(v[:, 1], v[:, 0]))
 

@@ -1,13 +1,13 @@
-"""How the state at fixes depends on the state at the anchor, on sensor errors and on noise.
+"""Sensitivity of the state at fixes to the state at the anchor, sensor errors and noise.
 
-Error is truth minus estimate. With phi about local level axes (``C_true = exp([phi x]) C``), f the
-specific force, e the errors that the sensors add, it grows by
+Error = true - estimated. With phi about local level axes (``C_true = exp([phi x]) C``), f the
+specific force and e the sensor errors, it grows by
 
 ``phi' = -C e_g``, ``v' = phi x C f - C e_f``, ``p' = v``,
 
-and is integrated backward from the anchor. What is left out, the Earth's and the transport rate
-and the change of gravity, is a share of ``2 w t + (g/R) t²``: 2e-3 over 10 s, 1e-2 over a minute.
-It concerns the standard deviations alone: the estimate itself solves the full equations.
+and is integrated backward from the anchor. Neglected are the Earth and transport rates and the
+change of gravity: a relative error of ``2 w t + (g/R) t²``, 2e-3 over 10 s, 1e-2 over a minute.
+This affects only the standard deviations: the estimate itself solves the full equations.
 """
 
 from __future__ import annotations
@@ -28,20 +28,20 @@ from strapdown.sensors.uncertainty import TriadUncertainty
 
 Array = NDArray[np.float64]
 
-# Noise between two fixes is taken as impulses that are no farther apart than this, s.
+# Noise between two fixes is approximated by impulses at most this far apart, s.
 PIECE = 0.25
 
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """A run as the sensitivities need it, at n stamps that end at the anchor.
+    """A run reduced to the data for the sensitivities, at n stamps ending at the anchor.
 
     Attributes
     ----------
     time : ndarray, (n,), s
     C_nb : ndarray, (n, 3, 3)
     rate, force : ndarray, (n, 3), rad/s, m/s²
-        Free of the biases that were found so far.
+        Corrected for the biases estimated so far.
     """
 
     time: Array
@@ -57,7 +57,7 @@ class SensorErrors:
     Attributes
     ----------
     gyro, accel : ndarray, (n, 3, q)
-        What unit parameters add to the rate and the specific force at each stamp.
+        Effect of unit parameters on the rate and the specific force at each stamp.
     sd : ndarray, (q,)
     """
 
@@ -67,7 +67,7 @@ class SensorErrors:
 
 
 def sensor_errors(gyro: TriadUncertainty, accel: TriadUncertainty, course: Course) -> SensorErrors:
-    """Collect scale, misalignment and g-sensitivity, where they are not zero."""
+    """Collect scale, misalignment and g-sensitivity where they are not zero."""
     n = len(course.time)
     columns: list[tuple[int, int, Array, float]] = []
     for triad, (spec, felt) in enumerate(((gyro, course.rate), (accel, course.force))):
@@ -121,29 +121,29 @@ def at_fixes(course: Course, errors: SensorErrors, instants: Array) -> Array:
 def noise_between_fixes(
     course: Course, gyro: TriadUncertainty, accel: TriadUncertainty, instants: Array
 ) -> tuple[Array, Array]:
-    """What the noise of the sensors does to position, velocity and attitude, backward.
+    """Effect of sensor noise on position, velocity and attitude, integrated backward.
 
     Parameters
     ----------
     course : Course
     gyro, accel : TriadUncertainty
     instants : ndarray, (m,), s
-        Falling, from the end of the course on.
+        Decreasing, from the end of the course.
 
     Returns
     -------
     carry : ndarray, (m, 9, 9)
-        From the error at the instant before, in this order, to that at each; of the first from
+        Error transition from the preceding instant, in this order, to each; of the first from
         the anchor.
     driven : ndarray, (m, 9, 9)
-        Covariance of what the noise adds on the way; as impulses in the middle of pieces.
+        Covariance of the noise added between them, as impulses at the middle of intervals.
     """
     pushed = np.einsum("nij,nj->ni", course.C_nb, course.force)
     gained = back_integral(course.time, pushed)
     moved = back_integral(course.time, gained)
 
     def effect(s: Array, t: Array) -> tuple[Array, Array]:
-        """Of an attitude error at s on velocity and position at t before it."""
+        """Effect of an attitude error at s on velocity and position at the earlier t."""
         v_s, v_t = between(course.time, gained, s), between(course.time, gained, t)
         s_s, s_t = between(course.time, moved, s), between(course.time, moved, t)
         return cross_matrix(v_s - v_t), -cross_matrix(v_s * (s - t)[:, None] - (s_s - s_t))
@@ -183,14 +183,14 @@ def back_integral(time: Array, values: Array) -> Array:
 
 
 def between(time: Array, values: Array, instants: Array) -> Array:
-    """Values at instants by straight lines between the stamps."""
+    """Values at instants, interpolated linearly between the stamps."""
     after = np.clip(np.searchsorted(time, instants), 1, len(time) - 1)
     share = (instants - time[after - 1]) / (time[after] - time[after - 1])
     share = share.reshape((-1,) + (1,) * (values.ndim - 1))
     return np.asarray(values[after - 1] * (1.0 - share) + values[after] * share)
 
 
-# What is known before the fixes are used: of the sensors, the vehicle and the receiver.
+# Priors of the sensors, the vehicle and the receiver.
 
 
 def _positive(value: float, name: str, code: str) -> None:
@@ -200,15 +200,15 @@ def _positive(value: float, name: str, code: str) -> None:
 
 @dataclass(frozen=True)
 class FixCorrelation:
-    """How much of a fix's error is still there at the next.
+    """Time correlation of the errors of fixes.
 
     Attributes
     ----------
     share : float
-        Of the variance that the receiver states, 0 to 1, which a Gauss-Markov process has; the
-        rest is new with each fix.
+        Fraction of the receiver's stated variance, 0 to 1, that is a Gauss-Markov process; the
+        rest is independent for each fix.
     time : float, s
-        In which its correlation falls to 1/e.
+        Correlation time (1/e).
 
     Raises
     ------
@@ -227,33 +227,33 @@ class FixCorrelation:
 
 @dataclass(frozen=True)
 class EntryPriors:
-    """Priors of an entry state. All are normal, independent, and standard deviations of zero mean.
+    """Priors of an entry state: normal, independent, zero mean, given by standard deviations.
 
     Attributes
     ----------
     gyro, accel : TriadUncertainty
-        Of the Imu table, in vehicle axes: noise and biases that are left in it, scale,
-        misalignment, g-sensitivity. Nonlinearity, vibration rectification and the range play no
-        part at what a vehicle feels before a crash.
+        Of the Imu table, in vehicle axes: noise and residual biases, scale, misalignment,
+        g-sensitivity. Nonlinearity, vibration rectification and range are negligible in normal
+        driving before a crash.
     roll_deg, pitch_deg, tilt_sd_deg : float, deg
-        Of the vehicle at the anchor; a road's slope and more, where nothing is known.
+        Of the vehicle at the anchor; if unknown, the slope of a road and more.
     heading_deg, heading_sd_deg : float, deg, optional
-        From elsewhere, as from marks on the road; both or neither.
+        From another source, such as marks on the road; both or neither.
     side_slip_sd_deg : float, deg, optional
-        The vehicle travels along its forward axis, within this: of the side-slip angle at
-        `no_slip_point`, once for the whole window and once more from fix to fix, where the
-        vehicle is faster than 3 m/s and its acceleration to the side, speed times yaw rate, is
-        below 2 m/s²: tyres slip where they hold. Without it the heading comes from
+        The vehicle travels along its forward axis within this: standard deviation of the
+        side-slip angle at `no_slip_point`, once for the whole window and once more from fix to
+        fix, where the speed exceeds 3 m/s and the lateral acceleration, speed times yaw rate, is
+        below 2 m/s² (tires slip even within grip). Without it the heading follows from
         accelerations alone.
     no_slip_point : triad, m
-        In vehicle axes; of a car the middle of the rear axle.
+        In vehicle axes; for a car the middle of the rear axle.
     antenna_sd : float, m
         Of each coordinate of the antenna.
     time_offset, time_offset_sd : float, s
-        A fix that is stamped t is of the instant ``t - time_offset``.
+        A fix stamped t belongs to the instant ``t - time_offset``.
     position_correlation, velocity_correlation : FixCorrelation
-        Places of a receiver that stands alone wander over a minute with most of their error; the
-        defaults say so. Velocities are new each time, unless the receiver filters them.
+        Positions of a stand-alone receiver wander over a minute with most of their error, which
+        the defaults assume. Velocities are independent, unless the receiver filters them.
 
     Raises
     ------
@@ -301,16 +301,16 @@ class EntryPriors:
             )
 
 
-# Which fixes before a crash are to be believed, from what the inertial sensors felt.
+# Selection of fixes before a crash, from the motion that the inertial sensors measured.
 
 
-#: Beyond these a receiver is not believed: m/s², without gravity, and m/s³.
+#: Limits beyond which fixes are rejected: m/s², without gravity, and m/s³.
 LARGEST_ACCELERATION = 50.0
 LARGEST_JERK = 20.0
-#: Acceleration is the mean over this many seconds, jerk the change between two such means that
-#: follow one another, over their distance: first and second difference of the velocity.
+#: Acceleration is the mean over this many seconds, jerk the change between two successive such
+#: means divided by their distance: first and second difference of the velocity.
 AVERAGED = 0.05
-#: For so long, s, after an excess nothing is believed either.
+#: Fixes are also rejected for this long after an excess, s.
 RECOVERY = 1.0
 
 
@@ -320,14 +320,14 @@ def strain(run: NavigationRun) -> tuple[Array, Array]:
     Parameters
     ----------
     run : NavigationRun
-        Its heading and velocity may be anything: only changes of the velocity count.
+        Heading and velocity are arbitrary: only changes of the velocity count.
 
     Returns
     -------
     acceleration, jerk : ndarray, (n,), m/s², m/s³
         At each stamp, from the samples up to it: lengths of ``(v(t) - v(t-h)) / h`` and of
         ``(v(t) - 2 v(t-h) + v(t-2h)) / h²`` with h = 50 ms; zero where the run begins later.
-        White noise of density N makes ``√(2/h) N/h`` of jerk on each axis: 3.6 m/s³ for
+        White noise of density N gives a jerk of ``√(2/h) N/h`` on each axis: 3.6 m/s³ for
         0.028 m/s²/√Hz. The first zero of the mean is at 20 Hz.
     """
     time, velocity = run.time, run.history[:, 3:6]
@@ -346,23 +346,23 @@ def strain(run: NavigationRun) -> tuple[Array, Array]:
 def judge_fixes(
     instants: Array, quality: Array, run: NavigationRun, impact: float, anchor: float, slack: float
 ) -> list[tuple[Finding, ...]]:
-    """Find out of each fix why it is not believed.
+    """Return for each fix the reasons why it is rejected.
 
     Parameters
     ----------
     instants : ndarray, (m,), s
-        To which the fixes belong, from the beginning of the run on.
+        Instants of validity of the fixes, from the beginning of the run on.
     quality : ndarray, (m,)
     run : NavigationRun
         Up to the anchor.
     impact, anchor : float, s
     slack : float, s
-        How far an instant may be wrong.
+        Possible error of an instant.
 
     Returns
     -------
     list of tuple of Finding
-        Empty where there is nothing against it.
+        Empty where the fix is accepted.
     """
     acceleration, jerk = strain(run)
     hard, rough = acceleration > LARGEST_ACCELERATION, jerk > LARGEST_JERK
@@ -392,7 +392,7 @@ def _reason(code: str, **values: float) -> Finding:
 def _excess(
     time: Array, acceleration: Array, jerk: Array, at: NDArray[np.intp]
 ) -> tuple[Finding, ...]:
-    """What exceeded a limit at these stamps, and when it last did."""
+    """Quantities above their limit at these stamps, and the last time of each excess."""
     if not at.size:
         return ()
     most, roughest = float(acceleration[at].max()), float(jerk[at].max())
@@ -404,7 +404,7 @@ def _excess(
 
 
 def record_of_fixes(stamps: Array, why: list[tuple[Finding, ...]]) -> pd.DataFrame:
-    """Begin the record of the fixes: all that are not believed have no weight."""
+    """Begin the record of the fixes: rejected ones have zero weight."""
     used = np.array([not w for w in why], dtype=np.bool_)
     return pd.DataFrame(
         {

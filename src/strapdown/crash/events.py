@@ -1,4 +1,4 @@
-"""Events of a whole record, after 49 CFR Part 563, and what a person should know of them."""
+"""Crash events of a whole record, after 49 CFR Part 563, and findings on them."""
 
 from __future__ import annotations
 
@@ -31,24 +31,24 @@ class CrashEvent:
     ----------
     time_zero : float, s
         First point of the interval in which the wake threshold was reached (49 CFR 563.5(b)), or
-        the instant at which it was; as `EventRule.zero_at` says.
+        the instant at which it was; see `EventRule.zero_at`.
     time_zero_sd : float, s
-        Of `time_zero` from noise and bias of the acceleration: that of the window's change,
-        over its slope where it crosses the threshold. First order: right while it is small
-        against the time in which the slope changes. Zero where nothing was said of the noise.
+        Of `time_zero` from noise and bias of the acceleration: standard deviation of the window's
+        change divided by its slope at the threshold. First order: valid while it is small
+        compared with the time in which the slope changes. Zero where no noise is stated.
     basis : {'longitudinal', 'lateral', 'resultant', 'acceleration'}
-        By which criterion.
+        Criterion that gave time zero.
     woken : float, s
-        When the wake threshold was reached: no earlier could a recorder know.
+        Instant at which the wake threshold was reached, the earliest at which a recorder knows.
     trigger : float, s
-        When the trigger threshold was reached: the instant of detection.
+        Instant of detection, at which the trigger threshold was reached.
     trigger_axis : {'longitudinal', 'lateral'}
     end : float, s
-        When the resultant change within the wake window became small; the last stamp where
-        `lasts_beyond_record`.
+        Instant at which the resultant change within the wake window became small; the last stamp
+        where `lasts_beyond_record`.
     end_sd : float, s
-        As `time_zero_sd`; NaN where the event lasts beyond the record, or where the end is that
-        of the trigger.
+        As `time_zero_sd`; NaN where the event lasts beyond the record, or where the end is set
+        by the trigger.
     peak : float, m/s²
         Largest horizontal magnitude of a sample from time zero to the end, unfiltered.
     peak_time : float, s
@@ -78,12 +78,12 @@ class CrashEvent:
 
 
 def two_sds(given: float | Sequence[float], name: str) -> tuple[float, float]:
-    """Forward and right standard deviation of one number or a triad.
+    """Forward and right standard deviation from one number or a triad.
 
     Raises
     ------
     ConfigError
-        It is neither, or negative, or not finite.
+        The value is neither, or negative, or not finite.
     """
     try:
         sds = np.asarray(given, dtype=np.float64)
@@ -95,7 +95,7 @@ def two_sds(given: float | Sequence[float], name: str) -> tuple[float, float]:
     return float(sds[0]), float(sds[1])
 
 
-# By what an event is told: thresholds and windows of 49 CFR Part 563.
+# Definition of an event: thresholds and windows of 49 CFR Part 563.
 
 
 #: km/h in m/s.
@@ -120,37 +120,37 @@ class EventRule:
     lateral_window : float, s
         *Time zero* (2)(ii): as above, laterally, within 5 ms.
     lateral : bool
-        Whether the vehicle records the lateral change; otherwise only the longitudinal one
-        counts, in the resultant too.
+        Whether the vehicle records the lateral change; otherwise only the longitudinal change
+        counts, also in the resultant.
     wake_acceleration : float, m/s², optional
         *Time zero* (1), for systems that wake up: the acceleration, longitudinal or lateral, at
-        which this recorder's algorithm is activated (the maker's figure). The 20 and 5 ms
-        windows are then not used for time zero.
+        which this recorder's algorithm is activated (the manufacturer's figure). The 20 and
+        5 ms windows are then not used for time zero.
     zero_at : {'interval', 'threshold'}
         Whether time zero is the first point of the interval in which the wake threshold is
-        reached, as the regulation has it, or the instant at which it is reached. In a hard
-        impact the first is before the contact: by 12 ms where 8 ms of it suffice.
+        reached, as in the regulation, or the instant at which it is reached. In a hard impact
+        the first precedes the contact: by 12 ms where the threshold is reached in 8 ms.
     quiet : float, s
-        For how long the resultant must stay small for the event to be over; the end is then
-        where that began. Zero is the regulation; 20 to 50 ms holds together an event whose
+        How long the resultant must stay small for the event to end; the end is then the beginning
+        of this interval. Zero is the regulation; 20 to 50 ms keeps together an event whose
         pulse has a dip.
     multi_event : float, s
-        *Multi-event crash*: events that begin not further apart belong together.
+        *Multi-event crash*: events that begin no further apart belong to one crash.
 
     Raises
     ------
     ConfigError
-        A threshold or window is not positive and finite, a word is unknown, or the wake's
-        windows are not shorter than the trigger's.
+        A threshold or window is not positive and finite, a word is unknown, or the wake windows
+        are not shorter than the trigger windows.
 
     Notes
     -----
-    The regulation leaves three things open, which are settled here so. (a) The lateral window
-    of 5 ms means 44 m/s²; a side impact may reach the trigger and never that. An event without
-    any other time zero takes the first point of the interval of 20 ms in which the *resultant*
-    changes by more than the threshold. (b) A window of the trigger does not reach back into an
-    event that has ended, else one impact would make two. (c) *(3)*, the deployment of a
-    restraint, is not seen by inertial sensors.
+    The regulation leaves three points open, settled here as follows. (a) The lateral window of
+    5 ms requires 44 m/s²; a side impact may reach the trigger without reaching that. An event
+    without another time zero takes the first point of the 20 ms interval in which the *resultant*
+    changes by more than the threshold. (b) A trigger window does not reach back into an event
+    that has ended; otherwise one impact would give two events. (c) *(3)*, the deployment of a
+    restraint, is not observable with inertial sensors.
     """
 
     trigger: float = 8.0 * KMH
@@ -196,7 +196,7 @@ PART_563 = EventRule()
 
 @dataclass(frozen=True)
 class CrashEvents:
-    """What was found in a record.
+    """Events found in a record.
 
     Attributes
     ----------
@@ -204,13 +204,13 @@ class CrashEvents:
         In order of time; the last one may last beyond the record.
     rule : EventRule
     woken : int
-        How often the wake threshold was exceeded without an event: potholes, kerbs, doors.
+        Number of times the wake threshold was exceeded without an event: potholes, curbs, doors.
     largest_change : float, m/s
-        Largest change of the longitudinal or lateral velocity within the trigger's window,
-        without what led to an event.
+        Largest change of the longitudinal or lateral velocity within the trigger window,
+        excluding changes that led to an event.
     largest_axis : {'longitudinal', 'lateral'}
     largest_time : float, s
-        Where that window ends; NaN where nothing changed.
+        End of that window; NaN without any change.
     source : str or None
     findings : tuple of Finding
     """
@@ -231,7 +231,7 @@ class CrashEvents:
         Raises
         ------
         DataError
-            There is none; the message tells the largest change that was found.
+            The record has no event; the message gives the largest change.
         """
         if not self.events:
             raise DataError(self.findings[-1])
@@ -244,13 +244,13 @@ class CrashEvents:
         Raises
         ------
         DataError
-            There is none.
+            The record has no event.
         """
         return max(self.events, key=lambda e: e.peak) if self.events else self.first
 
     @property
     def crashes(self) -> tuple[tuple[CrashEvent, ...], ...]:
-        """The events by crash: those that begin within 5 s of the first belong to one."""
+        """Events by crash: events that begin within 5 s of the first belong to one crash."""
         groups: list[list[CrashEvent]] = []
         for event in self.events:
             if groups and event.time_zero - groups[-1][0].time_zero <= self.rule.multi_event:
@@ -267,36 +267,36 @@ def detect_events(
     noise: float | Sequence[float] = 0.0,
     bias_sd: float | Sequence[float] = 0.0,
 ) -> CrashEvents:
-    """Find the events of a record, in retrospect.
+    """Find the events of a complete record.
 
     Parameters
     ----------
     acceleration : Acceleration
-        In the frame ``body`` (`body_acceleration`: the mean at rest taken off) or ``impact``
-        (resolved in north-east-down, gravity taken off, then `Acceleration.along` a heading).
+        In the frame ``body`` (`body_acceleration`: stationary mean subtracted) or ``impact``
+        (resolved in north-east-down, gravity subtracted, then `Acceleration.along` a heading).
     rule : EventRule
     noise : float or (3,), m/s²
-        Standard deviation of a sample, white.
+        Standard deviation of the white noise of a sample.
     bias_sd : float or (3,), m/s²
-        Of the resting value.
+        Of the stationary mean.
 
     Returns
     -------
     CrashEvents
-        The same events, to the last bit, as an `EventDetector` gives sample by sample.
-        Crossings are solved between the samples: with instantaneous sampling the acceleration is
-        a line there, which leaves an error of the second order in the step.
+        Bitwise the same events as an `EventDetector` gives sample by sample. Crossings are
+        interpolated linearly between samples; for instantaneous sampling the error is of second
+        order in the step.
 
     Raises
     ------
     ConfigError
-        The record is in north-east-down, where forward and right mean nothing.
+        The record is in north-east-down, where forward and right are undefined.
 
     Notes
     -----
     49 CFR 563.5(b): event, trigger threshold, time zero, end of event time, multi-event crash;
-    `EventRule` says how each is read. Braking at 0.9 g changes the velocity by 4.8 km/h within
-    150 ms and by 0.64 km/h within 20 ms, and is neither an event nor a wake.
+    see `EventRule`. Braking at 0.9 g changes the velocity by 4.8 km/h within 150 ms and by
+    0.64 km/h within 20 ms: neither an event nor a wake-up.
     """
     source = acceleration.source
     if acceleration.frame == "ned":
@@ -391,42 +391,42 @@ def _no_event(detector: EventDetector, acceleration: Acceleration) -> Finding:
     )
 
 
-# Events sample by sample, as a recorder in a vehicle finds them.
+# Sample-by-sample event detection, as in a vehicle's recorder.
 
 
 Array = NDArray[np.float64]
 
-#: By what time zero is told, in the order of the kernel's marks.
+#: Criteria of time zero, in the order of the kernel's marks.
 BASES = ("longitudinal", "lateral", "resultant", "acceleration")
 AXES = ("longitudinal", "lateral")
 
 
 class EventDetector:
-    """Find events, one call a sample or a piece of a record, and never look ahead.
+    """Find events causally, one sample or chunk of a record per call.
 
-    A record that is given in pieces, cut anywhere, gives the same bits as in one.
+    The result is bitwise independent of how a record is cut into chunks.
 
     Parameters
     ----------
     rule : EventRule
     sampling : {'instantaneous', 'mean'}
-        What a sample is: the value at its stamp, or its mean over the interval that ends there.
+        Whether a sample is the value at its stamp or the mean over the interval ending there.
     noise : float or (3,), m/s²
-        Standard deviation of a sample, taken as white, for the uncertainty of the times.
+        Standard deviation of the white noise of a sample, for the uncertainty of the times.
     bias_sd : float or (3,), m/s²
-        Of the resting value that was taken off.
+        Of the stationary mean that was subtracted.
     source : str, optional
         Name of the unit or file, for messages.
 
     Raises
     ------
     ConfigError
-        `sampling` is unknown, or a standard deviation is none.
+        `sampling` is unknown, or a standard deviation is not valid.
 
     Notes
     -----
-    The samples are accelerations in vehicle axes without gravity: the specific force with its
-    resting value taken off, as `body_acceleration` does. Only the first two components are used.
+    Samples are accelerations in vehicle axes without gravity: the specific force less its
+    stationary mean, as from `body_acceleration`. Only the first two components are used.
     """
 
     def __init__(
@@ -474,60 +474,60 @@ class EventDetector:
 
     @property
     def current(self) -> CrashEvent | None:
-        """The event that has been detected and not ended, as known now."""
+        """The event detected and not yet ended, as currently known."""
         if not self.triggered:
             return None
         state = self._state
         pending = state[kernel.PENDING]
         if math.isnan(pending):
             return self._event(float(state[kernel.NOW]), True)
-        # It has become quiet, though not yet for long enough.
+        # The change is small, but not yet for long enough.
         return self._event(float(pending), False)
 
     @property
     def samples(self) -> int:
-        """How many samples were taken."""
+        """Number of samples processed."""
         return self._held + self._gone
 
     @property
     def woken(self) -> int:
-        """How often the resultant woke the algorithm without an event."""
+        """Number of wake-ups without an event."""
         return int(self._state[kernel.WOKEN])
 
     @property
     def largest_change(self) -> tuple[float, str, float]:
-        """Largest change within the trigger's window, without what led to an event.
+        """Largest change within the trigger window, excluding changes that led to an event.
 
         m/s, its axis, and the instant in s at which the window ends; (0, 'longitudinal', NaN)
-        where there was none.
+        without any change.
         """
         state = self._state
         axis = AXES[int(state[kernel.MOST_AXIS])]
         return float(state[kernel.MOST]), axis, float(state[kernel.MOST_TIME])
 
     def update(self, time: float, accel: Array | Sequence[float]) -> tuple[CrashEvent, ...]:
-        """Take one sample.
+        """Process one sample.
 
         Parameters
         ----------
         time : float, s
-            Later than that of the sample before.
+            Later than that of the preceding sample.
         accel : array_like, (3,), m/s²
 
         Returns
         -------
         tuple of CrashEvent
-            Those that ended by it, mostly none.
+            Events ended by this sample, usually none.
 
         Raises
         ------
         DataError
-            Time does not advance, or a number is not finite. The sample is then not taken.
+            Time does not increase, or a number is not finite. The sample is then not processed.
         """
         held = self._held
         if 0 < held < len(self._rows) and np.shape(accel) == (3,):
             x, y, z = accel
-            # What is not finite, or goes back, is refused with its words by `extend`.
+            # `extend` rejects samples that are not finite or not later, with its message.
             if time > self._rows[held - 1, rows.T] and math.isfinite(x + y + z + time):
                 row = self._rows[held]
                 row[rows.T], row[rows.AX], row[rows.AY] = time, x, y
@@ -536,7 +536,7 @@ class EventDetector:
         return self.extend([time], [accel])  # type: ignore[arg-type]
 
     def extend(self, time: ArrayLike, accel: ArrayLike) -> tuple[CrashEvent, ...]:
-        """Take a piece of a record.
+        """Process a chunk of a record.
 
         Parameters
         ----------
@@ -546,12 +546,12 @@ class EventDetector:
         Returns
         -------
         tuple of CrashEvent
-            Those that ended in it.
+            Events that ended in it.
 
         Raises
         ------
         DataError
-            As `update`; then nothing of the piece is taken.
+            As `update`; then no sample of the chunk is processed.
         """
         try:
             stamps = np.asarray(time, dtype=np.float64)
@@ -612,12 +612,12 @@ class EventDetector:
             )
 
     def _make_room(self, more: int) -> None:
-        """Let go what no window reaches any more; hold twice what there is otherwise."""
+        """Drop samples that no window reaches any more; otherwise double the buffer."""
         if self._held + more <= len(self._rows):
             return
         if self._held:
             state, rule = self._state, self.rule
-            # An episode's peak may begin before its window does.
+            # The peak of an episode may precede its window.
             reach = rule.trigger_window + 2.0 * rule.wake_window
             pending = state[kernel.PENDING]
             oldest = state[kernel.NOW] if math.isnan(pending) else pending
@@ -643,7 +643,7 @@ class EventDetector:
         which = min(own, key=lambda i: first[i]) if own else 2
         trigger = float(state[kernel.TRIGGERED])
         begin = first[which] if not math.isnan(first[which]) else trigger - rule.trigger_window
-        # A rounding below the first stamp is the first stamp.
+        # A value below the first stamp by rounding is the first stamp.
         before = begin < began - 1e-12 * max(1.0, abs(began))
         late = rule.zero_at == "threshold" and not math.isnan(first[which])
         return CrashEvent(
@@ -662,7 +662,7 @@ class EventDetector:
         )
 
     def _time_sd(self, mark: Array) -> float:
-        """Uncertainty of the change at the crossing, over its slope."""
+        """Standard deviation of the change at the crossing divided by its slope."""
         _, slope, power, length, *shares = mark.tolist()
         if math.isnan(slope):
             return math.nan

@@ -1,4 +1,4 @@
-"""The state of a vehicle when it is struck, from satellite fixes before."""
+"""Vehicle state at the impact, estimated from GNSS fixes before it."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def entry_state_from_gnss(
     antenna: Sequence[float] = (0.0, 0.0, 0.0),
     ellipsoid: str = "wgs84",
 ) -> EntryState:
-    """Estimate speed, velocity, attitude and biases when a crash begins, from fixes before it.
+    """Estimate velocity, attitude and biases at the impact from GNSS fixes before it.
 
     Parameters
     ----------
@@ -77,17 +77,17 @@ def entry_state_from_gnss(
     gnss : DataFrame
         Gnss table on the same clock; rows anywhere in time.
     impact : float, s
-        Beginning of the crash; nothing from there on is used of either table.
+        Beginning of the crash; samples and fixes from there on are not used.
     priors : EntryPriors
     window : float, s
-        Length of the record before the anchor that is used, 1 to 60.
+        Length of the record used before the anchor, 1 to 60.
     anchor : float, s, optional
-        Instant of the state, not after the impact; the impact where it is left out. The state is
-        that at the last sample of the Imu table up to there.
+        Instant of the state, not after the impact; by default the impact. The state is that at
+        the last sample of the Imu table up to this instant.
     antenna : sequence of float, m
         From the reference point, in vehicle axes.
     ellipsoid : str
-        Of the places, one of `ellipsoids.ELLIPSOIDS`.
+        Reference ellipsoid of the positions, one of `ellipsoids.ELLIPSOIDS`.
 
     Returns
     -------
@@ -96,8 +96,8 @@ def entry_state_from_gnss(
     Raises
     ------
     DataError
-        A table is not valid, there is no specific force, the Imu table does not reach from before
-        the fixes to the anchor, or fewer than three fixes over one second are left to be used.
+        A table is not valid, specific force is missing, the Imu table does not reach from before
+        the fixes to the anchor, or fewer than three fixes over 1 s are usable.
     ConfigError
         An argument is out of range.
     DivergenceError
@@ -105,29 +105,29 @@ def entry_state_from_gnss(
 
     Notes
     -----
-    *Method.* Iterated generalised least squares (Gauss-Newton) for the 15 states at the anchor,
+    *Method.* Iterated generalized least squares (Gauss-Newton) for the 15 states at the anchor,
     from which the full mechanization runs backward over the window, and for scale,
     misalignment, g-sensitivity, antenna and time offset as far as the priors leave them open.
-    The covariance of the rows has the noise of the inertial sensors between each fix and the
-    anchor, and the part of the receiver's error that stays (`FixCorrelation`), so that ten fixes
-    a second are not taken for ten times the knowledge; `entry_adjust.adjust` solves it fix by
-    fix. Fixes that lie too far from what all others say lose weight (`entry_adjust.weigh`).
+    The covariance of the rows includes the noise of the inertial sensors between each fix and
+    the anchor and the correlated part of the receiver's error (`FixCorrelation`), so that ten
+    correlated fixes do not count as ten independent ones; `entry_adjust.adjust` solves it fix by
+    fix. Outlying fixes are down-weighted (`entry_adjust.weigh`).
 
-    *Which fixes.* None from the impact on; none where the acceleration without gravity exceeds
-    50 m/s² or the jerk 20 m/s³ (both means over 50 ms, `entry_trust.strain`), nor for 1 s after;
-    none of quality 0. `EntryState.fixes` says of each why.
+    *Fix selection.* Excluded are fixes from the impact on, fixes where the acceleration without
+    gravity exceeds 50 m/s² or the jerk 20 m/s³ (both means over 50 ms, `entry_trust.strain`) and
+    for 1 s after, and fixes of quality 0. `EntryState.fixes` gives the reason for each.
 
-    *What can be seen.* Velocity and place always. Roll and pitch, and the horizontal bias
-    that looks like them, only together while the vehicle neither turns nor accelerates: 0.1 m/s²
-    of bias is 0.6 deg, and the prior of the bias decides. Heading through changes of velocity
-    alone: a steady straight drive does not show it, unless the vehicle may be taken to travel
-    along its axis (`EntryPriors.side_slip_sd_deg`). A finding says when it is not seen. A
-    standard deviation beyond some 15 deg then means "unknown": errors so large are not linear,
-    and the noise that the accelerometers have summed up is itself taken for a motion.
+    *Observability.* Velocity and position are always observable. Roll and pitch are not separable
+    from the horizontal bias while the vehicle neither turns nor accelerates: 0.1 m/s² of bias is
+    0.6 deg, and the prior of the bias decides. Heading is observable only through changes of
+    velocity: a steady straight drive does not show it, unless the vehicle may be taken to travel
+    along its axis (`EntryPriors.side_slip_sd_deg`). A finding reports an unobservable heading. A
+    standard deviation beyond some 15 deg then means "unknown": errors that large are not linear,
+    and the integrated accelerometer noise is itself mistaken for a motion.
 
-    *Valid* for motions that the Imu table samples well; for sensor errors that stay over the
-    window; without vibration that the sensors rectify; and for fixes whose standard deviations
-    are right: a misfit that chance does not explain is told.
+    *Valid* for motions that the Imu table samples well; for sensor errors constant over the
+    window; without vibration rectification; and for fixes whose standard deviations are
+    right: a finding reports a misfit that chance does not explain.
     """
     mechanization = NorthEastDown(ellipsoid=ellipsoid)
     at = impact if anchor is None else anchor
@@ -175,7 +175,7 @@ def entry_state_from_gnss(
     arm = np.asarray(antenna, dtype=np.float64)
     best = estimate(mechanization, piece, fixes, guesses[0], priors, arm)
     for other in guesses[1:]:
-        # A drive backward, or with the axes turned, fits from the other heading alone.
+        # A drive backward, or with the axes turned, fits only from the opposite heading.
         if unlikely(best.cost, best.degrees_of_freedom):
             next_best = estimate(mechanization, piece, fixes, other, priors, arm)
             best = min(best, next_best, key=lambda e: e.cost)
@@ -213,7 +213,7 @@ def _between(imu: pd.DataFrame, begin: float, last: int) -> pd.DataFrame:
 def _turn_only(
     mechanization: NorthEastDown, imu: pd.DataFrame, gnss: pd.DataFrame
 ) -> NavigationRun:
-    """Navigate from a stand, level and to the north: only what changes means something."""
+    """Navigate from a level, stationary start heading north: only changes are meaningful."""
     increments = motion_increments(imu)
     begin = float(increments.index[0] - increments["dt"].iloc[0])
     at = gnss[GEODETIC].median()
@@ -221,39 +221,39 @@ def _turn_only(
     return run_mechanization(mechanization, start, increments)
 
 
-# A path that is tied to what a satellite receiver said before the crash.
+# Entry state from GNSS fixes before the crash, and the path from there.
 
 
 CONTRIBUTOR = "entry from GNSS"
-# What the entry state has instead: lines of the error budget.
+# Contributors to the error budget that the entry state replaces.
 BIASES = ("accelerometer bias", "gyro bias", "levelling")
 OTHER_PRIORS = tuple(f.name for f in fields(EntryPriors) if f.name not in ("gyro", "accel"))
 
 
 @dataclass(frozen=True, eq=False)
 class GnssEntry:
-    """Fixes before the crash, from which every unit finds its own entry state and biases.
+    """GNSS fixes before the crash, from which the entry state and biases of each unit are found.
 
     Attributes
     ----------
     fixes : DataFrame
         Gnss table, time from the common trigger.
     impact : float, s
-        Nothing from there on is used.
+        Samples and fixes from there on are not used.
     window : float, s
-        Length of the record before the impact that is used.
+        Length of the record used before the impact.
     before : float, s
-        How long before the impact the path is tied: the first sample of the crash already has
+        How long before the impact the entry lies: the first sample of the crash already has
         its jerk.
     antenna : sequence of float, (3,), m
         Vehicle axes, from the vehicle's origin.
     priors : dict
-        Attributes of `EntryPriors` other than the sensors', which are the unit's own.
+        Attributes of `EntryPriors` other than those of the sensors, which come from the unit.
 
     Raises
     ------
     ConfigError
-        A number is none, or a prior is unknown or out of range.
+        A number is not finite or out of range, or a prior is unknown or out of range.
     """
 
     fixes: pd.DataFrame = field(repr=False)
@@ -287,26 +287,26 @@ class GnssEntry:
 def start_from_gnss(
     at: PointKinematics, given: GnssEntry, point: Sequence[float]
 ) -> tuple[PointKinematics, Entry, EntryState]:
-    """Find the entry of a unit and take off the biases that were found with it.
+    """Estimate the entry state of a unit and remove the biases estimated with it.
 
     Parameters
     ----------
     at : PointKinematics
     given : GnssEntry
     point : sequence of float, (3,), m
-        Where the unit was moved to, vehicle axes from the vehicle's origin.
+        New point of the unit, vehicle axes from the vehicle's origin.
 
     Returns
     -------
     at : PointKinematics
-        Without the biases. Of its unknowns, those of the biases are gone, and each other one
-        counts only as far as it adds something else than it did on average over the window:
-        that much the biases have taken in. How the unit is turned in roll and pitch is taken in
-        by the attitude, too, and counts all the same: the bound is on the safe side there.
+        Corrected for the biases. Its bias unknowns are removed; each other unknown counts only
+        for its deviation from its mean over the window, because the estimated bias has absorbed
+        the mean. The mounting error in roll and pitch is absorbed by the attitude as well, but is
+        kept in full: the bound is conservative there.
     entry : Entry
-        With the joint covariance of attitude, velocity and biases.
+        With joint covariance of attitude, velocity and biases.
     state : EntryState
-        As it was estimated, with every fix and why it was used or not.
+        The estimate, with every fix and the reason why it was used or not.
 
     Raises
     ------
@@ -353,7 +353,7 @@ def _entry(state: EntryState) -> Entry:
         velocity=(north, east, down),
         heading_deg=heading % 360.0,
         unknowns=tuple(
-            # A bias that is larger than was found leaves less for the motion.
+            # A larger bias than estimated leaves less for the motion.
             (
                 f"{CONTRIBUTOR} {k + 1}",
                 CONTRIBUTOR,
@@ -391,37 +391,37 @@ def _without_biases(at: PointKinematics, state: EntryState, begin: float) -> Poi
     )
 
 
-# Where to begin the search for an entry state.
+# Initial guesses of the entry state.
 
 
-# Slower, the direction of travel is noise.
+# At lower speeds the direction of travel is noise.
 LEAST_SPEED = 1.0  # m/s
-# So many of the last fixes tell the velocity to begin with.
+# Number of last fixes that give the initial velocity.
 _LAST = 5
-# Changes of velocity of which the direction means something, m/s.
+# Smallest change of velocity with a usable direction, m/s.
 _LEAST_CHANGE = 0.5
-# Guesses nearer than this lead to the same end, deg.
+# Guesses nearer than this converge to the same solution, deg.
 _SAME = 30.0
 
 
 def first_guesses(
     turned: NavigationRun, fixes: Fixes, priors: EntryPriors
 ) -> tuple[list[NavState], list[Finding]]:
-    """Guess place and velocity from the last fixes, and one heading or two.
+    """Guess position and velocity from the last fixes, and one or two headings.
 
     Parameters
     ----------
     turned : NavigationRun
-        From a stand, level and north, up to the anchor.
+        From a level, stationary start heading north, up to the anchor.
     fixes : Fixes
-        Those that are believed.
+        The accepted fixes.
     priors : EntryPriors
 
     Returns
     -------
     guesses : list of NavState
-        Heading as the priors have it; or the direction of travel; and that for which the
-        changes of velocity by the sensors agree best with those of the fixes, where it is another.
+        Heading from the priors, or the direction of travel; and, where it differs, the heading
+        for which the velocity changes of the sensors agree best with those of the fixes.
     findings : list of Finding
     """
     velocity = _velocities(fixes)
@@ -459,7 +459,7 @@ def first_guesses(
 
 
 def _velocities(fixes: Fixes) -> Array:
-    """Of each fix; from its neighbours' places where it was not measured."""
+    """Velocity of each fix; from neighboring positions where it was not measured."""
     told = np.isfinite(fixes.sd[:, 3:])
     if told.all():
         return fixes.velocity
@@ -468,7 +468,7 @@ def _velocities(fixes: Fixes) -> Array:
 
 
 def _heading_by_changes(turned: NavigationRun, instants: Array, velocity: Array) -> float | None:
-    """Heading at the end, deg, from changes of the level velocity; None where there are none."""
+    """Heading at the end from changes of the level velocity, deg; None if there are none."""
     felt = between(turned.time, turned.history[:, 3:5], instants)
     felt = felt - felt.mean(axis=0)
     seen = velocity[:, :2] - velocity[:, :2].mean(axis=0)
@@ -482,10 +482,10 @@ def _near(a: float, b: float) -> bool:
     return bool(np.abs(rotation.within_half_turn(np.array(a - b))) < _SAME)
 
 
-# What an entry state cannot be made of.
+# Argument checks of the entry state.
 
 
-# Least of what an entry state can be made of.
+# Minimum data for an entry state.
 LEAST_FIXES = 3
 LEAST_SPAN = 1.0  # s
 LONGEST_WINDOW = 60.0  # s
@@ -499,7 +499,7 @@ def check_arguments(
     anchor: float,
     antenna: Sequence[float],
 ) -> None:
-    """Refuse tables and arguments that no entry state can be made of."""
+    """Refuse tables and arguments that cannot give an entry state."""
     check_imu(imu)
     check_gnss(gnss)
     if ACCEL[0] not in imu.columns:
@@ -542,12 +542,12 @@ def check_arguments(
 
 
 def check_enough(fixes: Fixes, why: list[tuple[Finding, ...]], source: str | None) -> None:
-    """Refuse to make one of too few fixes, and say where the others went."""
+    """Refuse too few fixes, with the reasons for which the others were excluded."""
     span = float(np.ptp(fixes.instants)) if len(fixes.instants) else 0.0
     placed = int(np.isfinite(fixes.sd[:, :3]).all(axis=1).sum())
     if min(len(fixes.instants), placed) >= LEAST_FIXES and span >= LEAST_SPAN:
         return
-    # Of each kind of reason its first stands for all.
+    # The first finding of each kind represents all of its kind.
     counts = Counter(f.code for found in why for f in found)
     first = {f.code: f for found in reversed(why) for f in found}
     refused = [
@@ -567,21 +567,21 @@ def check_enough(fixes: Fixes, why: list[tuple[Finding, ...]], source: str | Non
     )
 
 
-# What a person should know of an entry state.
+# Findings on an entry state.
 
 
-# A heading that is known less well is told.
+# Heading standard deviations above this are reported.
 WIDE_HEADING = 5.0  # deg
-# Misfits of all fixes that chance makes more seldom are told.
+# A misfit of all fixes with a probability below this is reported.
 UNLIKELY = 1e-4
-#: Reasons that need no word: such fixes are not of the drive before the impact.
+#: Reasons that are not reported: these fixes do not belong to the drive before the impact.
 LATE = frozenset(
     ("crash.fix-after-impact", "crash.fix-perhaps-after-impact", "crash.fix-after-anchor")
 )
 
 
 def say_outliers(record: pd.DataFrame) -> None:
-    """Say of each fix that lost weight how far it is off."""
+    """Add to each down-weighted fix a finding with its misfit."""
     why: list[tuple[Finding, ...]] = record["why"].tolist()
     for name in ("position", "velocity"):
         lower = record["used"] & (record[f"{name}_weight"] < 1.0)
@@ -595,7 +595,7 @@ def say_outliers(record: pd.DataFrame) -> None:
 def findings(
     best: Estimate, record: pd.DataFrame, source: str | None, priors: EntryPriors, impact: float
 ) -> list[Finding]:
-    """What a person should know of an estimate."""
+    """Return the findings on an estimate."""
     found = []
     late = record["why"].map(lambda why: any(f.code in LATE for f in why))
     refused = record[~record["used"] & ~late]
@@ -661,7 +661,7 @@ def findings(
 
 
 def unlikely(chi_square: float, degrees_of_freedom: int) -> bool:
-    """Whether chance hardly makes a misfit as large as this."""
+    """Whether the probability of a misfit this large is below `UNLIKELY`."""
     from scipy.stats import chi2
 
     return bool(chi2.sf(chi_square, degrees_of_freedom) < UNLIKELY)

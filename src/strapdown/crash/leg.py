@@ -1,4 +1,4 @@
-"""A stretch of record from the instant that a path is tied to, in the order in which it is met."""
+"""Integration segment of a record, forward or backward from the entry of a path."""
 
 from __future__ import annotations
 
@@ -22,34 +22,34 @@ from strapdown.tables import MOTION
 
 Array = NDArray[np.float64]
 
-# Columns of an error: rotation vector in level, velocity, place.
+# Columns of an error: rotation vector in level, velocity, position.
 ATTITUDE, VELOCITY, PLACE = slice(0, 3), slice(3, 6), slice(6, 9)
 
 
 @dataclass(frozen=True, eq=False)
 class IntegrationSegment:
-    """Increments of a stretch, what the unknowns add to them, and the states that follow.
+    """Increments of a segment, the effects of the unknowns on them, and the resulting states.
 
-    A backward leg is a motion of its own, with the opposite velocity on an Earth that turns the
-    other way; `errors`, `noise_covariance` and what is read from `nominal` are turned back by
-    who joins the legs.
+    A backward segment is a motion of its own, with opposite velocity on an Earth that rotates the
+    other way; `errors`, `noise_covariance` and values read from `nominal` are reversed by the
+    code that joins the segments.
 
     Attributes
     ----------
     backward : bool
     time : ndarray, (k + 1,), s
-        In the order in which they are met.
+        In the order of integration.
     state : ndarray
-        Of the kernel, at the start.
+        Kernel state at the start.
     rows : ndarray, (k, 10)
         Motion increments.
     nominal : ndarray, (k + 1, 10)
         States of the kernel.
     effects : ndarray, (p, 6, k)
-        One standard deviation of each unknown, on angle and velocity of each step.
+        Effect of one standard deviation of each unknown on angle and velocity of each step.
     noise_sd : ndarray, (6, k)
     earth, options : ndarray
-        Of the kernel.
+        Kernel arguments.
     """
 
     backward: bool
@@ -63,10 +63,10 @@ class IntegrationSegment:
     options: Array
 
     def errors(self, start: Array) -> Array:
-        """Grow the unknowns' errors from (p, 9) at the start to (p, k + 1, 9)."""
+        """Propagate the errors of the unknowns from (p, 9) at the start to (p, k + 1, 9)."""
         out = np.empty((len(start), len(self.time), 9))
         theta = self.effects[:, :3].transpose(0, 2, 1)
-        # What is added to a rotation vector turns the end of the step by this.
+        # An error of the rotation vector rotates the end of the step by this.
         theta = theta + 0.5 * np.cross(self.rows[:, 1:4], theta)
         grow_errors(
             self._attitude(),
@@ -79,7 +79,7 @@ class IntegrationSegment:
         return self._met(out)
 
     def noise_covariance(self) -> Array:
-        """Covariance of what the noise of the steps does, (k + 1, 9, 9)."""
+        """Covariance from the noise of the steps, (k + 1, 9, 9)."""
         out = np.empty((len(self.time), 9, 9))
         grow_noise(
             self._attitude(),
@@ -98,7 +98,7 @@ class IntegrationSegment:
         return np.ascontiguousarray(rotation.dcm_from_quaternion(self.nominal[:-1, Q : Q + 4]))
 
     def _met(self, errors: Array) -> Array:
-        """Errors of the motion as it is met, from those of the motion, or the other way."""
+        """Errors in the order of integration from those of the motion, or the reverse."""
         if not self.backward:
             return np.ascontiguousarray(errors)
         met = errors.copy()
@@ -115,25 +115,25 @@ def make_leg(
     *,
     backward: bool,
 ) -> IntegrationSegment:
-    """Cut a leg out of a record and navigate it.
+    """Cut a segment out of a record and navigate it.
 
     Parameters
     ----------
     mechanization : NorthEastDown
     start : NavState
-        At the first sample of `rows`, or at the last where the leg runs backward.
+        At the first sample of `rows`, or at the last where the segment runs backward.
     imu : DataFrame
         Imu table at the reference point.
     effects : SampleEffects
         On the same samples.
     rows : slice
-        Samples of the leg, at least one; one sample is a leg without a step.
+        Samples of the segment, at least one; one sample is a segment without a step.
     backward : bool
 
     Raises
     ------
     DivergenceError
-        The path left what the mechanization allows.
+        The path left the range of the mechanization.
     """
     part = imu.iloc[rows]
     part.attrs = dict(imu.attrs)
@@ -148,10 +148,10 @@ def make_leg(
     theta = _over_steps(effects.rate[:, rows], time, mean)
     force = _over_steps(effects.force[:, rows], time, mean)
     dv = increments[:, 4:7]
-    # Half of the turn lies before the middle of what the force gave.
+    # Half of the rotation precedes the middle of the velocity increment.
     force = force + 0.5 * np.cross(theta, dv)
     # A sample has the same noise in the step before it: over steps it adds up as if each step
-    # had one sample's alone.
+    # had the noise of one sample alone.
     noise = np.concatenate([effects.rate_noise[rows], effects.force_noise[rows]], axis=1)
     noise = noise[1:] * np.diff(time)[:, None]
     if backward:
@@ -194,7 +194,7 @@ def _over_steps(values: Array, time: Array, mean: bool) -> Array:
 def _reversed(
     increments: Array, theta: Array, force: Array, noise: Array
 ) -> tuple[Array, Array, Array, Array]:
-    """As `reverse_increments`, with what is added to the steps."""
+    """As `reverse_increments`, including the effects on the steps."""
     out = np.empty_like(increments)
     reverse_increments(increments, out)
     if not len(increments):

@@ -1,4 +1,4 @@
-"""Many possible paths of one crash, each with errors drawn from the budget."""
+"""Monte Carlo paths of one crash, with errors drawn from the error budget."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from strapdown.errors import ConfigError
 
 Array = NDArray[np.float64]
 
-# Runs that are made together, from one stream of random numbers: their size is part of what a
-# seed means, and the number of cores is not.
+# Number of runs that share one stream of random numbers: part of the meaning of a seed,
+# unlike the number of cores.
 TOGETHER = 64
-# A gigabyte of paths.
+# One gigabyte of paths.
 MOST_RUNS = 100_000
 
 
 @dataclass(frozen=True, eq=False)
 class PathSamples:
-    """Possible paths, as differences from the reconstructed one.
+    """Simulated paths, as differences from the reconstructed one.
 
     Attributes
     ----------
     time : ndarray, (n,), s
     errors : ndarray, (runs, n, 9)
-        Rotation vector in local level, rad; velocity, m/s; place, m: what the truth would be
-        less what was computed, if the errors were these.
+        Rotation vector in local level, rad; velocity, m/s; position, m: true minus computed,
+        for the drawn errors.
     draws : ndarray, (runs, p)
         Standard normal numbers, one for each unknown of the path.
     """
@@ -49,7 +49,7 @@ class PathSamples:
         return np.asarray(np.einsum("rni,rnj->nij", centred, centred) / (len(centred) - 1))
 
     def interval(self, share: float = 0.95) -> tuple[Array, Array]:
-        """Bounds between which the middle `share` of the runs lie, each (n, 9)."""
+        """Bounds of the central fraction `share` of the runs, each (n, 9)."""
         edge = 0.5 * (1.0 - share)
         low, high = np.quantile(self.errors, [edge, 1.0 - edge], axis=0)
         return low, high
@@ -58,20 +58,20 @@ class PathSamples:
 def sample_paths(
     path: CrashPath, *, runs: int = 10_000, seed: int = 0, workers: int | None = None
 ) -> PathSamples:
-    """Draw possible paths.
+    """Draw Monte Carlo paths.
 
     The same unknowns with the same standard deviations as in the linear covariance are drawn and
-    put on start and increments, and each is navigated in full.
+    applied to start and increments, and each path is navigated in full.
 
     Parameters
     ----------
     path : CrashPath
     runs : int
     seed : int
-        The same seed gives the same runs, bit for bit, on any number of cores; more runs of one
-        seed begin with the fewer.
+        The same seed gives bitwise the same runs on any number of cores; a larger number of
+        runs extends a smaller one with the same seed.
     workers : int, optional
-        Threads; all cores, if not given.
+        Threads; by default all cores.
 
     Returns
     -------
@@ -80,7 +80,7 @@ def sample_paths(
     Raises
     ------
     ConfigError
-        `runs` is less than 2, or too many for the memory; a seed or a number of workers is none.
+        `runs` is less than 2 or too large, or a seed or a number of workers is not valid.
     """
     _check(path, runs, seed, workers)
     unknowns = len(path.names)
@@ -115,7 +115,7 @@ def sample_paths(
         draws[rows] = mine
         for leg, view, active, start, effects, used in prepared:
             steps = len(leg.rows)
-            # Seven digits of a noise are enough, and half as much memory to fill.
+            # Single precision suffices for noise and halves the memory.
             noise = generator.standard_normal((TOGETHER, 6, steps), dtype=np.float32)
             perturbed_runs(
                 leg.state,

@@ -1,4 +1,4 @@
-"""How one unit is turned against another on the same vehicle."""
+"""Relative mounting of two units on one vehicle: rotation, lever arm, swapped axes."""
 
 from __future__ import annotations
 
@@ -38,15 +38,15 @@ Array = NDArray[np.float64]
 SIGMAS = 4.0
 ROUNDS = 3
 TINY = 1e-30
-# What is looked for is not taken for known to be small.
+# The mounting rotation is the estimated quantity, so its prior uncertainty is excluded.
 _TURN = (MOUNTING,)
-# A direction about which less is known than this is not known.
+# Directions with a larger standard deviation count as unknown.
 MOST_SD = 0.2  # rad
 
 
 @dataclass(frozen=True, eq=False)
 class MountingRotation:
-    """The rotation that turns what the second unit reads into what the first one reads.
+    """Rotation from the axes of the second unit to those of the first.
 
     Attributes
     ----------
@@ -54,11 +54,11 @@ class MountingRotation:
     vector_deg : ndarray, (3,), deg
         The same as a rotation vector.
     covariance : ndarray, (3, 3), rad²
-        Of a small rotation about the axes of the first unit; directions about which the motion
-        says nothing have a variance of pi².
+        Of a small rotation about the axes of the first unit; unobserved directions have a
+        variance of pi².
     misfit : float
-        Root of the residuals' chi-square over its degrees of freedom; where it exceeds one the
-        covariance was multiplied by its square.
+        Root of the residuals' chi-square over its degrees of freedom; where it exceeds one, the
+        covariance has been multiplied by its square.
     """
 
     matrix: Array
@@ -68,12 +68,12 @@ class MountingRotation:
 
     @classmethod
     def untold(cls) -> MountingRotation:
-        """Of units whose motion says nothing of it."""
+        """Return the result where the rotation is not observable."""
         return cls(np.eye(3), np.zeros(3), np.pi**2 * np.eye(3), 0.0)
 
     @property
     def sd_deg(self) -> Array:
-        """About each axis of the first unit, (3,), deg."""
+        """Standard deviation about each axis of the first unit, (3,), deg."""
         return np.asarray(np.degrees(np.sqrt(np.diag(self.covariance))), dtype=np.float64)
 
 
@@ -91,11 +91,11 @@ def mounting_rotation(first: VelocityIncrements, second: VelocityIncrements) -> 
 
     Notes
     -----
-    The rotation of least squares (Wahba 1965, doi:10.1137/1007077) by singular values (Markley
-    1988, J. Astronaut. Sci. 36, 245), forces and rates weighed by their stated variances; then
-    steps of Gauss and Newton with the whole covariances, since a bias is the same in every
-    piece. Its covariance is the inverse of their normal matrix. Rates of a gyro that both share
-    are left out.
+    The least-squares rotation (Wahba 1965, doi:10.1137/1007077) by singular values (Markley
+    1988, J. Astronaut. Sci. 36, 245), forces and rates weighted by their stated variances; then
+    Gauss-Newton steps with the full covariances, since a bias is common to all intervals. The
+    covariance of the estimate is the inverse of the normal matrix. Rates of a shared gyro are
+    left out.
     """
     C = _wahba(first, second)
     normal, step, square = np.eye(3), np.zeros(3), 0.0
@@ -117,13 +117,13 @@ def mounting_rotation(first: VelocityIncrements, second: VelocityIncrements) -> 
 def _observed(
     first: VelocityIncrements, second: VelocityIncrements
 ) -> list[tuple[Array, Array, str]]:
-    """Forces, and rates where they are not of one gyro."""
+    """Return forces, and rates unless both units share one gyro."""
     rates = [] if first.borrows(second) else [(first.turned, second.turned, "rate")]
     return [(first.values, second.values, "force"), *rates]
 
 
 def _wahba(first: VelocityIncrements, second: VelocityIncrements) -> Array:
-    """Rotation of least squares, each kind of vector with one variance."""
+    """Least-squares rotation with one variance for each kind of vector."""
     product = np.zeros((3, 3))
     for a, b, of in _observed(first, second):
         variance = float(np.trace(difference_covariance(first, second, of=of, without=_TURN)))
@@ -135,7 +135,7 @@ def _wahba(first: VelocityIncrements, second: VelocityIncrements) -> Array:
 def _refine(
     first: VelocityIncrements, second: VelocityIncrements, C: Array
 ) -> tuple[Array, Array, float]:
-    """Normal matrix, small rotation and chi-square of the residuals, by all covariances."""
+    """Normal matrix, small rotation and chi-square of the residuals, with full covariances."""
     normal, right, square = np.zeros((3, 3)), np.zeros(3), 0.0
     for a, b, of in _observed(first, second):
         turned = b @ C.T
@@ -153,19 +153,19 @@ def _refine(
 def rotation_findings(
     found: MountingRotation, stated_sd: float, first: str, second: str
 ) -> list[Finding]:
-    """A rotation between the units that their mounting does not explain.
+    """Report a rotation between the units beyond the stated mounting uncertainty.
 
     Parameters
     ----------
     found : MountingRotation
     stated_sd : float, rad
-        Of each angle between the two, as stated.
+        Stated standard deviation of each angle between the two.
     first, second : str
 
     Returns
     -------
     list of Finding
-        Empty where it is within four standard deviations, or not known.
+        Empty where it is within four standard deviations, or unknown.
     """
     vector = np.radians(found.vector_deg)
     values, vectors = np.linalg.eigh(found.covariance)
@@ -193,15 +193,15 @@ def rotation_findings(
     ]
 
 
-# The distance of two units on one vehicle, from how their forces differ while it turns.
+# Lever arm between two units, from the difference of their forces while the vehicle turns.
 
-# A direction that is known worse than this is not told by the motion.
+# Directions with a larger standard deviation count as unobserved.
 LEVER_ARM_CHECK_MOST_SD = 0.1  # m
 
 
 @dataclass(frozen=True, eq=False)
 class LeverArmCheck:
-    """By how much the true distance of two units differs from the stated.
+    """Correction of the stated lever arm between two units.
 
     Attributes
     ----------
@@ -209,11 +209,11 @@ class LeverArmCheck:
         To be added to the stated (position of the first minus position of the second), vehicle
         axes; meaningful along `told` only.
     directions : ndarray, (3, 3)
-        Columns: directions in which the estimate is uncorrelated, the best known first.
+        Columns: directions in which the estimate is uncorrelated, the most certain first.
     sd : ndarray, (3,), m
-        Along each of them; infinite where the vehicle did not turn.
+        Along each of these; infinite where the vehicle did not turn.
     told : ndarray of bool, (3,)
-        Whether that is better than 0.1 m.
+        Whether the standard deviation is below 0.1 m.
     misfit : float
         Root of the residuals' chi-square over its degrees of freedom; where it exceeds one, the
         sds were multiplied by it.
@@ -227,12 +227,12 @@ class LeverArmCheck:
 
     @classmethod
     def untold(cls) -> LeverArmCheck:
-        """Of units whose motion says nothing of their distance."""
+        """Return the result where the lever arm is not observable."""
         return cls(np.zeros(3), np.eye(3), np.full(3, np.inf), np.zeros(3, dtype=bool), 0.0)
 
 
 def check_lever_arm(first: VelocityIncrements, second: VelocityIncrements) -> LeverArmCheck:
-    """Estimate how far the stated positions of two units are off.
+    """Estimate the error of the stated relative position of two units.
 
     Parameters
     ----------
@@ -245,11 +245,11 @@ def check_lever_arm(first: VelocityIncrements, second: VelocityIncrements) -> Le
 
     Notes
     -----
-    Units that were moved with positions that are off by e₁ and e₂ (true minus stated) differ by
-    ``([α×] + [ω×]²) (e₁ - e₂)``: generalised least squares, with noise and every unknown of
-    both but for the positions as covariance. ``[α×] + [ω×]²`` has no word on the axis of a turn
-    that keeps its direction: the normal matrix tells which directions are seen. Noise of the
-    angular acceleration pulls the estimate towards zero by its share of the signal's power.
+    Units moved with position errors e₁ and e₂ (true minus stated) differ by
+    ``([α×] + [ω×]²) (e₁ - e₂)``: generalized least squares, with noise and all unknowns of
+    both except the positions as covariance. The component along a fixed axis of rotation is not
+    observable; the normal matrix shows which directions are. Noise of the angular acceleration
+    biases the estimate toward zero by its share of the signal power.
     """
     shares = [v.lever for v in (first, second) if v.lever.any()]
     if not shares:
@@ -274,13 +274,13 @@ def check_lever_arm(first: VelocityIncrements, second: VelocityIncrements) -> Le
 def lever_arm_findings(
     check: LeverArmCheck, stated_sd: float, stated: Array, first: str, second: str
 ) -> list[Finding]:
-    """Positions that the motion contradicts; silent where it does not tell.
+    """Report positions that the motion contradicts; empty where they are not observable.
 
     Parameters
     ----------
     check : LeverArmCheck
     stated_sd : float, m
-        Of each coordinate of the distance.
+        Stated standard deviation of each coordinate of the relative position.
     stated : ndarray, (3,), m
         Position of the first minus that of the second.
     first, second : str
@@ -314,34 +314,34 @@ def lever_arm_findings(
     return found
 
 
-# Swapped and inverted axes, seen by a second unit on the same vehicle.
+# Swapped and inverted axes, detected with a second unit on the same vehicle.
 
 
-# What the best is ahead of another by: of this much the other is still possible, of this much
-# it is not (differences of chi-square, 3 and 5 standard deviations).
+# Differences of chi-square to the best candidate: below the first another is still possible,
+# above the second it is excluded (3 and 5 standard deviations).
 POSSIBLE, EXCLUDED = 9.0, 25.0
-# Where the stated axes fit this well, no others are looked for: where nothing turns, one of 48
-# fits noise better by chance.
+# Where the stated axes fit with this probability, others are not searched: without rotation, one
+# of 48 candidates fits noise better by chance.
 FITS = 1e-3
 AXES = ("forward", "right", "down")
 
 
 @dataclass(frozen=True, eq=False)
 class AxisMatch:
-    """Which signed permutation of a unit's axes agrees best with another unit.
+    """Signed permutation of a unit's axes that agrees best with another unit.
 
     Attributes
     ----------
     accelerometers, gyro : ndarray, (3, 3)
-        Turns what the second one reads into what the first one reads; the identity where they
-        agree, or where the motion does not tell.
+        Maps the readings of the second unit to the axes of the first; the identity where they
+        agree or where the motion cannot decide.
     accelerometers_lead, gyro_lead : float
-        Chi-square by which the identity is worse than that; zero for the identity.
+        Excess chi-square of the identity over this permutation; zero for the identity.
     accelerometers_sure, gyro_sure : float
-        Probability of it among all 48, each as likely before.
+        Posterior probability among all 48 with equal priors.
     ambiguous : tuple of str
-        Axes of the first unit about which the accelerometers do not tell: others fit within
-        three standard deviations.
+        Axes of the first unit that the accelerometers leave ambiguous: other permutations fit
+        within three standard deviations.
     """
 
     accelerometers: Array
@@ -354,7 +354,7 @@ class AxisMatch:
 
     @classmethod
     def untold(cls) -> AxisMatch:
-        """Of units whose motion says nothing of it."""
+        """Return the result where the axes are not observable."""
         return cls(np.eye(3), np.eye(3), 0.0, 0.0, 0.0, 0.0, AXES)
 
     @property
@@ -371,7 +371,7 @@ class AxisMatch:
 
 
 def signed_permutations() -> Array:
-    """All 48 matrices with one ±1 in each row and column; 24 of them are rotations."""
+    """All 48 matrices with one ±1 in each row and column; 24 are rotations."""
     found = []
     for order in itertools.permutations(range(3)):
         for signs in itertools.product((1.0, -1.0), repeat=3):
@@ -387,7 +387,8 @@ def match_axes(first: VelocityIncrements, second: VelocityIncrements) -> AxisMat
     Parameters
     ----------
     first, second : VelocityIncrements
-        Between the same edges; gravity is in them, so that a rest within tells up from down.
+        Between the same edges; gravity is included, so that a stationary interval separates up
+        from down.
 
     Returns
     -------
@@ -395,14 +396,14 @@ def match_axes(first: VelocityIncrements, second: VelocityIncrements) -> AxisMat
 
     Notes
     -----
-    Least squares over the pieces with the whole covariance of the difference, since a bias is the
-    same in every piece. What the least residuals exceed it by is added to every piece alike: moved
-    by wrong rates, or with forces that were wrong before they were moved, nothing fits. Among
-    permutations that cannot be told apart the one nearest to the identity is taken, and the
-    identity where it fits with a probability of 1e-3 or more. Accelerometers
-    and gyros are judged apart, since either may be wired wrong; a rigid body turns everywhere
-    alike, and its forces agree after both are moved to one point, to which a wrong axis of the
-    gyro does harm, too. A gyro that both share is not judged.
+    Least squares over the intervals with the full covariance of the difference, since a bias is
+    common to all intervals. The excess of the smallest residuals is added to every interval alike:
+    after moving with wrong rates, or forces that were wrong before moving, no permutation fits.
+    Among indistinguishable permutations the one nearest to the identity is taken, and the identity
+    where it fits with a probability of 1e-3 or more. Accelerometers and gyros are judged
+    separately, since either may be wired wrong: the angular rate of a rigid body is the same
+    everywhere, while forces agree only after both are moved to one point, which a wrong gyro axis
+    also disturbs. A shared gyro is not judged.
     """
     accel, lead, sure, other = _best(first, second, "force")
     if first.borrows(second):
@@ -443,7 +444,7 @@ def _best(
 
 
 def axis_findings(match: AxisMatch, first: str, second: str) -> list[Finding]:
-    """Axes that are swapped or inverted, in words; empty where they agree.
+    """Report swapped or inverted axes; empty where they agree.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The path of the reference point near a crash, with its attitude and what is not known of it."""
+"""Path and attitude of the reference point near a crash, with linear covariance."""
 
 from __future__ import annotations
 
@@ -32,32 +32,32 @@ from strapdown.tables import VELOCITY as VELOCITIES
 
 Array = NDArray[np.float64]
 
-#: What the columns of an error are, in its order.
+#: Columns of an error, in order.
 ERROR = ["phi_n", "phi_e", "phi_d", *VELOCITIES, *NED]
 
 
 @dataclass(frozen=True, eq=False)
 class CrashPath:
-    """The path over a window, its linear covariance, and what makes it.
+    """Path over a window, with its linear covariance and integration segments.
 
     Attributes
     ----------
     time : ndarray, (n,), s
-        From the common trigger.
+        Time from the common trigger.
     anchor : int
-        The sample nearest to the entry; forward after it, backward before it.
+        Index of the sample nearest to the entry; integration runs forward and backward from it.
     entry : Entry
     table : DataFrame
-        Indexed by time: ``north east down`` m, from the reference point's place at the entry;
+        Indexed by time: ``north east down`` m, relative to the reference point at the entry;
         ``VN VE VD`` m/s; ``roll pitch heading`` deg.
     q_nb : ndarray, (n, 4)
     names, contributors : tuple of str
-        Of p unknowns, and the line of the budget that each belongs to.
+        Of the p unknowns, and the line of the error budget that each belongs to.
     errors : ndarray, (p, n, 9)
-        What one standard deviation of each does to attitude (rotation vector in local level,
-        rad), velocity (m/s) and place (m).
+        Effect of one standard deviation of each on attitude (rotation vector in local level,
+        rad), velocity (m/s) and position (m).
     noise_covariance : ndarray, (n, 9, 9)
-        Of what is independent from sample to sample.
+        Part that is independent from sample to sample.
     start : ndarray, (p, 9)
         `errors` at the entry.
     legs : tuple of Leg
@@ -81,7 +81,7 @@ class CrashPath:
 
     @cached_property
     def covariance(self) -> Array:
-        """Covariance of attitude (rad), velocity (m/s) and place (m), (n, 9, 9)."""
+        """Covariance of attitude (rad), velocity (m/s) and position (m), (n, 9, 9)."""
         systematic = np.einsum("pni,pnj->nij", self.errors, self.errors)
         return np.asarray(systematic + self.noise_covariance)
 
@@ -89,7 +89,7 @@ class CrashPath:
     def sd(self) -> pd.DataFrame:
         """Standard deviations: ``north east down`` m, ``VN VE VD`` m/s, ``roll pitch heading`` deg.
 
-        Of the angles to first order, away from a pitch of 90 deg.
+        Angles to first order, away from a pitch of 90 deg.
         """
         root = np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
         angles = angles_sd(self.table[EULER], self.covariance[:, ATTITUDE, ATTITUDE])
@@ -97,7 +97,7 @@ class CrashPath:
         return pd.DataFrame(values, index=self.table.index, columns=[*NED, *VELOCITIES, *EULER])
 
     def variances(self, row: int = -1) -> pd.DataFrame:
-        """Variance that each contributor adds at a sample.
+        """Variance contributed by each contributor at a sample.
 
         Parameters
         ----------
@@ -106,13 +106,13 @@ class CrashPath:
         Returns
         -------
         DataFrame
-            Indexed by contributor, columns as `ERROR`: rad², (m/s)², m². Its sums are the
-            diagonal of `covariance`.
+            Indexed by contributor, columns as `ERROR`: rad², (m/s)², m². The column sums are
+            the diagonal of `covariance`.
 
         Raises
         ------
         ConfigError
-            There is no such sample.
+            The sample does not exist.
         """
         if not -len(self.time) <= row < len(self.time):
             raise ConfigError("crash.no-sample", quantity="row", at_row=row, count=len(self.time))
@@ -131,29 +131,29 @@ def reconstruct_path(
     mechanization: NorthEastDown | None = None,
     zeroed_at_rest: bool = False,
 ) -> CrashPath:
-    """Navigate from the entry forward and backward, and grow what is not known along the way.
+    """Navigate from the entry forward and backward, and propagate the uncertainty.
 
     Parameters
     ----------
     imu : DataFrame
         Imu table of the reference point, vehicle axes, time from the common trigger.
     effects : SampleEffects
-        Of its unknowns, on the same samples.
+        Effects of the unknowns, on the same samples.
     levelling : Levelling
         Roll and pitch at `level_time`.
     level_time : float, s, or None
-        End of the stretch that the vehicle was levelled on; the gyros carry the attitude from
-        there to the entry. None: roll and pitch are those at the entry.
+        End of the interval used for leveling; the gyros carry the attitude from there to the
+        entry. None: roll and pitch are those at the entry.
     entry : Entry or None
-        None: the velocity follows from a vehicle that stood still until `level_time`, the path
-        is tied to time zero, and told in axes of the vehicle there.
+        None: the vehicle was stationary until `level_time`, which gives the velocity; the path
+        starts at time zero, in axes of the vehicle at that time.
     window : (float, float), s, optional
-        The path is given over the samples within, and those from there to the entry; -0.1 to
-        0.75 s, as far as the record has them, if not given.
+        The path covers the samples within, and those from there to the entry; by default -0.1
+        to 0.75 s, as far as recorded.
     mechanization : NorthEastDown, optional
     zeroed_at_rest : bool
-        The mean of the rates up to `level_time` was taken off as bias, and with it the Earth's
-        rate, as it was felt there.
+        The mean rate up to `level_time` was subtracted as bias, and with it the Earth rate
+        in the attitude at that time.
 
     Returns
     -------
@@ -162,23 +162,23 @@ def reconstruct_path(
     Raises
     ------
     DataError
-        The record does not hold the window or the entry; there is no velocity to begin with.
+        The record does not contain the window or the entry, or the initial velocity is unknown.
     DivergenceError
         As `make_leg`.
 
     Notes
     -----
-    An error is the truth less what is computed, ``C_true = (I + [phi x]) C`` (Tadic and
-    Vukajlovic 2016, Eq. (20)). Heading is defined at the entry: what the gyros do to it before
-    does not count. A specific force that is wrong by df at rest tilts the level by
-    ``phi_e = df_n / g, phi_n = -df_e / g``: its horizontal part comes back with the opposite
-    sign, and shows in the path only as far as the vehicle turns.
+    Error = true - computed, ``C_true = (I + [phi x]) C`` (Tadic and
+    Vukajlovic 2016, Eq. (20)). Heading is defined at the entry: earlier gyro errors do not
+    affect it. A specific-force error df while stationary tilts the level by
+    ``phi_e = df_n / g, phi_n = -df_e / g``: its horizontal part returns with the opposite sign
+    and appears in the path only as far as the vehicle turns.
     """
     time = imu.index.to_numpy(dtype=np.float64)
     mechanization = mechanization or NorthEastDown()
     origin = entry or Entry(time=0.0, velocity=(0.0, 0.0, 0.0), heading_deg=0.0)
     first, anchor, last = path_rows(imu, origin.time, window)
-    # Without an entry the velocity is that of the sample, whatever instant it is called.
+    # Without an entry the velocity belongs to the sample, at whatever instant.
     there = to_stamp(imu, effects, float(time[anchor]) if entry is None else origin.time, anchor)
     if origin.attitude_deg is not None:
         stated = _state(origin, *origin.attitude_deg, float(time[anchor]))
@@ -220,9 +220,9 @@ def reconstruct_path(
 
 @dataclass(frozen=True, eq=False)
 class _Begin:
-    """The state at the entry, the errors that sensors and levelling have put on it, their names.
+    """State at the entry, its errors from sensors and leveling, and their names.
 
-    And the rate that is missing from all samples, vehicle axes.
+    Includes the rate missing from all samples, vehicle axes.
     """
 
     state: NavState
@@ -261,7 +261,7 @@ def _carried(
     mechanization: NorthEastDown,
     zeroed: bool,
 ) -> _Begin:
-    """Carry the attitude from where the vehicle was levelled to the entry, and its errors."""
+    """Propagate the attitude and its errors from the leveling to the entry."""
     time = imu.index.to_numpy(dtype=np.float64)
     at = anchor if level_time is None else int(np.searchsorted(time, level_time - 1e-9))
     if at > anchor:
@@ -281,7 +281,7 @@ def _carried(
     still = replace(origin, velocity=(0.0, 0.0, 0.0), heading_deg=0.0)
     begin = _state(still, levelling.roll_deg, levelling.pitch_deg, float(time[at]))
     turning = earth_rate(origin.lat_deg, ellipsoid=find_ellipsoid(mechanization.ellipsoid))
-    # The mean of the rates at rest, which was taken off, had the Earth's in it.
+    # The mean stationary rate that was subtracted contains the Earth rate.
     felt = rotation.rotate(rotation.conjugate(begin.q_nb), turning) if zeroed else np.zeros(3)
     leg = make_leg(
         mechanization, begin, _turning(imu, felt), effects, slice(at, anchor + 1), backward=False
@@ -295,7 +295,7 @@ def _carried(
     twist = np.kron(np.eye(3), turn)
     errors, noise = errors @ twist.T, twist @ noise @ twist.T
     velocity = turn @ leg.nominal[-1, V : V + 3] if entry is None else np.array(origin.velocity)
-    # Heading is defined here: an error of it is one of the axes that the path is told in.
+    # The path is expressed relative to the heading here: a heading error rotates its axes.
     own = np.eye(9)
     own[3:6, 2] = -np.cross([0.0, 0.0, 1.0], velocity)
     own[2, 2] = 0.0
@@ -327,7 +327,7 @@ def _carried(
 
 
 def _turning(imu: pd.DataFrame, rate: Array) -> pd.DataFrame:
-    """An Imu table with a rate added to its own, (3,), rad/s."""
+    """An Imu table with a constant rate added, (3,), rad/s."""
     if not rate.any():
         return imu
     out = imu.copy()
@@ -339,7 +339,7 @@ def _turning(imu: pd.DataFrame, rate: Array) -> pd.DataFrame:
 def _padded(
     effects: SampleEffects, more: int, constants: Sequence[Sequence[float]]
 ) -> SampleEffects:
-    """Effects with unknowns that act on no sample, and others that act on all alike."""
+    """Effects extended by unknowns that act on no sample, and by ones common to all samples."""
     n = len(effects.force_noise)
     each = np.array([c if len(c) else (0.0,) * 6 for c in constants]).reshape(-1, 1, 6)
     none, rest = np.zeros((more, n, 3)), np.tile(each, (1, n, 1))
@@ -365,7 +365,7 @@ def _joined(
         [np.degrees(states[:, LAT]), np.degrees(states[:, LON]), states[:, ALT]]
     )
     moved = frames.place_difference(place, np.broadcast_to(place[anchor], place.shape))
-    # The entry may lie between two samples.
+    # The entry may be between two samples.
     between = 0.5 * (np.asarray(entry.velocity) + states[anchor, V : V + 3])
     moved = moved + (time[anchor] - entry.time) * between
     q_nb = states[:, Q : Q + 4]
@@ -388,15 +388,15 @@ def _states(leg: IntegrationSegment) -> Array:
     return states
 
 
-# The samples of a record that a path is given at.
+# Range of samples that a path covers.
 
 
-#: Where a path is wanted if nothing is said, s from the trigger: Tadic and Vukajlovic (2016).
+#: Default window of a path, s from the trigger: Tadic and Vukajlovic (2016).
 WINDOW = (-0.1, 0.75)
 
 
 def path_rows(imu: pd.DataFrame, at: float, window: Sequence[float] | None) -> tuple[int, int, int]:
-    """Find the first, the entry's and the last sample of a path.
+    """Find the first sample, the entry sample and the last sample of a path.
 
     Parameters
     ----------
@@ -404,17 +404,17 @@ def path_rows(imu: pd.DataFrame, at: float, window: Sequence[float] | None) -> t
     at : float, s
         Instant of the entry.
     window : (float, float), s, optional
-        `WINDOW`, as far as there is a record, if not given.
+        By default `WINDOW`, as far as recorded.
 
     Returns
     -------
     first, anchor, last : int
-        The entry's is the sample nearest to it, and within the path in any case.
+        The entry sample is the one nearest to the entry, and always within the path.
 
     Raises
     ------
     DataError
-        The record does not hold the entry or the window.
+        The record does not contain the entry or the window.
     """
     time = imu.index.to_numpy(dtype=np.float64)
     slack = 1e-9 + 0.5 * float(np.median(np.diff(time))) if len(time) > 1 else 0.0
@@ -429,7 +429,7 @@ def path_rows(imu: pd.DataFrame, at: float, window: Sequence[float] | None) -> t
         )
     begin, end = (float(x) for x in (_usual(time, at) if window is None else window))
     if not begin < end or begin < time[0] - slack or end > time[-1] + slack:
-        # What both have, in whole ms.
+        # Intersection of record and window, in whole ms.
         low = max(begin, math.ceil(1e3 * float(time[0])) / 1e3)
         high = min(end, math.floor(1e3 * float(time[-1])) / 1e3)
         raise DataError(
@@ -450,30 +450,30 @@ def path_rows(imu: pd.DataFrame, at: float, window: Sequence[float] | None) -> t
 
 
 def _usual(time: Array, at: float) -> tuple[float, float]:
-    """The usual window, as far as there is a record; the entry is within in any case."""
+    """The default window as far as recorded; always contains the entry."""
     return (
         min(max(WINDOW[0], float(time[0])), at),
         max(min(WINDOW[1], float(time[-1])), at + 1e-6),
     )
 
 
-# From the instant of an entry to the sample nearest to it: at most half a step.
+# Integration from the instant of an entry to the nearest sample: at most half a step.
 
 
 @dataclass(frozen=True, eq=False)
 class ToStamp:
-    """What happens from the instant of an entry to a sample.
+    """Motion from the instant of an entry to a sample.
 
     Attributes
     ----------
     length : float, s
-        Negative where the sample is the earlier one.
+        Negative where the sample is earlier.
     turn : ndarray, (3,), rad
         Rotation vector of the body, body axes.
     push : ndarray, (3,), m/s
-        Integral of the specific force, in the body axes in the middle.
+        Integral of the specific force, in body axes at mid-interval.
     turn_errors, push_errors : ndarray, (p, 3)
-        What one standard deviation of each unknown adds to them.
+        Effect of one standard deviation of each unknown on them.
     """
 
     length: float
@@ -500,25 +500,25 @@ class ToStamp:
         return np.asarray(self.felt(q_nb) + np.array([0.0, 0.0, GRAVITY * self.length]))
 
     def carried(self, errors: Array, q_nb: Array, *, turned: bool) -> Array:
-        """Errors at the sample from those at the entry.
+        """Propagate errors from the entry to the sample.
 
         Parameters
         ----------
         errors : ndarray, (p, 9)
-            Rotation vector in local level, velocity, place; the unknowns of the samples first.
+            Rotation vector in local level, velocity, position; unknowns of the samples first.
         q_nb : ndarray, (4,)
-            At the sample.
+            Attitude at the sample.
         turned : bool
-            The attitude is that of the entry too; otherwise it is the sample's already.
+            Whether the attitude error is that at the entry; otherwise it is that at the sample.
 
         Returns
         -------
         ndarray, (p, 9)
-            To first order. Of the place, what grows in half a step is left out.
+            First order. Position growth within half a step is neglected.
         """
         out, own = errors.copy(), slice(0, len(self.turn_errors))
         C = rotation.dcm_from_quaternion(q_nb)
-        # phi x f, of every row.
+        # phi x f, for every row.
         out[:, 3:6] += errors[:, :3] @ cross_matrix(self.felt(q_nb))
         out[own, 3:6] += self.push_errors @ C.T
         if turned:
@@ -527,16 +527,16 @@ class ToStamp:
 
 
 def to_stamp(imu: pd.DataFrame, effects: SampleEffects, instant: float, row: int) -> ToStamp:
-    """Integrate from an instant between two samples to one of them.
+    """Integrate from an instant between two samples to one of these samples.
 
     Parameters
     ----------
     imu : DataFrame
-        Imu table; between its samples as `window_weights` says.
+        Imu table; interpolated as in `window_weights`.
     effects : SampleEffects
         On the same samples.
     instant : float, s
-        Before the first or after the last sample, these hold on.
+        Before the first or after the last sample, its values are held.
     row : int
         Of the sample.
     """

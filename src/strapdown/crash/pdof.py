@@ -1,4 +1,4 @@
-"""Principal direction of force: where it came from, and its first-order uncertainty."""
+"""Principal direction of force and its first-order uncertainty."""
 
 from __future__ import annotations
 
@@ -83,14 +83,14 @@ class NedPdof:
 
 
 def vector_of(change: DeltaV | ArrayLike, frames: Sequence[str]) -> Array:
-    """Three components of a delta-V that have a direction.
+    """Return the three components of a delta-V with a direction.
 
     Raises
     ------
     ConfigError
-        It is in another frame.
+        The frame is another one.
     DataError
-        They are not three finite numbers, or all zero.
+        The components are not three finite numbers, or all zero.
     """
     if isinstance(change, DeltaV) and change.frame not in frames:
         raise ConfigError(
@@ -104,7 +104,7 @@ def vector_of(change: DeltaV | ArrayLike, frames: Sequence[str]) -> Array:
 
 def _angles(vector: Array) -> tuple[float, float]:
     x, y, z = vector.tolist()
-    # 0 - y and not -y: a change without a lateral part is from behind at +180 deg, not -180.
+    # 0 - y and not -y: a change without lateral component is from behind at +180 deg, not -180.
     horizontal = math.degrees(math.atan2(0.0 - y, 0.0 - x))
     return horizontal, math.degrees(math.atan2(z, math.hypot(x, y)))
 
@@ -121,15 +121,15 @@ def pdof(change: DeltaV | ArrayLike) -> Pdof:
     -------
     Pdof
         ``horizontal = atan2(-dV_y, -dV_x)``, ``vertical = atan2(dV_z, hypot(dV_x, dV_y))``.
-        Where the change is vertical the horizontal direction is 0 and means nothing;
-        `pdof_interval` says so.
+        For a vertical change the horizontal direction is 0 and undefined, which
+        `pdof_interval` reports.
 
     Raises
     ------
     ConfigError
         The change is in north-east-down.
     DataError
-        It is zero, or no three finite numbers.
+        The change is zero, or not three finite numbers.
     """
     return Pdof(*_angles(vector_of(change, ("body", "impact"))))
 
@@ -153,14 +153,14 @@ def ned_pdof(change: DeltaV | ArrayLike, heading_deg: float) -> NedPdof:
     ConfigError
         The change is along vehicle axes.
     DataError
-        It is zero, or no three finite numbers; or the heading is not finite.
+        The change is zero, or not three finite numbers; or the heading is not finite.
     """
     if not math.isfinite(heading_deg):
         raise DataError("crash.no-heading", quantity="heading", heading_deg=heading_deg)
     azimuth, vertical = _angles(vector_of(change, ("ned",)))
     relative = float(within_half_turn(np.array([azimuth - heading_deg]))[0])
     full = azimuth % 360.0
-    # A tiny negative angle is rounded up to 360 by the remainder.
+    # The remainder rounds a tiny negative angle up to 360.
     return NedPdof(0.0 if full >= 360.0 else full, relative, vertical)
 
 
@@ -202,13 +202,13 @@ def pdof_sd(change: DeltaV | ArrayLike, covariance: ArrayLike) -> tuple[float, f
     Returns
     -------
     horizontal_sd, vertical_sd : float, deg
-        ``sqrt(G P G^T)``. Right while the change is large against its uncertainty; `pdof_interval`
-        needs no such condition.
+        ``sqrt(G P G^T)``. Valid while the change is large compared with its uncertainty;
+        `pdof_interval` has no such condition.
 
     Raises
     ------
     DataError
-        As `pdof_gradient`; or `covariance` is none.
+        As `pdof_gradient`; or `covariance` is not a covariance.
     """
     gradient = pdof_gradient(change)
     spread = gradient @ covariance_of(covariance) @ gradient.T
@@ -221,7 +221,7 @@ def covariance_of(given: ArrayLike) -> Array:
     Raises
     ------
     DataError
-        It is not (3, 3), symmetric, finite and without a negative variance.
+        The matrix is not (3, 3), symmetric, finite and without a negative variance.
     """
     matrix = np.asarray(given, dtype=np.float64)
     good = matrix.shape == (3, 3) and bool(np.isfinite(matrix).all())
@@ -236,23 +236,23 @@ def covariance_of(given: ArrayLike) -> Array:
     return 0.5 * (matrix + matrix.T)
 
 
-# Other ways in which a direction of force is written.
+# Other conventions for a direction of force.
 
 
 @dataclass(frozen=True)
 class PdofConvention:
-    """How a horizontal direction is written.
+    """Convention for a horizontal direction.
 
     Attributes
     ----------
     meaning : str
-        For people, with the source.
+        Description for users, with the source.
     to : bool
-        The direction in which the force pushes, and not that which it comes from.
+        Direction in which the force pushes, instead of the one from which it comes.
     clockwise : bool
         Seen from above.
     full_turn : bool
-        In [0, 360), and not in (-180, 180].
+        In [0, 360) instead of (-180, 180].
     """
 
     meaning: str
@@ -261,7 +261,7 @@ class PdofConvention:
     full_turn: bool = False
 
 
-#: Zero is ahead in all of them.
+#: Zero is ahead in all conventions.
 CONVENTIONS: dict[str, PdofConvention] = {
     "strapdown": PdofConvention(
         "the direction the force came from, clockwise, -180 to 180: 90 from the right"
@@ -308,7 +308,7 @@ def _convention(name: str) -> PdofConvention:
 
 
 def to_convention(horizontal_deg: float, name: str) -> float:
-    """Write a direction in another convention.
+    """Convert a direction to another convention.
 
     Parameters
     ----------
@@ -332,7 +332,7 @@ def to_convention(horizontal_deg: float, name: str) -> float:
 
 
 def from_convention(angle_deg: float, name: str) -> float:
-    """Read a direction that is written in another convention.
+    """Convert a direction from another convention.
 
     Parameters
     ----------
@@ -368,7 +368,7 @@ def clock_of(horizontal_deg: float) -> int:
     int
         The nearest hour, each 30 deg wide: 12 is the front, 3 the right (the clock of the
         Collision Deformation Classification, SAE J224, columns 1 and 2). A direction on the
-        border belongs to the hour clockwise of it: 15 deg is 1 o'clock, 345 deg is 12.
+        border belongs to the next hour clockwise: 15 deg is 1 o'clock, 345 deg is 12.
 
     Raises
     ------
@@ -389,12 +389,12 @@ def direction_of_clock(hour: int) -> float:
     Returns
     -------
     float, deg
-        Within 15 deg of the direction that was coded.
+        Within 15 deg of the coded direction.
 
     Raises
     ------
     ConfigError
-        It is no hour.
+        The number is not an hour from 1 to 12.
     """
     if hour not in range(1, 13):
         raise ConfigError("crash.no-hour", quantity="clock", hour=hour)
@@ -405,7 +405,7 @@ def _wrapped(angle: float, full_turn: bool) -> float:
     turned = math.fmod(angle, 360.0)
     if full_turn:
         turned += 360.0 if turned < 0.0 else 0.0
-        # A tiny negative angle is rounded up to 360.
+        # The remainder rounds a tiny negative angle up to 360.
         return 0.0 if turned >= 360.0 else turned + 0.0
     if turned > 180.0:
         turned -= 360.0
@@ -420,20 +420,20 @@ def _finite(angle: float) -> float:
     return float(angle)
 
 
-# Interval of a direction of force that keeps its coverage where the delta-V is small.
+# Interval of the direction of force with correct coverage also for a small delta-V.
 
 
 @dataclass(frozen=True)
 class AngleInterval:
-    """All directions that the measurement does not contradict.
+    """All directions consistent with the measurement.
 
     Attributes
     ----------
     low_deg, high_deg : float, deg
-        Counted on from the estimate, so that ``low <= estimate <= high`` and either may lie
+        Continuous about the estimate, so that ``low <= estimate <= high``; either may lie
         beyond 180. The whole range where `undetermined`.
     undetermined : bool
-        No direction is contradicted: the change of velocity may be zero.
+        No direction can be excluded: the change of velocity may be zero.
     """
 
     low_deg: float
@@ -446,7 +446,7 @@ class AngleInterval:
         return self.high_deg - self.low_deg
 
     def contains(self, angle_deg: float) -> bool:
-        """Whether an angle, or that plus full turns, is within."""
+        """Whether the interval contains an angle, up to full turns."""
         return self.undetermined or (angle_deg - self.low_deg) % 360.0 <= self.width_deg
 
 
@@ -458,7 +458,7 @@ class PdofInterval:
     ----------
     horizontal, vertical : AngleInterval
     level : float
-        Share of cases in which each contains the truth.
+        Coverage probability of each.
     """
 
     horizontal: AngleInterval
@@ -474,7 +474,7 @@ def pdof_interval(
     Parameters
     ----------
     change : DeltaV or array_like, (3,), m/s
-        In any frame; of north-east-down the horizontal interval is that of the azimuth.
+        In any frame; for north-east-down the horizontal interval is that of the azimuth.
     covariance : array_like, (3, 3), m²/s²
         Of its error, taken as normal.
     level : float
@@ -484,28 +484,28 @@ def pdof_interval(
     -------
     PdofInterval
         The horizontal interval has the coverage `level` for every true change and covariance:
-        exactly, but for the chance that the estimate points away from the truth by more than a
-        right angle (in the metric of the covariance), which is below 1e-4 where the change is
-        four standard deviations long. Where it may be zero the interval is the whole circle and
-        says `undetermined`. The vertical interval is the same construction in the vertical plane
-        through the estimate, within [-90, 90]; it neglects the error of the horizontal
+        exactly, except for the chance that the estimate points away from the truth by more than
+        a right angle (in the metric of the covariance), which is below 1e-4 where the change is
+        four standard deviations long. Where the change may be zero the interval is the whole
+        circle and `undetermined`. The vertical interval is the same construction in the vertical
+        plane through the estimate, within [-90, 90]; it neglects the error of the horizontal
         direction, of second order.
 
     Raises
     ------
     ConfigError
-        `level` is no probability.
+        `level` is not between 0 and 1.
     DataError
-        The change is zero or not finite, or the covariance is none.
+        The change is zero or not finite, or the covariance is not valid.
 
     Notes
     -----
     Fieller's theorem (Fieller 1954, J. R. Stat. Soc. B 16, 175-185). A direction u, (2,), is
-    contradicted where the component of the change m across it, n(u) m, which is normal with
-    variance n P n and mean zero if u is the truth, is beyond z standard deviations: the
-    interval is ``{u: (n m)² <= z² n P n}``, z = 1.96 for 95 %. This is the angle under which the
-    ellipse ``(x - m) P^-1 (x - m) <= z²`` is seen from the origin. Note z² = 3.84, of one degree of
-    freedom; the 95 % ellipse of the two components (5.99) would cover 98.6 %. Linearised,
+    excluded where the component of the change m across it, n(u) m, which is normal with
+    variance n P n and mean zero if u is the truth, exceeds z standard deviations: the
+    interval is ``{u: (n m)² <= z² n P n}``, z = 1.96 for 95 %. This is the angle subtended at the
+    origin by the ellipse ``(x - m) P^-1 (x - m) <= z²``. Note z² = 3.84, for one degree of
+    freedom; the 95 % ellipse of the two components (5.99) would cover 98.6 %. Linearized,
     `pdof_sd` times z is the same for small angles.
     """
     if not 0.0 < level < 1.0:
@@ -532,25 +532,25 @@ def pdof_interval(
 
 
 def _fieller(mean: Array, spread: Array, z: float) -> tuple[float, float] | None:
-    """Directions, in deg about that of the mean, that are not contradicted; None where all."""
-    # Scaled, so that no square is lost.
+    """Directions not excluded, deg about that of the mean; None if none is excluded."""
+    # Scaled to avoid underflow of squares.
     scale = float(max(np.abs(mean).max(), math.sqrt(np.abs(spread).max())))
     if scale == 0.0:
         return None
     m, s = mean / scale, spread / scale**2
-    # Normals n with n A n <= 0 belong to directions that are not contradicted.
+    # Normals n with n A n <= 0 belong to directions that are not excluded.
     a = np.outer(m, m) - z * z * s
     half, part = 0.5 * (a[0, 0] + a[1, 1]), 0.5 * (a[0, 0] - a[1, 1])
     swing = math.hypot(part, a[0, 1])
     most, least = half + swing, half - swing
     if most <= 0.0 or not m.any():
         return None
-    # The direction in the middle is the axis of the largest eigenvalue; beside it, the normal
-    # turns towards that axis until A vanishes.
+    # The middle direction is the axis of the largest eigenvalue; beside it, the normal turns
+    # toward that axis until A vanishes.
     middle = 0.5 * math.degrees(math.atan2(a[0, 1], part))
     reach = math.degrees(math.atan(math.sqrt(max(-least, 0.0) / most)))
     estimate = math.degrees(math.atan2(m[1], m[0]))
-    # Of the two opposite directions the one on the estimate's side.
+    # Of the two opposite directions the one on the side of the estimate.
     away = float(within_half_turn(np.array(middle - estimate)))
     if abs(away) > 90.0:
         away -= math.copysign(180.0, away)

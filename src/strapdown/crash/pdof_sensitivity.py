@@ -1,4 +1,4 @@
-"""On what a direction of force hangs: the length of the window, and time zero."""
+"""Sensitivity of a direction of force to the length of the window and to time zero."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def pdof_by_window(
     *,
     heading_deg: float = 0.0,
 ) -> pd.DataFrame:
-    """Direction of force against the length of the window from time zero.
+    """Direction of force versus the length of the window from time zero.
 
     Parameters
     ----------
@@ -56,14 +56,14 @@ def pdof_by_window(
     time_zero : float, s
     windows : sequence of float, s
     heading_deg : float, deg
-        At the impact; of use for a record in north-east-down, whose direction is then relative
-        to it.
+        At the impact; for a record in north-east-down, the direction is relative to this
+        heading.
 
     Returns
     -------
     DataFrame
         Index ``window``, s; ``dv_x dv_y dv_z``, m/s, ``horizontal_deg``, ``vertical_deg``; NaN
-        where nothing changed. Windows that reach beyond the record are left out.
+        for a zero change of velocity. Windows that extend beyond the record are left out.
 
     Raises
     ------
@@ -86,17 +86,17 @@ def pdof_by_shift(
     keep_length: bool = False,
     heading_deg: float = 0.0,
 ) -> pd.DataFrame:
-    """Direction of force against an error of time zero.
+    """Direction of force versus an error of time zero.
 
     Parameters
     ----------
     acceleration : Acceleration
     time_zero, end : float, s
-        The window as found.
+        The detected window.
     shifts : sequence of float, s
         Added to `time_zero`.
     keep_length : bool
-        Whether the end moves along.
+        Whether the end is shifted as well.
     heading_deg : float, deg
         As `pdof_by_window`.
 

@@ -1,4 +1,4 @@
-"""From a recorded crash unit to one that can be navigated with."""
+"""Preparation of a recorded crash unit for navigation."""
 
 from __future__ import annotations
 
@@ -73,35 +73,34 @@ def prepare_unit(
     hysteresis: float = 0.1,
     fade: float = 0.0,
 ) -> PreparedUnit:
-    """Take biases off, merge the ranges, turn into vehicle axes and level.
+    """Remove biases, merge ranges, rotate into vehicle axes and level.
 
     Parameters
     ----------
     unit : CrashUnit
-        On the common clock, zero at the trigger; all triads at the same stamps, the gyro its
-        own or borrowed, in the unit's axes; or without what its `assumed` speaks of.
+        On the common clock, zero at the trigger; all triads at the same stamps, in the unit's
+        axes, with its own or a borrowed gyro; axes listed in its `assumed` may be missing.
     gravity : float, m/s²
-        At the place. Where the unit has axes that are assumed, gravity's part is put there.
+        At the site. Along assumed axes of the unit the gravity component is added.
     rest : 'auto' or (start, end), s
-        Where the vehicle stands before the crash: found, or stated.
+        Interval in which the vehicle is stationary before the crash: detected, or stated.
     levelling : (roll, pitch, sd), deg, optional
-        Attitude of the vehicle before the crash where it is known otherwise: needed where the
-        record has no rest or the unit lacks an axis of its accelerometers, and better than a
-        sensor with a bias of tenths of g. The bias of the
-        lowest range is then taken from gravity in that attitude, where this says more of it
-        than is stated: so are channels that were zeroed before the test given back what they
-        lost.
+        Known attitude of the vehicle before the crash. Required where the record has no
+        stationary interval or the unit lacks an accelerometer axis, and better than a sensor with
+        a bias of tenths of g. The bias of the lowest range is then taken from gravity in that
+        attitude, where this is more accurate than the stated bias; this also restores the offset of
+        channels that were zeroed before the test.
     impact : float, s
         Of the first contact, where the trigger is known to be late or early.
     moving_at_impact : bool
         As `find_pre_crash_rest`.
     steady_acceleration : float, m/s²
-        Standard deviation of what each axis of the vehicle may accelerate over a steady
-        stretch; 0.3 is a slope of 3 % or engine drag. At rest it is zero.
+        Standard deviation of the vehicle's own acceleration per axis over a steady interval;
+        0.3 corresponds to a slope of 3 % or engine drag. Zero while stationary.
     steady_rate : float, rad/s
         As `gyro_bias_from`.
     match_gravity : bool
-        Whether the length of the specific force at rest is made gravity's.
+        Whether the specific force while stationary is scaled to the length of gravity.
     margin, hysteresis, fade
         As `merge_ranges`.
 
@@ -112,9 +111,10 @@ def prepare_unit(
     Raises
     ------
     DataError
-        The unit is refused by `check_unit`; there is neither a rest nor a steady stretch and no
-        levelling is given; the stated rest has too few samples; the specific force at rest
-        has not the length of gravity, or an axis is missing and assumed, and no levelling is given.
+        `check_unit` refuses the unit; there is neither a stationary nor a steady interval and
+        no leveling is stated; the stated stationary interval has too few samples; the length of
+        the specific force while stationary differs from gravity, or an axis is missing and
+        assumed, and no leveling is stated.
     ConfigError
         An option is out of range.
     """
@@ -175,7 +175,7 @@ def prepare_unit(
             levelling, standing, _stated_sd(triads[0].uncertainty, C), unknown, gravity
         )
         if shift is not None:
-            # All ranges hang on the lowest, and move with it.
+            # All ranges are relative to the lowest and shift with it.
             force = force - shift
             bias_from = (FROM_GRAVITY, *bias_from[1:])
             assert own is not None and own.accel_mean_sd is not None
@@ -186,7 +186,7 @@ def prepare_unit(
         level = level_at_rest(standing, unknown, gravity, unit.name)
     correction = 0.0
     matched = bias_from[0] == FROM_GRAVITY
-    # Along an axis that is not there nothing is to be corrected.
+    # Missing axes are not corrected.
     whole = not triads[0].absent
     if match_gravity and whole and standing is not None and not matched:
         found = gravity_correction(standing, triads[0].uncertainty, unknown, gravity)
@@ -225,7 +225,7 @@ def _find_rest(
     noise: Array,
     gyro_noise: Array,
 ) -> RestStretch | None:
-    """In sensor axes."""
+    """Find the stationary interval, in sensor axes."""
     table = imu_table(
         data.time, data.gyro, data.accelerometers[0], sampling=data.sampling, source=unit.name
     )
@@ -246,7 +246,7 @@ def _range_biases(
     limits: Sequence[RangeLimits],
     rest: RestStretch | None,
 ) -> tuple[list[Array], tuple[int | None, ...], tuple[Triad, ...]]:
-    """Of every range relative to the lowest: each hangs on the next lower one."""
+    """Bias of every range relative to the lowest: each is tied to the next lower one."""
     bias: list[Array] = [np.zeros(3)]
     origin: list[int | None] = [None]
     sd: list[Triad] = [ZERO]
@@ -280,21 +280,21 @@ def _limits(time: Array, values: Array, triad: RecordedTriad) -> RangeLimits:
 
 
 def _with_held(limits: RangeLimits, triad: RecordedTriad) -> RangeLimits:
-    """What is spent, whether the values still show it or not."""
+    """Add samples flagged as clipped, whether or not the values still show it."""
     if triad.held is None:
         return limits
     return replace(limits, clipped=limits.clipped | triad.held)
 
 
 def _noise(time: Array, uncertainty: TriadUncertainty) -> Array:
-    """Standard deviation of each sample: white noise over its interval, and the step."""
+    """Standard deviation of each sample: white noise over its interval, and quantization."""
     steps = np.diff(time, prepend=2.0 * time[0] - time[1])
     white = np.asarray(uncertainty.noise_density) / np.sqrt(steps)[:, None]
     return np.hypot(white, np.asarray(uncertainty.quantization) / math.sqrt(12.0))
 
 
 def _where_there(found: BiasEstimate, absent: tuple[int, ...]) -> BiasEstimate:
-    """Without a word on axes that are not there: what is assumed of them is told elsewhere."""
+    """Omit missing axes: their assumptions are reported elsewhere."""
     keep = [k not in absent for k in range(3)]
     return BiasEstimate(
         triad_of(np.where(keep, found.bias, 0.0)), triad_of(np.where(keep, found.sd, 0.0))
@@ -302,11 +302,11 @@ def _where_there(found: BiasEstimate, absent: tuple[int, ...]) -> BiasEstimate:
 
 
 def _stated_sd(uncertainty: TriadUncertainty, C: Array) -> Array:
-    """Of the bias of the lowest range, in vehicle axes."""
+    """Stated standard deviation of the bias of the lowest range, in vehicle axes."""
     return np.asarray(np.sqrt(C**2 @ np.asarray(uncertainty.axis("bias")) ** 2))
 
 
-# What may be asked of `prepare_unit`.
+# Options of `prepare_unit`.
 
 
 OPTIONS = (
@@ -325,12 +325,12 @@ OPTIONS = (
 
 
 def checked_options(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the options, all of them known.
+    """Return the options after checking their names.
 
     Raises
     ------
     ConfigError
-        One is not.
+        An option is unknown.
     """
     for name in options:
         if name not in OPTIONS:
@@ -350,7 +350,7 @@ def check_options(unit: str, **given: Any) -> None:
     Raises
     ------
     ConfigError
-        One is out of range, or of another kind.
+        An option is out of range, or of the wrong type.
     """
     gravity, rest, levelling = given["gravity"], given["rest"], given["levelling"]
     if not (finite(gravity) and 9.7 < gravity < 9.9):
@@ -386,10 +386,11 @@ def _is_stretch(given: Any) -> bool:
     return finite(start) and finite(end) and start < end
 
 
-# Units of one vehicle prepared together: who has no rest is levelled by who has.
+# Joint preparation of units of one vehicle: units without a stationary interval are leveled
+# from units with one.
 
 
-# Over which the attitude that is lent is read, in samples.
+# Number of samples over which the lender's attitude is read.
 READ = 2
 
 
@@ -404,20 +405,20 @@ def prepare_together(
     Parameters
     ----------
     together : SynchronisedUnits
-        Each over what it covers itself.
+        Each over its own record.
     point : sequence of float, (3,), m
         Vehicle axes, from the vehicle's origin.
     gravity : float, m/s²
     options : mapping
-        Of `prepare_unit`, for all; under the name of a unit, a mapping of its own ones.
+        Options of `prepare_unit` for all units; under the name of a unit, a mapping of its own.
 
     Returns
     -------
     list of PointKinematics
-        In the order of the units. A unit that borrows its gyro and is not levelled by an option,
-        and whose record begins after the lender's rest, is levelled by the lender: its roll and
-        pitch carried on by the gyro to where the borrower's record begins, with their standard
-        deviation.
+        In the order of the units. A unit that borrows its gyro, is not leveled by an option, and
+        whose record begins after the lender's stationary interval is leveled by the lender: roll
+        and pitch are propagated with the gyro to the start of the borrower's record, with their
+        standard deviation.
 
     Raises
     ------
@@ -455,13 +456,13 @@ def prepare_together(
 
 
 def _turns(unit: SynchronisedUnit) -> bool:
-    """Whether it has a gyro that measures something, and is no stand-in for an assumption."""
+    """Whether the unit has a gyro that measures, not a substitute for an assumption."""
     gyro = unit.unit.gyro
     return gyro is not None and len(gyro.absent) < 3
 
 
 def _gyro_to_borrow(unit: SynchronisedUnit, turning: Sequence[str]) -> Finding | None:
-    """For a unit without gyro that takes none from another, of which there are some."""
+    """Report a unit without gyro that borrows none although other units have one."""
     if unit.lender is not None or _turns(unit) or not turning:
         return None
     return Finding(
@@ -476,7 +477,7 @@ def _gyro_to_borrow(unit: SynchronisedUnit, turning: Sequence[str]) -> Finding |
 def _attitude_at_start(
     unit: SynchronisedUnit, lender: PointKinematics
 ) -> tuple[float, float, float] | None:
-    """Roll, pitch and their sd in deg where a record begins, or None where it has its own rest."""
+    """Roll, pitch and their sd in deg at the start of a record; None if it can level itself."""
     begin = float(unit.accelerometers[0].triad.table.index[0])
     rest = lender.rest
     if rest is None or rest.grade == "steady" or begin <= rest.end:
@@ -500,18 +501,18 @@ def _attitude_at_start(
     )
 
 
-# Attitude and the lowest range's bias from the specific force before a crash.
+# Attitude and bias of the lowest range from the specific force before a crash.
 
 
 def level_at_rest(rest: RestStretch, unknown: float, gravity: float, source: str) -> Levelling:
-    """Roll and pitch from the mean specific force, with the sd that its noise leaves.
+    """Roll and pitch from the mean specific force, with the sd from its noise.
 
     Parameters
     ----------
     rest : RestStretch
         In vehicle axes.
     unknown : float, m/s²
-        Standard deviation of the vehicle's own acceleration over it, each axis.
+        Standard deviation of the vehicle's own acceleration over the interval, each axis.
     gravity : float, m/s²
     source : str
         For messages.
@@ -519,13 +520,13 @@ def level_at_rest(rest: RestStretch, unknown: float, gravity: float, source: str
     Returns
     -------
     Levelling
-        Its sd is that of the worse of the two angles: an acceleration error e across the
-        specific force turns it by ``e / g`` (roll: over ``cos(pitch)``).
+        The sd is that of the worse of the two angles: an acceleration error e perpendicular to
+        the specific force tilts the level by ``e / g`` (roll: divided by ``cos(pitch)``).
 
     Raises
     ------
     DataError
-        The length is not within 20 % of gravity.
+        The length differs from gravity by more than 20 %.
     """
     assert rest.accel_mean is not None and rest.accel_mean_sd is not None
     try:
@@ -559,7 +560,7 @@ def from_stated_attitude(
     rest : RestStretch, optional
         In vehicle axes.
     bias_sd : ndarray, (3,), m/s²
-        Stated sd of the lowest range's bias, vehicle axes.
+        Stated sd of the bias of the lowest range, vehicle axes.
     unknown : float, m/s²
         As `level_at_rest`.
     gravity : float, m/s²
@@ -568,9 +569,9 @@ def from_stated_attitude(
     -------
     levelling : Levelling
     shift : ndarray, (3,), m/s², or None
-        What the lowest range reads at rest less what gravity gives in that attitude; None where
-        there is no rest, or where the stated bias is known better than ``g`` times the sd of
-        the attitude.
+        Stationary reading of the lowest range minus gravity in that attitude; None where there is
+        no stationary interval, or where the stated bias is more accurate than ``g`` times the sd
+        of the attitude.
     """
     roll, pitch, sd = stated
     levelling = Levelling(float(roll), float(pitch), float(sd), from_rest=False)
@@ -588,23 +589,23 @@ def with_gravity(
     levelling: tuple[float, float, float] | None,
     gravity: float,
 ) -> UnitArrays:
-    """Put gravity's part on the axes that are assumed.
+    """Add the gravity component along assumed axes.
 
     Parameters
     ----------
     unit : CrashUnit
-        Whose triads say which axes those are.
+        Its triads give the assumed axes.
     data : UnitArrays
-        Its numbers, sensor axes.
+        Arrays of the unit, sensor axes.
     levelling : (roll, pitch, sd), deg, optional
-        Of the vehicle at rest.
+        Of the stationary vehicle.
     gravity : float, m/s²
 
     Raises
     ------
     DataError
-        There is such an axis, and no levelling is stated: accelerometers along two axes do not
-        tell how a vehicle stands.
+        There is such an axis and no leveling is stated: two accelerometer axes do not determine
+        the attitude.
     """
     absent = list(unit.accelerometers[0].absent)
     if not absent:
@@ -627,7 +628,7 @@ def with_gravity(
 def gravity_correction(
     rest: RestStretch, uncertainty: TriadUncertainty, unknown: float, gravity: float
 ) -> tuple[float, Array] | None:
-    """What makes the specific force at rest as long as gravity.
+    """Correction that makes the stationary specific force as long as gravity.
 
     Parameters
     ----------
@@ -648,9 +649,9 @@ def gravity_correction(
 
     Notes
     -----
-    It takes off the bias along the vertical, and what the scale factor makes of gravity, while
-    the body does not turn. None over a steady stretch whose own acceleration is less known than
-    that bias and scale.
+    It removes the bias along the vertical and the scale-factor error on gravity, as long as the
+    body does not turn. None over a steady interval whose own acceleration is less certain than
+    that bias and scale factor.
     """
     assert rest.accel_mean is not None
     mean = np.asarray(rest.accel_mean)

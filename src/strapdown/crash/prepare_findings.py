@@ -1,4 +1,4 @@
-"""What a person should know of a unit's preparation."""
+"""Findings on the preparation of a unit."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from strapdown.sensors.saturation import RangeLimits
 
 Array = NDArray[np.float64]
 
-# Beyond this many standard deviations a number contradicts what is stated of it.
+# A number contradicts its stated value beyond this many standard deviations.
 SIGMAS = 4.0
-# Of the range: what interpolation and decimation make of two that are cut at other places.
+# Fraction of the range: differences from interpolation and decimation of two clipped ranges.
 LEAST_STEP = 1e-3
-# A record that begins less than this before the impact has no stretch before it.
+# A record that begins less than this before the impact has no interval before it.
 SHORTEST = 0.05  # s
-# Of a specific force at rest that was read in g.
+# Limits of a stationary specific force that is in g instead of m/s².
 NEAR_ONE = (0.8, 1.2)
 
 
@@ -33,12 +33,12 @@ def rest_findings(
     levelled: bool,
     steady_acceleration: float,
 ) -> list[Finding]:
-    """No rest, or only a steady stretch.
+    """Report a missing stationary interval, or only a steady one.
 
     Raises
     ------
     DataError
-        There is neither, and no levelling is stated.
+        There is neither, and no leveling is stated.
     """
     if rest is None:
         late = time[0] > impact - SHORTEST
@@ -63,7 +63,7 @@ def rest_findings(
 
 
 def length_findings(unit: CrashUnit, rest: RestStretch, gravity: float) -> list[Finding]:
-    """A specific force at rest that is in g, points down, or contradicts its stated errors.
+    """Report a stationary force that is in g, points down, or contradicts its stated errors.
 
     Raises
     ------
@@ -114,7 +114,7 @@ def saturation_findings(
     limits: Sequence[RangeLimits],
     gyro_limits: RangeLimits,
 ) -> list[Finding]:
-    """The last range or the gyro at its end; ranges that are not what is stated."""
+    """Report clipping of the last range or the gyro, and ranges unlike the stated ones."""
     found = []
     last = len(limits) - 1
     for j, (triad, limit) in enumerate(zip(unit.accelerometers, limits, strict=True)):
@@ -185,7 +185,7 @@ def bias_findings(
     bias_from: Sequence[int | None],
     rest: RestStretch | None,
 ) -> list[Finding]:
-    """A bias that could not be found, or is larger than was stated."""
+    """Report a bias that could not be estimated, or exceeds the stated one."""
     found = []
     for j in range(1, len(bias)):
         triad = unit.accelerometers[j]
@@ -224,7 +224,7 @@ def bias_findings(
 
 
 def step_findings(unit: CrashUnit, merged: MergedRanges) -> list[Finding]:
-    """Ranges that do not meet where one takes over from the other."""
+    """Report ranges that differ where one takes over from the other."""
     found = []
     largest = np.abs(merged.values).max(axis=0)
     for j in range(len(merged.step)):
@@ -236,7 +236,7 @@ def step_findings(unit: CrashUnit, merged: MergedRanges) -> list[Finding]:
             scale = level * np.hypot(
                 low.uncertainty.axis("scale")[k], high.uncertainty.axis("scale")[k]
             )
-            # Each feels the other axes by its own two angles.
+            # Each axis senses the other axes through its own two angles.
             angles = np.hypot(
                 low.uncertainty.axis("misalignment")[k], high.uncertainty.axis("misalignment")[k]
             )

@@ -1,4 +1,4 @@
-"""The answers of a reconstruction in a small table, and each in a line for people."""
+"""Results of a reconstruction as a small table and as text lines."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Row = tuple[str, str, float, float, float]
 
 
 def summary_table(units: Sequence[UnitReconstruction]) -> pd.DataFrame:
-    """Changes of velocity, directions of force and ends of the path, with their bounds.
+    """Changes of velocity, directions of force and ends of the path, with 95 % bounds.
 
     Parameters
     ----------
@@ -33,8 +33,8 @@ def summary_table(units: Sequence[UnitReconstruction]) -> pd.DataFrame:
     -------
     DataFrame
         Indexed by ``unit``, ``part`` (number and type of the event, or ``path``) and
-        ``quantity``; ``value``, ``low`` and ``high`` in the unit that the quantity names. The
-        bounds hold 95 %.
+        ``quantity``; ``value``, ``low`` and ``high`` in the unit that the quantity names, with
+        95 % bounds.
     """
     index, rows = [], []
     for unit in units:
@@ -84,7 +84,7 @@ def _about(value: float, half: float) -> tuple[float, float, float]:
 
 
 def _direction(change: VelocityChange) -> tuple[float, float, float]:
-    """Horizontal direction and its bounds, deg; the bounds within half a turn of it."""
+    """Horizontal direction and its bounds, deg; bounds within half a turn of the direction."""
     across = change.interval.horizontal
     at = change.pdof.azimuth_deg if isinstance(change.pdof, NedPdof) else change.pdof.horizontal_deg
     turn = 360.0 * round((at - 0.5 * (across.low_deg + across.high_deg)) / 360.0)
@@ -92,7 +92,7 @@ def _direction(change: VelocityChange) -> tuple[float, float, float]:
 
 
 def change_line(change: VelocityChange) -> str:
-    """One change of velocity in a line."""
+    """One change of velocity as a line of text."""
     axes = "north, east, down" if change.delta_v.frame == "ned" else "forward, right, down"
     parts = ", ".join(
         f"{v:.2f} ± {b:.2f}"
@@ -112,7 +112,7 @@ def change_line(change: VelocityChange) -> str:
 
 
 def path_line(path: CrashPath) -> str:
-    """Where a path goes, in a line."""
+    """End point of a path as a line of text."""
     sd = TWO_SIDED_95 * path.sd[NED].iloc[-1].to_numpy()
     ends = ", ".join(
         f"{v:.2f} ± {s:.2f}" for v, s in zip(path.table[NED].iloc[-1], sd, strict=True)
@@ -124,7 +124,7 @@ def path_line(path: CrashPath) -> str:
 
 
 def unit_line(unit: UnitReconstruction) -> str:
-    """One unit's answers in a line for each event, and one for the path."""
+    """Results of one unit: a line for each event, and one for the path."""
     lines = [
         f"{unit.name}, event {k}, {kind.name}: delta-V {c.event.resultant:.2f} ± "
         f"{c.event.resultant_bound:.2f} m/s; {change_line(c.event)}"

@@ -20,25 +20,25 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class PathComparison:
-    """Reconstructed less reference.
+    """Reconstructed minus reference path.
 
     Attributes
     ----------
     errors : DataFrame
         ``north east down``, m, indexed by the reference's instants, s.
     bound : DataFrame
-        Half width of the interval that holds 95 % of such errors, m: path and reference together.
+        Half width of the 95 % interval of such errors, m: path and reference together.
     rms, largest : tuple of float, m
         Over the instants, per axis; the largest by size.
     within : tuple of float
-        Share of the instants at which the error is within the bound. Errors of neighbouring
-        instants are nearly one and the same, so that a share is no count of independent trials.
+        Fraction of the instants at which the error is within the bound. Errors of neighboring
+        instants are highly correlated, so the instants are not independent trials.
     chi_square : float
-        Of the three components at the last instant, against `chi_square_95`.
+        For the three components at the last instant, to compare with `chi_square_95`.
     chi_square_95 : float
-        Limit of 95 % for three degrees of freedom.
+        95 % limit for three degrees of freedom.
     consistent : bool
-        Whether the last instant's chi-square is below the limit.
+        Whether the chi-square of the last instant is below the limit.
     """
 
     errors: pd.DataFrame = field(repr=False)
@@ -51,7 +51,7 @@ class PathComparison:
 
     @property
     def consistent(self) -> bool:
-        """Whether the last error is one that the covariances allow."""
+        """Whether the covariances are consistent with the last error."""
         return self.chi_square <= self.chi_square_95
 
 
@@ -63,15 +63,15 @@ def compare_with_reference(path: CrashPath, reference: pd.DataFrame) -> PathComp
     path : CrashPath
     reference : DataFrame
         Indexed by time from the common trigger, s; ``north east down`` of the same point, m, in
-        the axes of the path, from any origin: it is moved so that both agree at the entry. With
+        the axes of the path, from any origin: it is shifted so that both agree at the entry. With
         ``north_sd east_sd down_sd``, m, where it is not exact.
 
     Returns
     -------
     PathComparison
-        At the reference's instants that lie within the path. The path is taken between its
-        samples by the cubic that has its velocities, so that a reference of 1000 frames a second
-        is not compared with chords.
+        At the reference's instants within the path. The path is interpolated by the cubic that
+        matches its velocities, so that a reference of 1000 frames a second is not compared with
+        chords.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def compare_with_reference(path: CrashPath, reference: pd.DataFrame) -> PathComp
     origin = origin - own(entry)
     difference = own(time[inside]) - (values[inside] - origin)
     covariance = _covariance(path, time[inside])
-    # The origin's reading is one more, independent of the others.
+    # The reading at the origin is a further independent one.
     own_noise = sd[inside] ** 2 + at_origin**2
     covariance = covariance + np.einsum("ni,ij->nij", own_noise, np.eye(3))
     bound = TWO_SIDED_95 * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))

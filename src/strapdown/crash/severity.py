@@ -1,9 +1,9 @@
 """Published models of injury risk.
 
-A model is here only if its table can be named. URGENCY and its successors (Malliaris 1997,
-Bahouth 2004, Kononen 2011) and the MAIS3+ model of the planner by Geisslinger and others (2023)
-are not: their coefficients were found in programs that name no table of a publication.
-`severity_file.load_severity_model` takes them from a user who has the source.
+Only models with an identified published table are included. URGENCY and its successors
+(Malliaris 1997, Bahouth 2004, Kononen 2011) and the MAIS3+ model of the planner by Geisslinger
+and others (2023) are not: their coefficients were found in programs that name no table of a
+publication. `severity_file.load_severity_model` reads them from a user who has the source.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ WANG_NOTE = (
     "is that in which the curves of one table keep their order (a graver injury is less likely), "
     "and not the report's own. Its tables of other directions were not seen."
 )
-# Where two curves of a table cross first, in mph, rounded down: 56.3 and 60.4.
+# First crossing of two curves of a table, in mph, rounded down: 56.3 and 60.4.
 WANG_RANGE = {"all": 56.0, "front": 60.0}
 WANG_TABLE = {"all": "A-3", "front": "A-6"}
 
@@ -41,7 +41,7 @@ def _wang(crash: str, outcome: str, intercept: float, slope: float) -> SeverityM
     )
 
 
-#: By name; what a person asks for.
+#: Models by name, as selected by the user.
 SEVERITY_MODELS: dict[str, SeverityModel] = {
     "wang_2022_all_mais1": _wang("all", "MAIS1+", -1.3925, 0.0815),
     "wang_2022_all_mais2": _wang("all", "MAIS2+", -5.1331, 0.1479),
@@ -64,7 +64,7 @@ def find_severity_model(name: str) -> SeverityModel:
     Raises
     ------
     ConfigError
-        There is none of that name; the message has the nearest.
+        There is none of that name; the message suggests the nearest.
     """
     if name not in SEVERITY_MODELS:
         raise ConfigError(

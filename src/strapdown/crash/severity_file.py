@@ -1,4 +1,4 @@
-"""A model of injury risk from a TOML file that a person wrote from a publication."""
+"""Injury-risk model from a TOML file transcribed from a publication."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ CATEGORY_TERM = ("input", "equals", "coefficient")
 
 
 def load_severity_model(path: str | Path) -> SeverityModel:
-    """Read a model of injury risk.
+    """Read an injury-risk model.
 
     Parameters
     ----------
     path : str or Path
-        A TOML file; its name is the model's. ``title``, ``author``, ``year``, ``table`` and
-        ``outcome`` say what it is and where it stands; ``intercept`` and ``[[terms]]``, each with
-        ``input``, ``unit`` and ``coefficient`` (and ``transform``: identity, log or square), or
-        with ``input``, ``equals`` and ``coefficient`` for a category, are the logit.
-        ``[validity]`` gives ``input = [least, greatest]`` in the unit of its term, and
-        ``[applies]`` ``input = ["category", ...]``.
+        A TOML file; its name is that of the model. ``title``, ``author``, ``year``, ``table`` and
+        ``outcome`` give the outcome and the source; ``intercept`` and ``[[terms]]`` are the logit.
+        Each term has ``input``, ``unit`` and ``coefficient`` (and ``transform``: identity, log or
+        square), or, for a category, ``input``, ``equals`` and ``coefficient``. ``[validity]`` gives
+        ``input = [least, greatest]`` in the unit of its term, ``[applies]`` gives
+        ``input = ["category", ...]``.
 
     Returns
     -------

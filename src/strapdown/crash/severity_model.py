@@ -1,4 +1,4 @@
-"""What a model of injury risk is, and the probability that it gives, with a bound."""
+"""Injury-risk models, and the probability of injury with a bound from the inputs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from strapdown.errors import ConfigError, DataError, Finding
 
 __all__ = ["SPEEDS", "InjuryRisk", "SeverityModel", "Term", "injury_risk"]
 
-#: Units of speed, in m/s. An input in one of them is given in m/s; any other as its unit says.
+#: Units of speed, in m/s. Inputs with these units are given in m/s; others in their stated unit.
 SPEEDS: dict[str, float] = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
 TRANSFORMS = ("identity", "log", "square")
 OUTSIDE = ("refuse", "tell")
@@ -24,15 +24,15 @@ class Term:
     Attributes
     ----------
     input : str
-        Name of what is known of the crash: ``delta_v``, ``age``, ``crash_type``.
+        Name of the input: ``delta_v``, ``age``, ``crash_type``.
     coefficient : float
-        Per unit of the transformed input; of a category, added where it is met.
+        Per unit of the transformed input; for a category, added where it matches.
     unit : str
         Of the input in the source's table; empty for a category.
     transform : {'identity', 'log', 'square'}
-        Of the input in its unit; log is natural.
+        Applied to the input in its unit; log is natural.
     equals : str, optional
-        The category that is meant; such a term has no unit.
+        The category; such a term has no unit.
     """
 
     input: str
@@ -50,18 +50,18 @@ class SeverityModel:
     ----------
     name, title : str
     author, year, table : str
-        Where it was published, and where in it the coefficients stand.
+        Publication, and the table with the coefficients.
     outcome : str
-        What is predicted: ``MAIS3+``.
+        Predicted outcome: ``MAIS3+``.
     intercept : float
     terms : tuple of Term
     validity : dict
-        By input, the least and the greatest value that the model is good for, in the unit of
+        By input, the least and greatest value for which the model is valid, in the unit of
         its term.
     applies : dict
-        By input, the categories that it is good for: ``{"crash_type": ("front",)}``.
+        By input, the categories for which the model is valid: ``{"crash_type": ("front",)}``.
     note : str
-        How the coefficients were come by, and where the range is from.
+        Origin of the coefficients and of the validity range.
     """
 
     name: str
@@ -78,7 +78,7 @@ class SeverityModel:
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """Names of what it needs."""
+        """Names of the inputs."""
         return tuple(dict.fromkeys(term.input for term in self.terms))
 
     def unit(self, name: str) -> str:
@@ -93,14 +93,14 @@ class SeverityModel:
 
 @dataclass(frozen=True)
 class InjuryRisk:
-    """Probability of an injury by one model.
+    """Probability of an injury from one model.
 
     Attributes
     ----------
     model : SeverityModel
     probability : float
     low, high : float
-        Bound by the uncertainty of the inputs alone, not of the model's coefficients.
+        Bound from the uncertainty of the inputs alone, without that of the coefficients.
     coverage : float
         Of the bound.
     logit, logit_sd : float
@@ -125,7 +125,7 @@ def injury_risk(
     coverage: float = 0.95,
     outside: str = "refuse",
 ) -> InjuryRisk:
-    """Probability of an injury, with the bound that the uncertainty of the inputs makes.
+    """Probability of an injury, with a bound from the uncertainty of the inputs.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def injury_risk(
     coverage : float
         Of the bound, between 0 and 1.
     outside : {'refuse', 'tell'}
-        What happens where the model is not valid: an error, or a finding beside the number.
+        Action where the model is not valid: an error, or a finding with the number.
 
     Returns
     -------
@@ -146,14 +146,14 @@ def injury_risk(
     Raises
     ------
     DataError
-        An input is missing or no number, or the model is not valid there.
+        An input is missing or not a number, or the model is not valid there.
     ConfigError
-        An option or an sd is none.
+        An option or an sd is not valid.
 
     Notes
     -----
-    The logistic function is monotone, so the bound is that of the logit carried through it; with
-    the inputs' own scale (no log, no square) and normal errors it is exact.
+    The logistic function is monotone, so the bound is that of the logit transformed by it; for
+    untransformed inputs (no log, no square) and normal errors it is exact.
     """
     from scipy.special import expit, ndtri
 
@@ -234,7 +234,7 @@ def _value(model: SeverityModel, name: str, given: float | str) -> float:
 
 
 def _transformed(model: SeverityModel, term: Term, value: float) -> tuple[float, float]:
-    """The term's value and its slope, by the input in its unit."""
+    """Value of the term and its slope with respect to the input in its unit."""
     if term.transform == "square":
         return value * value, 2.0 * value
     if term.transform == "log":

@@ -1,4 +1,4 @@
-"""Increments of velocity of units at a common point, and the covariance of their differences."""
+"""Velocity increments of units at a common point, and the covariance of their differences."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-# Relative to the largest variance: below it a covariance is rounding.
+# Relative to the largest variance: smaller covariances are rounding.
 FLOOR, TINY = 1e-12, 1e-30
 
 
 @dataclass(frozen=True, eq=False)
 class VelocityIncrements:
-    """Integrals of a unit's specific force and rates over pieces of time.
+    """Integrals of a unit's specific force and rates over intervals.
 
-    Rows of the matrices are ordered by piece, then axis.
+    Rows of the matrices are ordered by interval, then axis.
 
     Attributes
     ----------
@@ -46,14 +46,14 @@ class VelocityIncrements:
     turned : ndarray, (m, 3), rad
         Integrals of the rates.
     names, contributors : tuple of str
-        Of p unknowns, as `SampleEffects`.
+        Of p unknowns, as in `SampleEffects`.
     effects : ndarray, (3 m, p), m/s
-        What one standard deviation of each does to the values.
+        Effect of one standard deviation of each on the values.
     turned_effects : ndarray, (3 m, p), rad
-        The same to `turned`.
+        The same for `turned`.
     noise : NoiseOfSums
     lever : ndarray, (3 m, 3), 1/s
-        What an error of the position (true minus stated) does to the values.
+        Effect of a position error (true minus stated) on the values.
     """
 
     edges: Array
@@ -67,7 +67,7 @@ class VelocityIncrements:
     lever: Array
 
     def of_pieces(self, kept: NDArray[np.bool_]) -> VelocityIncrements:
-        """Some of the pieces; the edges stay those of all.
+        """Select some of the intervals; the edges remain those of all.
 
         Parameters
         ----------
@@ -87,7 +87,7 @@ class VelocityIncrements:
         )
 
     def borrows(self, other: VelocityIncrements) -> bool:
-        """Whether both have the rates of one gyro, so that their agreement says nothing."""
+        """Whether both share one gyro, so that their rates agree by construction."""
         return self.noise.gyro == other.noise.gyro
 
 
@@ -102,16 +102,16 @@ def joint_covariance(
     Parameters
     ----------
     increments : sequence of VelocityIncrements
-        Of k units, between the same edges.
+        For k units, between the same edges.
     of : {'force', 'rate'}
     without : collection of str
-        Contributors that are left out.
+        Contributors to leave out.
 
     Returns
     -------
     ndarray, (3 m k, 3 m k)
-        Unknowns of one name are one unknown, and the noise of a gyro that several borrow is one
-        noise, as far as they have it at the same samples.
+        Unknowns of the same name are one unknown, and the noise of a gyro that several units
+        borrow is common, as far as they use the same samples.
     """
     columns: dict[str, int] = {}
     gyros: dict[tuple[str, int], list[int]] = {}
@@ -150,7 +150,7 @@ def difference_covariance(
     without: Collection[str] = (),
     turn: Array | None = None,
 ) -> Array:
-    """Covariance of the increments of one unit less those of another.
+    """Covariance of the increments of one unit minus those of another.
 
     Parameters
     ----------
@@ -159,12 +159,12 @@ def difference_covariance(
     of, without
         As `joint_covariance`.
     turn : ndarray, (..., 3, 3), optional
-        By which those of the second are turned before.
+        Rotation applied to the increments of the second unit.
 
     Returns
     -------
     ndarray, (..., 3 m, 3 m)
-        What both share is not in it.
+        Common errors cancel.
     """
     size, pieces = first.values.size, len(first.values)
     turned = np.eye(3) if turn is None else turn
@@ -179,7 +179,7 @@ def difference_covariance(
 
 
 def floored(covariance: Array) -> Array:
-    """A covariance that can be inverted: raised by what is rounding to its largest variance.
+    """Make a covariance invertible: raise it by the rounding of its largest variance.
 
     Parameters
     ----------
@@ -193,14 +193,14 @@ def floored(covariance: Array) -> Array:
 def common_edges(
     units: Sequence[PointKinematics], window: tuple[float, float] | None, pieces: int
 ) -> Array:
-    """Edges of equal pieces over a window that all units cover.
+    """Edges of equal intervals over a window that all units cover.
 
     Raises
     ------
     DataError
         The units have no common time, or do not cover the window.
     ConfigError
-        A piece is shorter than two samples of a unit.
+        An interval is shorter than two samples of a unit.
     """
     if len(units) < 2:
         raise DataError("crash.unit-comparison-needs-two", quantity="units", count=len(units))
@@ -245,7 +245,7 @@ def velocity_increments(unit: PointKinematics, edges: Array) -> VelocityIncremen
     Returns
     -------
     VelocityIncrements
-        In body axes, which turn: what two units on one body share at every instant.
+        In body axes, which rotate; two units on one body share them at every instant.
     """
     sampling = str(unit.imu.attrs["sampling"])
     weights = np.array(
@@ -272,13 +272,13 @@ def velocity_increments(unit: PointKinematics, edges: Array) -> VelocityIncremen
 
 
 def chi_square_tail(chi_square: float, freedom: int) -> float:
-    """Probability of a chi-square of so many degrees of freedom, or none, to be this or more."""
+    """Probability of a chi-square at least this large; `freedom` may be zero."""
     from scipy.stats import chi2
 
     return float(chi2.sf(chi_square, freedom)) if freedom else 1.0
 
 
-# What the noise of the samples of a unit does to weighted sums of them.
+# Effect of the sample noise of a unit on weighted sums of samples.
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,14 +288,14 @@ class NoiseOfSums:
     Attributes
     ----------
     of_force : ndarray, (3 m, 3 m), (m/s)²
-        Covariance of the sums of the specific force from the accelerometers' noise.
+        Covariance of the sums of the specific force from accelerometer noise.
     through_arm : ndarray, (3 m, q), m/s
-        What one standard deviation of each of q independent numbers, the noise of the gyro, does
-        to them through the lever arm.
+        Effect of one standard deviation of each of q independent numbers, the gyro noise, on
+        the sums through the lever arm.
     turned : ndarray, (3 m, q), rad
-        The same to the sums of the rates.
+        The same for the sums of the rates.
     gyro : str
-        Name of the unit that has the gyro: others that borrow it have the same numbers.
+        Name of the unit that has the gyro: units that borrow it have the same numbers.
     """
 
     of_force: Array
@@ -311,19 +311,19 @@ class NoiseOfSums:
 
 
 def noise_of_sums(at_point: PointKinematics, weights: Array) -> NoiseOfSums:
-    """Find what the noise of the samples does to weighted sums of them.
+    """Compute the effect of the sample noise on weighted sums of samples.
 
     Parameters
     ----------
     at_point : PointKinematics
-        Of a unit, or of a combination, whose samples are taken as independent.
+        A unit, or a combination, whose samples are taken as independent.
     weights : ndarray, (m, n), s
 
     Returns
     -------
     NoiseOfSums
-        What the noise of the gyro does through the lever arm keeps its correlation from sample to
-        sample: it all but cancels in a change of velocity.
+        Gyro noise through the lever arm keeps its correlation from sample to sample: it nearly
+        cancels in a change of velocity.
     """
     m = len(weights)
     prepared, moved, effects = at_point.prepared, at_point.moved, at_point.effects
@@ -346,7 +346,7 @@ def noise_of_sums(at_point: PointKinematics, weights: Array) -> NoiseOfSums:
 
 
 def _touched(at_point: PointKinematics, weights: Array) -> slice:
-    """The samples that count in a sum, with those from which an angular acceleration is made."""
+    """Samples with weight in a sum, and those used for their angular acceleration."""
     used = np.flatnonzero(weights.any(axis=0))
     if not used.size:
         return slice(0, 0)

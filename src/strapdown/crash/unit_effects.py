@@ -1,4 +1,4 @@
-"""The unknowns of one unit, listed."""
+"""Unknowns of one unit and their effects on the samples."""
 
 from __future__ import annotations
 
@@ -24,41 +24,41 @@ __all__ = ["AssumedEffect", "assumed_effects"]
 
 Array = NDArray[np.float64]
 
-# What is alike for all units of one vehicle.
+# Contributors common to all units of one vehicle.
 VEHICLE = "vehicle"
-# What is faster than this part of a record is vibration to it.
+# Signal parts faster than this count as vibration.
 VIBRATION = 0.025  # s
 
 
 def unit_effects(prepared: PreparedUnit, moved: MovedImu, *, time_sd: float = 0.0) -> SampleEffects:
-    """List the unknowns of a unit and what each does at a point.
+    """List the unknowns of a unit and the effect of each at a point.
 
     Parameters
     ----------
     prepared : PreparedUnit
     moved : MovedImu
-        The same moved to the point: `move_unit`.
+        The same unit moved to the point: `move_unit`.
     time_sd : float, s
-        How well the unit's clock is known against the common one.
+        Standard deviation of the unit's clock relative to the common one.
 
     Returns
     -------
     SampleEffects
-        Bias, scale factor, misalignment, nonlinearity and vibration rectification of every range
-        that speaks, with what its bias was taken from; the same of the gyro, with its sensitivity
-        to specific force and what it does through the lever arm; mounting; lever arm; timing.
-        What is assumed of axes and turning that were not measured (contributors ``assumed:
-        no turning`` and ``assumed: missing axis``), of the vehicle.
+        Bias, scale factor, misalignment, nonlinearity and vibration rectification of every used
+        range, including the errors that its bias estimate inherits; the same for the gyro, with
+        its g-sensitivity and its effect through the lever arm; mounting; lever arm; timing; and
+        the assumptions on unmeasured axes and rotation of the vehicle (contributors ``assumed:
+        no turning`` and ``assumed: missing axis``).
         An unknown without a standard deviation is left out. Those of a borrowed gyro have the
-        name of its unit, and are along its axes; those of the levelling are of the vehicle.
+        name of its unit, and are along its axes; those of the leveling belong to the vehicle.
 
     Notes
     -----
-    A higher range whose bias was taken from a lower one at rest has the lower one's error there,
-    and its own only as far as the input has changed since: with ``e_l`` and ``e_h`` the errors of
-    the two curves, ``e_l(f_rest) + e_h(f) - e_h(f_rest)``. A gyro's bias was taken at rest, so
-    that its sensitivity to specific force acts on ``f - f_rest``. Vibration is the variance about
-    a moving mean of 25 ms.
+    A higher range whose bias was taken from a lower one while stationary has the lower one's error
+    there, and its own only as far as the input has changed since: with ``e_l`` and ``e_h`` the
+    errors of the two curves, ``e_l(f_rest) + e_h(f) - e_h(f_rest)``. The gyro bias was estimated
+    while stationary, so that its g-sensitivity acts on ``f - f_rest``. Vibration is the variance
+    about a moving mean of 25 ms.
     """
     return _UnitEffects(prepared, moved, time_sd).collect()
 
@@ -76,7 +76,7 @@ class _UnitEffects:
         self.time = prepared.imu.index.to_numpy(dtype=np.float64)
         self.force = prepared.imu[ACCEL].to_numpy(dtype=np.float64)
         self.rate = prepared.imu[GYRO].to_numpy(dtype=np.float64)
-        # As the sensors have them.
+        # In sensor axes.
         self.felt, self.turned = self.force @ self.turn, self.rate @ self.gyro_turn
         rest = prepared.rest
         has_rest = rest is not None and rest.accel_mean is not None
@@ -112,8 +112,8 @@ class _UnitEffects:
             np.array(self.rates).reshape(count, n, 3),
             np.array(self.rests).reshape(count, 3),
             np.array(self.tilts).reshape(count, 3),
-            # What the gyro's noise adds through the arm is told as if each sample had its own:
-            # more than there is, since a slope's noise comes back with the other sign.
+            # Gyro noise through the lever arm is treated as independent for each sample. This is
+            # conservative: the noise of successive slopes has opposite signs.
             _sd(self._noise()),
             _sd(self.prepared.gyro_noise_covariance),
         )
@@ -135,17 +135,17 @@ class _UnitEffects:
         if rate is not None and through_arm and self.moved.lever_arm.any():
             added = added + self.moved.of_rate(rate)
         if not of_all_axes:
-            # No sensor, and no arm, makes the value of an axis that is assumed.
+            # Sensor and lever-arm errors do not affect an assumed axis.
             added, rest = added @ self.measured, rest @ self.measured
-        # The correction that makes the force at rest as long as gravity takes back what an
-        # unknown adds along it.
+        # Matching the stationary force to the length of gravity cancels the component of an
+        # unknown along it.
         if self.prepared.gravity_matched and self.has_rest and rest.any():
             along = self.turn @ self.rest_felt
             along = along / np.sqrt(along @ along)
             taken = (rest @ along) * along
             added, rest = added - taken, rest - taken
         name = f"{owner or self.prepared.unit.name} {name}"
-        # Two parts of one name have unknowns of their own.
+        # Two parts of one name have separate unknowns.
         again = sum(known.split("#")[0] == name for known in self.names)
         self.names.append(f"{name}#{again + 1}" if again else name)
         self.contributors.append(contributor)
@@ -163,7 +163,7 @@ class _UnitEffects:
         triad = self.prepared.unit.accelerometers[number]
         spoke = self.prepared.range_spoken == number
         source = self.prepared.bias_from[number]
-        # Ranges whose bias was taken from this one carry its error at rest.
+        # Ranges whose bias was taken from this one carry its stationary error.
         heirs = np.isin(self.prepared.range_spoken, self._heirs(number))
         if not (spoke.any() or heirs.any()):
             return
@@ -242,7 +242,7 @@ class _UnitEffects:
 
     def _gyro(self) -> None:
         sd, owner, none = self.gyro.uncertainty, self.lender.name, np.zeros(3)
-        # Prepared in the axes of this unit; a bias at rest is one of the part's axes.
+        # Prepared in the axes of this unit; a stationary bias is along the part's axes.
         square = (self.gyro_turn.T @ self.turn) ** 2
         biases = np.sqrt(square @ np.square(self.prepared.gyro_bias_sd))
         felt = (self.force - self.turn @ self.rest_felt) @ self.gyro_turn
@@ -298,7 +298,7 @@ class _UnitEffects:
                 rate = turned * np.cross(unit, self.rate)
                 self._add(name, MOUNTING, None, rate, np.zeros(3), self.lender.name)
             if mounting.position_sd > 0.0:
-                # The sensor sits further along the axis, so that the arm is shorter there.
+                # The sensor is further along the axis, so that the arm is shorter there.
                 force = self.moved.lever @ (-mounting.position_sd * unit)
                 self._add(
                     f"lever arm {TRIAD_CURVES_AXES[axis]}", LEVER_ARM, force, None, np.zeros(3)
@@ -325,10 +325,10 @@ class _UnitEffects:
         n = len(self.time)
         for axis, name in enumerate(("north", "east")):
             tilt = sd * np.eye(3)[axis]
-            # Where a bias was taken from gravity in a stated attitude, it is wrong with it.
+            # A bias taken from gravity in a stated attitude inherits the attitude error.
             shift = -self.level.T @ np.cross(tilt, [0.0, 0.0, -GRAVITY])
             if self.prepared.bias_from[0] != FROM_GRAVITY:
-                # Gravity was put on an assumed axis, all the same.
+                # Gravity was added along an assumed axis in any case.
                 shift = self.unmeasured @ shift
             if sd > 0.0:
                 force = np.tile(shift, (n, 1))
@@ -353,7 +353,7 @@ class _UnitEffects:
         none = np.zeros(3)
         slope = np.gradient(self.rate, self.time, axis=0)
         if self.lender is not self.prepared.unit:
-            # The clock of a borrowed gyro is its owner's.
+            # The clock of a borrowed gyro is that of its owner.
             if self.time_sd > 0.0:
                 force = self.time_sd * np.gradient(self.force, self.time, axis=0)
                 self._add("timing", "timing", force, None, none)
@@ -361,7 +361,7 @@ class _UnitEffects:
             if late > 0.0:
                 self._add("timing", "timing", None, late * slope, none, self.lender.name)
         elif self.time_sd > 0.0:
-            # Force and rate are late together, and with them what the arm makes of the rate.
+            # Force and rate are delayed together, and so is the lever-arm term.
             at_point = self.moved.imu[ACCEL].to_numpy(dtype=np.float64)
             force = self.time_sd * np.gradient(at_point, self.time, axis=0)
             self._add("timing", "timing", force, self.time_sd * slope, none, through_arm=False)
@@ -371,12 +371,12 @@ def _sd(covariances: Array) -> Array:
     return np.asarray(np.sqrt(np.diagonal(covariances, axis1=1, axis2=2)))
 
 
-# The unknowns of what is assumed of axes and turning that a unit does not measure.
+# Unknowns of assumed axes and rotation that a unit does not measure.
 
 
 @dataclass(frozen=True, eq=False)
 class AssumedEffect:
-    """What one standard deviation of an unknown adds to the samples, vehicle axes.
+    """Effect of one standard deviation of an unknown on the samples, vehicle axes.
 
     Attributes
     ----------
@@ -392,7 +392,7 @@ class AssumedEffect:
 
 
 def assumed_effects(prepared: PreparedUnit) -> Iterator[AssumedEffect]:
-    """List the unknowns of what is assumed of a unit.
+    """List the unknowns of a unit's assumptions.
 
     Parameters
     ----------
@@ -401,17 +401,18 @@ def assumed_effects(prepared: PreparedUnit) -> Iterator[AssumedEffect]:
     Yields
     ------
     AssumedEffect
-        Of the vehicle: units that lack the same have the same unknowns. About each of the vehicle's
-        axes two in time (`Assumed`), and of a turn what its square does; along each two.
+        Of the vehicle: units that lack the same axes have the same unknowns. For rotation, two
+        time functions about each vehicle axis (`Assumed`) and the second-order effect; for
+        missing axes, two along each.
 
     Notes
     -----
-    A specific force f that is turned by φ about e keeps ``f - φ²/2 (f - e (e·f))`` to second
-    order: turns of 5 deg shorten a change of velocity by 0.4 %, always, where the first order
-    turns it aside. ``φ²/2`` has the mean ``sd²/2`` and the standard deviation ``sd²/√2``. The
-    means of all axes are taken as one unknown about zero, the deviations as one each, so that the
-    mean square of the whole is right; as it is one-sided, 6.5 % of it are beyond the bound of
-    95 %. Products of a turn and a missing axis are left out: 4 deg and 0.8 m/s make 0.03 m/s.
+    A specific force f rotated by φ about e keeps ``f - φ²/2 (f - e (e·f))`` to second order:
+    rotations of 5 deg always shorten a change of velocity by 0.4 %, while the first order only
+    deflects it. ``φ²/2`` has the mean ``sd²/2`` and the standard deviation ``sd²/√2``. The means
+    of all axes are taken as one unknown about zero, the deviations as one each, so that the total
+    mean square is right; as it is one-sided, 6.5 % lie beyond the 95 % bound. Products of a
+    rotation and a missing axis are neglected: 4 deg and 0.8 m/s give 0.03 m/s.
     """
     unit = prepared.unit
     time = prepared.imu.index.to_numpy(dtype=np.float64)
@@ -454,16 +455,16 @@ def _of_turning(
 def _directions(
     sds: tuple[float, float, float], unmeasured: Array, names: tuple[str, ...]
 ) -> Iterator[tuple[str, Array]]:
-    """What one standard deviation about each of the vehicle's axes is along what is assumed."""
+    """Effect of one standard deviation about each vehicle axis along the assumed directions."""
     for axis, (name, sd) in enumerate(zip(names, sds, strict=True)):
         along = sd * unmeasured[:, axis]
         if along.any():
             yield name, along
 
 
-# Errors of a triad that follow from its input: one standard deviation of each.
+# Errors of a triad that depend on its input: one standard deviation of each.
 
-#: From what a triad feels, (n, 3), to what is added to the output of one axis, (n,).
+#: From the input of a triad, (n, 3), to the addition to the output of one axis, (n,).
 Curve = Callable[[Array], Array]
 #: The axis it is added to, the end of the unknown's name, the curve.
 AxisCurve = tuple[int, str, Curve]
@@ -484,7 +485,7 @@ def triad_curves(triad: RecordedTriad) -> Iterator[tuple[str, str, list[AxisCurv
     contributor : str
         Line of the error budget.
     curves : list of (axis, end of the name, curve)
-        Those that have a standard deviation.
+        Curves with a nonzero standard deviation.
     """
     sd = triad.uncertainty
     scale, skew = sd.axis("scale"), sd.axis("misalignment")
@@ -538,10 +539,10 @@ def constant(value: float) -> Curve:
     return curve
 
 
-# What the unknowns of a unit do to every sample at a point of the vehicle.
+# Effect of the unknowns of a unit on every sample at a point of the vehicle.
 
 
-#: Lines of the error budget that others look for.
+#: Lines of the error budget that other modules look up.
 GYRO_BIAS = "gyro bias"
 LEVER_ARM = "lever arm"
 MOUNTING = "mounting"
@@ -551,12 +552,12 @@ MISSING_AXIS = "assumed: missing axis"
 
 @dataclass(frozen=True, eq=False)
 class SampleEffects:
-    """What one standard deviation of each of p unknowns adds to n samples, in vehicle axes.
+    """Effect of one standard deviation of each of p unknowns on n samples, in vehicle axes.
 
     Attributes
     ----------
     names : tuple of str
-        Of each unknown. Unknowns of one name are one unknown, in whatever unit they appear.
+        Unknowns of the same name are one unknown, in whatever unit they appear.
     contributors : tuple of str
         The line of the error budget that each belongs to.
     force : ndarray, (p, n, 3), m/s²
@@ -564,12 +565,12 @@ class SampleEffects:
     rate : ndarray, (p, n, 3), rad/s
         Added to the rate of the vehicle.
     rest_force : ndarray, (p, 3), m/s²
-        Added to the mean of the specific force at rest.
+        Added to the mean stationary specific force.
     tilt : ndarray, (p, 3), rad
-        Rotation vector by which it turns the attitude that the vehicle was levelled at, in local
-        level with forward as north.
+        Rotation vector of the effect on the leveled attitude, in local level with forward as
+        north.
     force_noise : ndarray, (n, 3), m/s²
-        Standard deviation of what is independent from sample to sample.
+        Standard deviation of the part independent from sample to sample.
     rate_noise : ndarray, (n, 3), rad/s
     """
 
@@ -590,7 +591,7 @@ class SampleEffects:
 
 
 def level_turned_by(rest: Array, level: Array) -> Array:
-    """Turn of the level by what was added to the force at rest that it was found from.
+    """Tilt of the level caused by an error of the stationary force it was computed from.
 
     Parameters
     ----------

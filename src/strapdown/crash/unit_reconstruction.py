@@ -1,4 +1,4 @@
-"""One unit, or the mean of several, from what it says at the reference point to its answers."""
+"""Crash reconstruction from one unit, or from the mean of several."""
 
 from __future__ import annotations
 
@@ -43,23 +43,23 @@ NO_ROLL = "whether it rolled over cannot be told without a gyro about the forwar
 
 @dataclass(frozen=True, eq=False)
 class UnitReconstruction:
-    """The answers of one unit, or of the mean of several.
+    """Reconstruction from one unit, or from the mean of several.
 
     Attributes
     ----------
     name : str
     at_point : PointKinematics
     acceleration : Acceleration
-        Along the turning axes of the vehicle, the resting value taken off.
+        Along the rotating axes of the vehicle, stationary mean subtracted.
     resolved : Acceleration
-        In the axes of the path, gravity taken off; over the path's window.
+        In the axes of the path, gravity subtracted; over the path's window.
     events : CrashEvents
     path : CrashPath
     body, ned : tuple of EventChanges
-        Of every event, along the turning axes and resolved. An event that reaches beyond the
+        For every event, along the rotating axes and resolved. An event that extends beyond the
         path's window has no resolved change.
     types : tuple of CrashType
-        Of every event, from its change along the turning axes and the roll.
+        For every event, from its change along the rotating axes and the roll.
     findings : tuple of Finding
     """
 
@@ -78,12 +78,12 @@ class UnitReconstruction:
         return f"<UnitReconstruction\n{unit_line(self)}>"
 
     def summary(self) -> pd.DataFrame:
-        """Answers with their bounds of 95 %: `summary_table` of this unit."""
+        """Results with 95 % bounds: `summary_table` of this unit."""
         return summary_table([self])
 
     @property
     def delta_v(self) -> VelocityChange | None:
-        """Change of velocity of the severest event, along the turning axes; None without one."""
+        """Change of velocity of the severest event, along the rotating axes; None without any."""
         changes = [one.event for one in self.body]
         return max(changes, key=lambda change: change.resultant) if changes else None
 
@@ -110,13 +110,13 @@ def reconstruct_unit(
     peak_window : float, s
     rule : EventRule
     gravity : float, m/s²
-        At the place.
+        At the site.
     mechanization : NorthEastDown, optional
 
     Returns
     -------
     UnitReconstruction
-        Without any event where there is no crash in the record: `events` says how near it came.
+        Without events where the record has no crash: `events` gives the largest change.
 
     Raises
     ------
@@ -189,7 +189,7 @@ def reconstruct_unit(
                     time_2=path.time[-1],
                 )
             )
-    # Of a roll that was assumed nothing can be told.
+    # An assumed roll gives no information on a rollover.
     rolled = "roll" not in at_point.assumed_axes
     types = classify_crashes(
         [changes.event.delta_v for changes in body],
@@ -218,7 +218,7 @@ def reconstruct_unit(
 
 
 def _unseen(at_point: PointKinematics, events: CrashEvents) -> list[Finding]:
-    """An impact along an axis that is assumed is none of the events."""
+    """Report that an impact along an assumed axis is not among the events."""
     blind = [axis for axis in at_point.assumed_axes if axis in ("forward", "right")]
     if events.events or not blind:
         return []
@@ -230,7 +230,7 @@ def _unseen(at_point: PointKinematics, events: CrashEvents) -> list[Finding]:
 
 
 def _moved(change: DeltaV, ends: tuple[float, float]) -> Array:
-    """What one standard deviation of either end of an event does to its change."""
+    """Effect on the change of one standard deviation of either end of an event."""
     return np.array([-change.start_rate * ends[0], change.end_rate * ends[1]])
 
 
@@ -248,22 +248,22 @@ def _resolved(
     return velocity_change(window, change, bound, heading)
 
 
-# Whether what is said of the entry agrees with the record itself.
+# Consistency of the stated entry with the record.
 
 
-# Beyond so many standard deviations two numbers contradict each other.
+# Two numbers are inconsistent beyond so many standard deviations.
 SIGMAS = 4.0
-# A vehicle that is steeper than this when it is struck is on a slope: no braking pitches it so far.
+# A vehicle steeper than this at the impact is on a slope: braking does not pitch it so far.
 SLOPE_DEG = 4.0
 
 
 def check_standing(at_point: PointKinematics, entry: Entry | None) -> None:
-    """Refuse to begin at zero speed where the vehicle may have been driving.
+    """Refuse a start at zero speed where the vehicle may have been driving.
 
     Raises
     ------
     DataError
-        No entry is given, and the quiet stretch may be one at speed.
+        No entry is given, and the quiet interval may be one of driving at speed.
     """
     rest = at_point.rest
     if entry is None and rest is not None and rest.grade == "steady":
@@ -283,22 +283,22 @@ def entry_findings(
     events: CrashEvents,
     mechanization: NorthEastDown | None,
 ) -> list[Finding]:
-    """An entry that lies in the crash, or a speed that the record contradicts.
+    """Report an entry during the crash, or a speed that the record contradicts.
 
     Parameters
     ----------
     at_point : PointKinematics
     entry : Entry or None
     path : CrashPath
-        That is tied to it.
+        The path from this entry.
     events : CrashEvents
     mechanization : NorthEastDown, optional
     """
     if entry is None:
         return []
     found = _slope(at_point, entry, path)
-    # Time zero is the begin of a window in which a little changes: a vehicle that strikes a wall
-    # does that at its end, and is first touched up to so much after time zero.
+    # Time zero is the beginning of a window with a small change; for an impact on a wall the change
+    # is at the end of the window, and the first contact up to one window after time zero.
     if events.events and events.events[0].time_zero + events.rule.wake_window < entry.time:
         first = events.events[0].time_zero
         found.append(
@@ -311,7 +311,7 @@ def entry_findings(
                 first=first,
             )
         )
-        # Its speed need not be that at the beginning.
+        # Its speed may differ from that at the beginning.
         return found
     rest = at_point.rest
     if rest is None or rest.grade != "still" or at_point.prepared is None:
@@ -346,7 +346,7 @@ def entry_findings(
 
 
 def _slope(at_point: PointKinematics, entry: Entry, path: CrashPath) -> list[Finding]:
-    """A level velocity of a vehicle that stands on a slope."""
+    """Report a level velocity for a vehicle that is stationary on a slope."""
     now, sd = path.table.iloc[path.anchor], path.sd.iloc[path.anchor]
     pitch, along = float(now["pitch"]), entry.velocity
     speed = float(np.hypot(along[0], along[1]))

@@ -1,4 +1,4 @@
-"""Weights with which samples make the integral over a window: the gradient of a delta-V."""
+"""Sample weights of an integral over a window: the gradient of a delta-V."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ def window_weights(
     start, end : float, s
         Within the record; where `end` is before `start`, the integral is negative.
     sampling : {'instantaneous', 'mean'}
-        Values at the stamps: between two of them the signal is a line (trapezoids, and parts of
-        trapezoids at the ends; error of the second order in the step). Means over the interval
-        that ends at the stamp: exact from stamp to stamp; within an interval its mean is taken
-        all over it (an end inside one: at most h²/8 of the slope there). The first row of means
-        tells of the time before the record and has no weight.
+        Values at the stamps: interpolated linearly (trapezoids, and parts of trapezoids at the
+        ends; second-order error in the step). Means over the interval that ends at the stamp:
+        exact from stamp to stamp; within an interval its mean is used throughout (for an end
+        inside one: error at most h²/8 of the slope there). The first row of means belongs to
+        the time before the record and has zero weight.
 
     Returns
     -------
@@ -48,7 +48,7 @@ def window_weights(
     ConfigError
         `sampling` is unknown.
     DataError
-        The window reaches beyond the record, or time does not advance.
+        The window extends beyond the record, or time does not increase.
     """
     stamps = as_array(time, None, "time")
     check_time(stamps, None)
@@ -66,7 +66,7 @@ def check_within(time: Array, start: float, end: float, source: str | None) -> N
     Raises
     ------
     DataError
-        It is not, or the record has fewer than two samples.
+        The window is not within it, or the record has fewer than two samples.
     """
     if len(time) < 2:
         raise DataError(
@@ -75,7 +75,7 @@ def check_within(time: Array, start: float, end: float, source: str | None) -> N
             quantity="time",
             count=len(time),
         )
-    # Instants that were computed from stamps may lie a rounding beyond the last.
+    # Instants computed from stamps may exceed the last by rounding.
     slack = 8.0 * float(np.spacing(np.abs(time[[0, -1]]).max()))
     for instant in (start, end):
         if not time[0] - slack <= instant <= time[-1] + slack:
@@ -122,12 +122,12 @@ def resolved_weights(weights: ArrayLike, q_nb: ArrayLike, sampling: str) -> Arra
     Returns
     -------
     ndarray, (n, 3, 3), s
-        ``G``: an error ``e[k]`` of the samples, (3,), moves the delta-V by ``sum G[k] @ e[k]``.
+        ``G``: an error ``e[k]`` of the samples, (3,), changes the delta-V by ``sum G[k] @ e[k]``.
 
     Raises
     ------
     DataError
-        There is not one rotation a sample.
+        The number of rotations differs from that of samples.
     """
     w = as_array(weights, None, "weights")
     q = attitude_of_samples(q_nb, sampling, len(w))
@@ -138,14 +138,14 @@ def resolved_weights(weights: ArrayLike, q_nb: ArrayLike, sampling: str) -> Arra
 # Sums over the unknowns of each line of an error budget.
 
 
-#: The line of what is independent from sample to sample.
+#: Line of the errors that are independent from sample to sample.
 NOISE = "sensor noise"
 
 
 def by_contributor(
     values: Array, columns: Sequence[str], contributors: Sequence[str], more: Mapping[str, Array]
 ) -> pd.DataFrame:
-    """Add up what belongs to one line.
+    """Sum the values of each contributor.
 
     Parameters
     ----------
@@ -153,9 +153,9 @@ def by_contributor(
         Of each unknown: variances, or products.
     columns : sequence of str, (k,)
     contributors : sequence of str, (p,)
-        The line that each unknown belongs to.
+        The contributor of each unknown.
     more : dict of ndarray, (k,)
-        What no unknown stands for, by line.
+        Additional values without an unknown, by contributor.
 
     Returns
     -------

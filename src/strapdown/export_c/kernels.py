@@ -1,4 +1,4 @@
-"""The sources of the kernels, and the functions that were asked of them."""
+"""Specialized kernel functions and their sources."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from strapdown._kernels.arithmetic import PACKAGE, SOURCES
 
 @dataclass
 class Function:
-    """One function of a kernel, specialised.
+    """One function of a kernel, specialized.
 
     Attributes
     ----------
     name : str
-        That of the kernel; a second version of it has a number behind it.
+        Name of the kernel; a second version has a number appended.
     doc : str
         First paragraphs of its docstring.
     parameters : list of str
-        Those that are still used.
+        Parameters that are still used.
     body : list of stmt
-        Its statements; ``comment`` of each are the comment lines above it.
+        Statements; ``comment`` of each holds the comment lines above it.
     results : int
-        Numbers that it returns.
+        Number of returned values.
     """
 
     name: str
@@ -39,7 +39,7 @@ class Function:
 
 @dataclass(frozen=True)
 class Constant:
-    """A constant of a kernel module with the comment that stands above it."""
+    """A constant of a kernel module with the comment above it."""
 
     name: str
     value: Number
@@ -48,14 +48,14 @@ class Constant:
 
 @dataclass
 class Kernels:
-    """The sources of all kernels, and what was asked of them so far.
+    """The sources of all kernels, and the functions required so far.
 
     Attributes
     ----------
     ranges : dict
-        For a variable that holds a whole number at run time: the least and the greatest.
+        For a variable with an integer value at run time: the least and the greatest.
     functions : list of Function
-        In the order in which they must be defined.
+        In the order of definition.
     """
 
     ranges: dict[str, tuple[int, int]] = field(default_factory=dict)
@@ -87,16 +87,16 @@ class Kernels:
     def require(
         self, name: str, options: Env | None = None, keep: tuple[int, ...] | None = None
     ) -> Function:
-        """Specialise a function and all that it calls.
+        """Specialize a function and all functions that it calls.
 
         Parameters
         ----------
         name : str
             A function of a kernel module.
         options : dict
-            What is known of its parameters.
+            Known values of its parameters.
         keep : tuple of int
-            The results that are wanted, by position; all where not given.
+            Results to keep, by position; by default all.
         """
         options = options or {}
         key = (name, tuple(sorted(options.items())), keep)
@@ -119,7 +119,7 @@ class Kernels:
         return self._made[key]
 
     def named(self, name: str) -> Function | None:
-        """Return the specialised function of that name."""
+        """Return the specialized function of that name."""
         return next((f for f in self.functions if f.name == name), None)
 
     def is_kernel(self, name: str) -> bool:
@@ -131,7 +131,7 @@ class Kernels:
         return [a.arg for a in self._sources[name].args.args]
 
     def span(self, name: str) -> Span | None:
-        """Return the value of a module's constant."""
+        """Return the value of a module constant."""
         constant = self._constants.get(name)
         return (constant.value, constant.value) if constant else None
 
@@ -148,16 +148,17 @@ class Kernels:
         return 0
 
 
-# The kernels that one algorithm needs, with its options put in as constants.
+# Specialization of the kernels of one algorithm, with its options as constants.
 #
-# The kernels take their options as numbers. Here a kernel is read as a syntax tree and followed
-# from its first function: conditions that the options decide are decided, what they exclude is
-# dropped, and so are parameters and variables that are then of no use. What remains are the same
+# The kernels take their options as numbers. A kernel is read as a syntax tree and followed from
+# its first function: conditions on options are decided, and excluded branches and unused
+# parameters and variables are dropped. The same formulas remain in the same order. This part is
+# independent of C.
 # formulas in the same order. Nothing here knows C.
 
 
 class Specialiser:
-    """One function, with what is known of its names."""
+    """One function, with the known values of its names."""
 
     def __init__(self, kernels: Kernels, env: Env) -> None:
         self.kernels, self.env = kernels, env
@@ -165,7 +166,7 @@ class Specialiser:
     # --- statements -----------------------------------------------------------------------
 
     def block(self, body: list[ast.stmt]) -> list[ast.stmt]:
-        """Specialise statements, up to the first that returns."""
+        """Specialize statements up to the first return."""
         done: list[ast.stmt] = []
         for node in body:
             done += self.statement(node)
@@ -174,7 +175,7 @@ class Specialiser:
         return done
 
     def statement(self, node: ast.stmt) -> list[ast.stmt]:
-        """Specialise one statement: into none, one or several."""
+        """Specialize one statement into none, one or several."""
         if isinstance(node, ast.If):
             return self.branch(node)
         new: ast.stmt
@@ -201,7 +202,7 @@ class Specialiser:
         return [like(new, node)]
 
     def target(self, node: ast.expr) -> ast.expr:
-        """Specialise what a value is given to."""
+        """Specialize the target of an assignment."""
         for part in ast.walk(node):
             if (
                 isinstance(part, ast.Name)
@@ -212,12 +213,12 @@ class Specialiser:
         return self.expression(node)
 
     def remember(self, target: ast.expr) -> None:
-        """Note the range of a name that has one."""
+        """Store the range of a name that has one."""
         if isinstance(target, ast.Name) and target.id in self.kernels.ranges:
             self.env[target.id] = self.kernels.ranges[target.id]
 
     def each(self, node: ast.For, values: ast.Tuple) -> list[ast.stmt]:
-        """Write a loop over a tuple out."""
+        """Unroll a loop over a tuple."""
         if not isinstance(node.target, ast.Name):
             raise UntranslatableError("loop over more than one name", node)
         out: list[ast.stmt] = []
@@ -228,7 +229,7 @@ class Specialiser:
         return out
 
     def branch(self, node: ast.If) -> list[ast.stmt]:
-        """Decide a condition, or follow both ways with what each of them knows."""
+        """Decide a condition, or follow both branches with the knowledge of each."""
         truth = self.truth(node.test)
         if truth is not None:
             return self.block(node.body if truth else node.orelse)
@@ -242,14 +243,14 @@ class Specialiser:
         if name:
             otherwise[name] = without(before[name], value)
         orelse = self.block(node.orelse)
-        # What follows is reached only by the other way.
+        # The following statements are reached only through the other branch.
         self.env = otherwise if body and isinstance(body[-1], ast.Return) else before
         return [like(ast.If(test, body, orelse), node)]
 
     # --- expressions ----------------------------------------------------------------------
 
     def expression(self, node: ast.expr) -> ast.expr:
-        """Put in what is known."""
+        """Substitute known values."""
         if self.depends(node):
             span = self.span(node)
             if span and span[0] == span[1]:
@@ -273,12 +274,12 @@ class Specialiser:
         return new
 
     def boolean(self, node: ast.BoolOp) -> ast.expr:
-        """Leave out the terms that are known and do not matter."""
+        """Drop known terms that do not matter."""
         rest = [self.expression(v) for v in node.values if self.truth(v) is None]
         return rest[0] if len(rest) == 1 else ast.copy_location(ast.BoolOp(node.op, rest), node)
 
     def call(self, node: ast.Call) -> ast.expr:
-        """Call the function that is specialised for what is known of the arguments."""
+        """Call the function specialized for the known arguments."""
         if not isinstance(node.func, ast.Name) or not self.kernels.is_kernel(node.func.id):
             return ast.copy_location(
                 ast.Call(node.func, [self.expression(a) for a in node.args], []), node
@@ -290,14 +291,14 @@ class Specialiser:
         values = [self.expression(arguments[n]) for n in function.parameters]
         return ast.copy_location(ast.Call(ast.Name(function.name, ast.Load()), values, []), node)
 
-    # --- what is known --------------------------------------------------------------------
+    # --- known values ---------------------------------------------------------------------
 
     def depends(self, node: ast.expr) -> bool:
-        """Whether an option has a part in it; formulas of constants alone stay as written."""
+        """Whether an option takes part; formulas of constants alone stay as written."""
         return any(isinstance(p, ast.Name) and p.id in self.env for p in ast.walk(node))
 
     def span(self, node: ast.expr) -> Span | None:
-        """Value or range of an expression, where the options or the constants tell."""
+        """Value or range of an expression, if options or constants determine it."""
         if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
             return node.value, node.value
         if isinstance(node, ast.Name):
@@ -315,7 +316,7 @@ class Specialiser:
         return None
 
     def truth(self, node: ast.expr) -> bool | None:
-        """Whether a condition holds, where the options tell."""
+        """Value of a condition, if the options determine it."""
         if isinstance(node, ast.BoolOp):
             known = [self.truth(v) for v in node.values]
             decides = isinstance(node.op, ast.Or)
@@ -330,11 +331,11 @@ class Specialiser:
         return bool(span[0]) if span and span[0] == span[1] else None
 
 
-# What is known of a number before the program runs: its value, or its range.
+# Knowledge of a number before the program runs: its value, or its range.
 
 
 Number = float | int
-# A scalar is (v, v); a whole number of which only the range is known is (low, high).
+# A scalar is (v, v); an integer known only by range is (low, high).
 Span = tuple[Number, Number]
 Env = dict[str, Span]
 
@@ -386,23 +387,23 @@ def equality(test: ast.expr, env: Env) -> tuple[str, Number]:
 
 
 def without(span: Span, value: Number) -> Span:
-    """Leave a value at either end of a range out."""
+    """Exclude a value at either end of a range."""
     low, high = span
     return (low + (low == value), high - (high == value))
 
 
-# What is read from, and changed in, the syntax trees of kernels.
+# Analysis and transformation of kernel syntax trees.
 
 
 class UntranslatableError(Exception):
-    """A kernel has left the subset of Python that can be translated."""
+    """A kernel is outside the subset of Python that can be translated."""
 
     def __init__(self, what: str, node: ast.AST) -> None:
         super().__init__(f"line {getattr(node, 'lineno', '?')}: {what}: {ast.unparse(node)}")
 
 
 class Put(ast.NodeTransformer):
-    """Put an expression in the place of a name."""
+    """Replace a name by an expression."""
 
     def __init__(self, name: str, value: ast.expr) -> None:
         self.name, self.value = name, value
@@ -413,7 +414,7 @@ class Put(ast.NodeTransformer):
 
 
 class Keep(ast.NodeTransformer):
-    """Return some of the results alone."""
+    """Return only some of the results."""
 
     def __init__(self, keep: tuple[int, ...]) -> None:
         self.keep = keep
@@ -428,20 +429,20 @@ class Keep(ast.NodeTransformer):
 
 
 def like(new: ast.stmt, old: ast.stmt) -> ast.stmt:
-    """Give a new statement the place and the comment of the old one."""
+    """Give a new statement the position and the comment of the old one."""
     ast.copy_location(new, old)
     new.comment = getattr(old, "comment", "")  # type: ignore[attr-defined]
     return new
 
 
 def walk(body: Iterable[ast.AST]) -> Iterator[ast.AST]:
-    """Every node of some statements."""
+    """Iterate over every node of some statements."""
     for node in body:
         yield from ast.walk(node)
 
 
 def loaded(body: Iterable[ast.AST]) -> set[str]:
-    """Return the names that are read; what an augmented assignment changes is read, too."""
+    """Return the names that are read; targets of augmented assignments are included."""
     names = set()
     for node in walk(body):
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
@@ -452,14 +453,14 @@ def loaded(body: Iterable[ast.AST]) -> set[str]:
 
 
 def without_docstring(body: list[ast.stmt]) -> list[ast.stmt]:
-    """The statements of a function after its docstring."""
+    """Statements of a function after its docstring."""
     first = body[0]
     is_doc = isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant)
     return body[1:] if is_doc else body
 
 
 def without_unused(body: list[ast.stmt]) -> list[ast.stmt]:
-    """Drop assignments to names that nobody reads, until there are none."""
+    """Drop assignments to unused names, repeatedly."""
     while True:
         used = loaded(body)
         shorter = _assignments_to(body, used)
@@ -492,7 +493,7 @@ def _assignments_to(body: list[ast.stmt], used: set[str]) -> list[ast.stmt]:
 
 
 def attach_comments(tree: ast.Module, lines: list[str]) -> None:
-    """Note with each statement the comment lines right above it."""
+    """Attach to each statement the comment lines directly above it."""
     for node in ast.walk(tree):
         if isinstance(node, ast.stmt) and not isinstance(node, ast.FunctionDef):
             at = node.lineno - 2
@@ -503,11 +504,11 @@ def attach_comments(tree: ast.Module, lines: list[str]) -> None:
             node.comment = " ".join(found)  # type: ignore[attr-defined]
 
 
-# --- where a variable is declared ---------------------------------------------------------
+# --- declaration of variables -------------------------------------------------------------
 
 
 def first_uses(body: list[ast.stmt], names: set[str]) -> dict[int, set[str]]:
-    """Find for each name the innermost block that holds it all, and its first statement there."""
+    """For each name, find the innermost block with all its uses, and its first statement there."""
     places: dict[int, set[str]] = {}
     for name in names:
         block = body
@@ -534,19 +535,19 @@ def _names(body: Iterable[ast.AST]) -> set[str]:
 
 
 def stored(body: Iterable[ast.AST]) -> Iterator[str]:
-    """The names that are given a value."""
+    """Names that are assigned."""
     for node in walk(body):
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
             yield node.id
 
 
 def plain_name(node: ast.expr) -> str:
-    """The name that an expression is, or nothing."""
+    """The name that an expression consists of, or an empty string."""
     return node.id if isinstance(node, ast.Name) else ""
 
 
 def name_of(node: ast.expr) -> str:
-    """The name that an expression must be."""
+    """The name of an expression that must be a name."""
     if not isinstance(node, ast.Name):
         raise UntranslatableError("a plain name is expected", node)
     return node.id

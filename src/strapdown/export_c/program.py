@@ -1,4 +1,4 @@
-"""The C file: header, interface, kernels, test."""
+"""Compose the C file: header, interface, kernels, test."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from strapdown.increments.angle import INTERPOLATIONS
 from strapdown.tables import SAMPLINGS as KINDS
 from strapdown.tables import check_imu
 
-# What a name of the math library is in either precision.
+# Math functions with a macro for each precision.
 MACROS = ("SQRT", "SIN", "COS", "ATAN2", "HYPOT", "FABS", "FMOD", "FMAX", "COPYSIGN")
 
 
@@ -34,23 +34,23 @@ def export_c(
     q_nb: ArrayLike = (1.0, 0.0, 0.0, 0.0),
     imu: pd.DataFrame | None = None,
 ) -> str:
-    """Write an attitude algorithm as one C99 file that holds its own test.
+    """Write an attitude algorithm as one C99 file with its own test.
 
-    The formulas are translated from the kernels that strapdown itself runs: the same
-    operations in the same order. In double precision the file gives the bits of
-    `run_attitude` wherever the C library's sine and cosine are those of Python.
+    The formulas are translated from strapdown's own kernels: the same operations in the same order.
+    In double precision the file reproduces `run_attitude` bitwise wherever the C library's sine and
+    cosine equal those of Python.
 
     Parameters
     ----------
     algorithm : AttitudeAlgorithm
     interpolation : {'linear', 'cubic'}
-        As `increments_from_imu`; with the cubic the attitude is one sample late.
+        As in `increments_from_imu`; the cubic delays the attitude by one sample.
     sampling : {'instantaneous', 'mean'}, optional
-        What a sample is; that of `imu` where not given, or the rate at its instant.
+        Meaning of a sample; by default as in `imu`, or the rate at its instant.
     q_nb : array_like, (4,)
-        Where the test starts.
+        Initial attitude of the test.
     imu : DataFrame, optional
-        An Imu table whose first 48 samples are the test; a motion of its own where not given.
+        An Imu table whose first 48 samples are the test; by default a built-in motion.
 
     Returns
     -------
@@ -60,9 +60,9 @@ def export_c(
     Raises
     ------
     ConfigError
-        `interpolation` or `sampling` is unknown, or `sampling` is not that of `imu`.
+        `interpolation` or `sampling` is unknown, or `sampling` differs from that of `imu`.
     DataError
-        `q_nb` is no rotation; or as `tables.check_imu`.
+        `q_nb` is not a rotation; or as `tables.check_imu`.
     """
     kind = _kind(interpolation, sampling, imu)
     around, shape = SAMPLINGS[kind], shape_of(algorithm)
@@ -123,7 +123,7 @@ def _kind(interpolation: str, sampling: str | None, imu: pd.DataFrame | None) ->
     return "mean" if sampling == "mean" else interpolation
 
 
-# --- what is asked of the kernels ---------------------------------------------------------
+# --- required kernel functions ------------------------------------------------------------
 
 
 def _require_step(kernels: Kernels, algorithm: AttitudeAlgorithm) -> Function:
@@ -142,7 +142,7 @@ def _require_increments(kernels: Kernels, kind: str, change: bool) -> Function:
 
 
 def _rest(shape: Shape, size: int) -> str:
-    """Statements that clear what of the state does not begin with the attitude."""
+    """Statements that clear the part of the state not set from the attitude."""
     if size == shape.begun:
         return ""
     if size == shape.begun + 1:
@@ -182,7 +182,7 @@ def _update(around: Sampling, step: Function, increments: Function) -> str:
 
 def _header(algorithm: AttitudeAlgorithm, around: Sampling, size: int) -> str:
     accuracy, count = algorithm.accuracy, operation_count(algorithm)
-    # Looked up, because the package itself names what stands on higher floors.
+    # Looked up at run time, because the package root imports higher layers.
     version = importlib.import_module("strapdown").__version__
     operations = ", ".join(f"{count[k]:.3g} {k}" for k in count if count[k])
     orders = (
@@ -258,10 +258,10 @@ def _constants(kernels: Kernels) -> str:
     return "\n".join([*lines, ""]) if lines else ""
 
 
-# What is around the kernels in the C file: the structure, its start, one sample, its reading.
+# C code around the kernels: structure, initialization, one sample, output.
 #
-# This is the part of `AttitudeTracker` and of each algorithm's `begin` and `quaternions` that is
-# no kernel, written once in C. The formulas it calls are translated.
+# The non-kernel part of `AttitudeTracker` and of each algorithm's `begin` and `quaternions`,
+# written once in C. The formulas it calls are translated.
 
 
 _PLACES = "&q_nb[0], &q_nb[1], &q_nb[2], &q_nb[3]"
@@ -275,7 +275,7 @@ _COPY = """a->state[0] = w;
 _ROWS = """quat_from_dcm({0}[0], {0}[1], {0}[2], {0}[3], {0}[4], {0}[5],
         {0}[6], {0}[7], {0}[8], &q_nb[0], &q_nb[1], &q_nb[2], &q_nb[3]);"""
 
-# The rotation nearest in Frobenius norm. Newton's step finds it from every matrix whose
+# Nearest rotation in the Frobenius norm. Newton's iteration finds it from every matrix whose
 # singular values are below sqrt(3), as they are when their squares sum to 3.
 NEAREST = """real_t m[9];
     real_t sum = R(0.0);
@@ -294,20 +294,20 @@ NEAREST = """real_t m[9];
 
 @dataclass(frozen=True)
 class Shape:
-    """How an algorithm's state begins and is read.
+    """Initialization and output of an algorithm's state.
 
     Attributes
     ----------
     state : str
-        What its numbers are.
+        Meaning of its numbers.
     begin, read : str
         Statements: from w, x, y, z into ``a->state``; from there into ``q_nb``.
     begun : int
-        Numbers of the state that `begin` sets; the rest is zero.
+        Count of state numbers that `begin` sets; the rest is zero.
     kernels : tuple of str
-        What these call.
+        Kernels that these call.
     ranges : callable
-        Least and greatest value of whole numbers that a kernel works out at run time.
+        Least and greatest value of integers that a kernel computes at run time.
     """
 
     state: str
@@ -361,31 +361,31 @@ SHAPES: dict[str, Shape] = {
 
 
 def shape_of(algorithm: AttitudeAlgorithm) -> Shape:
-    """Return how the state of an algorithm begins and is read."""
+    """Return the initialization and output of an algorithm's state."""
     if algorithm.name == "dcm" and algorithm.kernel_options()[0]:
         return _TRUNCATED
     return SHAPES[algorithm.name]
 
 
-# --- one sample, by what a sample is and how rates run between samples ----------------------
+# --- one sample, by meaning of a sample and interpolation of rates ----------------------------
 
 
 @dataclass(frozen=True)
 class Sampling:
-    """How samples become steps.
+    """Conversion of samples to steps.
 
     Attributes
     ----------
     words : str
-        What the header says of it.
+        Description in the file header.
     memory : str
-        What the structure remembers, as declarations.
+        Stored data of the structure, as declarations.
     code : str
-        The functions; ``STEP`` stands for the call of the algorithm.
+        The functions; ``STEP`` is replaced by the call of the algorithm.
     bytes : int
-        What the structure remembers takes in single precision.
+        Size of the stored data in single precision.
     lag : int
-        Samples by which the attitude is behind.
+        Delay of the attitude in samples.
     """
 
     words: str

@@ -1,4 +1,4 @@
-"""A short record and the attitudes that the kernels find for it, in double and single precision."""
+"""Test vector: a short record and its attitudes in double and single precision."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from strapdown.tables import GYRO
 
 Array = NDArray[np.float64]
 SAMPLES = 48
-# Roundings of a step that another compiler may make otherwise (fused products, its own sine): a
+# Rounding of a step that may differ between compilers (fused products, their own sine): a
 # product of quaternions is four sums of four products, 4 roundings of half an eps each, and so
-# 2 eps a component, 4 eps in the vector of four, 8 eps as an angle; as much again for the
+# 2 eps a component, 4 eps in the vector of four, 8 eps as an angle; the same again for the
 # quaternion of the increment; and both runs may have them.
 ROUNDINGS = 32
 
@@ -32,11 +32,11 @@ class Vector:
     Attributes
     ----------
     samples : ndarray, (n, 4)
-        dt in s and the rates in rad/s, each a number that single precision holds exactly.
+        dt in s and the rates in rad/s, each exactly representable in single precision.
     double, single : ndarray, (n, 4)
-        The attitude at each sample by the kernels in either precision.
+        Attitude at each sample from the kernels in either precision.
     condition : float
-        By how much the algorithm magnifies an error near its singularity.
+        Factor by which the algorithm magnifies an error near its singularity.
     """
 
     samples: Array
@@ -46,19 +46,19 @@ class Vector:
 
     @property
     def roundings(self) -> float:
-        """Largest difference between two right implementations, in eps of the precision."""
+        """Largest difference between two correct implementations, in eps of the precision."""
         return len(self.samples) * ROUNDINGS * self.condition
 
 
 def motion() -> Array:
-    """Turns that grow from nothing to 0.8 rad a step, in equal steps and then in unequal ones.
+    """Rotations that grow from zero to 0.8 rad per step, in equal and then in unequal steps.
 
-    So both the series and the functions are used, and both kinds of blocks.
+    They exercise both the series and the functions, and both kinds of blocks.
     """
     k = np.arange(SAMPLES)
     dt = np.where((k > SAMPLES / 2) & (k % 5 > 2), 0.09375, 0.0625)
     grow = 0.2 * k
-    # Most of it about one axis, so that pitch stays away from its pole.
+    # Mostly about one axis, so that pitch stays away from its pole.
     rates = [grow, 0.4 * grow * np.sin(0.9 * k), 0.4 * grow * np.cos(0.7 * k)]
     return np.column_stack([dt, *rates])
 
@@ -78,10 +78,10 @@ def make_vector(
     ----------
     algorithm : AttitudeAlgorithm
     q_nb : ndarray, (4,)
-        Where it starts.
+        Initial attitude.
     kind : {'linear', 'cubic', 'mean'}
     imu : DataFrame, optional
-        Its first 48 samples; a motion of its own where not given.
+        Its first 48 samples; by default a built-in motion.
     """
     rows = motion() if imu is None else _rows(imu)
     rows = rows.astype(np.float32).astype(np.float64)
@@ -91,7 +91,7 @@ def make_vector(
         rows[0, 0] = 0.0
     double, state = _run(algorithm, rows, q_nb, kind, single=False)
     single, _ = _run(algorithm, rows, q_nb, kind, single=True)
-    # The angles' rates have 1/cos(pitch) as a factor, and so have errors in them.
+    # The rates of the angles, and their errors, have 1/cos(pitch) as a factor.
     condition = 1.0 / max(float(state[3]), 1e-3) if algorithm.name == "euler" else 1.0
     return Vector(rows, double, single, condition)
 
@@ -109,7 +109,7 @@ def _run(
 
     dt, rate = rows[:, 0].astype(number), rows[:, 1:].astype(number)
     if kind == "mean":
-        # A mean has no sample at the start; what stands there is not used.
+        # A mean has no sample at the start; the value there is not used.
         rate = np.vstack([rate[:1], rate])
     else:
         dt = dt[1:]
@@ -131,7 +131,7 @@ def _run(
     return algorithm.quaternions(np.ascontiguousarray(history, dtype=np.float64)), state
 
 
-# The test at the end of the C file: a vector with its attitudes, and a filter from a pipe.
+# Test at the end of the C file: a vector with its attitudes, and a filter for a pipe.
 
 
 _TEST = """\
@@ -236,15 +236,15 @@ _LAST = """\
 
 
 def main_program(vector: Vector, q_nb: Array, lag: int) -> str:
-    """Return the end of the file: what is compiled for a test alone.
+    """Return the end of the file, which is compiled only for a test.
 
     Parameters
     ----------
     vector : Vector
     q_nb : ndarray, (4,)
-        Where it starts.
+        Initial attitude.
     lag : int
-        Samples by which the attitude is behind.
+        Delay of the attitude in samples.
     """
     from_ = ", ".join(f"R({float(v).hex()})" for v in q_nb)
     bound = (
@@ -269,7 +269,7 @@ def main_program(vector: Vector, q_nb: Array, lag: int) -> str:
 
 
 def _rows_main(values: Array) -> str:
-    # Hexadecimal loses nothing.
+    # Hexadecimal is exact.
     return "\n".join(f"    {{{', '.join(_hex(v) for v in row)}}}," for row in values)
 
 

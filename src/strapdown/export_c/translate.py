@@ -1,4 +1,4 @@
-"""From a specialised kernel to a C function: same names, same formulas, same order."""
+"""Translate a specialized kernel to a C function: same names, same formulas, same order."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from strapdown.export_c.kernels import (
     walk,
 )
 
-# From an expression of a kernel to one of C, with parentheses where C needs them.
+# Translation of kernel expressions to C, with parentheses where C needs them.
 
 
 FUNCTIONS = {
@@ -45,7 +45,7 @@ _UNARY, _ATOM = 14, 20
 
 
 class Expressions:
-    """The expressions of one function."""
+    """Translate the expressions of one function."""
 
     def __init__(self, kinds: Kinds, function: Function) -> None:
         self.all, self.function = kinds, function
@@ -71,7 +71,7 @@ class Expressions:
         if isinstance(node, ast.BinOp):
             sign, strength = BINARY[type(node.op)]
             left = self.text(node.left, over=strength)
-            # Not regrouped: floating point is not associative.
+            # Not regrouped: floating-point arithmetic is not associative.
             return f"{left} {sign}{TIE}{self.text(node.right, over=strength + 1)}", strength
         if isinstance(node, ast.Compare) and len(node.ops) == 1:
             sides = [self.text(n, over=12) for n in (node.left, node.comparators[0])]
@@ -134,20 +134,20 @@ class Expressions:
         return range(*(int(b) for b in bounds))[-1]
 
 
-# What each name of the specialised kernels is in C, and the heads of the functions.
+# C types of the names in the specialized kernels, and function prototypes.
 
 
-# Results up to this number go where pointers say; more of them into one array.
+# Up to this number results are returned through pointers, more of them in one array.
 POINTERS = 4
 
 
 class Kinds:
-    """The kinds of all names in the functions that were asked of the kernels.
+    """C types of all names in the required functions.
 
     Attributes
     ----------
     state_size : int
-        Numbers of the state that the functions written so far touch.
+        Count of state numbers that the functions written so far use.
     """
 
     def __init__(self, kernels: Kernels) -> None:
@@ -156,18 +156,18 @@ class Kinds:
         self._types: dict[str, dict[str, str]] = {}
         self._returns: dict[str, str] = {}
         self._changed: dict[str, set[str]] = {}
-        for function in kernels.functions:  # callees stand before their callers
+        for function in kernels.functions:  # callees precede their callers
             self._changed[function.name] = set(self._written(function))
             self._type_arrays(function)
         for function in reversed(kernels.functions):
             self._type_arguments(function)
 
     def types(self, function: Function) -> dict[str, str]:
-        """Return the kind of each name: 'real_t', 'int', or 'array'."""
+        """Return the type of each name: 'real_t', 'int', or 'array'."""
         return self._types.setdefault(function.name, {})
 
     def changes(self, name: str, parameter: str) -> bool:
-        """Whether a function writes into an array that it is given."""
+        """Whether a function writes into an array argument."""
         return parameter in self._changed[name]
 
     def _written(self, function: Function) -> Iterator[str]:
@@ -186,7 +186,7 @@ class Kinds:
         return None
 
     def _type_arrays(self, function: Function) -> None:
-        """Find what is an array: it has an index here, or where it is handed on to."""
+        """Find arrays: names with an index here, or passed to an array parameter."""
         types = self.types(function)
         for node in walk(function.body):
             if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name):
@@ -197,7 +197,7 @@ class Kinds:
                         types[name_of(argument)] = "array"
 
     def _type_arguments(self, function: Function) -> None:
-        """Find the kinds of the locals, then of the parameters of what is called."""
+        """Find the types of the locals, then of the parameters of called functions."""
         types = self.types(function)
         for node in walk(function.body):
             if isinstance(node, ast.For):
@@ -214,7 +214,7 @@ class Kinds:
                 self._returns[function.name] = self.kind(node.value, types)
 
     def kind(self, node: ast.expr, types: dict[str, str]) -> str:
-        """Return the kind of an expression."""
+        """Return the type of an expression."""
         if isinstance(node, ast.Name):
             span = self.kernels.span(node.id)
             return "int" if span and isinstance(span[0], int) else types.get(node.id, "real_t")
@@ -231,11 +231,11 @@ class Kinds:
         return "real_t"
 
     def returns(self, function: Function) -> str:
-        """Return what a C function returns: one number, or nothing."""
+        """Return the result type of a C function: one number, or void."""
         return self._returns.get(function.name, "real_t") if function.results == 1 else "void"
 
     def prototype(self, function: Function) -> str:
-        """Return the head of a function, on one line."""
+        """Return the prototype of a function, on one line."""
         types, arguments = self.types(function), []
         for p in function.parameters:
             if types.get(p) == "array":
@@ -251,7 +251,7 @@ class Kinds:
 
 
 class Translator(Kinds):
-    """Translate the functions that were asked of the kernels."""
+    """Translate the required functions."""
 
     def function(self, function: Function) -> list[str]:
         """Return the lines of a function's definition."""
@@ -259,7 +259,7 @@ class Translator(Kinds):
 
 
 class _Body(Expressions):
-    """The statements of one function."""
+    """Translate the statements of one function."""
 
     def __init__(self, kinds: Kinds, function: Function) -> None:
         super().__init__(kinds, function)
@@ -399,7 +399,7 @@ class _Body(Expressions):
         return out if last else [*out, f"{indent}return;"]
 
 
-# How a comment, a statement and a number stand in the C file.
+# Layout of comments, statements and numbers in the C file.
 
 
 WIDTH = 100
@@ -439,7 +439,7 @@ def wrapped(text: str, indent: str) -> list[str]:
 
 
 def number(value: float) -> str:
-    """A literal: whole numbers as such, others as R(...), which is of the precision chosen."""
+    """A literal: integers as such, others as R(...) in the chosen precision."""
     if isinstance(value, int):
         return str(int(value))
     return f"R({value!r})"

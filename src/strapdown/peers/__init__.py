@@ -1,4 +1,4 @@
-"""Filters of other libraries over the same log: one file each, and the one table of them."""
+"""Comparison with filters of other libraries: one module each, and their table."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ PEERS: dict[str, Peer] = {
 
 
 def available_peers() -> tuple[str, ...]:
-    """Names of the libraries that are installed, in the order of `PEERS`."""
+    """Names of the installed libraries, in the order of `PEERS`."""
     return tuple(name for name, peer in PEERS.items() if peer.available)
 
 
 def _chosen(names: Sequence[str]) -> list[tuple[Peer, str]]:
-    """Pairs of library and filter that the words name, each once."""
+    """Pairs of library and filter selected by the names, without repetition."""
     pairs: list[tuple[Peer, str]] = []
     for word in names:
         name, _, one = word.strip().lower().partition(":")
@@ -81,32 +81,32 @@ def run_peers(
     names : sequence of str
         ``vqf``, ``imufusion``, ``ahrs``, or one filter of a library, as in ``ahrs:madgwick``.
     imu : DataFrame
-        An Imu table, and ``mag_x..z`` in µT where there is a magnetometer.
+        An Imu table, with ``mag_x..z`` in µT if there is a magnetometer.
     q_nb : array_like, (4,)
         Attitude at the first stamp.
     aidings : sequence of str, optional
-        Of `AIDINGS`; those that the columns of `imu` allow.
+        From `AIDINGS`; by default all that the columns of `imu` allow.
     longest_s : float, s, optional
-        A filter that would take longer, as far as is known beforehand, is left out.
+        Filters with a longer expected run time are left out.
     progress : callable, optional
         Called with a sentence before each run.
 
     Returns
     -------
     runs : tuple of (str, str, DataFrame)
-        Library with version and filter, aiding, Attitude table; by aiding, in the order of
-        `AIDINGS`, for only like is to be compared with like.
+        Library with version and filter, aiding, Attitude table; ordered by aiding as in
+        `AIDINGS`, since only filters with the same aiding are comparable.
     findings : tuple of Finding
-        What was left out, and where the steps are not what a library takes them for.
+        Filters left out, and records whose steps violate a library's assumption.
 
     Raises
     ------
     ConfigError
-        A library is not known or not installed, or a filter or an aiding is unknown.
+        A library is unknown or not installed, or a filter or an aiding is unknown.
     DataError
-        An aiding was asked for by name, and its columns are absent.
+        The columns of a requested aiding are absent.
     DivergenceError
-        A library gave up.
+        A library failed.
     """
     pairs = _chosen(names)
     if aidings is None:

@@ -1,4 +1,4 @@
-"""What a filter of another library is here: samples in, attitudes out, in our conventions."""
+"""Interface to a filter of another library: samples in, attitudes out, in our conventions."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ Array = NDArray[np.float64]
 
 AIDINGS = ("gyro", "gyro+accel", "gyro+accel+mag")
 
-# Steps that differ from their mean by more than this share are not a constant rate.
+# Steps that differ from their mean by more than this fraction are not uniform.
 STEADY = 0.01
 
 
 @dataclass(frozen=True)
 class Samples:
-    """What a filter may use.
+    """Samples available to a filter.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Samples:
     force : ndarray, (n, 3), m/s²
         Specific force; empty, (0, 3), for the gyro alone. Body axes forward-right-down.
     mag : ndarray, (n, 3), µT
-        Likewise empty where it is not used.
+        Also empty where it is not used.
     """
 
     dt: Array
@@ -53,12 +53,12 @@ class PeerFilter:
     Attributes
     ----------
     compute : dict of str to callable
-        For each aiding: from samples and the initial attitude to ``q_nb``, (n, 4), the first
-        row at the first stamp.
+        For each aiding: function from samples and the initial attitude to ``q_nb``, (n, 4), the
+        first row at the first stamp.
     steady : bool
-        It knows one rate only, and is given the mean of the record.
+        Whether it supports only a constant rate, and gets the mean rate of the record.
     microseconds : float
-        About what it takes a sample, the slowest of its aidings; for the choice of what to
+        Approximate run time per sample of its slowest aiding; used to decide which filters to
         leave out.
     """
 
@@ -74,12 +74,12 @@ class Peer:
     Attributes
     ----------
     name : str
-        Its distribution, its module, and the word for it here.
+        Name of its distribution, its module, and the option value.
     licence : str
     filters : dict of str to PeerFilter
-        The first that offers an aiding is the default for it.
+        The first that supports an aiding is the default for it.
     source : str
-        Where its method stands.
+        Publication of its method.
     """
 
     name: str
@@ -89,7 +89,7 @@ class Peer:
 
     @property
     def available(self) -> bool:
-        """Whether it is installed."""
+        """Whether the library is installed."""
         return importlib.util.find_spec(self.name) is not None
 
     @property
@@ -99,13 +99,13 @@ class Peer:
         Raises
         ------
         ConfigError
-            It is not installed.
+            The library is not installed.
         """
         load(self.name)
         return metadata.version(self.name)
 
     def label(self, filter_name: str) -> str:
-        """Name, version and, where there are several, the filter."""
+        """Name, version and, if there are several, the filter."""
         chosen = f" {filter_name}" if len(self.filters) > 1 else ""
         return f"{self.name} {self.version}{chosen}"
 
@@ -122,7 +122,7 @@ class Peer:
             Attitude at the first stamp.
         aiding : {'gyro', 'gyro+accel', 'gyro+accel+mag'}
         filter_name : str, optional
-            One of `filters`; the first that offers the aiding.
+            One of `filters`; by default the first that supports the aiding.
 
         Returns
         -------
@@ -137,7 +137,7 @@ class Peer:
         DataError
             A column that the aiding needs is absent or not finite; or as `tables.check_imu`.
         DivergenceError
-            The library gave up, or what it returned is no attitude.
+            The library failed, or its result is not an attitude.
         """
         load(self.name)
         _known_aiding(aiding)
@@ -176,7 +176,7 @@ def load(name: str) -> Any:
     Raises
     ------
     ConfigError
-        It is not installed.
+        The library is not installed.
     """
     try:
         return importlib.import_module(name)
@@ -197,7 +197,7 @@ def needed_columns(aiding: str) -> list[str]:
 
 
 def samples_for(imu: pd.DataFrame, aiding: str) -> Samples:
-    """Take from an Imu table what an aiding needs.
+    """Extract the data that an aiding needs from an Imu table.
 
     Raises
     ------
@@ -235,7 +235,7 @@ def samples_for(imu: pd.DataFrame, aiding: str) -> Samples:
 
 
 def steadiness(dt: Array, label: str, source: str | None) -> Finding | None:
-    """Say that a library for a constant rate got a record whose steps vary.
+    """Report varying steps of a record passed to a library that assumes a constant rate.
 
     Parameters
     ----------
@@ -264,7 +264,7 @@ def steadiness(dt: Array, label: str, source: str | None) -> Finding | None:
 
 
 def align_heading(q: ArrayLike, known: ArrayLike, row: int = 0) -> Array:
-    """Turn attitudes about the vertical so that one of them comes nearest to a known one.
+    """Rotate attitudes about the vertical so that one of them comes nearest to a known one.
 
     Parameters
     ----------
@@ -281,9 +281,9 @@ def align_heading(q: ArrayLike, known: ArrayLike, row: int = 0) -> Array:
 
     Notes
     -----
-    The turn is the twist about down of ``known q*``, ``2 atan2(z, w)``: of all turns about the
-    vertical it leaves the smallest rotation angle. It needs no Euler angles, and is free only
-    where the two differ by half a turn about a level axis.
+    The rotation is the twist about down of ``known q*``, ``2 atan2(z, w)``: of all rotations about
+    the vertical it leaves the smallest rotation angle. It needs no Euler angles, and is ambiguous
+    only where the two differ by half a turn about a level axis.
     """
     rows = np.asarray(q, dtype=np.float64)
     w, _, _, z = rotation.compose(known, rotation.conjugate(rows[row]))

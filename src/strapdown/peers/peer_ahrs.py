@@ -1,7 +1,7 @@
 """ahrs: angular rate, Madgwick (2011), Mahony (2008) and a Kalman filter, with its defaults.
 
-All turn body into earth axes and multiply increments from the right. The earth axes follow
-from the sign of the acceleration and from the axis that the horizontal field is compared with:
+All rotate body into earth axes and multiply increments from the right. The earth axes follow
+from the sign of the acceleration and from the axis compared with the horizontal field:
 
 ========  ==========================  =====================
 filter    acceleration                earth axes
@@ -12,7 +12,7 @@ EKF       gravity, down at rest       north-east-down
 ========  ==========================  =====================
 
 Each sample has its own step, and each run starts at the given attitude: sample by sample,
-because the class for Madgwick forgets it where it is given a magnetometer.
+because the Madgwick class ignores the attitude when it is given a magnetometer.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def _step_by_step(
 
 
 def _angular_rate(samples: Samples, q_nb: Array, method: str) -> Array:
-    # Order 1 of the series: from 2 on, version 0.4.0 squares the elements and not the matrix.
+    # First-order series: from order 2 on, version 0.4.0 squares elements instead of the matrix.
     update, gyro = load("ahrs").filters.AngularRate().update, samples.gyro
     return _step_by_step(
         samples, q_nb, lambda q, k, dt: update(q, gyro[k], method=method, order=1, dt=dt)
@@ -74,7 +74,7 @@ def _mahony(samples: Samples, q_nb: Array) -> Array:
 
 
 def _dip_deg(samples: Samples) -> float:
-    """Dip of the field: the median angle of it below the plane square to the specific force."""
+    """Dip of the field: median angle below the plane normal to the specific force."""
     sizes = np.linalg.norm(samples.force, axis=1) * np.linalg.norm(samples.mag, axis=1)
     sine = -(samples.force * samples.mag).sum(axis=1)[sizes > 0.0] / sizes[sizes > 0.0]
     return float(np.degrees(np.arcsin(np.clip(np.median(sine), -1.0, 1.0)))) if sine.size else 0.0
@@ -83,7 +83,7 @@ def _dip_deg(samples: Samples) -> float:
 def _kalman(samples: Samples, q_nb: Array) -> Array:
     filters, gyro, gravity, mag = load("ahrs").filters, samples.gyro, -samples.force, samples.mag
     if len(mag):
-        # It reads from the attribute whether there is a magnetometer, not from the call.
+        # The filter takes the presence of a magnetometer from the attribute, not from the call.
         marg = filters.EKF(mag=mag, frame="NED", magnetic_ref=_dip_deg(samples))
         return _step_by_step(
             samples, q_nb, lambda q, k, dt: marg.update(q, gyro[k], gravity[k], mag[k], dt=dt)

@@ -18,7 +18,7 @@ from strapdown.peers.peer import Array, Peer, PeerFilter, Samples, load
 def _run(samples: Samples, q_nb: Array, update: Callable[[Any, int], Any]) -> Array:
     library = load("imufusion")
     settings = library.AhrsSettings()
-    # As an argument of the constructor, version 1.3.3 passes over it.
+    # Version 1.3.3 ignores it as a constructor argument.
     settings.convention = library.CONVENTION_NED
     settings.sample_rate = 1.0 / float(samples.dt.mean())
     ahrs = library.Ahrs()
@@ -35,7 +35,7 @@ def _run(samples: Samples, q_nb: Array, update: Callable[[Any, int], Any]) -> Ar
 
 
 def _gyro(samples: Samples, q_nb: Array) -> Array:
-    """Integrate the gyro alone: a specific force of exactly zero counts as none."""
+    """Integrate the gyro alone: a specific force of exactly zero is ignored."""
     gyro, none = np.degrees(samples.gyro), np.zeros(3)
     return _run(samples, q_nb, lambda ahrs, k: ahrs.update_no_magnetometer(gyro[k], none))
 

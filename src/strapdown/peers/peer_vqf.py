@@ -1,8 +1,8 @@
 """vqf: the versatile quaternion-based filter of Laidig and Seel (2023), with its defaults.
 
-Earth axes east-north-up; any right-handed body axes; specific force up at rest. One rate. It
-has no way to be given an attitude: with an accelerometer it levels itself with the first
-sample, and without a magnetometer its heading counts from an arbitrary zero.
+Earth axes east-north-up; any right-handed body axes; specific force up at rest. Constant rate.
+It does not accept an initial attitude: with an accelerometer it levels itself with the first
+sample, and without a magnetometer its heading has an arbitrary zero.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from strapdown.rotation.quaternions import Q_NED_ENU
 
 
 def _gyro(samples: Samples, q_nb: Array) -> Array:
-    """Integrate the gyro alone: a specific force of exactly zero counts as none."""
+    """Integrate the gyro alone: a specific force of exactly zero is ignored."""
     gyro = samples.gyro[1:]
     turned = load("vqf").VQF(float(samples.dt.mean())).updateBatch(gyro, np.zeros_like(gyro))
     return np.vstack([q_nb, rotation.compose(q_nb, turned["quat6D"])])

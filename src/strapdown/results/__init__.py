@@ -1,4 +1,4 @@
-"""Frozen results: what a run found, with what a reader needs to judge it."""
+"""Frozen results of runs, with the data needed to judge them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the attitude bench found."""
+"""Results of the attitude bench."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ __all__ = [
 
 @dataclass(frozen=True, repr=False)
 class AttitudeBench:
-    """What the attitude bench found.
+    """Result of the attitude bench.
 
     Attributes
     ----------
@@ -39,51 +39,51 @@ class AttitudeBench:
         Name of the log or the scenario.
     description : str
     specification : dict
-        Everything that determines the run, as it is sealed with the outputs.
+        Everything that determines the run, as stored with the outputs.
     imu : DataFrame
-        The samples as used: body axes, SI, bias removed where that was asked for.
+        Samples as used: body axes, SI, bias removed if requested.
     runs : tuple of AttitudeRun
     truth : DataFrame or None
         Attitude table at (some of) the samples' stamps.
     scored : ndarray of bool or None
-        Which rows of `truth` count.
+        Rows of `truth` that are scored.
     scores : tuple of Score
     sampling_error_deg : tuple of float, or None
-        For a scenario: what noise-free samples lose with exact arithmetic, at the end and at
-        most. For a log an estimate: the difference between rates that run along chords and
-        along cubics between their stamps; None for mean rates.
+        For a scenario: error of noise-free samples with exact arithmetic, at the end and at
+        most. For a log an estimate: the difference between linear and cubic interpolation of
+        the rates between their stamps; None for mean rates.
     differences_deg : DataFrame
         Largest rotation angle between each pair of algorithms.
     rests : tuple of RestStretch
     initial : dict
-        The initial attitude in degrees and where it came from.
+        Initial attitude in degrees, and its source.
     gyro_bias : dict
-        What was subtracted, in rad/s, and where it came from.
+        Subtracted bias in rad/s, and its source.
     references : DataFrame
     readings : tuple of Reading
     findings : tuple of Finding
         Warnings and notes, in words.
     inputs : tuple of InputFiles
     costs : tuple of Cost
-        One an algorithm, in the order of `runs`.
+        One per algorithm, in the order of `runs`.
     shares : tuple of Share
         Likewise.
     sweep : DataFrame
-        One row an algorithm, a rate and a way to come to it: ``algorithm``, ``meaning``
-        (``drop``: samples are left out; ``sum``: increments are summed, as a sensor that
-        integrates would), ``factor``, ``rate_hz``, ``own_deg`` (largest error of algorithm and
+        One row per algorithm, rate and decimation method: ``algorithm``, ``meaning``
+        (``drop``: samples are decimated; ``sum``: increments are summed, as in an
+        integrating sensor), ``factor``, ``rate_hz``, ``own_deg`` (largest error of algorithm and
         rate, as in `Share`), ``final_deg``, ``rms_deg``, ``max_deg`` (against the truth),
-        ``reference_deg`` (largest at a reference point), ``error_deg`` (the one that the answer
-        judges: against the truth, else at the reference points, else ``own_deg``).
+        ``reference_deg`` (largest at a reference point), ``error_deg`` (the one used for the
+        answer: against the truth, else at the reference points, else ``own_deg``).
     answer : Answer
     trials : Trials or None
     peers : tuple of PeerRun
     places : tuple of PositionScore
-        One an algorithm and a reference point of place.
+        One per algorithm and position reference point.
     offers : tuple of SamePose
-        Rests that look alike, where no reference point was named.
+        Stationary intervals of similar pose, if no reference point is given.
     second : SecondLog or None
-        How a second sensor's log lies to this one.
+        Alignment of a second sensor's log with this one.
     """
 
     source: str
@@ -118,19 +118,19 @@ class AttitudeBench:
 
     @property
     def summary(self) -> pd.DataFrame:
-        """One row an algorithm and a comparison; angles in degrees, time in seconds."""
+        """One row per algorithm and comparison; angles in degrees, time in seconds."""
         columns = [f.name for f in fields(Score)]
         return pd.DataFrame([vars(score) for score in self.scores], columns=columns)
 
     def to_pandas(self) -> pd.DataFrame:
-        """One row an algorithm and a comparison, with its share of the error and its cost.
+        """One row per algorithm and comparison, with error shares and cost.
 
         Returns
         -------
         DataFrame
             The columns of `summary`, then ``own_*_deg``, ``sensor_*_deg`` and ``single_*_deg``
-            with ``final``, ``rms`` and ``max`` for the star, and the fields of `Cost`. Where
-            nothing is known to compare with, one row an algorithm.
+            with ``final``, ``rms`` and ``max`` for the star, and the fields of `Cost`. Without
+            a reference, one row per algorithm.
         """
         table = self.summary
         if table.empty:
@@ -144,7 +144,7 @@ class AttitudeBench:
         return table.merge(costs, on="algorithm", how="left")
 
     def plot(self, kind: str = "cost") -> Figure:
-        """Draw one chart, as the report shows it.
+        """Draw one chart of the report.
 
         Parameters
         ----------
@@ -155,19 +155,19 @@ class AttitudeBench:
         Returns
         -------
         matplotlib.figure.Figure
-            Of no window and no global state; it shows itself in a notebook.
+            Independent of windows and global state; displayed by a notebook.
 
         Raises
         ------
         ConfigError
-            There is no such chart, or nothing to show in it.
+            The chart does not exist or has no data.
         """
         from strapdown.report.attitude_view import plot
 
         return plot(self, kind)
 
     def _repr_html_(self) -> str:
-        """The answer and the table of results, for a notebook."""
+        """Answer and table of results, for a notebook."""
         from strapdown.report.attitude_view import short_html
 
         return short_html(self)
@@ -186,7 +186,7 @@ def _flat(share: Share) -> list[Any]:
     return [share.algorithm, *values]
 
 
-# Which algorithm is enough, what it costs, whose its error is, and whether that was luck.
+# Choice of algorithm, its cost, the error budget, and the significance of the ranking.
 
 
 @dataclass(frozen=True)
@@ -196,16 +196,16 @@ class Answer:
     Attributes
     ----------
     verdict : str
-        ``enough``: one is found; ``sensor``: none is, because of the sensor; ``rate``: none is,
-        because of the rate; ``own``: nothing is known of the attitude, and it is the
-        algorithm's own error that was judged.
+        ``enough``: one is found; ``sensor``: none, because of the sensor; ``rate``: none,
+        because of the rate; ``own``: the attitude has no reference, and the algorithm error
+        was judged.
     sentence : str
-        For people.
+        The answer as text.
     tolerance_deg : float
     algorithm, meaning : str or None
     rate_hz : float or None
     why, helps : tuple of str
-        What it rests on, and what would help.
+        Reasons, and possible remedies.
     """
 
     verdict: str
@@ -220,7 +220,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Cost:
-    """What one sample costs one algorithm.
+    """Computational cost of one sample.
 
     Attributes
     ----------
@@ -231,7 +231,7 @@ class Cost:
     cycles : float
         The same in cycles of a Cortex-M4F (`constants.CORTEX_M4F_CYCLES`): a weight for ranking.
     memory : int
-        Numbers that it keeps between samples.
+        Count of numbers stored between samples.
     """
 
     algorithm: str
@@ -246,19 +246,19 @@ class Cost:
 
 @dataclass(frozen=True)
 class Share:
-    """Whose the error of one algorithm is: its own, the sensor's, and single precision's.
+    """Error of one algorithm, separated into algorithm, sensor and single-precision error.
 
     Attributes
     ----------
     algorithm : str
     own_deg : tuple of float
-        Error of the algorithm and of the rate: at the end, RMS, largest. On a simulation the
-        error on error-free samples; on a log the difference from the most accurate algorithm
-        on the same samples, which is an estimate.
+        Algorithm and rate error: at the end, RMS, largest. On a simulation the error on
+        error-free samples; on a log the difference from the most accurate algorithm on the same
+        samples, which is an estimate.
     sensor_deg : tuple of float, or None
-        Likewise what the sensor's errors make: on a simulation the difference that they make
-        to this algorithm, on a log the error of the most accurate algorithm against the
-        truth; None without a truth.
+        Likewise the sensor error: on a simulation the change that the sensor errors cause in
+        this algorithm, on a log the error of the most accurate algorithm against the truth;
+        None without a truth.
     single_deg : tuple of float
         Likewise the difference between single and double precision on the same samples.
     """
@@ -271,17 +271,17 @@ class Share:
 
 @dataclass(frozen=True)
 class Trials:
-    """The same bench over several logs or seeds.
+    """Results of the same bench over several logs or seeds.
 
     Attributes
     ----------
     names : tuple of str
         Of the trials.
     errors : DataFrame
-        One row a trial and an algorithm: ``trial``, ``algorithm``, ``error_deg`` (what the
-        answer is judged by), ``own_deg``, ``rms_deg``, ``final_deg``.
+        One row per trial and algorithm: ``trial``, ``algorithm``, ``error_deg`` (the error used
+        for the answer), ``own_deg``, ``rms_deg``, ``final_deg``.
     ranking : DataFrame
-        One row an algorithm, best first: ``algorithm``, ``mean_deg``, ``low_deg``, ``high_deg``
+        One row per algorithm, best first: ``algorithm``, ``mean_deg``, ``low_deg``, ``high_deg``
         (95 % interval of the mean), ``luck`` (probability that the next one is no worse, from
         paired differences; NaN for the last).
     """
@@ -303,11 +303,11 @@ class AttitudeRun:
     algorithm : str
         Name and options, as the command line takes them.
     title, equations : str
-        For people; the equations are numbered as in the algorithm's source.
+        Display text; the equations are numbered as in the algorithm's source.
     attitude : DataFrame
         Attitude table at every sample.
     diagnostics : dict of str to float
-        What the algorithm says of its own condition; each key carries its unit.
+        Condition measures of the algorithm; each key has its unit.
     """
 
     algorithm: str
@@ -326,7 +326,7 @@ class PeerRun:
     peer : str
         Name and version.
     aiding : str
-        ``gyro``, ``gyro+accel`` or ``gyro+accel+mag``; only like is compared with like.
+        ``gyro``, ``gyro+accel`` or ``gyro+accel+mag``; compare only equal aidings.
     attitude : DataFrame
         Attitude table.
     scores : tuple of Score
@@ -338,7 +338,7 @@ class PeerRun:
     scores: tuple[Score, ...]
 
 
-# How an attitude, or a position reckoned from it, compares with what is known.
+# Comparison of an attitude, or of a dead-reckoned position, with a reference.
 
 
 Triple = tuple[float, float, float]
@@ -346,7 +346,7 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Score:
-    """How one algorithm compares with one thing that is known.
+    """Comparison of one algorithm with one reference.
 
     Attributes
     ----------
@@ -354,15 +354,15 @@ class Score:
     against : str
         ``truth``, or the reference point in words.
     time : float, s
-        Where the comparison ends.
+        End of the comparison.
     error_deg : float
-        Rotation angle between the computed and the known attitude, at that instant.
+        Rotation angle between the computed and the reference attitude at that instant.
     rms_deg, max_deg : float or None
         Over every scored instant; None for a reference point.
     turned_deg, expected_deg : float or None
-        For a number of turns: the integrated angle about the axis, and what it should be.
+        For a number of turns: integrated angle about the axis, and expected angle.
     sd_deg : float or None
-        How well the reference itself is known.
+        Standard deviation of the reference.
     reference : int or None
         Number of the reference point, from 1.
     """
@@ -381,35 +381,35 @@ class Score:
 
 @dataclass(frozen=True)
 class PositionScore:
-    """How a position dead-reckoned between rests compares with what is known of it.
+    """Comparison of a position dead-reckoned between stationary intervals with a reference.
 
     Attributes
     ----------
     algorithm : str
-        Whose attitude turned the specific force.
+        Algorithm whose attitude rotated the specific force.
     against : str
-        The reference in words.
+        The reference as text.
     time, since : float, s
-        The instants that it compares.
+        The instants that are compared.
     legs : int
-        Stretches between two rests that were reckoned one after the other.
+        Number of successive dead-reckoned legs between stationary intervals.
     seconds : float
-        Their lengths together, in s: what the errors grow with.
+        Total length of the legs, in s, with which the errors grow.
     moved_m, moved_corrected_m : tuple of float, m
         Displacement along the axes of the run's local level, without and with the velocity at
-        the end of each leg brought to zero.
+        the end of each leg corrected to zero.
     expected_m : tuple of float, m
     error_m, corrected_error_m : float, m
-        Distance from what is expected.
+        Distance from the expected displacement.
     end_velocity_m_s : float, m/s
-        The largest velocity that was left at the end of a leg, where it should be zero.
+        Largest remaining velocity at the end of a leg, where it should be zero.
     sd_m, corrected_sd_m, end_velocity_sd_m_s : float
-        What the stated errors of the sensors and of the start lead to, root mean square of
-        the length, first order.
+        From the stated errors of the sensors and of the start: root mean square of the length,
+        first order.
     reference_sd_m : float or None
-        How well the reference itself is known.
+        Standard deviation of the reference.
     gravity_m_s2 : float
-        What was taken off along the vertical.
+        Gravity subtracted along the vertical.
     """
 
     algorithm: str
@@ -431,12 +431,12 @@ class PositionScore:
     gravity_m_s2: float
 
 
-# How the log of a second sensor on the same body lies to the first.
+# Alignment of a second sensor's log with the first, on the same body.
 
 
 @dataclass(frozen=True)
 class SecondLog:
-    """How the log of a second sensor on the same body lies to the first.
+    """Alignment of a second sensor's log with the first, on the same body.
 
     The model is ``omega_1(t) = scale R_12 omega_2(u) + bias`` with
     ``u = t + offset + drift (t - middle)``; every ``sd`` is one standard deviation from the
@@ -445,36 +445,36 @@ class SecondLog:
     Attributes
     ----------
     start, end : float, s
-        What both logs cover, on the first one's clock.
+        Common interval of both logs, on the first clock.
     middle : float, s
-        Instant of the first clock for which `offset` holds.
+        Instant of the first clock at which `offset` holds.
     offset, offset_sd : float, s
-        Second clock less first clock.
+        Second clock minus first clock.
     drift_ppm, drift_sd_ppm : float
-        How much faster the second clock runs, in parts per million.
+        Rate excess of the second clock, in parts per million.
     mounting : tuple of four float
-        ``q_12``: turns a vector from the second sensor's axes into the first one's.
+        ``q_12``: rotates a vector from the second sensor's axes into the first one's.
     mounting_deg : tuple of float, deg
         The same as roll, pitch, heading.
     mounting_sd_deg : tuple of float, deg
-        About the first sensor's axes; infinite where it cannot be told.
+        About the first sensor's axes; infinite where not observable.
     bias, bias_sd : tuple of float, rad/s
-        Bias of the first less (scaled, turned) bias of the second, in the first one's axes.
+        Bias of the first minus (scaled, rotated) bias of the second, in the first one's axes.
     scale, scale_sd : float
         Scale of the first over that of the second.
     axis : tuple of float or None
-        Where the body turned about one axis only: that axis, in the first sensor's axes. The
-        mounting about it is then the least turn that fits, and not known.
+        If the body rotated about one axis only: that axis, in the first sensor's axes. The
+        mounting about it is then the smallest rotation that fits, and not observable.
     correlation : float
-        Share of the rates that the two have in common at the coarse offset, 1 at best.
+        Correlation of the rates at the coarse offset, at best 1.
     runner_up : float
-        The same for the best other offset.
+        The same for the next-best offset.
     residual : float, rad/s
-        Root mean square of what is left, all axes together, after smoothing.
+        Root mean square of the residuals, all axes together, after smoothing.
     smoothing : float, s
-        Standard deviation of the Gaussian that both were smoothed with before the fit.
+        Standard deviation of the Gaussian that smoothed both before the fit.
     cells : int
-        Points that were fitted.
+        Number of fitted points.
     """
 
     start: float

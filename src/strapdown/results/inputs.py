@@ -1,4 +1,4 @@
-"""What a run read: its files, and what each column of a log was taken for."""
+"""Inputs of a run: its files, and the interpretation of each log column."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ class InputFiles:
     role : str
         ``log``, ``truth``, ``gyro-bias``, ``reference-log`` or ``sensor``.
     path : Path
-        As it was given: a file, or a folder.
+        As given: a file, or a folder.
     files : tuple of Path
         Every file that was read.
     digests : tuple of str
         SHA-256 of each when it was read.
     copied : bool
-        Whether a bundle copies them, whatever their size: they are of tables in memory, and exist
-        nowhere else.
+        Whether a bundle copies them, whatever their size: they come from tables in memory and
+        exist only there.
     """
 
     role: str
@@ -36,20 +36,20 @@ class InputFiles:
 
 @dataclass(frozen=True)
 class Reading:
-    """What a reader took one column of a log for.
+    """Interpretation of one column of a log.
 
     Attributes
     ----------
     source : str
         Name of the column in the file.
     quantity : str
-        Column of the table that it became, with a sign where it was reversed.
+        Table column that it became, with a sign if it was reversed.
     unit : str
         Unit in the file.
     why : str
-        What that was concluded from.
+        Reason for this interpretation.
     first : float or str
-        The first value, as it stands in the file.
+        The first value, as written in the file.
     """
 
     source: str

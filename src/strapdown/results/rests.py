@@ -1,4 +1,4 @@
-"""Rests of a sensor, the bias of its gyro from them, and two of one pose."""
+"""Stationary intervals of a sensor, the gyro bias from them, and pairs of equal pose."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class RestStretch:
-    """A stretch in which the sensor did not turn.
+    """An interval in which the sensor did not rotate.
 
     Attributes
     ----------
     start, end : float, s
     gyro_mean : tuple of float, rad/s
-        Mean of each gyro over it: its bias, where the Earth's 15 deg/h does not matter.
+        Mean of each gyro: its bias, where the Earth's 15 deg/h is negligible.
     gyro_sd : tuple of float, rad/s
     accel_mean : tuple of float or None, m/s²
     gyro_mean_sd : tuple of float or None, rad/s
-        How well the mean is known: from the scatter of the means of its parts, so that
-        shaking and slow wandering count, and not from the samples as if each were new.
+        Standard deviation of the mean, from the scatter of the means of its parts, so that
+        vibration and slow drift count; not from the samples as if they were independent.
     accel_sd, accel_mean_sd : tuple of float or None, m/s²
         As for the gyro.
     grade : {'still', 'shaking', 'steady', 'stated'}
         Quiet within the noise of the sensor; shaken about one attitude, so that only the
-        means are those of a rest; quiet and without turning, but perhaps at speed; or taken
-        from the user's word.
+        means are those of a stationary sensor; quiet and without rotation, but perhaps at
+        speed; or stated by the user.
     """
 
     start: float
@@ -44,22 +44,22 @@ class RestStretch:
 
 @dataclass(frozen=True)
 class GyroBiasCourse:
-    """The bias of a gyro over a log, from its rests.
+    """Gyro bias over a log, from its stationary intervals.
 
     Attributes
     ----------
     time : tuple of float, s
-        Middle of each rest.
-    mean, sd : tuple of three float a rest, rad/s
-        Bias at each rest, and how well it is known.
+        Middle of each interval.
+    mean, sd : tuple of three float per interval, rad/s
+        Bias in each interval, and its standard deviation.
     average, average_sd : tuple of float, rad/s
-        Over the rests, weighted by how well each is known. The sd is widened where the rests
-        scatter by more than their own.
+        Weighted mean over the intervals. The sd is inflated if the intervals scatter by more
+        than their own.
     drift, drift_sd : tuple of float or None, rad/s²
-        Slope of a line through the rests; None for a single one.
+        Slope of a line through the intervals; None for a single one.
     scatter : tuple of float or None
-        Root of the mean square distance of the rests from the average, in units of their own
-        sd: near 1 for a bias that stays, far above for one that wanders. None for a single
+        Root mean square distance of the intervals from the average, in units of their own
+        sd: near 1 for a constant bias, far above for a drifting one. None for a single
         one.
     """
 
@@ -75,18 +75,18 @@ class GyroBiasCourse:
 
 @dataclass(frozen=True)
 class SamePose:
-    """Two rests at which gravity had the same direction in the body.
+    """Two stationary intervals at which gravity had the same direction in the body.
 
     Attributes
     ----------
     time, since : float, s
-        Instants within the two rests, the later one first.
+        Instants within the two intervals, the later one first.
     apart_deg, sd_deg : float
-        Angle between the two directions, and its standard deviation by the noise.
+        Angle between the two directions, and its standard deviation from noise.
     words : str
-        The reference point that it would be, as the command line takes it.
+        The corresponding reference point, in command-line syntax.
     caveat : str
-        What must be known besides, before it is one.
+        Condition for using it as a reference point.
     """
 
     time: float

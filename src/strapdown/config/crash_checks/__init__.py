@@ -1,4 +1,4 @@
-"""What a crash case says twice, or against itself: refused with the lines of both."""
+"""Consistency checks of a crash case; contradictions are reported with both lines."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["Written", "check_case"]
 
 
 def check_case(spec: CaseSpec, written: Written) -> None:
-    """Refuse what cannot be meant.
+    """Refuse an inconsistent case.
 
     Parameters
     ----------
@@ -27,8 +27,8 @@ def check_case(spec: CaseSpec, written: Written) -> None:
     Raises
     ------
     ConfigError
-        Something is missing for what is asked, out of all proportion, or contradicts something
-        else; the message names the line, or both lines, and the values.
+        A required value is missing, a value is implausible, or two values are contradictory; the
+        message names the line, or both lines, and the values.
     """
     check_places(spec, written)
     check_entry(spec, written)

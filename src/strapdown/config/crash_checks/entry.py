@@ -1,4 +1,4 @@
-"""The entry of a case: each kind with what it needs, and nothing else."""
+"""Checks of entry, options, references and positions of a crash case."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from strapdown.errors import Finding
 __all__ = ["check_entry", "check_options", "check_places", "check_references"]
 
 
-# Faster than any car on a road, and slower than most speeds in km/h that were taken for m/s.
+# Above any car's speed on a road, and below most speeds in km/h entered as m/s.
 FASTEST = 90.0  # m/s
 MOST_ANGLE = 360.0  # deg
-# What each kind has no use for; a value of zero says nothing.
+# Keys that each kind does not use; a value of zero is ignored.
 _NO_USE = {
     "speed": ("path", "antenna_m", "antenna_sd_m"),
     "standstill": (
@@ -65,7 +65,7 @@ def check_entry(spec: CaseSpec, written: Written) -> None:
     Raises
     ------
     ConfigError
-        It lacks something, says what its kind has no use for, or a number is out of proportion.
+        A value is missing, is not used by this kind, or is implausible.
     """
     entry = spec.entry
     for name in _NO_USE[entry.kind]:
@@ -123,13 +123,13 @@ def _instant(spec: CaseSpec, written: Written) -> None:
         raise written.refuse(at, "config.entry-far-from-trigger")
 
 
-# How a case is computed: windows that can be, and models that there are.
+# Options: plausible windows, and available models.
 
 
-# A path of the crash is told, and not a drive.
+# The path covers the crash, not the whole drive.
 LONGEST_WINDOW = 60.0  # s
 LONGEST_PEAK = 1.0  # s
-#: Of the Earth, from the equator at height to the poles.
+#: On the Earth, from the equator at altitude to the poles.
 GRAVITY = (9.7, 9.9)  # m/s²
 
 
@@ -139,7 +139,7 @@ def check_options(spec: CaseSpec, written: Written) -> None:
     Raises
     ------
     ConfigError
-        A window or gravity cannot be, or a model of severity is not known.
+        A window or gravity is implausible, or a severity model is unknown.
     """
     _windows(spec, written)
     options = spec.options
@@ -174,7 +174,7 @@ def _windows(spec: CaseSpec, written: Written) -> None:
 
 
 def _model(number: int, name: str, names: Sequence[str], written: Written) -> None:
-    # Models come with the computation; a command that reads no case does not load them.
+    # Models are loaded with the computation; a command that reads no case does not need them.
     from strapdown.crash.severity import SEVERITY_MODELS
 
     if name not in SEVERITY_MODELS:
@@ -188,7 +188,7 @@ def _model(number: int, name: str, names: Sequence[str], written: Written) -> No
         raise written.refuse(("options", "severity", number), "config.severity-model-repeated")
 
 
-# What else is known of a crash: a path, or a change of velocity, and not both in one.
+# References: either a path or a change of velocity.
 
 
 _REFERENCES_NO_USE = {
@@ -200,7 +200,7 @@ _REFERENCES_UNUSED = {
     "path": "config.reference-path-no-use",
     "delta_v": "config.reference-delta-v-no-use",
 }
-# No crash on a road changes a velocity by more.
+# Larger than any change of velocity in a road crash.
 MOST = 90.0  # m/s
 
 
@@ -210,7 +210,7 @@ def check_references(spec: CaseSpec, written: Written) -> None:
     Raises
     ------
     ConfigError
-        One lacks what its kind needs, has what it has no use for, or two have one name.
+        A value is missing or not used by its kind, or two references have one name.
     """
     check_names("references", [r.name for r in spec.references], written)
     for k, reference in enumerate(spec.references):
@@ -240,31 +240,31 @@ def check_references(spec: CaseSpec, written: Written) -> None:
             raise written.refuse((*at, "over_s"), "config.reference-end-before-begin")
 
 
-# Places on a vehicle: they lie on it, or a number is in another unit.
+# Positions on a vehicle: within its outline; otherwise the unit is probably wrong.
 
 
 Corner = tuple[float, float]
 
-#: How far beside the outline a place may lie: a bumper's camera, a mirror, a rough drawing.
+#: Largest distance of a position from the outline: a camera on a bumper, a mirror, a rough drawing.
 BEYOND = 0.5  # m
-#: And above or below the origin.
+#: Largest distance above or below the origin.
 HIGHEST = 4.5  # m
 LONGEST = 30.0  # m
-#: So far from the origin a coordinate is likely in another unit.
+#: Beyond this distance from the origin a coordinate is probably in another unit.
 LARGE = 10.0  # m
-#: Beyond it no tape has measured.
+#: Largest plausible standard deviation of a measured position.
 MOST_SD = 2.0  # m
 LIGHTEST, HEAVIEST = 20.0, 100_000.0  # kg
 SMALLEST = 0.1  # m²
 
 
 def check_places(spec: CaseSpec, written: Written) -> None:
-    """Check the vehicle, and the places on it.
+    """Check the vehicle and the positions on it.
 
     Raises
     ------
     ConfigError
-        Its sizes contradict each other or are none of a vehicle, or a place is far outside of it.
+        Its sizes are contradictory or implausible, or a position is far outside the vehicle.
     """
     vehicle = spec.vehicle
     _sizes_places(vehicle, written)
@@ -312,14 +312,14 @@ def _outline(corners: Sequence[Corner], written: Written) -> None:
 
 
 def _area(corners: Sequence[Corner]) -> float:
-    # Half the sum of the cross products of neighbours (Gauss).
+    # Half the sum of the cross products of neighbors (Gauss).
     following = [*corners[1:], corners[0]]
     pairs = zip(corners, following, strict=True)
     return 0.5 * math.fsum(x * v - u * y for (x, y), (u, v) in pairs)
 
 
 def _corners(vehicle: VehicleSpec) -> list[Corner]:
-    """The outline; where the origin may be anywhere in the vehicle, all that it may then be."""
+    """The outline; with the origin anywhere in the vehicle, all positions it may then cover."""
     if vehicle.outline_m:
         return list(vehicle.outline_m)
     length, half = vehicle.length_m, 0.5 * vehicle.width_m

@@ -1,4 +1,4 @@
-"""The recorders of a case: told apart, placed, each with a gyro or what is assumed for it."""
+"""Checks of the recorders of a case: names, positions, gyros, assumptions and sensors."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ __all__ = [
 
 MOST_ANGLE = 360.0  # deg
 STEEPEST = 90.0  # deg
-#: A common trigger that is known no better ties no clocks together.
+#: A common trigger with a larger standard deviation cannot synchronize clocks.
 MOST_TRIGGER_SD = 0.5  # s
 
 
 def check_units(spec: CaseSpec, written: Written) -> None:
-    """Check the units, but for their triads.
+    """Check the units except for their triads.
 
     Raises
     ------
     ConfigError
-        One lacks its place, or says two things at once, or borrows a gyro that is not there.
+        A position is missing, values are contradictory, or a borrowed gyro does not exist.
     """
     check_names("units", [unit.name for unit in spec.units], written)
     _triggered(spec, written)
@@ -51,7 +51,7 @@ def check_units(spec: CaseSpec, written: Written) -> None:
 
 
 def check_names(several: str, names: Sequence[str], written: Written) -> None:
-    """Refuse two of one name.
+    """Refuse duplicate names.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def _rest(k: int, spec: CaseSpec, written: Written) -> None:
         )
 
 
-# What is assumed of a recorder: for all that is missing, and for nothing that is there.
+# Assumptions of a recorder: for every missing axis, and for no other.
 
 
 AXES = ("x", "y", "z")
@@ -156,12 +156,12 @@ LONGEST = 10.0  # s
 
 
 def check_assumed(k: int, spec: CaseSpec, written: Written) -> None:
-    """Check a unit for axes that are missing.
+    """Check the assumptions of a unit on missing axes.
 
     Raises
     ------
     ConfigError
-        Something is missing and nothing is assumed for it, or the other way round.
+        An axis is missing without an assumption, or the reverse.
     """
     unit = spec.units[k]
     no_force, no_turn = _forces_missing(k, unit, written), _turns_missing(unit)
@@ -233,7 +233,7 @@ def _missing(triad: TriadSpec) -> list[str]:
     return [axis for axis in AXES if axis not in triad.channels]
 
 
-# The triads of a case: each channel once, its unit, and how good its sensor is.
+# Triads of a case: each channel once, its unit, and its uncertainty.
 
 
 _UNITS = {"accel": ACCEL_UNITS, "gyro": GYRO_UNITS}
@@ -246,8 +246,8 @@ def check_triads(spec: CaseSpec, written: Written) -> None:
     Raises
     ------
     ConfigError
-        A channel is used twice, a unit is none of the triad, a sensor is not known, nothing says
-        how good it is, or a wide range stands before a narrow one.
+        A channel is used twice, a unit does not fit the triad, a sensor is unknown, its uncertainty
+        is not stated, or a wide range precedes a narrow one.
     """
     used: dict[tuple[str, str], KeyPath] = {}
     for at, kind, triad in _triads(spec):
@@ -289,7 +289,7 @@ def _channels(
 
 
 def _unit(at: KeyPath, kind: str, triad: TriadSpec, written: Written) -> None:
-    # Spellings of other programs are those of the readers, loaded only where a case is read.
+    # Unit spellings of other programs are part of the readers, loaded only where a case is read.
     from strapdown.formats.unit_words import unit_of
 
     if triad.unit is not None:
@@ -313,14 +313,14 @@ def _unit(at: KeyPath, kind: str, triad: TriadSpec, written: Written) -> None:
             )
 
 
-# How good the sensors of a case are, and how far they reach: the lowest range comes first.
+# Uncertainty and range of the sensors of a case: the lowest range comes first.
 
 
 Triple = tuple[float, float, float]
 
 
 def check_sensor(at: KeyPath, kind: str, triad: TriadSpec, written: Written) -> None:
-    """Check what is said of a triad's errors.
+    """Check the stated errors of a triad.
 
     Parameters
     ----------
@@ -333,8 +333,8 @@ def check_sensor(at: KeyPath, kind: str, triad: TriadSpec, written: Written) -> 
     Raises
     ------
     ConfigError
-        Nothing is said, the sensor is not known or has no such triad, or a key of the
-        uncertainty is not known, stands twice in two units, or has no number that it can have.
+        Errors are not stated, the sensor is unknown or has no such triad, or a key of the
+        uncertainty is unknown, given in two units, or has an invalid number.
     """
     if triad.sensor is None and not triad.uncertainty:
         raise written.missing((*at, "sensor"), "config.uncertainty-missing")
@@ -349,7 +349,7 @@ def check_ranges(k: int, unit: UnitSpec, written: Written) -> None:
     Raises
     ------
     ConfigError
-        A wider range stands before a narrower one.
+        A wider range precedes a narrower one.
     """
     triads = unit.accelerometers
     for n in range(1, len(triads)):
@@ -367,7 +367,7 @@ def check_ranges(k: int, unit: UnitSpec, written: Written) -> None:
 
 
 def _known_sensor(at: KeyPath, kind: str, name: str, written: Written) -> None:
-    # The catalogue is read only with a case.
+    # The catalogue is loaded only with a case.
     from strapdown.sensors.catalogue import SENSORS, load_sensor
 
     path = (*at, "sensor")
@@ -433,7 +433,7 @@ def _range_key(triad: TriadSpec) -> KeyPath:
 
 
 def _full_scale(triad: TriadSpec) -> Triple | None:
-    """As stated or by the sensor, g; None where it is not known."""
+    """As stated or from the sensor, g; None if unknown."""
     from strapdown.sensors.catalogue import load_sensor
 
     stated = triad.uncertainty.get("full_scale_g")

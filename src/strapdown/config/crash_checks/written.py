@@ -1,4 +1,4 @@
-"""A value of a case as its file has it, with its line."""
+"""Values of a case as written in its file, with their lines."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from strapdown.errors import ConfigError, Finding
 
 __all__ = ["Written"]
 
-#: Keys of a table that a message shows.
+#: Number of keys of a table that a message shows.
 MOST = 4
 
 
 @dataclass(frozen=True)
 class Written:
-    """The file of a case, asked by the names of fields.
+    """The file of a case, looked up by the names of fields.
 
     Attributes
     ----------
     file : TomlFile
     names : dict
-        By the path of a field, its path in the file, where the file has another unit.
+        Path of a field to its path in the file, where the file has another unit.
     """
 
     file: TomlFile
@@ -42,18 +42,18 @@ class Written:
         return f"{self._equation(path, value)} (line {self.file.line(self._at(path))})"
 
     def refuse(self, path: KeyPath, code: str, /, **data: Any) -> ConfigError:
-        """Return an error about one value, which the sentence shows first."""
+        """Return an error about one value; the message starts with the value."""
         value = self._value(path)
         if value is not None and not _big(value):
             data["shown"] = shown(value)
         return self.file.refuse(self._at(path), code, **data)
 
     def located(self, path: KeyPath, finding: Finding) -> ConfigError:
-        """Return an error of a finding that names the value itself, at its key."""
+        """Return an error at a key from a finding that names the value itself."""
         return self.file.refuse(self._at(path), finding)
 
     def missing(self, path: KeyPath, code: str, /, **data: Any) -> ConfigError:
-        """Return an error about a field that is not written, though it is needed."""
+        """Return an error about a required field that is not written."""
         return self.file.refuse(path, code, wanted=what_to_write(path), **data)
 
     def contradiction(
@@ -78,7 +78,7 @@ class Written:
         node: Any = self.file.table
         for part in self._at(path):
             if isinstance(node, str):
-                # One where several may be.
+                # A single value where several are allowed.
                 break
             try:
                 node = node[part]
@@ -100,6 +100,6 @@ def _shown(value: Any) -> str:
 
 
 def _big(value: Any) -> bool:
-    """A table with tables, or several."""
+    """A table that contains tables, or several of them."""
     parts = list(value.values()) if isinstance(value, dict) else value
     return isinstance(parts, list) and any(isinstance(part, dict) for part in parts)

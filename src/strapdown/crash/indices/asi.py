@@ -14,7 +14,7 @@ from strapdown.errors import ConfigError
 __all__ = ["ASI_AVERAGES", "Asi", "asi"]
 
 Array = NDArray[np.float64]
-#: How the accelerations are smoothed: by the editions of EN 1317-1.
+#: Smoothing of the accelerations, by edition of EN 1317-1.
 ASI_AVERAGES: dict[str, str] = {
     "mean_50ms": "EN 1317-1:1998, mean over a moving window of 50 ms",
     "butterworth_13hz": "EN 1317-1:2010, four-pole Butterworth low-pass without phase, 13 Hz",
@@ -31,9 +31,9 @@ class Asi:
     Attributes
     ----------
     value : float
-        The greatest; without a unit.
+        Maximum; dimensionless.
     at : float, s
-        When: the centre of the window.
+        Center of the window.
     average : str
         One of `ASI_AVERAGES`.
     time, history : ndarray, (m,)
@@ -64,9 +64,9 @@ def asi(
     average : {'butterworth_13hz', 'mean_50ms'}
         Edition of 2010 or of 1998.
     cutoff : {'whole', 'pass'}
-        Of the 13 Hz: `phaseless.four_pole`. The standard gives the frequency; the whole filter
-        3 dB down there is its plain meaning. Two passes of 13 Hz each smooth more and so give
-        less on short pulses.
+        Meaning of the 13 Hz: `phaseless.four_pole`. The standard gives the frequency; its plain
+        meaning is -3 dB there for the whole filter. Two passes of 13 Hz each smooth more and
+        give smaller values on short pulses.
 
     Returns
     -------
@@ -75,7 +75,7 @@ def asi(
     Raises
     ------
     DataError
-        As `pulse.checked`; the record is shorter than 50 ms, or its steps differ.
+        As `pulse.checked`; the record is shorter than 50 ms, or its steps are not uniform.
     ConfigError
         An option is unknown.
 

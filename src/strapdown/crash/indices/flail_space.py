@@ -32,14 +32,14 @@ class FlailSpace:
     Attributes
     ----------
     oiv_x, oiv_y : float, m/s
-        Occupant impact velocity: of the occupant relative to the vehicle, forward and to the
+        Occupant impact velocity: of the occupant relative to the vehicle, forward and
         right.
     at : float, s, or None
-        Of the occupant's impact, on the record's clock; None where the occupant meets nothing,
-        and the velocities are the greatest changes of the vehicle's.
+        Of the occupant's impact, on the record's clock; None without an impact, and the
+        velocities are then the greatest changes of the vehicle's velocity.
     ora_x_g, ora_y_g : float or None
-        Ridedown acceleration of the vehicle, the mean over 10 ms of greatest size after the
-        impact, in g, with its sign.
+        Ridedown acceleration of the vehicle: the 10 ms mean of greatest magnitude after the
+        impact, in g, signed.
     findings : tuple of Finding
     """
 
@@ -59,18 +59,18 @@ def flail_space(
     forward: float = FORWARD,
     sideways: float = SIDEWAYS,
 ) -> FlailSpace:
-    """Occupant impact velocity, and the ridedown acceleration after it.
+    """Occupant impact velocity, and the subsequent ridedown acceleration.
 
     Parameters
     ----------
     time : array_like, (n,), s
     accel : array_like, (n, 2) or (n, 3), m/s²
-        Of the vehicle near its centre of gravity, forward and to the right, without gravity, of
+        Of the vehicle near its center of gravity, forward and right, without gravity, of
         class CFC 180.
     start : float, s
         First contact.
     forward, sideways : float, m
-        The flail space; the same to the rear and to the left.
+        Flail space; the same to the rear and to the left.
 
     Returns
     -------
@@ -81,12 +81,12 @@ def flail_space(
     DataError
         As `pulse.checked`; `start` is not in the record.
     ConfigError
-        A distance is none.
+        A distance is not valid.
 
     Notes
     -----
-    Each axis for itself, the vehicle's turn left out: the occupant moves by ``-∬ a`` relative to
-    the vehicle and meets it when that is 0.6 m along or 0.3 m across, whichever is first; the
+    Each axis separately, rotation of the vehicle neglected: the occupant moves by ``-∬ a``
+    relative to the vehicle and hits it at 0.6 m along or 0.3 m across, whichever is first; the
     velocities are ``-∫ a`` then. Where neither is reached, they are the vehicle's changes of
     velocity (Michie 1981, Transportation Research Record 796; NCHRP Report 350, 1993, and MASH
     2009, occupant risk). Exact for acceleration that is linear between samples.

@@ -25,9 +25,9 @@ class Hic:
     value : float
         In the customary unit, s g^2.5.
     begin, end : float, s
-        Of the window that gives it.
+        Window with the maximum.
     longest : float, s
-        Windows up to this length were looked at.
+        Longest window evaluated.
     """
 
     value: float
@@ -37,13 +37,13 @@ class Hic:
 
 
 def hic(time: ArrayLike, accel: ArrayLike, *, longest: float = 0.015) -> Hic:
-    """Head injury criterion, the greatest over all windows between samples.
+    """Head injury criterion: maximum over all windows between samples.
 
     Parameters
     ----------
     time : array_like, (n,), s
     accel : array_like, (n, 3), m/s²
-        Of the head's centre of gravity, of class CFC 1000.
+        Of the head's center of gravity, of class CFC 1000.
     longest : float, s
         0.015 for HIC15, 0.036 for HIC36.
 
@@ -56,19 +56,19 @@ def hic(time: ArrayLike, accel: ArrayLike, *, longest: float = 0.015) -> Hic:
     DataError
         As `pulse.checked`.
     ConfigError
-        `longest` is no time.
+        `longest` is not a positive, finite time.
 
     Notes
     -----
     ``max (t2 - t1) [1/(t2 - t1) ∫ a dt]^2.5`` with a the resultant in g, over windows that begin
-    and end at samples (49 CFR 571.208, S6.2). Every pair is looked at: nothing is searched for.
+    and end at samples (49 CFR 571.208, S6.2). Every pair of samples is evaluated.
     """
     if not (math.isfinite(longest) and longest > 0.0):
         raise ConfigError("crash.no-length-window", quantity="longest", longest=longest)
     t, a = checked(time, accel, 3, "accel")
     total = running_integral(t, np.sqrt((a * a).sum(axis=1)) / STANDARD_GRAVITY)
     best = (0.0, 0, 1)
-    # By the number of samples between the ends, until no window is short enough.
+    # By number of samples between the ends, until every window is too long.
     for apart in range(1, t.size):
         length = t[apart:] - t[:-apart]
         fits = length <= longest * (1.0 + 1e-9)

@@ -26,7 +26,7 @@ class Olc:
     value_g : float or None
         Deceleration of the ideally restrained occupant, in g; None where the pulse is too weak.
     restraint_from, restraint_to : float, s, or None
-        Between which instants, from the start, the restraint acts.
+        Instants, from the start, between which the restraint acts.
     findings : tuple of Finding
     """
 
@@ -54,7 +54,7 @@ def olc(
     start : float, s
         First contact.
     free, whole : float, m
-        Way of the occupant relative to the vehicle before the restraint acts, and in all.
+        Travel of the occupant relative to the vehicle before the restraint acts, and in total.
 
     Returns
     -------
@@ -65,16 +65,16 @@ def olc(
     DataError
         As `pulse.checked`; `start` is not in the record.
     ConfigError
-        The ways are not ``0 <= free < whole``.
+        The travels do not satisfy ``0 <= free < whole``.
 
     Notes
     -----
     With ``u`` the velocity that the vehicle has lost and ``d`` its integral: the restraint acts
-    from t1, where ``d = 65 mm``, and slows the occupant evenly to the vehicle's velocity at t2,
-    where the occupant has moved by 300 mm in all: ``d(t2) - u(t2) (t2 - t1)/2 = 300 mm``. The
-    criterion is ``u(t2)/(t2 - t1)``. Euro NCAP Technical Bulletin TB 027, v1.1.1, as the manual
-    of T/HIS 22.1 describes it (page "Occupant Load Criterion"; the 0.0235 m printed there is
-    0.300 - 0.065 = 0.235 m). Exact for acceleration that is linear between samples.
+    from t1, where ``d = 65 mm``, and decelerates the occupant uniformly to the vehicle's velocity
+    at t2, where the occupant has moved by 300 mm in all: ``d(t2) - u(t2) (t2 - t1)/2 = 300 mm``.
+    The criterion is ``u(t2)/(t2 - t1)``. Euro NCAP Technical Bulletin TB 027, v1.1.1, as the
+    manual of T/HIS 22.1 describes it (page "Occupant Load Criterion"; the 0.0235 m printed there
+    is 0.300 - 0.065 = 0.235 m). Exact for acceleration that is linear between samples.
     """
     if not (math.isfinite(whole) and 0.0 <= free < whole):
         raise ConfigError(
@@ -88,7 +88,7 @@ def olc(
     rest = t - begin
     way = ahead - 0.5 * lost * rest
     slope = 0.5 * (lost + a * rest)
-    # Before the restraint acts the formula means nothing.
+    # Before the restraint acts the formula is not valid.
     later = t > begin
     at_begin = cubic(t, ahead, lost, begin)
 

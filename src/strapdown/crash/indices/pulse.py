@@ -1,4 +1,4 @@
-"""The record that the indices take: its checks, and what double integration makes of it."""
+"""Input of the crash indices: checks of a record and its integrals, means and filters."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from strapdown.dsp.running_integral import running_integral
 from strapdown.errors import ConfigError, DataError
 
 Array = NDArray[np.float64]
-# Stamps are rounded; steps that differ by more than this share are not one rate.
+# Stamps are rounded; steps that differ by more than this fraction are not uniform.
 SAME_STEP = 0.02
 
 
@@ -25,14 +25,14 @@ def checked(
     time : array_like, (n,), s
     values : array_like, (n,) or (n, width)
     width : int or None
-        None for one number a sample.
+        None for one number per sample.
     quantity : str
         For messages.
 
     Raises
     ------
     DataError
-        The shapes disagree, a value is not finite, time does not advance, or there are fewer
+        The shapes disagree, a value is not finite, time does not increase, or there are fewer
         than two samples.
     """
     t, v = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
@@ -64,12 +64,12 @@ def checked(
 
 
 def step_of(time: Array) -> float:
-    """Return the one step of a record, for a digital filter.
+    """Return the uniform step of a record, for a digital filter.
 
     Raises
     ------
     DataError
-        The steps differ.
+        The steps are not uniform.
     """
     steps = np.diff(time)
     step = float(time[-1] - time[0]) / steps.size
@@ -126,11 +126,11 @@ def integrals(time: Array, values: Array) -> tuple[Array, Array]:
     return first, np.concatenate([first[:1], np.cumsum(grown, axis=0)])
 
 
-# When a quantity that is known with its slope first reaches a level.
+# First instant at which a quantity with known slope reaches a level.
 
 
 def cubic(time: Array, values: Array, slopes: Array, at: float) -> tuple[float, float]:
-    """Value and slope between samples, along the cubic that the two neighbours share.
+    """Value and slope between samples, on the cubic through the two neighbors.
 
     Exact for the double integral of an acceleration that is linear between samples.
 
@@ -151,7 +151,7 @@ def cubic(time: Array, values: Array, slopes: Array, at: float) -> tuple[float, 
 
 
 def first_reach(time: Array, values: Array, slopes: Array, level: float) -> float | None:
-    """Return the first instant at which a quantity comes up to a level from below.
+    """Return the first instant at which a quantity reaches a level from below.
 
     Parameters
     ----------
@@ -161,8 +161,7 @@ def first_reach(time: Array, values: Array, slopes: Array, level: float) -> floa
     Returns
     -------
     float or None
-        None where it stays below. A touch within one step that both its ends are below is not
-        seen.
+        None where it stays below. A crossing and return within one step is not detected.
     """
     above = np.flatnonzero(values >= level)
     if not above.size:
@@ -175,13 +174,13 @@ def first_reach(time: Array, values: Array, slopes: Array, level: float) -> floa
     def short(at: float) -> float:
         return cubic(time, values, slopes, at)[0] - level
 
-    # The value at a knot is that of the samples to rounding: a root there has no change of sign.
+    # The value at a knot is that of the sample up to rounding: a root there has no change of sign.
     if short(float(time[k])) <= 0.0:
         return float(time[k])
     return float(brentq(short, float(time[k - 1]), float(time[k]), xtol=1e-15, rtol=1e-14))
 
 
-# Means over a window that moves, exact where the record is linear between its samples.
+# Means over a moving window, exact for a record that is linear between its samples.
 
 
 def moving_means(time: Array, values: Array, width: float) -> tuple[Array, Array]:
@@ -192,7 +191,7 @@ def moving_means(time: Array, values: Array, width: float) -> tuple[Array, Array
     time : ndarray, (n,), s
     values : ndarray, (n,) or (n, k)
     width : float, s
-        No whole number of samples is needed.
+        Need not be an integer number of samples.
 
     Returns
     -------
@@ -205,7 +204,7 @@ def moving_means(time: Array, values: Array, width: float) -> tuple[Array, Array
     DataError
         The record is shorter than the window.
     """
-    # Stamps are sums of steps: a record as long as its window may miss it by rounding.
+    # Stamps are sums of steps: a record as long as its window may be shorter by rounding.
     last = time[-1] - width
     if last < time[0] - 1e-9 * width:
         raise DataError(
@@ -227,9 +226,9 @@ def moving_means(time: Array, values: Array, width: float) -> tuple[Array, Array
 
 
 def largest_mean(time: Array, values: Array, width: float) -> tuple[float, float]:
-    """Return the mean of greatest size, with its sign, and the start of its window.
+    """Return the mean of greatest magnitude, signed, and the start of its window.
 
-    Exact for a record that is linear between samples: between two neighbouring windows the mean
+    Exact for a record that is linear between samples: between two neighboring windows the mean
     is a parabola, whose vertex is where the values at both ends of the window are equal.
 
     Parameters
@@ -266,14 +265,14 @@ def _integral_at(time: Array, values: Array, total: Array, at: Array) -> Array:
     return np.asarray(total[k] + into * (values[k] + 0.5 * into * slope))
 
 
-# The four-pole Butterworth low-pass without phase of EN 1317-1:2010.
+# Zero-phase four-pole Butterworth low-pass of EN 1317-1:2010.
 
-#: What the cut-off frequency belongs to.
+#: Whether the cut-off frequency is that of the whole filter or of each pass.
 CUTOFFS = ("whole", "pass")
-# Record that is put before and after, in s, as T/HIS does for EN 1317-1:2010.
+# Length of the extension before and after the record, s, as in T/HIS for EN 1317-1:2010.
 PADDING = 0.5
-# Both passes together fall by 1/(1 + (f/each)^4), which is 3 dB at this share of their own
-# cut-off, 0.8022.
+# Both passes together attenuate by 1/(1 + (f/each)^4), which is 3 dB at this fraction of their
+# own cut-off, 0.8022.
 PASS_SHARE = (math.sqrt(2.0) - 1.0) ** 0.25
 
 
@@ -283,25 +282,25 @@ def four_pole(time: Array, values: Array, frequency: float, cutoff: str = "whole
     Parameters
     ----------
     time : ndarray, (n,), s
-        Of one step.
+        Uniform steps.
     values : ndarray, (n,) or (n, k)
     frequency : float, Hz
     cutoff : {'whole', 'pass'}
-        Whether the filter as a whole is 3 dB down there, or each pass (the whole then 6 dB).
+        Whether the whole filter is 3 dB down there, or each pass (6 dB for the whole).
 
     Returns
     -------
     ndarray
-        Of the shape of `values`. Before and after the record its point mirror is put, half a
-        second of it or as much as there is, so that a record that rests at its ends starts
+        Of the shape of `values`. The record is extended at both ends by its point reflection,
+        by 0.5 s or as much as there is, so that a record that is stationary at its ends starts
         and stops without a transient.
 
     Raises
     ------
     DataError
-        The steps differ, or the record is sampled at less than ten times the frequency.
+        The steps are not uniform, or the record is sampled at less than ten times the frequency.
     ConfigError
-        The cut-off is of neither kind.
+        `cutoff` is unknown.
     """
     from scipy.signal import butter, sosfiltfilt
 

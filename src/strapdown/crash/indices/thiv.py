@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 FORWARD, SIDEWAYS = 0.6, 0.3  # m
 WINDOW = 0.01  # s
 FREQUENCY = 10.0  # Hz
-#: How the acceleration after the impact of the head is smoothed.
+#: Smoothing of the acceleration after the head impact.
 PHD_AVERAGES: dict[str, str] = {
     "mean_10ms": "mean of the resultant over a moving window of 10 ms (EN 1317-1:1998; MASH)",
     "butterworth_10hz": "resultant of the components through a four-pole Butterworth low-pass "
@@ -37,12 +37,12 @@ PHD_AVERAGES: dict[str, str] = {
 
 @dataclass(frozen=True)
 class Thiv:
-    """What a head that flies freely in the vehicle meets.
+    """Impact of a head that flies freely in the vehicle.
 
     Attributes
     ----------
     velocity : float, m/s, or None
-        Of the head relative to the vehicle at its impact; None where it meets nothing.
+        Of the head relative to the vehicle at its impact; None without an impact.
     time_of_flight : float, s, or None
         From the start.
     surface : str or None
@@ -76,22 +76,22 @@ def thiv(
     sideways: float = SIDEWAYS,
     phd_average: str = "mean_10ms",
 ) -> Thiv:
-    """Theoretical head impact velocity, and the deceleration after it.
+    """Theoretical head impact velocity, and the subsequent deceleration.
 
     Parameters
     ----------
     time : array_like, (n,), s
     accel : array_like, (n, 2) or (n, 3), m/s²
-        Acceleration of the reference point, forward and to the right, without gravity, of class
+        Acceleration of the reference point, forward and right, without gravity, of class
         CFC 180.
     yaw_rate : array_like, (n,), rad/s, optional
-        About the downward axis: clockwise from above; left out, the vehicle does not turn.
+        About the downward axis: clockwise from above; by default zero.
     start : float, s
         First contact.
     head : pair of float, m
         The head before the impact, forward and right of the reference point.
     forward, sideways : float, m
-        How far the head flies until it meets something.
+        Flight distance of the head to the surfaces.
     phd_average : {'mean_10ms', 'butterworth_10hz'}
 
     Returns
@@ -107,14 +107,14 @@ def thiv(
 
     Notes
     -----
-    The head keeps the velocity that the reference point had at `start`. In axes that move with
-    this velocity and do not turn, the vehicle's point moves by ``X'' = ax cos ψ - ay sin ψ``,
+    The head keeps the velocity of the reference point at `start`. In nonrotating axes that move
+    with this velocity, the vehicle's point moves by ``X'' = ax cos ψ - ay sin ψ``,
     ``Y'' = ax sin ψ + ay cos ψ``; the head, at rest there, is at ``(x, y) = C(ψ)ᵀ (head - (X, Y))``
-    in the vehicle. It meets a surface where x has grown by `forward` or y has changed by
-    `sideways`, whichever is first, with the velocity ``(x', y')``, the turn of the vehicle
-    included (EN 1317-1, clauses on THIV and PHD; MASH 2009, appendix F2, which takes it over).
-    There is no surface behind the head. Exact for acceleration that is linear between samples
-    and no yaw; with yaw, of the second order of the step.
+    in the vehicle. It hits a surface where x has grown by `forward` or y has changed by
+    `sideways`, whichever is first, with the velocity ``(x', y')``, including the rotation of the
+    vehicle (EN 1317-1, clauses on THIV and PHD; MASH 2009, appendix F2, which adopts it).
+    The model has no surface behind the head. Exact for acceleration that is linear between
+    samples and no yaw; with yaw, of the second order of the step.
     """
     t, a, rate = _inputs(time, accel, yaw_rate, forward, sideways, phd_average)
     table = np.column_stack([a, rate])
@@ -173,7 +173,7 @@ def _inputs(
 
 
 def _head_in_vehicle(time: Array, accel: Array, rate: Array, head: Array) -> tuple[Array, Array]:
-    """Place of the head in vehicle axes, and its velocity there."""
+    """Position of the head in vehicle axes, and its velocity there."""
     yaw = running_integral(time, rate)
     c, s = np.cos(yaw), np.sin(yaw)
     level = np.column_stack([c * accel[:, 0] - s * accel[:, 1], s * accel[:, 0] + c * accel[:, 1]])
