@@ -29,8 +29,8 @@ class SummedState:
     given : int
         Outputs so far.
     values : ndarray, (k, c)
-        Screened samples from the one before the stamp of the last output on; at the start of the
-        record there is no earlier one.
+        Screened samples from the one before the stamp of the last output on,
+        beginning with the first sample of the record.
     """
 
     grid: Grid
