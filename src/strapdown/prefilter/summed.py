@@ -29,8 +29,8 @@ class SummedState:
     given : int
         Outputs so far.
     values : ndarray, (k, c)
-        Screened samples from the one before the stamp of the last output on,
-        beginning with the first sample of the record.
+        Screened samples, starting one before the stamp of the last output; before the first output,
+        from the start of the record.
     """
 
     grid: Grid
