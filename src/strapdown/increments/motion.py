@@ -154,10 +154,10 @@ class MotionAccuracy:
     Attributes
     ----------
     attitude, velocity, position : int
-            For equal steps in a block.
-        unequal : int
-            For all three with unequal steps: with an even number of steps, one error term cancels
-            between the halves of a block only where these are equal.
+        For equal steps in a block.
+    unequal : int
+        For all three with unequal steps: with an even number of steps, one error term cancels
+        between the halves of a block only where these are equal.
     """
 
     attitude: int

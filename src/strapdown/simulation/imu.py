@@ -363,9 +363,10 @@ def low_passed(
         Until the first instant the filter is settled at the value there.
     bandwidth : float, Hz
         -3 dB frequency.
-    A quantity within this of a straight line between two instants is treated as linear, and the
-    quadrature elsewhere has 3 nodes; zero disables both. This saves evaluations where the quantity
-    changes little.
+    straight : float
+        A quantity within this of a straight line between two instants is treated as linear, and the
+        quadrature elsewhere has 3 nodes; zero disables both. This saves evaluations where the
+        quantity changes little.
 
     Returns
     -------
