@@ -622,7 +622,7 @@ def _turned(log: HealthLog, k: int, at: int, step: float) -> bool:
     seen = after - before
     told_size = float(told @ told)
     if told_size < 1e-6 * float(before @ before):
-        return False  # about the vertical: nothing is seen
+        return False  # rotation about the vertical: not observable
     share = float((seen @ told) @ angles) / (told_size * float(angles @ angles))
     # Inconclusive where accelerometer noise could confirm the rotation by chance.
     noise = float(np.median(log.blocks.noise[:, 3:].max(axis=1))) / math.sqrt(log.blocks.samples)

@@ -251,7 +251,7 @@ class UnitVoting:
             accel.append(values_of(table, ACCEL))
         if len(samplings) > 1:
             raise DataError("sensors.some-units-give-instantaneous-values", quantity="sampling")
-        assert time is not None  # two units at least
+        assert time is not None  # at least two units
         return time, np.hstack(gyro), np.hstack(accel), samplings.pop()
 
 

@@ -203,8 +203,8 @@ class Sculling(FlatMotion):
 
     Notes
     -----
-    With ``z = e + i (n x e)`` the acceleration is ``B exp(iα sin Ωt) sin(Ωt + ψ)``, by
-    the Jacobi-Anger expansion (DLMF 10.12.1) a sum of ``B/2i (J[m-1](α) exp(iψ) - J[m+1](α)
+    With ``z = e + i (n x e)`` the acceleration is ``B exp(iα sin Ωt) sin(Ωt + ψ)``, by the
+    Jacobi-Anger expansion (DLMF 10.12.1) a sum of ``B/2i (J[m-1](α) exp(iψ) - J[m+1](α)
     exp(-iψ)) exp(imΩt)``, whose integrals are closed.
     """
 

@@ -248,11 +248,11 @@ Array = NDArray[np.float64]
 
 # After the impact: 0.75 s of path, plus the margin for filters and late triggers.
 RECORDED = 0.85  # s
-BEFORE, AFTER = 0.1, 0.75  # s, of the path, which the cameras film
+BEFORE, AFTER = 0.1, 0.75  # s, interval filmed by the cameras
 TRUTH_STEP = 0.001  # s
 # From its center the image spans 1300 px in depth and 512 px in height: a motion of 1 m is fully
 # visible from 2.5 m, plus 1 m where the vehicle approaches.
-DISTANCES, NEAREST = 4.0, 8.0  # of the way that is filmed, and m
+DISTANCES, NEAREST = 4.0, 8.0  # multiple of the filmed displacement, and m
 # Light gate with two beams.
 SPEED_SD = 0.05  # m/s
 # Random stream key, by name as for a recorder or a camera.

@@ -254,7 +254,7 @@ class Handling(FlatMotion):
         draw = np.random.Generator(np.random.PCG64(self.seed)).integers
         home = (0.0,) * 6
         poses: list[tuple[float, ...]] = [(0.0, *home)]
-        tenths = 0  # whole numbers, so that no machine rounds a time otherwise
+        tenths = 0  # integers, so that times are identical on every machine
         while True:
             tenths += int(draw(15, 51))
             rows: list[tuple[float, ...]] = [(tenths / 10, *home)]

@@ -47,8 +47,8 @@ def simulate_imu(
     sampling : {'instantaneous', 'mean'}
         The value at each stamp, or the mean over the interval that ends there. Mean rates are
         exact, from the motion's angle; mean specific forces use 8-node Gauss-Legendre quadrature,
-        divided at the motion's `cuts` (for ringing). The first row of
-        means holds the value at time zero.
+        divided at the motion's `cuts` (for ringing). The first row of means holds the value at
+        time zero.
     seed : int
         Seed of all random draws; the same seed gives the same samples on every machine.
     source : str, optional

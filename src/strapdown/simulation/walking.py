@@ -43,9 +43,9 @@ class Gait:
     heel_off_deg, toe_up_deg : float, deg
         Nose-down pitch at heel-off, and nose-up pitch before heel strike.
     strike : float, m
-        Height from which the shoe falls onto its heel at the end,
+        Height from which the shoe falls onto its heel at the end of the swing.
     strike_time : float, s
-        within this time: an acceleration of about ``5.8 strike / strike_time²``.
+        Duration of that fall, with an acceleration of about ``5.8 strike / strike_time²``.
     """
 
     stride: float
