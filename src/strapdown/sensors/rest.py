@@ -223,9 +223,9 @@ def of_one_bias(rests: list[RestStretch]) -> tuple[RestStretch, ...]:
 
 
 # Vibration about one attitude leaves half-second means constant; driving does not. In a car at 2 to
-# 14 m/s on streets and in one on a motorway, in every 4 s window the means scatter by at least 0.33
-# deg/s and 0.084 m/s² (root sum over the axes). In a parked car with people getting in and doors
-# slammed they scatter by 0.03 to 0.19 deg/s and 0.004 to 0.061 m/s².
+# 14 m/s on streets and in one on a motorway, no window of 4 s had means that scatter by less than
+# 0.33 deg/s and 0.084 m/s² (root of the summed variances of the axes). In a parked car with people
+# getting in and doors slammed they scatter by 0.03 to 0.19 deg/s and 0.004 to 0.061 m/s².
 SHAKING_REST_WINDOW = 4.0  # s
 BLOCKS = 8
 STEP = 1.0  # s
