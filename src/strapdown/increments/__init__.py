@@ -1,4 +1,4 @@
-"""From samples of rate and specific force to increments of angle, velocity and distance."""
+"""Angle, velocity and position increments from samples of angular rate and specific force."""
 
 from strapdown.increments.angle import increments_from_imu
 from strapdown.increments.motion import (

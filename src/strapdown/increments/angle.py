@@ -1,4 +1,4 @@
-"""From samples of a rate to the angular increments of the steps between them."""
+"""Angular increments from samples of angular rate."""
 
 from __future__ import annotations
 
@@ -23,18 +23,17 @@ def increments_from_imu(imu: pd.DataFrame, interpolation: str = "linear") -> pd.
     imu : DataFrame
         An Imu table; any spacing, each step has its own length.
     interpolation : {'linear', 'cubic'}
-        How rates at the stamps run between them: along the chord (the trapezoid, Alexiev 2021,
-        Eq. (2); second order in the step), or along the cubic through the two samples and
-        their neighbours (fourth order on smooth motion; a step beside a gap or in a burst
-        uses the neighbours whose steps are like it, within a factor of two). The cubic of a
-        step needs the sample after it, so that live it is known one sample late. A mean rate
-        has nothing between stamps to interpolate.
+        Rate between the stamps. ``linear``: the trapezoid rule (Alexiev 2021, Eq. (2)), second
+        order in the step. ``cubic``: the cubic through the two samples and their neighbors, fourth
+        order on smooth motion; beside a gap or in a burst only neighbors whose steps agree within a
+        factor of two are used. The cubic needs the sample after the step, which delays live output
+        by one sample. Ignored for mean rates.
 
     Returns
     -------
     DataFrame
-        An Increments table of one row less; a mean rate is multiplied by its step. The first
-        row of a mean rate belongs to an interval that begins before the log, and is left out.
+        An Increments table with one row less than `imu`. A mean rate is multiplied by its step; its
+        first row is omitted because that interval begins before the log.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""From an Imu table to the turn, the velocity and the distance of each step."""
+"""Motion increments (rotation, velocity, position) of each step from an Imu table."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ __all__ = [
 
 
 Array = NDArray[np.float64]
-#: `constant` is for means alone.
+#: `constant` applies to mean samples only.
 INTERPOLATIONS = ("constant", *BETWEEN_STAMPS)
 ROWS = ("sample", "block")
 
@@ -42,43 +42,43 @@ def motion_increments(
     imu : DataFrame
         An Imu table with specific force; any spacing, each step has its own length.
     samples : int
-        Steps of a block, 1 to 4, over which rate and force are one polynomial: of degree
-        `samples` through the ``samples + 1`` samples at the stamps, or, of means, of degree
-        ``samples - 1`` with the integrals over the steps that were measured. A block ends
-        before a step that is more than three times longer or shorter than its first, as beside
-        a gap or in a burst. One that a gap or the end of the log cuts short borrows the steps
-        before it, where they are like its own.
+        Steps per block, 1 to 4. Over a block, rate and specific force are one polynomial: of degree
+        `samples` through the ``samples + 1`` samples at the stamps, or, for means, of degree
+        ``samples - 1`` with the measured integrals over the steps. A block ends before a step that
+        is more than three times longer or shorter than its first, as beside a gap or in a burst. A
+        block cut short by a gap or the end of the log borrows the preceding steps where their
+        lengths are similar.
     interpolation : {'constant', 'linear', 'cubic'}
-        For ``samples=1``. ``linear``: along the chord between two samples; of means, along the
-        line whose integrals over this step and the one before it are those measured (constant
-        where that one is unlike). ``cubic``: along the polynomial that the two neighbours
-        share, where they are like it within a factor of two: the cubic through four samples,
-        or the parabola with the integrals over three steps. It is known one sample late.
-        ``constant``, for means alone: each for itself, without coning.
+        For ``samples=1``. ``linear``: the chord between two samples; for means, the line with the
+        measured integrals over this step and the previous one (constant where their lengths
+        differ). ``cubic``: the polynomial that also uses the two neighbors, where their steps agree
+        within a factor of two: the cubic through four samples, or the parabola with the integrals
+        over three steps. It is delayed by one sample. ``constant``, for means only: each mean by
+        itself, without coning.
     rows : {'sample', 'block'}
-        One row a sample, the flow of the block's polynomial over that step alone, known up to
-        ``samples - 1`` samples late; or one row a block, in which these are put together.
+        One row per sample, integrating the block's polynomial over that step alone, delayed by up
+        to ``samples - 1`` samples; or one row per block, the composition of these.
 
     Returns
     -------
     DataFrame
-        A MotionIncrements table of one row less than `imu`, or of one row a block. The first
-        row of means belongs to an interval that begins before the log: it gives no row.
+        A MotionIncrements table with one row less than `imu`, or one row per block. The first row
+        of means gives no increment because its interval begins before the log.
 
     Raises
     ------
     DataError
-        As `tables.check_imu`; there is no accelerometer.
+        As `tables.check_imu`, or the table has no accelerometer.
     ConfigError
-        An option is unknown or does not go with another.
+        An option is unknown or conflicts with another.
 
     Notes
     -----
-    A mean belongs, on average, to half a sample before its stamp; its integral belongs to the
-    interval that ends there exactly, so that no delay is left. Turn, velocity and distance
-    come from one Magnus series, to fourth order with ``samples=1`` and ``linear``, and else to
-    sixth (Blanes, Casas and Ros, BIT 40 (2000) 434, Eqs. (3.9), (3.11)). It holds where a step
-    turns by less than about 1 rad. `motion_accuracy` has the orders.
+    A mean is centered half a sample before its stamp, but its integral covers exactly the interval
+    that ends there, so no delay remains. Rotation, velocity and position increments come from one
+    Magnus series, to fourth order for ``samples=1`` with ``linear``, otherwise to sixth (Blanes,
+    Casas and Ros, BIT 40 (2000) 434, Eqs. (3.9), (3.11)). It is valid where a step rotates by less
+    than about 1 rad. `motion_accuracy` gives the orders.
     """
     mean = _check(imu, samples, interpolation, rows)
     time = np.ascontiguousarray(imu.index.to_numpy(dtype=np.float64))
@@ -98,7 +98,7 @@ def motion_increments(
         last = np.empty(len(dt), dtype=np.int64)
         joined = np.empty_like(out)
         count = motion_blocks.join_blocks(dt, samples, out, last, joined)
-        # A step is as long as its stamps say, to the last bit.
+        # The step length equals the stamp difference, to the last bit.
         ends, out = ends[last[:count]], joined[:count].copy()
     table = pd.DataFrame(out, index=pd.Index(ends, name="time"), columns=MOTION, copy=False)
     table.attrs["source"] = imu.attrs.get("source")
@@ -107,7 +107,7 @@ def motion_increments(
 
 
 def _check(imu: pd.DataFrame, samples: int, interpolation: str, rows: str) -> bool:
-    """Whether the table holds means; everything that was asked is possible."""
+    """Check table and options; return whether the samples are means."""
     if samples not in (1, 2, 3, 4):
         raise ConfigError("mechanization.out-range", quantity="samples", samples=samples)
     for quantity, value, known in (
@@ -144,20 +144,20 @@ def _check(imu: pd.DataFrame, samples: int, interpolation: str, rows: str) -> bo
     return mean
 
 
-# The orders of accuracy of motion increments, as data; the tests fit each of them.
+# Orders of accuracy of motion increments, as data; the tests fit each one.
 
 
 @dataclass(frozen=True)
 class MotionAccuracy:
-    """Powers of the step with which errors fall on smooth motion, at the ends of blocks.
+    """Powers of the step with which errors decrease on smooth motion, at the ends of blocks.
 
     Attributes
     ----------
     attitude, velocity, position : int
-        Where the steps of a block are equal.
+        For equal steps in a block.
     unequal : int
-        Of all three where they are not: with an even number of steps a term of the error
-        cancels between the halves of a block only where these are alike.
+        For all three with unequal steps: with an even number of steps, one error term cancels
+        between the halves of a block only where these are equal.
     """
 
     attitude: int
@@ -170,10 +170,9 @@ def _orders(equal: int, unequal: int) -> MotionAccuracy:
     return MotionAccuracy(equal, equal, equal, unequal)
 
 
-# By the number of steps and the interpolation. The polynomial is wrong by a multiple of
-# the product of distances to its nodes: those of n steps are n + 1 stamps, for samples and for
-# the running sums of means alike, and the integral of that product over equal steps is zero
-# where n is even.
+# By number of steps and interpolation. The error of the polynomial is a multiple of the product of
+# distances to its nodes. For n steps these are n + 1 stamps, for samples and for the running sums
+# of means alike, and the integral of that product over equal steps is zero where n is even.
 _BLOCKS = {2: _orders(4, 3), 3: _orders(4, 4), 4: _orders(6, 5)}
 ORDERS: dict[tuple[str, int, str], MotionAccuracy] = {
     ("instantaneous", 1, "linear"): _orders(2, 2),
@@ -203,7 +202,7 @@ def motion_accuracy(
     Raises
     ------
     ConfigError
-        There is no such combination.
+        The combination is unknown.
     """
     try:
         return ORDERS[sampling, samples, interpolation]
@@ -217,7 +216,7 @@ def motion_accuracy(
         ) from None
 
 
-# A sensor that sums: increments of angle and velocity as means over their steps.
+# Sensors that integrate: increments of angle and velocity as means over their steps.
 
 
 def imu_from_increments(
@@ -227,18 +226,18 @@ def imu_from_increments(
     dt: float | None = None,
     source: str | None = None,
 ) -> pd.DataFrame:
-    """Make an Imu table of the increments that a sensor summed since its last sample.
+    """Make an Imu table from increments that a sensor integrated since its last sample.
 
     Parameters
     ----------
     time : array_like, (n,), s
-        Stamps: the end of the interval of each sample, which begins at the stamp before it.
+        Stamps: the end of each sample's interval, which begins at the previous stamp.
     theta : array_like, (n, 3), rad
         Integral of the rate over the interval, axis by axis, without coning correction.
     dv : array_like, (n, 3), m/s, optional
         Integral of the specific force, axis by axis, without sculling correction.
     dt : float, s, optional
-        Length of the first interval, which no stamp tells; else the median step.
+        Length of the first interval, which the stamps do not give; default, the median step.
     source : str, optional
         Name for messages.
 
@@ -260,7 +259,7 @@ def imu_from_increments(
         check_same_length(source, time=stamps, dv=velocity)
     check_time(stamps, source)
     if len(stamps) < 2 and dt is None:
-        # The table says what is wrong with a single sample.
+        # The table raises the error for a single sample.
         return imu_table(stamps, angle, velocity, sampling="mean", source=source)
     first = float(np.median(np.diff(stamps))) if dt is None else float(dt)
     if not (np.isfinite(first) and first > 0.0):

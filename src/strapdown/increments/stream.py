@@ -1,4 +1,4 @@
-"""Motion increments of samples that come in pieces of any length."""
+"""Motion increments of samples that arrive in chunks of any length."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ STREAMED = ("linear", "cubic")
 
 @dataclass(frozen=True, eq=False)
 class IncrementStreamState:
-    """Between pieces.
+    """State between chunks.
 
     Attributes
     ----------
     mean : bool
-        Whether samples are means over the step that ends at their stamp.
+        Whether samples are means over the step ending at their stamp.
     time : ndarray, (k,), s
         Newest stamps, as many as the next step needs.
     values : ndarray, (k, 6)
     done : int
-        Steps between these stamps that were given already.
+        Steps between these stamps already returned.
     """
 
     mean: bool
@@ -41,18 +41,18 @@ class IncrementStreamState:
 
 @dataclass(frozen=True)
 class IncrementStream:
-    """Rows of motion increments as `motion_increments` makes them of the whole, to the last bit.
+    """Stream the rows of `motion_increments`, bit-identical to processing the whole record.
 
     Attributes
     ----------
     interpolation : {'linear', 'cubic'}
-        Between samples: see `motion_increments`. ``linear`` gives each step with the sample that
-        ends it, ``cubic`` one sample later.
+        See `motion_increments`. ``linear`` returns each step with the sample that ends it,
+        ``cubic`` one sample later.
 
     Raises
     ------
     ConfigError
-        There is no such interpolation.
+        The interpolation is unknown.
     """
 
     interpolation: str = "linear"
@@ -80,18 +80,18 @@ class IncrementStream:
     def advance(
         self, state: IncrementStreamState, time: Array, values: Array, last: bool = False
     ) -> tuple[IncrementStreamState, Array, Array]:
-        """Take further samples.
+        """Process further samples.
 
         Parameters
         ----------
         state : IncrementStreamState
-            It is not changed.
+            Not changed.
         time : ndarray, (k,), s
-            Stamps, increasing, after those before; k may be nought.
+            Stamps, increasing, after the previous ones; k may be zero.
         values : ndarray, (k, 6)
             Rates in rad/s and specific forces in m/s².
         last : bool
-            Whether no sample follows: what waits for one is given as well as it can be.
+            Whether no sample follows; steps still waiting for one are then returned without it.
 
         Returns
         -------
@@ -113,7 +113,7 @@ class IncrementStream:
             scratch = np.empty((motion_blocks.ROWS, motion_blocks.WIDEST))
             motion_blocks.motion_increments_neighbours(dt, rate, force, state.mean, scratch, out)
             upto = dt.size if last else max(dt.size - 1, state.done)
-        # The step before the next one tells how a mean changes over it, and is its neighbour.
+        # Keep the step before the next one: it gives the slope of a mean, and is its neighbor.
         keep = max(upto - 1, 0)
         after = IncrementStreamState(
             state.mean, stamps[keep:].copy(), samples[keep:].copy(), min(upto, 1)

@@ -1,4 +1,4 @@
-"""From samples of 1 kHz to those that are navigated by: outliers, low-pass, decimation."""
+"""Prefilters from a high sample rate to the navigation rate: outliers, low-pass, decimation."""
 
 from __future__ import annotations
 

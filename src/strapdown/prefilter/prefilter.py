@@ -1,4 +1,4 @@
-"""What every prefilter is: samples in, fewer and better ones out, in segments of any length."""
+"""Common base of all prefilters: screened, decimated samples from chunks of any length."""
 
 from __future__ import annotations
 
@@ -36,21 +36,21 @@ __all__ = [
 Array = NDArray[np.float64]
 
 CHANNELS = [*GYRO, *ACCEL]
-# Samples that are taken at a time: memory stays small, and a record is always in pieces.
+# Samples processed at a time. This bounds memory, and every record is processed in chunks.
 PIECE = 32_768
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Even stamps of a record's samples.
+    """Evenly spaced stamps of the samples of a record.
 
     Attributes
     ----------
     start : float, s
-        Stamp of the first.
+        Stamp of the first sample.
     step : float, s
     means : bool
-        Whether a sample is the mean over the step that ends at its stamp.
+        Whether a sample is the mean over the step ending at its stamp.
     """
 
     start: float
@@ -58,21 +58,21 @@ class Grid:
     means: bool
 
     def time(self, number: int | NDArray[np.int64]) -> Any:
-        """Stamp of a sample, counted from zero."""
+        """Stamp of a sample, counted from zero, s."""
         return self.start + self.step * number
 
 
 @dataclass(frozen=True, eq=False)
 class Portion:
-    """What came out of a segment.
+    """Output of one chunk.
 
     Attributes
     ----------
     time : ndarray, (m,), s
     values : ndarray, (m, c)
-        Samples at these stamps, of `Prefilter.sampling`.
+        Samples at these stamps, of the kind given by `Prefilter.sampling`.
     rows : ndarray, (m, 10) or (0, 10)
-        Motion increments that end at these stamps, of a prefilter that makes them itself.
+        Motion increments ending at these stamps, if the prefilter forms them itself.
     changed : Changed
     """
 
@@ -84,14 +84,14 @@ class Portion:
 
 @dataclass(frozen=True, eq=False)
 class Prefiltered:
-    """A record after a prefilter.
+    """A prefiltered record.
 
     Attributes
     ----------
     imu : DataFrame
         Imu table.
     increments : DataFrame
-        MotionIncrements table over the same time: what a mechanization takes.
+        MotionIncrements table over the same time, the input of a mechanization.
     report : PrefilterReport
     """
 
@@ -102,7 +102,7 @@ class Prefiltered:
 
 @dataclass(frozen=True)
 class Prefilter(ABC):
-    """Turns samples of a high rate into those that are navigated by; it holds no state."""
+    """Reduce samples of a high rate to the navigation rate; holds no state."""
 
     name: ClassVar[str]
     summary: ClassVar[str]
@@ -116,37 +116,37 @@ class Prefilter(ABC):
         ----------
         grid : Grid
         channels : int
-            Three gyros, and three accelerometers if there are.
+            Three gyros, then three accelerometers if present.
         """
 
     @abstractmethod
     def advance(self, state: Any, values: Array, last: bool = False) -> tuple[Any, Portion]:
-        """Take a further segment of samples.
+        """Process a further chunk of samples.
 
         Parameters
         ----------
         state
-            Of `begin` or an earlier call; it is not changed.
+            From `begin` or an earlier call; not changed.
         values : ndarray, (k, c)
             rad/s and m/s²; k may be one.
         last : bool
-            Whether the record ends with them: what waits for later samples is given as well as
-            it can be.
+            Whether the record ends here; outputs still waiting for later samples are then completed
+            without them.
 
         Returns
         -------
         state
         portion : Portion
-            The same numbers, to the bit, however the record is cut.
+            Bit-identical however the record is divided.
         """
 
     @abstractmethod
     def figures(self, grid: Grid) -> dict[str, float]:
-        """What it does to time, noise and frequencies: the floats of `PrefilterReport`."""
+        """Delay, latency, noise factor and band of the filter: the floats of `PrefilterReport`."""
 
     @abstractmethod
     def sampling(self, grid: Grid) -> str:
-        """What the outputs are: 'instantaneous' or 'mean'."""
+        """Kind of the output samples: 'instantaneous' or 'mean'."""
 
     def apply(self, imu: pd.DataFrame) -> Prefiltered:
         """Filter a record.
@@ -211,12 +211,12 @@ class Prefilter(ABC):
 
 
 def grid_of(imu: pd.DataFrame) -> Grid:
-    """Even stamps of a table.
+    """Return the evenly spaced stamps of a table.
 
     Raises
     ------
     DataError
-        They are not even: the row is named.
+        The stamps are uneven; the message names the row.
     """
     time = index_of(imu)
     try:
@@ -232,7 +232,7 @@ def whole_factor(rate: float, grid: Grid, name: str) -> int:
     Raises
     ------
     ConfigError
-        The rate does not divide that of the samples.
+        The rate does not divide the sample rate.
     """
     own = 1.0 / grid.step
     if not (math.isfinite(rate) and rate > 0.0):
@@ -251,29 +251,29 @@ def whole_factor(rate: float, grid: Grid, name: str) -> int:
     return factor
 
 
-# What a prefilter changed, and what it does to time, noise and frequencies.
+# Report of a prefilter: changed samples, and its effect on time, noise and frequencies.
 
 Indices = NDArray[np.int64]
 
-# Flagged samples with fewer between them belong to one event.
+# Flagged samples with fewer samples between them belong to one event.
 APART = 32
-# A share of outliers above this is no rare fault.
+# A larger share of outliers is not a rare fault.
 USUAL_SHARE = 0.01
-# Events of one channel that are told one by one.
+# Events of one channel that are listed individually.
 MOST_TOLD = 3
 
 
 @dataclass(frozen=True, eq=False)
 class Changed:
-    """Samples that stood out.
+    """Outlying samples of a chunk.
 
     Attributes
     ----------
     number : ndarray of int64, (k,)
-        Of the sample, from zero.
+        Sample number, from zero.
     channel : ndarray of int64, (k,)
     value, by : ndarray, (k,)
-        As it came, and what stands for it; the same where it was kept.
+        Measured value and its replacement; equal where the sample was kept.
     flag : ndarray of int8, (k,)
     """
 
@@ -285,47 +285,47 @@ class Changed:
 
     @classmethod
     def none(cls) -> Changed:
-        """Nothing stood out."""
+        """No outliers."""
         no = np.empty(0, dtype=np.int64)
         return cls(no, no, np.empty(0), np.empty(0), np.empty(0, np.int8))
 
     @classmethod
     def of(cls, part: Screened) -> Changed:
-        """Those of a segment."""
+        """Outliers of one chunk."""
         row, channel = np.nonzero(part.flags)
         at = (row, channel)
         return cls(row + part.first, channel, part.raw[at], part.values[at], part.flags[at])
 
     @classmethod
     def joined(cls, parts: Sequence[Changed]) -> Changed:
-        """Those of several segments."""
+        """Outliers of several chunks."""
         names = ("number", "channel", "value", "by", "flag")
         return cls(*(np.concatenate([getattr(p, n) for p in parts]) for n in names))
 
 
 @dataclass(frozen=True, eq=False)
 class PrefilterReport:
-    """What became of a record.
+    """Changes that a prefilter made to a record.
 
     Attributes
     ----------
     name : str
     delay : float, s
-        Group delay of the filter: the same for all channels and frequencies, and taken off by
-        the stamps of the outputs.
+        Group delay of the filter, the same for all channels and frequencies; the output stamps are
+        corrected for it.
     latency : float, s
-        From an output's stamp to the last sample that it waits for.
+        From an output's stamp to the last sample it needs.
     noise_factor : float
-        Standard deviation of an output per that of white noise of the samples.
+        Standard deviation of an output divided by that of the samples, for white noise.
     passband, stopband : float, Hz
-        Up to the one the gain is 1, from the other on nothing, both to `attenuation`.
+        Gain 1 up to `passband` and 0 from `stopband` on, both to within `attenuation`.
     attenuation : float, dB
     replaced : DataFrame
-        One row a replaced sample: time (s), row (from 1), channel, value, by.
+        One row per replaced sample: time (s), row (from 1), channel, value, by.
     kept : DataFrame
-        The same of samples that stood out and were left, for one side confirms them.
+        As `replaced`, for outlying samples that were kept because one side confirms them.
     share : dict
-        Replaced part of each channel.
+        Replaced fraction of each channel.
     findings : tuple of Finding
     """
 
@@ -342,9 +342,9 @@ class PrefilterReport:
     findings: tuple[Finding, ...]
 
 
-#: Code of the finding that a pre-filter cannot tell outliers from knocks: a caution, and no fault.
+#: Code of the caution that a prefilter cannot separate outliers from mechanical shocks.
 LOW_RATE = "prefilter.rate-too-low-for-knocks"
-# A knock on a body lasts some milliseconds; faster samples show more than one of it.
+# A shock lasts some milliseconds; at higher sample rates it shows in more than one sample.
 SHORTEST_KNOCK = 2e-3  # s
 
 
@@ -357,7 +357,7 @@ def report_of(
     samples: int,
     source: str | None,
 ) -> PrefilterReport:
-    """Put together the report of a record."""
+    """Compile the report of a record."""
     names = np.array(columns, dtype=object)
 
     def table(flag: int) -> pd.DataFrame:
@@ -392,7 +392,7 @@ def report_of(
 def _bursts(
     changed: Changed, grid: Any, columns: Sequence[str], source: str | None
 ) -> list[Finding]:
-    """Events of more samples than are bridged, but no mere steps."""
+    """Find events with more samples than are bridged, other than steps."""
     found = []
     for c, column in enumerate(columns):
         of = changed.channel == c
@@ -400,7 +400,7 @@ def _bursts(
         told, left = 0, 0
         for event in np.split(np.arange(len(number)), np.flatnonzero(np.diff(number) > APART) + 1):
             kept = number[event][flag[event] == KEPT]
-            # A step stands out at one place: at two samples beside each other, or one.
+            # A step gives outliers at one instant: at one sample or two adjacent ones.
             if (np.diff(kept) > 1).sum() < 1:
                 continue
             if told == MOST_TOLD:
@@ -464,12 +464,12 @@ def _knocks(replaced: pd.DataFrame, grid: Any, source: str | None) -> list[Findi
     ]
 
 
-# No prefilter: samples as they come.
+# Pass-through prefilter.
 
 
 @dataclass(frozen=True)
 class NoPrefilter(Prefilter):
-    """Every sample as it came, at the rate at which it came."""
+    """Pass every sample unchanged, at the input rate."""
 
     name: ClassVar[str] = "none"
     summary: ClassVar[str] = "samples as they come"
@@ -502,5 +502,5 @@ class NoPrefilter(Prefilter):
         }
 
     def sampling(self, grid: Grid) -> str:
-        """As the samples are."""
+        """Same as the input samples."""
         return "mean" if grid.means else "instantaneous"

@@ -1,4 +1,4 @@
-"""Outliers replaced, then a linear-phase low-pass and fewer samples: the robust digital filter."""
+"""Robust digital filter: outlier replacement, linear-phase low-pass, decimation."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["RobustFir", "RobustFirState"]
 
 @dataclass(frozen=True, eq=False)
 class RobustFirState:
-    """Between segments: what screening and low-pass remember."""
+    """State of outlier screening and low-pass between chunks."""
 
     grid: Grid
     low_pass: FirDecimation
@@ -30,29 +30,29 @@ class RobustFirState:
 
 @dataclass(frozen=True)
 class RobustFir(Prefilter):
-    """Outliers replaced, a linear-phase FIR, every so manyth sample.
+    """Replace outliers, apply a linear-phase FIR low-pass, and decimate.
 
-    All channels pass the same weights: between gyros and accelerometers no phase arises, and the
-    delay, half the length, is taken off by the stamps. Constants pass as they are, and the
-    integral of the outputs is that of the samples. What is lost is motion above `passband`:
-    its coning and sculling, too; `Summed` keeps them.
+    All channels use the same weights, so no phase difference arises between gyros and
+    accelerometers; the stamps are corrected for the delay of half the filter length. Constants pass
+    unchanged, and the integral of the outputs equals that of the samples. Motion above `passband`,
+    including its coning and sculling, is lost; `Summed` keeps it.
 
     Parameters
     ----------
     rate : float, Hz
-        Of the output: a whole part of that of the samples.
+        Output rate; must divide the sample rate.
     passband : float
-        Its end, as a part of the output's Nyquist frequency.
+        End of the passband as a fraction of the output's Nyquist frequency.
     attenuation : float, dB
         From that Nyquist frequency on.
     outliers : OutlierDesign
     steps : tuple of float, optional
-        Steps of the converters of the channels, as `OutlierDesign.begin`.
+        Quantization steps of the channels, as `OutlierDesign.begin`.
 
     Notes
     -----
-    Chernodarov (2009), Figs. 3 to 5, names a robust digital filter at 1 kHz and not its formulas;
-    those of its reference [12] are not in the paper.
+    Chernodarov (2009), Figs. 3 to 5, names a robust digital filter at 1 kHz without its formulas;
+    those in its reference [12] are not in the paper.
     """
 
     name: ClassVar[str] = "robust_fir"
@@ -66,12 +66,12 @@ class RobustFir(Prefilter):
     steps: tuple[float, ...] | None = None
 
     def low_pass(self, grid: Grid) -> FirDecimation:
-        """The low-pass for samples of a grid.
+        """Design the low-pass for the samples of a grid.
 
         Raises
         ------
         ConfigError
-            The rate does not divide that of the samples, or is theirs.
+            The rate does not divide the sample rate, or equals it.
         """
         factor = whole_factor(self.rate, grid, self.name)
         if factor == 1:
@@ -122,5 +122,5 @@ class RobustFir(Prefilter):
         }
 
     def sampling(self, grid: Grid) -> str:
-        """Values at the stamps: also those made of means, which lie on both sides of the stamp."""
+        """Values at the stamps, also for means, because the filter is symmetric about the stamp."""
         return "instantaneous"

@@ -1,4 +1,4 @@
-"""Outliers replaced, motion increments at the full rate, joined exactly: nothing is lost."""
+"""Outlier replacement and exact composition of full-rate motion increments."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["Summed", "SummedState"]
 
 @dataclass(frozen=True, eq=False)
 class SummedState:
-    """Between segments.
+    """State between chunks.
 
     Attributes
     ----------
@@ -29,8 +29,8 @@ class SummedState:
     given : int
         Outputs so far.
     values : ndarray, (k, c)
-        Screened samples from the one before the stamp of the last output on; at the start of the
-        record there is none before.
+        Screened samples, starting one before the stamp of the last output; before the first output,
+        from the start of the record.
     """
 
     grid: Grid
@@ -41,24 +41,24 @@ class SummedState:
 
     @property
     def before(self) -> int:
-        """Samples before the first that is to be joined."""
+        """Samples before the first one to be joined."""
         return int(self.given > 0)
 
 
 @dataclass(frozen=True)
 class Summed(Prefilter):
-    """Outliers replaced; turn, velocity and distance of each step joined to those of an interval.
+    """Replace outliers and compose the motion increments of each step over an output interval.
 
-    Nothing is filtered. Each step is the flow of the cubic through four samples, or of the
-    parabola with the means of three (`motion_increments`, 'cubic'): of coning and sculling that
-    turn by x = 2 pi f step it lacks 11/360 x⁴, 6e-4 at 60 Hz and 1 kHz. The samples of the Imu
-    table that comes with them, for levelling and the like, are means over the intervals: of what is
-    above their Nyquist frequency they hold much.
+    No low-pass is applied. Each step is the flow of the cubic through four samples, or of the
+    parabola with the means of three (`motion_increments`, 'cubic'). For coning and sculling that
+    rotate by x = 2 pi f step, the relative deficit is 11/360 x⁴: 6e-4 at 60 Hz and 1 kHz. The
+    accompanying Imu table, for leveling and similar uses, holds means over the intervals and is
+    strongly aliased above its Nyquist frequency.
 
     Parameters
     ----------
     rate : float, Hz
-        Of the output: a whole part of that of the samples.
+        Output rate; must divide the sample rate.
     outliers : OutlierDesign
     steps : tuple of float, optional
         As `OutlierDesign.begin`.
@@ -87,7 +87,7 @@ class Summed(Prefilter):
         grid, factor, before = state.grid, state.factor, state.before
         outliers, part = self.outliers.advance(state.outliers, values, last)
         held = np.vstack([state.values, part.values])
-        # A step's polynomial goes through its neighbours: one more sample, unless there is none.
+        # A step's polynomial uses its neighbors: one more sample, except at the end of the record.
         count = max(0, (len(held) - before - (1 if last else 2)) // factor)
         steps = count * factor
         used = held[before : before + steps + 1] if count else held[:0]
@@ -95,7 +95,7 @@ class Summed(Prefilter):
         means, rows = np.empty((count, channels)), np.empty((0, 10))
         if count:
             each = used[1:] if grid.means else 0.5 * (used[:-1] + used[1:])
-            # Summed in one order whatever the number of rows.
+            # Summed in a fixed order, independent of the number of rows.
             means = sum((each[j::factor] for j in range(1, factor)), each[::factor]) / factor
         if count and channels == 6:
             rows = _joined(held[: before + steps + 2], grid, factor, before, steps)
@@ -112,10 +112,10 @@ class Summed(Prefilter):
             "delay": 0.0,
             "latency": (self.outliers.latency + 1) * grid.step,
             "noise_factor": 1.0 / math.sqrt(factor),
-            # Where sinc(f length) is down by 0.1 dB: (pi f length)²/6 = 0.0114.
+            # sinc(f length) is down by 0.1 dB: (pi f length)²/6 = 0.0114.
             "passband": 0.0833 / length,
             "stopband": 0.5 / length,
-            # Of sinc at the Nyquist frequency.
+            # Attenuation of sinc at the Nyquist frequency.
             "attenuation": 20.0 * math.log10(math.pi / 2.0),
         }
 
@@ -125,7 +125,7 @@ class Summed(Prefilter):
 
 
 def _joined(values: Array, grid: Grid, factor: int, before: int, steps: int) -> Array:
-    """Motion increments of each step, joined over the outputs' intervals."""
+    """Motion increments of each step, composed over the output intervals."""
     from strapdown._kernels import motion_blocks as kernels
 
     dt = np.full(len(values) - 1, grid.step)

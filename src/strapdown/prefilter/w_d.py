@@ -1,4 +1,4 @@
-"""A robust W-D filter of each channel: the paper's own use of its filter at the primary level."""
+"""Robust W-D Kalman filter of each channel, the paper's filter at the primary level."""
 
 from __future__ import annotations
 
@@ -22,28 +22,28 @@ Array = NDArray[np.float64]
 
 __all__ = ["RobustWd", "RobustWdState"]
 
-# Samples at the start that tell the noise.
+# Samples at the start from which the noise is estimated.
 SETTLE = 256
-# A sample with less weight was replaced: its residual is beyond 5.4 standard deviations of Huber's.
+# Samples with less weight count as replaced: residuals beyond 5.4 of Huber's standard deviations.
 BELIEVED = 0.25
-# Of a sixth difference over twenty, by white noise.
+# Standard deviation of a sixth difference over twenty, for unit white noise.
 RESIDUAL = math.sqrt(924.0) / 20.0
 
 
 @dataclass(frozen=True, eq=False)
 class RobustWdState:
-    """Between segments.
+    """State between chunks.
 
     Attributes
     ----------
     grid : Grid
     channels : int
     noise : ndarray, (c,), or None
-        None until enough samples have told it.
+        None until enough samples are available to estimate it.
     waiting : ndarray, (k, c)
         Samples after the last whole epoch.
     taken, given : int
-        Epochs so far, filtered and handed out.
+        Epochs filtered and epochs returned so far.
     signals : tuple of SignalState
     """
 
@@ -58,24 +58,24 @@ class RobustWdState:
 
 @dataclass(frozen=True)
 class RobustWd(Prefilter):
-    """Level and slope of each channel by a robust Kalman filter in W-D form, smoothed.
+    """Estimate level and slope of each channel by a smoothed robust Kalman filter in W-D form.
 
-    An epoch is an interval of the output; its samples are its observations, with one
-    orthogonalisation. The gains are the same for all channels while no sample is
-    doubted. It knows of the motion that it is below `bandwidth` and as small as the noise: what is
-    faster or larger looks like outliers to it. For a vehicle at rest; see `RobustFir`.
+    An epoch is one output interval; its samples are the measurements, processed in one
+    orthogonalization. The gains are the same for all channels while no sample is down-weighted. The
+    filter assumes motion below `bandwidth` and as small as the noise; faster or larger motion
+    appears as outliers. For a stationary vehicle; see `RobustFir`.
 
     Parameters
     ----------
     rate : float, Hz
-        Of the output: a whole part of that of the samples.
+        Output rate; must divide the sample rate.
     bandwidth : float, Hz
-        Where the smoother's gain is a half; `SignalFilter`.
+        Frequency at which the smoother's gain is one half; see `SignalFilter`.
     noise : tuple of float, optional
-        Standard deviation of a sample of each channel. Not given, it is taken from the first
-        256 samples (median of the sixth difference).
+        Standard deviation of a sample of each channel. Default: estimated from the first 256
+        samples (median of the sixth difference).
     smooth : bool
-        Whether later samples count; else the filter alone, which is not late and has phase.
+        Whether later samples are used; without them the filter has no delay but has phase.
     form, rule : CovarianceForm, UpdateRule
     """
 
@@ -109,7 +109,7 @@ class RobustWd(Prefilter):
         Raises
         ------
         DataError
-            A value is not finite, or a channel has no noise by which samples could be judged.
+            A value is not finite, or the noise of a channel is zero and cannot scale the residuals.
         """
         grid, signal = state.grid, self.signal
         factor = whole_factor(self.rate, grid, self.name)
@@ -119,7 +119,7 @@ class RobustWd(Prefilter):
         noise = state.noise
         if noise is None and (len(held) >= SETTLE or last):
             noise = _noise(held[:SETTLE])
-        # The first sample stands at the start of the first epoch.
+        # The first sample lies at the start of the first epoch.
         skip = 0 if state.taken else 1
         count = 0 if noise is None else max(0, (len(held) - skip) // factor)
         ages = grid.step * (np.arange(factor - 1, -1, -1.0) + 0.5 * grid.means)
@@ -155,7 +155,7 @@ class RobustWd(Prefilter):
         return after, Portion(time, level, np.empty((0, 10)), Changed.joined(changed))
 
     def figures(self, grid: Grid) -> dict[str, float]:
-        """As `Prefilter.figures`; the passband ends where the gain is off by 0.1 dB."""
+        """As `Prefilter.figures`; the passband ends where the gain error reaches 0.1 dB."""
         signal = self.signal
         epoch = whole_factor(self.rate, grid, self.name) * grid.step
         stop = 0.5 / epoch
@@ -176,7 +176,7 @@ class RobustWd(Prefilter):
 
 
 def _noise(samples: Array) -> Array:
-    """Standard deviation of each channel from sample to sample."""
+    """Estimate the standard deviation of each channel from sample to sample."""
     rough = np.abs(np.diff(samples, 6, axis=0)) / 20.0
     sd = MAD_TO_SD * np.median(rough, axis=0) / RESIDUAL if len(rough) else np.zeros(1)
     if not (sd > 0.0).all():

@@ -1,4 +1,4 @@
-"""What a sensor does and what can be known of it."""
+"""Sensor models: errors, uncertainty, health tests, redundancy and preparation of records."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a satellite antenna is, and how it moves, on a body that moves and turns."""
+"""Position and velocity of a GNSS antenna on a moving body."""
 
 from __future__ import annotations
 
@@ -22,28 +22,28 @@ def antenna_motion(
     *,
     ellipsoid: Ellipsoid = WGS84,
 ) -> tuple[Array, Array]:
-    """Place and velocity of a point that is fixed to a body.
+    """Position and velocity of a point fixed to a body.
 
     Parameters
     ----------
     place : array_like, (n, 3)
-        Of the body: latitude and longitude in deg, height in m.
+        Position of the body: latitude and longitude in deg, height in m.
     v_n : array_like, (n, 3), m/s
-        Relative to the Earth, north, east, down.
+        Velocity relative to the Earth, north, east, down.
     q_nb : array_like, (n, 4)
     rate : array_like, (n, 3), rad/s
-        Of the body relative to inertial space, in body axes, as gyros read it.
+        Angular rate relative to inertial space, in body axes, as measured by gyros.
     arm : array_like, (3,), m
-        From the body's own point to the other, in body axes.
+        Lever arm from the body's reference point to the other point, in body axes.
     ellipsoid : Ellipsoid
 
     Returns
     -------
     place : ndarray, (n, 3)
-        As the argument; at the end of the straight arm.
+        Position of the end of the straight lever arm, as the argument.
     v_n : ndarray, (n, 3), m/s
-        ``v + C_nb (w_eb x r)``, along the axes of the body's own place; those of the point are
-        turned by arm over radius, 1.6e-7 rad a metre.
+        ``v + C_nb (w_eb x r)``, along local-level axes at the body's own position; those at the
+        point are rotated by arm over Earth radius, 1.6e-7 rad per meter.
     """
     p, v = np.asarray(place, dtype=np.float64), np.asarray(v_n, dtype=np.float64)
     q, r = np.asarray(q_nb, dtype=np.float64), np.asarray(arm, dtype=np.float64)

@@ -1,4 +1,4 @@
-"""Redundant axes that measure one vector: least squares, mutual testing, voting."""
+"""Redundant axes that measure one vector: least squares, parity tests, voting."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ __all__ = [
 ]
 
 
-# Parity of redundant axes: what they tell of each other whatever the motion is.
+# Parity of redundant axes: their consistency, independent of the motion.
 
 
-# Of the smallest over the largest singular value, and of the cosine of two parity columns.
+# Limits of the smallest over the largest singular value, and of the cosine of two parity columns.
 RANK = 1e-6
 PARALLEL = 1e-9
 
 
 def checked_directions(directions: ArrayLike) -> Array:
-    """Unit vectors, one a row, that span the space.
+    """Check and return unit vectors, one per row, that span space.
 
     Raises
     ------
     ConfigError
-        They are no (m, 3) numbers of length one to within 1e-6, or lie in a plane.
+        They are not (m, 3) numbers of length one to within 1e-6, or they lie in a plane.
     """
     h = np.asarray(directions, dtype=np.float64)
     if h.ndim != 2 or h.shape[1] != 3 or h.shape[0] < 3 or not np.isfinite(h).all():
@@ -61,25 +61,25 @@ def checked_directions(directions: ArrayLike) -> Array:
 
 
 def parity_matrix(directions: ArrayLike) -> Array:
-    """Matrix V that no motion passes: ``V H = 0``, ``V Vᵀ = I``.
+    """Parity matrix V, which cancels the motion: ``V H = 0``, ``V Vᵀ = I``.
 
     Parameters
     ----------
     directions : array_like, (m, 3)
-        H, unit vectors along which the axes measure.
+        H, unit vectors of the measurement axes.
 
     Returns
     -------
     ndarray, (m - 3, m)
-        The parity vector of readings z is ``p = V z``. Errors e of covariance C give it the
+        The parity vector of readings z is ``p = V z``. Errors e with covariance C give it the
         covariance ``V C Vᵀ``, and ``pᵀ (V C Vᵀ)⁻¹ p`` is chi-square with m - 3 degrees of freedom.
-        Its sign and turn are those of a singular value decomposition.
+        Its sign and rotation are those of a singular value decomposition.
 
     Notes
     -----
     Potter and Suman 1977 (AGARDograph 224, Thresholdless redundancy management with arrays of
-    skewed instruments). An axis that fails moves p along its own column of V: one of five axes or
-    more can be told by that, where no two columns are parallel.
+    skewed instruments). An axis that fails moves p along its own column of V, which identifies it
+    among five or more axes if no two columns are parallel.
     """
     h = checked_directions(directions)
     u, _, _ = np.linalg.svd(h, full_matrices=True)
@@ -87,7 +87,7 @@ def parity_matrix(directions: ArrayLike) -> Array:
 
 
 def isolable_axes(directions: ArrayLike) -> NDArray[np.bool_]:
-    """Which axes, where one fails, can be told from every other, (m,)."""
+    """Axes whose single failure can be distinguished from that of any other, (m,)."""
     v = parity_matrix(directions)
     m = v.shape[1]
     if v.shape[0] < 2:
@@ -99,34 +99,35 @@ def isolable_axes(directions: ArrayLike) -> NDArray[np.bool_]:
     return np.asarray(seen & ~(cosine > 1.0 - PARALLEL).any(axis=1))
 
 
-# When redundant axes disagree, and what is stated of them.
+# Voting rule, and stated errors of the axes.
 
 
 @dataclass(frozen=True)
 class VotingRule:
-    """When axes are held to disagree, to have failed, and to be sound again.
+    """Criteria for disagreement, exclusion and readmission of an axis.
 
     Attributes
     ----------
     windows : tuple of float, s
-        Time constants of the means that are compared: a short one for what is large, a long one
-        for what is small. Each mean is that of all samples so far until it is as old.
+        Time constants of the compared means: short ones for large faults, long ones for small
+        faults. Until a mean is as old as its time constant, it is the mean of all samples so far.
     persist : float
-        A window's chi-square must be beyond its limit for this part of its time constant.
+        Fraction of its time constant for which a window's chi-square must exceed its limit.
     learn : float, s
-        For so long the axes are compared within their stated biases; from then on, each within
-        what may have changed since.
+        Learning time, in which the axes are compared within their stated biases; afterwards each is
+        compared within its possible change since.
     readmit : float, s
-        An axis that failed is taken back after it has been within half of the limit for so long;
-        infinite is never. A disagreement of the same two is told again after so long without one.
+        A failed axis is readmitted after it has been within half the limit for this time; infinite
+        means never. A disagreement of the same two axes is reported again after this time without
+        one.
     false_alarm : float, 1/h
-        Expected number of samples an hour beyond a limit, of all windows and both triads, where all
-        is as stated.
+        Expected number of samples per hour beyond a limit, for all windows and both triads, if all
+        errors are as stated.
     confusion : float
-        Likelihood of the next axis over that of the one that is excluded.
+        Required likelihood ratio of the excluded axis to the next candidate.
     apart : float, m
-        Largest distance between the accelerometers of two units. Lever arms are not corrected;
-        this allows for the centripetal acceleration between them, ``apart ω²``.
+        Largest distance between the accelerometers of two units. Lever arms are not corrected; this
+        allows for the centripetal acceleration between them, ``apart ω²``.
 
     Raises
     ------
@@ -160,7 +161,7 @@ class VotingRule:
 
 @dataclass(frozen=True, eq=False)
 class AxisErrors:
-    """What is not known of m axes: arrays (m,), named as in `TriadUncertainty` and `BiasDrift`."""
+    """Stated errors of m axes: arrays (m,), named as in `TriadUncertainty` and `BiasDrift`."""
 
     noise_density: Array
     bias: Array
@@ -173,7 +174,7 @@ class AxisErrors:
 
     @classmethod
     def of(cls, parts: Sequence[tuple[TriadUncertainty, BiasDrift, int]]) -> AxisErrors:
-        """Take axis ``part[2]`` of each triad, one an axis."""
+        """Collect axis ``part[2]`` of each triad."""
         names = (
             "noise_density",
             "bias",
@@ -192,39 +193,38 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 HOUR = 3600.0  # s
-# Gyros and accelerometers are tested apart.
+# Gyros and accelerometers are tested separately.
 TRIADS = 2
 
 
 @dataclass(frozen=True, eq=False)
 class VotingState:
-    """Where a vote over a log stands; arrays of the kernel's, which no advance changes."""
+    """State of a vote over a log; `advance` does not change these kernel arrays."""
 
     arrays: tuple[NDArray[np.generic], ...]
     samples: int
 
     @property
     def excluded(self) -> Mask:
-        """Axes that have failed, (m,)."""
+        """Excluded axes, (m,)."""
         return np.asarray(self.arrays[8] != 0)
 
 
 @dataclass(frozen=True)
 class AxisEvent:
-    """Something that the vote decided.
+    """A decision of the vote.
 
     Attributes
     ----------
     kind : {'excluded', 'readmitted', 'disagree'}
     row : int
-        Sample of the segment at which it was decided, from 0.
+        Sample of the chunk at which it was decided, from 0.
     since : int
-        Sample from which the chi-square has been beyond its limit; before the segment's
-        beginning it is negative.
+        Sample from which the chi-square has exceeded its limit; negative if before the chunk.
     axes : tuple of int
-        That failed; of a disagreement, the two that are most likely.
+        The failed axes; for a disagreement, the two most likely ones.
     size : float
-        How far the first is off what the others tell, in the unit of the readings.
+        Deviation of the first axis from the others, in the unit of the readings.
     chi_square, limit : float
     """
 
@@ -239,12 +239,12 @@ class AxisEvent:
 
 @dataclass(frozen=True, eq=False)
 class AxisVote:
-    """A segment of a vote.
+    """Result of a vote over a chunk.
 
     Attributes
     ----------
     values : ndarray, (n, 3)
-        The vector in body axes, from the healthy axes.
+        Vector in body axes, from the healthy axes.
     used : ndarray of bool, (n, m)
     events : tuple of AxisEvent
     """
@@ -261,30 +261,32 @@ class AxisVoting:
     Attributes
     ----------
     directions : array_like, (m, 3)
-        Unit vectors in body axes along which they measure. Four show that one has failed, five
-        of which no three lie in a plane show which.
+        Unit vectors of the measurement axes, in body axes. Four detect a single failure; five, no
+        three in a plane, identify it.
     errors : AxisErrors
     rate : float, Hz
-        Samples a second; noise of a sample follows from it.
+        Sample rate, from which the noise of a sample follows.
     rule : VotingRule
     groups : sequence of int, optional
-        Unit of each axis, from 0: a unit may fail as a whole. Left out, each is its own.
+        Unit of each axis, from 0: a unit may fail as a whole. Default: each axis is its own unit.
     apart : float, m
-        Of accelerometers: as `VotingRule.apart`.
+        For accelerometers, as `VotingRule.apart`.
 
     Raises
     ------
     ConfigError
-        The directions are none, the errors are of another number, or nothing is stated of an axis.
+        The directions are invalid, the number of errors differs, or the errors of an axis are not
+        stated.
 
     Notes
     -----
-    The vector is the weighted least-squares solution of the healthy axes. Over each window the
-    readings' means are tested: the chi-square of their residuals is that of the parity vector,
-    against noise, and what is stated of bias, scale factor, misalignment, g-sensitivity and drift.
-    Once compared for `learn`, each axis is taken less what it was off the mean of all, and only
-    what can have changed counts: so the vector does not step when an axis is excluded. An axis is
-    excluded where the others agree without it, and no other explains it as well; a unit, where no
+    The vector is the weighted least-squares solution of the healthy axes. The means of the readings
+    over each window are tested: the chi-square of their residuals, equal to that of the parity
+    vector, against noise and the stated bias, scale factor, misalignment, g-sensitivity and drift.
+    After `learn`, each axis is corrected for its deviation from the mean of all, and only possible
+    changes count, so that the vector does not step when an axis is excluded. An axis is excluded
+    where the others agree without it and no other explains the deviation as well; a unit, where no
+    single axis does. The axes are assumed to share stamps and delay.
     single axis does. Axes are taken to share their stamps and their delay.
     """
 
@@ -317,18 +319,18 @@ class AxisVoting:
 
     @property
     def weights(self) -> Array:
-        """Of the axes: inverse variances of their means over a second, bias and drift with it."""
+        """Weights of the axes: inverse variances of 1 s means, with bias and drift."""
         return np.asarray(1.0 / self._one_second())
 
     def covariance(self, used: Mask, variance: Array) -> Array:
-        """Covariance of the vector, (3, 3), for independent errors of these variances, (m,)."""
+        """Covariance of the vector, (3, 3), for independent axis variances, (m,)."""
         h = np.asarray(self.directions)
         w = self.weights * used
         gain = np.linalg.solve((h.T * w) @ h, h.T * w)
         return np.asarray((gain * variance) @ gain.T)
 
     def begin(self) -> VotingState:
-        """Stand before the first sample."""
+        """Return the state before the first sample."""
         m, s = len(np.asarray(self.directions)), len(self.rule.windows)
         ints = np.int64
         arrays = (
@@ -350,16 +352,16 @@ class AxisVoting:
     def advance(
         self, state: VotingState, readings: ArrayLike, other: ArrayLike | None = None
     ) -> tuple[VotingState, AxisVote]:
-        """Go over a segment; one cut anywhere gives the same numbers.
+        """Process a chunk; the results do not depend on how the log is divided.
 
         Parameters
         ----------
         state : VotingState
         readings : array_like, (n, m)
-            NaN where there is none.
+            NaN where a reading is missing.
         other : array_like, (n, 3), optional
-            Of gyros the specific force, which their g-sensitivity feels; of accelerometers the
-            rate, which throws units apart (`VotingRule.apart`); in body axes.
+            For gyros the specific force, for their g-sensitivity; for accelerometers the rate, for
+            units apart (`VotingRule.apart`); in body axes.
 
         Returns
         -------
@@ -368,7 +370,7 @@ class AxisVoting:
         Raises
         ------
         DataError
-            The shapes disagree, or at a sample too few healthy axes are left to span the space.
+            The shapes disagree, or at a sample the healthy axes do not span space.
         """
         from strapdown._kernels import voting as kernel
 
@@ -438,7 +440,7 @@ class AxisVoting:
         return np.asarray(e.noise_density**2 + e.bias**2 + e.drift**2 + e.quantization**2 / 12.0)
 
     def _limits(self) -> Array:
-        """Of chi-square by degrees of freedom, (m + 1,): the union over all samples of an hour."""
+        """Chi-square limits by degrees of freedom, (m + 1,), for all samples of an hour."""
         from scipy.special import chdtri
 
         m = len(np.asarray(self.directions))

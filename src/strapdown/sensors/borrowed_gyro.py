@@ -1,4 +1,4 @@
-"""A gyro of another unit on the same rigid body, as it would have read in one's own axes."""
+"""Gyro of another unit on the same rigid body, rotated into the borrower's axes."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ Array = NDArray[np.float64]
 
 __all__ = ["check_lenders", "turned_gyro", "turned_uncertainty"]
 
-# A component that takes less than this of an axis does not feel that axis's end of range.
+# A component with a smaller share of an axis is not affected by that axis's range limit.
 FEELS = 1e-3
 
 
 def check_lenders(units: dict[str, CrashUnit]) -> None:
-    """Check that every borrowed gyro is there.
+    """Check that every borrowed gyro exists.
 
     Raises
     ------
     ConfigError
-        A unit borrows from itself, from a unit that is not there, or from one that has none.
+        A unit borrows from itself, from an unknown unit, or from one without a gyro.
     """
     for unit in units.values():
         if unit.gyro is not None or unit.gyro_from is None:
@@ -55,7 +55,7 @@ def check_lenders(units: dict[str, CrashUnit]) -> None:
 
 
 def turned_gyro(lent: TriadAtStamps, lender: Mounting, borrower: Mounting) -> TriadAtStamps:
-    """Turn a gyro through both mountings into the borrower's sensor axes.
+    """Rotate a gyro through both mountings into the borrower's sensor axes.
 
     Parameters
     ----------
@@ -66,9 +66,9 @@ def turned_gyro(lent: TriadAtStamps, lender: Mounting, borrower: Mounting) -> Tr
     Returns
     -------
     TriadAtStamps
-        ``ω_b = C_vb^T C_va ω_a``. Standard deviations are turned as of independent axes,
-        ``sd_b² = (C ∘ C) sd_a²``; the range of an axis is the least of those it feels, and it is
-        clipped where one of them is.
+        ``ω_b = C_vb^T C_va ω_a``. Standard deviations are rotated as for independent axes, ``sd_b²
+        = (C ∘ C) sd_a²``. The range of an axis is the least of the contributing ranges, and the
+        axis is clipped where one of those is.
     """
     C_ba = borrower.C_vs.T @ lender.C_vs
     square = C_ba**2
@@ -88,19 +88,19 @@ def turned_gyro(lent: TriadAtStamps, lender: Mounting, borrower: Mounting) -> Tr
 
 
 def turned_uncertainty(uncertainty: TriadUncertainty, C: Array) -> TriadUncertainty:
-    """What is stated of a triad, in other axes.
+    """Rotate the stated uncertainty of a triad into other axes.
 
     Parameters
     ----------
     uncertainty : TriadUncertainty
     C : ndarray, (3, 3)
-        Turns vectors from the axes of the triad into the others.
+        Rotates vectors from the axes of the triad into the others.
 
     Returns
     -------
     TriadUncertainty
-        Standard deviations as of independent axes, ``sd² -> (C ∘ C) sd²``; the range of an axis is
-        the least of those it feels.
+        Standard deviations rotated as for independent axes, ``sd² -> (C ∘ C) sd²``; the range of an
+        axis is the least of the contributing ranges.
     """
     square, feels = C**2, np.abs(C) > FEELS
 

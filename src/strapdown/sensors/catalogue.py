@@ -1,4 +1,4 @@
-"""Named sensors: what their data sheets state, and where."""
+"""Sensor catalogue: named sensors with their data-sheet values and sources."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from strapdown.sensors.error_chain import child
 from strapdown.sensors.triad_errors import ImuErrors, Matrix, Triad, TriadErrors
 
 FOLDER = Path(__file__).with_suffix("")
-#: Names of the sensors that come with strapdown; nothing is read for them.
+#: Names of the sensors supplied with strapdown; listing them reads no file content.
 SENSORS: tuple[str, ...] = tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
 GRADES = ("phone", "industrial", "tactical", "navigation", "crash")
 
 TOP = ("title", "class", "summary", "sources", "gyro", "accel")
 FIGURE = ("value", "source", "place", "assumed")
-# Place in the tree of seeds, beside those of the triads in a simulation, and what is drawn for
-# a unit, in the order of its places below it.
+# Key in the seed tree, beside those of the triads in a simulation; the quantities drawn for a unit,
+# in the order of their keys below it.
 DRAW_SEED = 2
 DRAWN = ("bias", "scale", "misalignment", "g_sensitivity", "nonlinearity")
 
 
 @dataclass(frozen=True)
 class Figure:
-    """One number of a data sheet.
+    """One value of a data sheet.
 
     Attributes
     ----------
@@ -40,9 +40,9 @@ class Figure:
     value : triad
         In the unit of the key.
     source : str
-        Document and place; empty, where it is assumed.
+        Document and location in it; empty for an assumed value.
     assumed : str
-        Why it is taken to be so; empty, where it has a source.
+        Reason for the assumption; empty for a value with a source.
     """
 
     key: str
@@ -53,7 +53,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Spread:
-    """How a quantity differs from unit to unit, in SI: ``sd`` (normal) or ``bound`` (uniform)."""
+    """Unit-to-unit variation of a quantity, in SI: ``sd`` (normal) or ``bound`` (uniform)."""
 
     kind: str
     size: Triad
@@ -69,14 +69,13 @@ class Sensor:
     grade : str
         The file's ``class``: ``phone``, ``industrial``, ``tactical``, ``navigation``, ``crash``.
     imu_errors : ImuErrors
-        What all units have in common. A triad that the sensor lacks has no errors (gyro) or is
-        None (accelerometer).
+        Errors common to all units. A missing triad has no errors (gyro) or is None (accelerometer).
     spreads : dict
-        By triad and quantity, what differs from unit to unit.
+        Unit-to-unit variation, by triad and quantity.
     rates : dict
         Highest output rate in Hz, by triad.
     sources : tuple of Figure
-        Every number, with where it is from.
+        Every value with its source.
     """
 
     name: str
@@ -89,13 +88,13 @@ class Sensor:
     sources: tuple[Figure, ...]
 
     def draw(self, seed: int) -> ImuErrors:
-        """Errors of one unit.
+        """Draw the errors of one unit.
 
         Parameters
         ----------
         seed : int
-            The unit. Bias, scale factor, misalignment, g-sensitivity and nonlinearity are drawn
-            within what the data sheet states, each axis from a stream of its own.
+            Identifies the unit. Bias, scale factor, misalignment, g-sensitivity and nonlinearity
+            are drawn within the data-sheet limits, each axis from its own stream.
 
         Returns
         -------
@@ -123,8 +122,8 @@ def load_sensor(name: str | Path) -> Sensor:
     Raises
     ------
     ConfigError
-        There is no such sensor, or the file is not in the form of the catalogue; the message
-        names the file and the key.
+        The sensor is unknown, or the file is not in the form of the catalogue; the message names
+        the file and the key.
     """
     text = str(name)
     if text.lower() in SENSORS:
@@ -200,7 +199,7 @@ def _triad(
         raise _bad(path, f"{triad}.correlation_time_s", "sensors.bias-instability-needs-missing")
     try:
         nominal = TriadErrors(**errors)
-        # The worst unit must be one that can exist, or a draw would fail for some seeds.
+        # The worst-case unit must be valid, or a draw would fail for some seeds.
         _worst(nominal, spreads)
     except ConfigError as error:
         place = f"{triad}: {error.finding.quantity}"
@@ -261,7 +260,7 @@ def _unit(
 
 
 def _worst(nominal: TriadErrors, spreads: Mapping[str, Spread]) -> TriadErrors:
-    """Make a unit whose every bounded quantity is at its bound, and others at 6 sd."""
+    """Make a unit with every bounded quantity at its bound, and others at 6 sd."""
     values: dict[str, Any] = {}
     for quantity, spread in spreads.items():
         size = np.asarray(spread.size) * (6.0 if spread.kind == "sd" else 1.0)
@@ -270,7 +269,7 @@ def _worst(nominal: TriadErrors, spreads: Mapping[str, Spread]) -> TriadErrors:
 
 
 def _placed(quantity: str, rows: np.ndarray[Any, Any]) -> dict[str, Any]:
-    """Put three numbers an axis where the quantity has its place."""
+    """Assign three values per axis to the attributes of a quantity."""
     if quantity == "misalignment":
         matrix = rows.copy()
         np.fill_diagonal(matrix, 0.0)
@@ -308,7 +307,7 @@ def _bad(path: Path, key: str, code: str, **values: Any) -> ConfigError:
     return ConfigError(code, file=path.name, quantity=key, data=values)
 
 
-# What a data sheet of the catalogue may state: the keys with their units, in SI.
+# Keys that a sensor file may contain, with their units.
 
 
 DEG = GYRO_UNITS["deg/s"]
@@ -316,24 +315,24 @@ DEG_H = GYRO_UNITS["deg/h"]
 G = STANDARD_GRAVITY
 
 # The Allan deviation of a first-order Gauss-Markov process has its maximum at 1.893 correlation
-# times, and it is this part of the process's standard deviation (from IEEE Std 952-1997,
-# Annex C, C.1.1.5). A data sheet's bias instability is the level of the Allan deviation there.
+# times, where it is this fraction of the process's standard deviation (from IEEE Std 952-1997,
+# Annex C, C.1.1.5). A data sheet's bias instability is that maximum.
 ALLAN_OF_GAUSS_MARKOV = 0.61736
 
 
 @dataclass(frozen=True)
 class Key:
-    """What a key of a sensor file means.
+    """Meaning of a key of a sensor file.
 
     Attributes
     ----------
     quantity : str
         The attribute of `TriadErrors`, or ``nonlinearity`` or ``output_rate``.
     factor : float
-        To SI, of `TriadErrors`.
+        Converts to the SI units of `TriadErrors`.
     spread : str
-        How one unit's value comes from the figure: ``value`` as it stands, ``sd`` a normal
-        draw, ``bound`` a uniform draw within ±.
+        How a unit's value follows from the figure: ``value`` unchanged, ``sd`` a normal draw,
+        ``bound`` a uniform draw within ±.
     """
 
     quantity: str
@@ -349,7 +348,7 @@ def _spread(quantity: str, units: dict[str, float]) -> dict[str, Key]:
     }
 
 
-# Without a unit of their own: the same for gyros and accelerometers.
+# Keys without a unit: the same for gyros and accelerometers.
 COMMON: dict[str, Key] = {
     **_spread("scale", {"ppm": 1e-6, "percent": 1e-2}),
     **_spread("misalignment", {"mrad": 1e-3, "deg": DEG, "percent": 1e-2}),

@@ -1,4 +1,4 @@
-"""Whether a channel of a crash record can be believed: alone, and among its like."""
+"""Health tests of the channels of a crash record, individually and against similar channels."""
 
 from __future__ import annotations
 
@@ -17,28 +17,28 @@ __all__ = ["ChannelHealth", "Fault", "check_channel", "check_peers"]
 
 Array = NDArray[np.float64]
 
-# A sensor that moves in a crash does not repeat a value for so long, unless its steps are
-# coarse: then it does so at rest, too.
+# A moving sensor does not repeat a value for this long in a crash, unless its quantization is
+# coarse, which then also shows at rest.
 STUCK_TIME = 5e-3  # s
 STUCK_LEAST = 10  # samples
 STUCK_FACTOR = 4.0
-# Samples at the very end of the range that follow each other, and the share of the range.
+# Consecutive samples at the end of the range, and the fraction of the range that counts as end.
 FLAT_TOP = 3  # samples
 FULL_SHARE = 0.98
-# A step from one quiet level to another: means over so long, the step itself being shorter. A
-# ramp that is as quiet as this makes the means differ by 4.3 times the noise at most.
+# A step between quiet levels: averaging time of the means, and the largest step duration. A ramp
+# with the same noise makes the means differ by 4.3 times the noise at most.
 JUMP_WINDOW, JUMP_STEP = 5e-3, 5e-4  # s
 JUMP_FACTOR, QUIET_FACTOR = 8.0, 1.5
-# Share of the step that lies between the near sixths of both windows, 1.3 ms apart; a head that
-# turns takes longer.
+# Fraction of the step between the near sixths of both windows, 1.3 ms apart; a rotating head takes
+# longer.
 ABRUPT = 0.8
-# What a vehicle still decelerates with when the crash is over: tyres on a road, not locked.
+# Largest deceleration after a crash: tires on a road, not locked.
 SETTLED = 5.0  # m/s²
 SETTLED_WINDOW = 0.05  # s
-# Restitution of cars into rigid walls stays below, and a metre a second is a zero error of
-# 0.3 g over a third of a second.
+# Cars rebound from rigid walls with less restitution; 1 m/s corresponds to a bias of 0.3 g over a
+# third of a second.
 RESTITUTION, SPEED_LEFT = 0.3, 1.0  # m/s
-# Among its like: noise before the impact, and how much earlier a record may end.
+# Against similar channels: ratio of noise before the impact, and missing fraction of the record.
 NOISE_FACTOR = 3.0
 SHORT_SHARE = 0.1
 LEAST_REST = 20  # samples
@@ -46,16 +46,16 @@ LEAST_REST = 20  # samples
 
 @dataclass(frozen=True)
 class Fault:
-    """Something that a sound channel does not do.
+    """A defect of a channel.
 
     Attributes
     ----------
     kind : str
         ``stuck``, ``saturation``, ``jump``, ``offset``, ``velocity``, ``noise``, ``cut``.
     at : float, s
-        When it begins.
+        Start of the fault.
     size, limit : float
-        What was measured, and what it may be; in the channel's unit, its integral's, or s.
+        Measured value and its limit, in the channel's unit, its integral's, or s.
     """
 
     kind: str
@@ -67,7 +67,7 @@ class Fault:
 
 @dataclass(frozen=True)
 class ChannelHealth:
-    """What the tests say of a channel.
+    """Test results of a channel.
 
     Attributes
     ----------
@@ -76,9 +76,9 @@ class ChannelHealth:
     noise : float
         Standard deviation before the impact, in the channel's unit.
     velocity : float, m/s, or None
-        At the end, of an accelerometer: entry speed and integral.
+        Velocity at the end, for an accelerometer: entry speed plus integral.
     offset : float or None
-        Mean over the last 50 ms, of an accelerometer.
+        Mean over the last 50 ms, for an accelerometer.
     faults : tuple of Fault
     """
 
@@ -106,7 +106,7 @@ def check_channel(
     entry_speed: float = 0.0,
     rest_until: float = 0.0,
 ) -> ChannelHealth:
-    """Test a channel by itself.
+    """Test a single channel.
 
     Parameters
     ----------
@@ -116,15 +116,15 @@ def check_channel(
     name : str
         For messages.
     acceleration : bool
-        Whether it is an acceleration, whose mean and integral at the end are looked at; these
-        two hold for a part that moves straight and comes to rest within the record, and alarm
-        falsely for one that does not, as a dummy's head.
+        Whether it is an acceleration, to test its mean and integral at the end. These two tests
+        assume a part that moves straight and comes to rest within the record; for others, such as a
+        dummy's head, they give false alarms.
     full_scale : float, optional
         End of its range, same unit.
     entry_speed : float, m/s
         Along its axis before the impact.
     rest_until : float, s
-        Before this nothing happens to it.
+        End of the quiet time before the impact.
 
     Returns
     -------
@@ -133,8 +133,8 @@ def check_channel(
     Raises
     ------
     DataError
-        The shapes disagree, a value is not finite, time does not advance, or there are fewer
-        than 20 samples before `rest_until`.
+        The shapes disagree, a value is not finite, time does not increase, or fewer than 20 samples
+        precede `rest_until`.
     """
     t, v = _arrays(time, values, name)
     rest = v[t < rest_until]
@@ -160,17 +160,17 @@ def check_channel(
 
 
 def check_peers(channels: Sequence[ChannelHealth]) -> tuple[ChannelHealth, ...]:
-    """Test channels of one kind against each other: noise before the impact, and their ends.
+    """Compare channels of one kind: noise before the impact, and ends of their records.
 
     Parameters
     ----------
     channels : sequence of ChannelHealth
-        Of one kind of sensor and one recorder.
+        From one kind of sensor and one recorder.
 
     Returns
     -------
     tuple of ChannelHealth
-        The same, with what was found added.
+        The same channels with the new faults added.
     """
     if not channels:
         return ()
@@ -215,9 +215,9 @@ def _arrays(time: ArrayLike, values: ArrayLike, name: str) -> tuple[Array, Array
 
 
 def _usual_run(rest: Array) -> int:
-    """Longest run of equal values at rest, which the steps of the converter make."""
+    """Longest run of equal values at rest, caused by quantization."""
     longest = int(equal_runs(rest)[1].max())
-    # A channel that never moves at rest, as one that is dead, tells no usual run.
+    # A channel that is constant at rest may be dead, and its run is not representative.
     return 1 if longest == rest.size else longest
 
 
@@ -258,7 +258,7 @@ def _saturation(
 
 
 def _jump(t: Array, v: Array, noise: float, name: str) -> list[Fault]:
-    """A step between two levels that are each as quiet as the rest."""
+    """Find a step between two levels that are each as quiet as at rest."""
     step = float(t[-1] - t[0]) / (t.size - 1)
     width, gap = max(round(JUMP_WINDOW / step), 3), max(round(JUMP_STEP / step), 1)
     if t.size < 2 * width + gap or noise == 0.0:

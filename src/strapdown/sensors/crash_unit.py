@@ -1,4 +1,4 @@
-"""A recorder on a vehicle: its triads, where it sits, and how its clock relates to the others'."""
+"""Crash recorder: triads, mounting, clock and trigger, and assumptions for missing axes."""
 
 from __future__ import annotations
 
@@ -25,25 +25,25 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Mounting:
-    """Where a unit sits on the vehicle, and how it is turned.
+    """Position and orientation of a unit on the vehicle.
 
     Attributes
     ----------
     position : triad, m
-        Of the sensors, in vehicle axes (forward, right, down), from the vehicle's origin: any
-        point that all positions of a case share.
+        Position of the sensors in vehicle axes (forward, right, down), from the vehicle's origin:
+        any point shared by all positions of a case.
     angles_deg : triad, deg
-        Roll, pitch, heading (3-2-1) that turn vehicle axes into sensor axes.
+        Roll, pitch, heading (3-2-1) that rotate vehicle axes into sensor axes.
     position_sd : float, m
         Standard deviation of each coordinate.
     angles_sd_deg : float, deg
-        Standard deviation of a small turn about each of the vehicle's axes.
+        Standard deviation of a small rotation about each vehicle axis.
 
     Raises
     ------
     ConfigError
-        A number is none, a standard deviation is negative, or the position is farther from the
-        origin than any vehicle is long.
+        A value is not a number, a standard deviation is negative, or the position is farther from
+        the origin than the length of any vehicle.
     """
 
     position: Triad = ZERO
@@ -69,13 +69,13 @@ class Mounting:
 
     @property
     def C_vs(self) -> Array:  # noqa: N802
-        """Turns vectors from sensor into vehicle axes, (3, 3)."""
+        """Rotation from sensor into vehicle axes, (3, 3)."""
         return rotation.dcm_from_quaternion(rotation.quaternion_from_euler(self.angles_deg))
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedTriad:
-    """One triad of a unit, as recorded.
+    """One recorded triad of a unit.
 
     Attributes
     ----------
@@ -84,19 +84,18 @@ class RecordedTriad:
         ``gyro_x gyro_y gyro_z``, rad/s, in sensor axes; ``attrs["sampling"]`` as of an Imu table.
     uncertainty : TriadUncertainty
     name : str
-        Of the part, for messages.
+        Name of the part, for messages.
     held : ndarray of bool, (n, 3), optional
-        Of a table that was brought to other stamps: whether a recorded sample at an end of the
-        range counts in a row, where the values themselves may be well within. None where the
-        table is as recorded.
+        For a resampled table, whether a recorded sample at the end of the range contributes to a
+        row, even if the resampled values are well within the range. None for a table as recorded.
     absent : tuple of int
-        Axes (0, 1, 2) that were not recorded: their columns are there in place of what is
-        assumed (`unmeasured.with_filled_axes`).
+        Axes (0, 1, 2) that were not recorded; their columns hold assumed values
+        (`unmeasured.with_filled_axes`).
 
     Raises
     ------
     ConfigError
-        The table or the uncertainty is of another kind, or `held` is not of its rows.
+        Table or uncertainty is of another kind, or `held` does not match its rows.
     """
 
     table: pd.DataFrame
@@ -128,26 +127,26 @@ class CrashUnit:
     ----------
     name : str
     accelerometers : tuple of RecordedTriad
-        One or more, the lowest range first.
+        One or more, in order of increasing range.
     gyro : RecordedTriad, optional
     mounting : Mounting
     gyro_from : str, optional
-        Name of the unit whose gyro is borrowed, where there is none: a rigid vehicle turns
-        everywhere alike.
+        Unit whose gyro is borrowed, for a unit without one: all points of a rigid vehicle have the
+        same angular rate.
     trigger : float, s, optional
         Instant of the common trigger on this unit's clock.
     trigger_sd : float, s
-        How well that instant is known.
+        Standard deviation of that instant.
     lender : CrashUnit, optional
-        The unit of that name, once its gyro stands in `gyro`, turned into these sensor axes.
+        The unit named in `gyro_from`, once its gyro is in `gyro`, rotated into these sensor axes.
     assumed : Assumed, optional
-        What is taken of the axes that its tables have no column of, and of the turning where
-        it has no gyro and borrows none.
+        Assumption for axes without a column in the tables, and for the rotation of a unit without
+        own or borrowed gyro.
 
     Raises
     ------
     ConfigError
-        A part is of another kind, or the trigger is no number.
+        A part is of another kind, or the trigger is not a number.
     """
 
     name: str
@@ -186,16 +185,16 @@ def _wrong_type(quantity: str, given: object, unit: object) -> ConfigError:
     )
 
 
-# What a crash unit must be before anything is made of it.
+# Requirements that a crash unit must meet before processing.
 
 
-# Stamps that agree to this part of a step are the same.
+# Stamps that agree to within this fraction of a step are equal.
 SAME_STAMP = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class UnitArrays:
-    """The numbers of a unit whose triads share their stamps.
+    """Arrays of a unit whose triads share their stamps.
 
     Attributes
     ----------
@@ -214,7 +213,7 @@ class UnitArrays:
 
 
 def check_unit(unit: CrashUnit) -> UnitArrays:
-    """Check a unit and take out its numbers.
+    """Check a unit and extract its arrays.
 
     Parameters
     ----------
@@ -228,8 +227,8 @@ def check_unit(unit: CrashUnit) -> UnitArrays:
     Raises
     ------
     DataError
-        There is no accelerometer or no gyro, an axis is missing, a value is not finite, time
-        does not advance, or the triads' stamps or kinds of sampling differ.
+        Accelerometer, gyro or an axis is missing, a value is not finite, time does not increase, or
+        the triads' stamps or kinds of sampling differ.
     """
     if not unit.accelerometers:
         raise DataError("sensors.no-accelerometer", file=unit.name, quantity="accelerometers")
@@ -317,58 +316,57 @@ def _gaps(unit: CrashUnit, time: Array) -> tuple[Finding, ...]:
     )
 
 
-# What is taken of a vehicle where a unit does not measure it, and how uncertain that is.
+# Assumed motion of a vehicle on unmeasured axes, and its uncertainty.
 
 
-#: Of the two shapes in time, in the order of `assumed_shapes`, for the names of unknowns.
+#: Names of the two time profiles, in the order of `assumed_shapes`, for the names of unknowns.
 SHAPES = ("by the end", "on the way")
-# A random walk that is known at its end is known to half of that half way.
+# Standard deviation at the midpoint of a random walk with known end, relative to that of its end.
 ON_THE_WAY = 0.5
-# A vehicle that has turned farther is not near to "not turning", and linear bounds end there.
+# Beyond this angle "not rotating" is a poor assumption, and linear bounds are invalid.
 MOST_TURN = 45.0  # deg
-# No road vehicle changes its velocity by more in a crash.
+# Velocity changes of road vehicles in crashes are smaller.
 MOST_CHANGE = 60.0  # m/s
-# An assumption for longer than this is none about an impact.
+# Longer intervals are not plausible for an impact.
 LONGEST = 10.0  # s
 
 
 @dataclass(frozen=True)
 class Assumed:
-    """What is taken for the axes that a unit has no sensor on.
+    """Assumed motion on the axes that a unit does not measure.
 
     Attributes
     ----------
     turn_sd_deg : float or triad, deg, optional
-        Where there is no gyro the vehicle is taken not to turn. Standard deviation of what each
-        of roll, pitch and heading has changed by at the end of `over`. None: a missing gyro is
-        refused.
+        Without a gyro the vehicle is assumed not to rotate. Standard deviation of the change of
+        each of roll, pitch and heading at the end of `over`. None: a missing gyro is an error.
     delta_v_sd : float or triad, m/s, optional
-        Where there is no accelerometer along an axis, the specific force along it is taken as
-        gravity's in the attitude of the vehicle at rest, and no more, at the point that is
-        reconstructed. Standard deviation of the change of velocity along it over `over`; three
-        numbers are for the vehicle's forward, right, down. None: a missing axis is refused.
+        Along an axis without an accelerometer, the specific force at the reconstructed point is
+        assumed to be gravity alone, in the attitude of the vehicle at rest. Standard deviation of
+        the velocity change along that axis over `over`; three numbers are for the vehicle's
+        forward, right, down. None: a missing axis is an error.
     over : (float, float), s
-        From the trigger: when that may happen. What the vehicle does before and after is in no
-        bound.
+        Interval of these changes, from the trigger. Motion before and after it is not covered by
+        any bound.
     because : str
-        Why it may be assumed, in words of the person who does, for the report.
+        User's reason for the assumption, for the report.
 
     Raises
     ------
     ConfigError
-        Neither is given, a number is negative or not finite, a turn is beyond 45 deg or a change
-        beyond 60 m/s, or `over` is no stretch of up to 10 s.
+        Neither standard deviation is given, a number is negative or not finite, a rotation exceeds
+        45 deg or a velocity change 60 m/s, or `over` is not an interval of up to 10 s.
 
     Notes
     -----
-    In time, what an axis turns (or gains) is the sum of two independent unknowns. One grows by
-    ``u - sin(2 pi u) / (2 pi)``, the integral of a haversine, with u from 0 to 1 over `over`; it
-    has the stated standard deviation at the end. Alone it would say that half way half of the turn
-    was done, no more and no less: a turn that comes early, or a dip that comes back, would do more
-    to the velocity than any bound has, since a crash pulse acts when it acts. So another goes there
-    and back, by ``sin²(pi u)``, with half the standard deviation at the middle: as much as remains
-    unknown of a random walk half way when its end is known. The standard deviation in the middle is
-    then 0.71 of that at the end, that of a random walk as well.
+    The rotation (or velocity change) of an axis over time is the sum of two independent unknowns.
+    One grows as ``u - sin(2 pi u) / (2 pi)``, the integral of a haversine, with u from 0 to 1 over
+    `over`, and has the stated standard deviation at the end. Alone it would fix the midpoint at
+    exactly half the rotation; an early rotation, or a dip that returns, would change the velocity
+    by more than the bound, because it depends on the attitude during the crash pulse. The other
+    unknown therefore rises and returns as ``sin²(pi u)``, with half the standard deviation at the
+    midpoint: the remaining uncertainty of a random walk at its midpoint when its end is known. The
+    total standard deviation at the midpoint is then 0.71 of that at the end, as for a random walk.
     """
 
     turn_sd_deg: float | Triad | None = None
@@ -402,7 +400,7 @@ class Assumed:
 
 
 def assumed_shapes(time: Array, over: tuple[float, float], sampling: str) -> Array:
-    """Rates of the two shapes at the samples, for one standard deviation of one at the end.
+    """Rates of the two profiles at the samples, for a standard deviation of one at the end.
 
     Parameters
     ----------
@@ -413,8 +411,8 @@ def assumed_shapes(time: Array, over: tuple[float, float], sampling: str) -> Arr
     Returns
     -------
     ndarray, (2, n), 1/s
-        Means over the interval that ends at the stamp, or about it, so that their sum times
-        the step is exact, even where few samples are in `over`.
+        Means over the interval that ends at the stamp, or about it, so that their sum times the
+        step is exact even with few samples in `over`.
     """
     steps = np.diff(time, prepend=2.0 * time[0] - time[1])
     after = np.append(steps[1:], steps[-1])
@@ -426,7 +424,7 @@ def assumed_shapes(time: Array, over: tuple[float, float], sampling: str) -> Arr
 
 
 def _grown(time: Array, over: tuple[float, float]) -> Array:
-    """What both shapes have come to, (2, n)."""
+    """Values of both profiles, (2, n)."""
     u = np.clip((time - over[0]) / (over[1] - over[0]), 0.0, 1.0)
     whole = u - np.sin(2.0 * np.pi * u) / (2.0 * np.pi)
     return np.array([whole, ON_THE_WAY * np.sin(np.pi * u) ** 2])

@@ -1,19 +1,19 @@
-"""Errors of a triad put on true values, and what is known of them taken off again.
+"""Error model of a triad: apply its errors to true values, and compensate the known ones.
 
-The order is that of a real chain, from the motion to the number that is read:
+The order is that of a real signal chain, from the motion to the output:
 
 1. the sampler's clock: `jitter`;
 2. the low-pass between motion and sampler: `bandwidth`;
 3. the directions of the sensors: ``v = (I + misalignment) u``;
-4. what the specific force does to a gyro: ``v + g_sensitivity f``;
-5. the sensor's curve: `scale`, `nonlinearity_2`, `nonlinearity_3`;
+4. the effect of specific force on a gyro: ``v + g_sensitivity f``;
+5. the sensor's transfer curve: `scale`, `nonlinearity_2`, `nonlinearity_3`;
 6. the drifts: `bias`, `trend`, `warm_up`, `vibration_rectification`, `bias_instability`,
    `random_walk`;
 7. `noise_density`;
 8. the converter: `full_scale`, then `quantization`.
 
-`compensate` undoes 3 to 5 and the bias, trend, warm-up and rectification of 6. The others are
-random, or lose what they take.
+`compensate` inverts 3 to 5 and the bias, trend, warm-up and rectification of 6. The others are
+random or not invertible.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from strapdown.tables import SAMPLINGS
 
 Array = NDArray[np.float64]
 
-# Beyond this part of the interval, instants would begin to overtake one another.
+# With larger jitter, instants could overtake one another.
 MOST_JITTER = 0.1
 
 
@@ -45,7 +45,7 @@ def apply(
     sampled: bool = False,
     vibration: ArrayLike | None = None,
 ) -> Array:
-    """Put the errors of a triad on true values.
+    """Apply the errors of a triad to true values.
 
     Parameters
     ----------
@@ -53,22 +53,22 @@ def apply(
     time : array_like, (n,), s
         Increasing stamps, any spacing.
     true : array_like, (n, 3), u
-        What an ideal triad in body axes reads.
+        Readings of an ideal triad in body axes.
     sampling : {'instantaneous', 'mean'}
-        Whether a row holds the value at its stamp or the mean over the interval that ends there;
-        the first interval is taken as long as the second.
+        Whether a row is the value at its stamp or the mean over the interval that ends there; the
+        first interval is assumed as long as the second.
     seed : int or SeedSequence
-        Each kind of error and each axis has a stream of its own, so that switching one on or
-        off leaves the draws of the others.
+        Each kind of error and each axis has its own stream, so that enabling one does not change
+        the draws of the others.
     specific_force : array_like, (n, 3), m/s², optional
-        Needed where `g_sensitivity` is not zero.
+        Required where `g_sensitivity` is not zero.
     sampled : bool
-        The values already have what comes before the sampler, jitter and low-pass: where a
-        motion is known between the samples, `simulate_imu` evaluates it there. Otherwise the
-        values are taken to run linearly (means: their integral) from one to the next.
+        The values already include the effects before the sampler, jitter and low-pass, as from
+        `simulate_imu`, which evaluates the motion between the samples. Otherwise the values are
+        interpolated linearly (means: their integral).
     vibration : array_like, (n, 3), (m/s²)², optional
-        Mean square of the vibration about each sample, which `vibration_rectification` turns
-        into a shift; none, if not given.
+        Mean square vibration about each sample, which `vibration_rectification` converts to a bias
+        shift; default, none.
 
     Returns
     -------
@@ -77,7 +77,7 @@ def apply(
     Raises
     ------
     DataError
-        Shapes disagree or time does not advance.
+        Shapes disagree or time does not increase.
     ConfigError
         `sampling` is unknown, the specific force is missing, or the jitter exceeds a tenth of
         an interval.
@@ -115,25 +115,25 @@ def compensate(
     specific_force: ArrayLike | None = None,
     vibration: ArrayLike | None = None,
 ) -> Array:
-    """Take the known part of the errors off what was measured.
+    """Remove the known errors from measured values.
 
     Parameters
     ----------
     errors : TriadErrors
-        The specification that `apply` was given, or a calibration.
+        The specification given to `apply`, or a calibration.
     time : array_like, (n,), s
     measured : array_like, (n, 3), u
     sampling : {'instantaneous', 'mean'}
     specific_force : array_like, (n, 3), m/s², optional
-        Needed where `g_sensitivity` is not zero; compensate the accelerometer first.
+        Required where `g_sensitivity` is not zero; compensate the accelerometer first.
     vibration : array_like, (n, 3), (m/s²)², optional
         As of `apply`.
 
     Returns
     -------
     ndarray, (n, 3), u
-        Free of bias, trend, warm-up, rectification, scale factor, nonlinearity, g-sensitivity and
-        misalignment to rounding.
+        Corrected for bias, trend, warm-up, rectification, scale factor, nonlinearity, g-sensitivity
+        and misalignment, to rounding.
 
     Raises
     ------
@@ -150,13 +150,13 @@ def compensate(
 
 
 def intervals(time: Array) -> Array:
-    """Length of the interval that each sample stands for; the first as the second."""
+    """Length of the interval of each sample; the first as the second."""
     steps = np.diff(time)
     return np.concatenate([steps[:1], steps])
 
 
 def jitter(errors: TriadErrors, steps: Array, seed: Seed) -> Array:
-    """How far each sampling instant lies after its stamp, (n,), s.
+    """Delay of each sampling instant after its stamp, (n,), s.
 
     Raises
     ------
@@ -203,7 +203,7 @@ def _through_clock(
         return np.column_stack([np.interp(late, t, u[:, k]) for k in range(3)])
     ends = np.concatenate([[t[0] - steps[0]], t])
     total = np.vstack([np.zeros(3), np.cumsum(u * steps[:, None], axis=0)])
-    # The edge before the first interval keeps its place; beyond the last, nothing is known.
+    # The edge before the first interval has no jitter; beyond the last, no data exist.
     places = np.concatenate([ends[:1], late])
     read = np.column_stack([np.interp(places, ends, total[:, k]) for k in range(3)])
     return np.asarray(np.diff(read, axis=0) / steps[:, None], dtype=np.float64)
@@ -214,14 +214,14 @@ def _through_filter(errors: TriadErrors, t: Array, u: Array, steps: Array, mean:
         return u
     if not mean:
         return low_pass(t, u, errors.bandwidth)
-    # A mean is held over its interval: the input is constant within each step.
+    # A mean is held over its interval, so the input is constant within each step.
     edges = np.concatenate([[t[0] - steps[0]], t])
     out = _held(edges, u, errors.bandwidth)
     return mean_of_filtered(out, u, steps, errors.bandwidth)
 
 
 def _held(edges: Array, u: Array, bandwidth: float) -> Array:
-    """The filter's output at the end of each step, the input held within it."""
+    """Filter output at the end of each step, with the input held within the step."""
     from strapdown._kernels.recursion import first_order
     from strapdown.sensors.low_pass import time_constant
 
@@ -266,36 +266,35 @@ def _curve(errors: TriadErrors, axis: int) -> tuple[float, float, float, float]:
 
 
 def _known_drift(errors: TriadErrors, t: Array, steps: Array, mean: bool) -> Array:
-    """Bias, trend and warm-up; the mean of a trend over an interval is its value in the middle."""
+    """Bias, trend and warm-up; the mean of a trend over an interval is its midpoint value."""
     middle = t - 0.5 * steps if mean else t
     drift = np.asarray(errors.bias) + np.outer(middle, np.asarray(errors.trend))
     if any(errors.axis("warm_up")):
         left = np.exp(-t / errors.warm_up_time)
         if mean:
-            # The mean of exp(-s/T) over the interval that ends at t.
+            # Mean of exp(-s/T) over the interval that ends at t.
             h = steps / errors.warm_up_time
             left *= np.divide(np.expm1(h), h, out=np.ones_like(h), where=h > 0.0)
         drift += np.outer(left, errors.axis("warm_up"))
     return np.asarray(drift, dtype=np.float64)
 
 
-# Scale factor and nonlinearity of one sensor axis, and back.
+# Transfer curve of one sensor axis, scale factor and nonlinearity, and its inverse.
 
 
-# Newton halves the bracket at worst and squares the error at best; a double has 53 bits.
+# Each step at least halves the bracket and at best squares the error; a double has 53 bits.
 MOST_ITERATIONS = 60
 
 
 def transfer(x: Array, scale: float, second: float, third: float, full: float) -> Array:
-    """What an axis reads for an input.
+    """Output of an axis for a given input.
 
     Parameters
     ----------
     x : ndarray, (n,), u
     scale, second, third : float
-        Of `TriadErrors`: ``y/F = (1 + scale) x/F + second (x/F)² + third (x/F)³`` up to full
-        scale, ``|x| <= F``, and beyond it along the tangent, so that a reading never has two
-        inputs.
+        From `TriadErrors`: ``y/F = (1 + scale) x/F + second (x/F)² + third (x/F)³`` up to full
+        scale, ``|x| <= F``, and linear along the tangent beyond, so that the inverse is unique.
     full : float, u
         F.
 
@@ -314,9 +313,9 @@ def transfer(x: Array, scale: float, second: float, third: float, full: float) -
 
 
 def input_of(y: Array, scale: float, second: float, third: float, full: float) -> Array:
-    """Which input an axis reads so: the inverse of `transfer`, to rounding.
+    """Input of an axis for a given output: the inverse of `transfer`, to rounding.
 
-    Newton's method within a bracket, which the monotone curve cannot leave.
+    Newton's method within a bracket; the curve is monotone, so the solution stays inside.
     """
     gain = 1.0 + scale
     if second == 0.0 and third == 0.0:
@@ -342,28 +341,29 @@ def input_of(y: Array, scale: float, second: float, third: float, full: float) -
     return np.asarray(x * full, dtype=np.float64)
 
 
-# Random errors of a triad, each kind and axis from a stream of its own.
+# Random errors of a triad; each kind and axis has its own stream.
 
 Seed = int | np.random.SeedSequence
 
-# Places in the tree of seeds. A number is never given to another kind: what a seed draws would
-# change. "Mean" kinds hold what a mean over an interval knows beyond the value at its end.
+# Keys in the seed tree. A number is never reused for another kind, because that would change the
+# draws of a seed. "Mean" kinds hold the part of an interval's mean that is independent of the value
+# at its end.
 NOISE, INSTABILITY, INSTABILITY_MEAN, WALK, WALK_MEAN, JITTER = range(6)
 
-# Below this ratio of step to correlation time, the closed form of the integral's variance
-# loses more than half its digits, and its series is used.
+# Below this ratio of step to correlation time, the closed form of the integral's variance loses
+# more than half its digits, and its series is used.
 SERIES_LIMIT = 0.1
 
 
 def child(seed: Seed, *place: int) -> np.random.SeedSequence:
-    """Return the seed at a place in the tree that hangs below another.
+    """Return the child seed at a path below another seed.
 
     Parameters
     ----------
     seed : int or SeedSequence
         A SeedSequence is not changed.
     *place : int
-        As successive calls of ``SeedSequence.spawn`` would number it.
+        Path, numbered as by successive calls of ``SeedSequence.spawn``.
     """
     root = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
     return np.random.SeedSequence(root.entropy, spawn_key=(*root.spawn_key, *place))
@@ -379,18 +379,17 @@ def normal(seed: Seed, kind: int, count: int, axes: int = 3) -> Array:
 
 
 def white_noise(seed: Seed, steps: Array, density: Triad) -> Array:
-    """White noise of the given density over intervals of the given lengths.
+    """White noise of a given density over intervals of given lengths.
 
-    The mean of white noise of density N over an interval dt has the standard deviation
-    ``N / √dt``; an instantaneous sample is taken to be limited to half the sampling rate, which
-    gives the same.
+    The mean of white noise of density N over an interval dt has the standard deviation ``N / √dt``.
+    An instantaneous sample is assumed band-limited to half the sampling rate, which gives the same.
     """
     sd = np.asarray(density) / np.sqrt(steps)[:, None]
     return np.asarray(normal(seed, NOISE, steps.size) * sd, dtype=np.float64)
 
 
 def random_walk(seed: Seed, steps: Array, density: Triad, mean: bool) -> Array:
-    """Brownian motion at the end of each step, or its mean over each step.
+    """Random walk at the end of each step, or its mean over each step.
 
     Instantaneous: zero at the first sample. Mean: zero at the start of the first step. With
     ``x1 - x0 = K √dt w1``, the mean over the step is ``x0 + K √dt (w1/2 + w2/√12)``.
@@ -406,12 +405,12 @@ def random_walk(seed: Seed, steps: Array, density: Triad, mean: bool) -> Array:
 
 
 def gauss_markov(seed: Seed, steps: Array, sd: Triad, correlation: float, mean: bool) -> Array:
-    """A stationary Gauss-Markov process at the end of each step, or its mean over each step.
+    """Stationary Gauss-Markov process at the end of each step, or its mean over each step.
 
     Exact for every step length: with ``h = dt/τ`` and ``a = exp(-h)``,
-    ``x1 = a x0 + sd √(1 - a²) w1``. The integral over the step, in units of sd τ, has given x0
-    the mean ``(1 - a) x0/sd``, the variance ``2h - 3 + 4a - a²`` and the covariance
-    ``(1 - a)²`` with x1 (Gillespie 1996, Physical Review E 54, 2084).
+    ``x1 = a x0 + sd √(1 - a²) w1``. Given x0, the integral over the step, in units of sd τ, has the
+    mean ``(1 - a) x0/sd``, the variance ``2h - 3 + 4a - a²`` and the covariance ``(1 - a)²`` with
+    x1 (Gillespie 1996, Physical Review E 54, 2084).
     """
     from strapdown._kernels.recursion import first_order
 
@@ -422,8 +421,8 @@ def gauss_markov(seed: Seed, steps: Array, sd: Triad, correlation: float, mean: 
     drive = spread[:, None] * w1
     first = np.zeros(3)
     if mean:
-        # The process begins, stationary, at the start of the first step; that number is the
-        # first of the second stream.
+        # The process starts, stationary, at the start of the first step, with the first number of
+        # the second stream.
         further = normal(seed, INSTABILITY_MEAN, steps.size + 1)
         first = further[0].copy()
     else:
@@ -435,7 +434,7 @@ def gauss_markov(seed: Seed, steps: Array, sd: Triad, correlation: float, mean: 
         return np.asarray(x * np.asarray(sd), dtype=np.float64)
     before = np.vstack([first, x[:-1]])
     given_start = -np.expm1(-h)
-    # Part of the integral that the end tells, and what is left.
+    # Part of the integral determined by the end value, and the independent remainder.
     told = np.divide(given_start**2, spread, out=np.zeros_like(h), where=spread > 0.0)
     left = np.sqrt(np.maximum(integral_variance(h) - told**2, 0.0))
     integral = given_start[:, None] * before + told[:, None] * w1 + left[:, None] * further[1:]

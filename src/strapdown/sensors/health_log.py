@@ -1,4 +1,4 @@
-"""What the tests of a log's channels share: its channels, its blocks, and where it rests."""
+"""Common parts of the health tests: channels, block statistics, stationary blocks."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ __all__ = [
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# Long enough for a standard deviation and a mean, short enough to say when.
+# Long enough for a standard deviation and a mean, short enough to locate a fault.
 BLOCK = 1.0  # s
 LEAST_BLOCK = 32  # samples
-#: Fewer say nothing of how a channel usually reads.
+#: With fewer blocks the typical behavior of a channel is unknown.
 LEAST_SAMPLES = 2 * LEAST_BLOCK
-# A body is at rest where so many of the other channels say so.
+# A body is stationary where at least this many of the other channels are quiet.
 LEAST_WITNESSES = 3
 WORDS = {
     "gyro_x": "the gyro about x (forward)",
@@ -52,20 +52,20 @@ WORDS = {
 
 @dataclass(frozen=True)
 class ChannelFault:
-    """Something that a sound channel does not do.
+    """A defect of a channel.
 
     Attributes
     ----------
     channel : str
-        ``gyro_x`` to ``accel_z``, or ``gyro``, ``accel`` where the triad as a whole is meant.
+        ``gyro_x`` to ``accel_z``, or ``gyro``, ``accel`` for the triad as a whole.
     kind : str
         A key of `imu_health.TESTS`, or ``dead``, ``burst``.
     begin, end : float, s
-        Stamps of its first and last sample.
+        Stamps of the first and last affected sample.
     first, last : int
-        The same as positions in the table, from 0, both within it.
+        The same as row numbers of the table, from 0, both included.
     size, limit : float
-        What was measured, and what it may be.
+        Measured value and its limit.
     finding : Finding
     """
 
@@ -82,21 +82,20 @@ class ChannelFault:
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """Statistics of blocks of equal numbers of samples, (blocks, channels).
+    """Statistics of blocks with equal numbers of samples, (blocks, channels).
 
     Attributes
     ----------
     samples : int
-        Of a block.
+        Per block.
     mean, sd : ndarray
     noise : ndarray
-        Standard deviation of a sample from second differences: of what is white; slow motion
-        is not in it.
+        Standard deviation of a sample from second differences: the white part, without slow motion.
     white : ndarray
-        The same by second differences over that by first, squared: one for white noise, less
-        for what is slower than a quarter of the rate.
+        Squared ratio of that to the estimate from first differences: one for white noise, less for
+        signals slower than a quarter of the rate.
     valid : ndarray of bool
-        No sample is missing or known to be wrong.
+        Block without missing samples and without samples known to be faulty.
     """
 
     samples: int
@@ -109,23 +108,23 @@ class Blocks:
 
 @dataclass(frozen=True, eq=False)
 class HealthLog:
-    """A log that is tested.
+    """A log under test.
 
     Attributes
     ----------
     source : str or None
     time : ndarray, (n,), s
     names : tuple of str
-        Of the channels, c of them.
+        Names of the c channels.
     values : ndarray, (c, n)
-        As recorded, NaN where nothing is.
+        As recorded, NaN where missing.
     wrong : ndarray of bool, (c, n)
-        Samples that an earlier test took out.
+        Samples excluded by an earlier test.
     sensors : ImuUncertainty or None
     gravity : tuple of float, m/s²
-        Least and greatest that it can be.
+        Smallest and largest possible value.
     false_alarm : float
-        Per channel, test and record.
+        Probability per channel, test and record.
     """
 
     source: str | None
@@ -143,16 +142,16 @@ class HealthLog:
 
     @property
     def rate(self) -> float:
-        """Mean number of samples a second."""
+        """Mean sample rate, Hz."""
         return float((self.time.size - 1) / (self.time[-1] - self.time[0]))
 
     def triad(self, channel: int) -> list[int]:
-        """Channels of the same triad, itself among them."""
+        """Channels of the same triad, including the channel itself."""
         kind = self.names[channel].split("_")[0]
         return [k for k, name in enumerate(self.names) if name.startswith(kind)]
 
     def stated(self, channel: int) -> tuple[TriadUncertainty, int] | None:
-        """What is stated of a channel: its triad and the axis in it."""
+        """Stated uncertainty of a channel: its triad and the axis in it."""
         if self.sensors is None:
             return None
         name = self.names[channel]
@@ -160,9 +159,9 @@ class HealthLog:
         return triad, "xyz".index(name[-1])
 
     def quiet(self) -> Mask:
-        """Blocks in which each channel is as still as it is in the quietest, (blocks, channels).
+        """Blocks in which each channel is as quiet as in its quietest, (blocks, channels).
 
-        Where a channel is not valid it has no say, and counts as quiet.
+        Blocks in which a channel is not valid count as quiet.
         """
         b = self.blocks
         out = np.ones(b.sd.shape, dtype=bool)
@@ -172,14 +171,14 @@ class HealthLog:
                 continue
             most = MAX_GYRO_SD if name in GYRO else MAX_ACCEL_SD
             least = float(np.quantile(b.sd[own, k], QUIET_QUANTILE))
-            # Counts that hardly ever change have quiet blocks without any.
+            # Coarsely quantized channels that rarely change have quiet blocks with zero scatter.
             step = float(np.median(b.sd[own, k])) if least <= ROUNDING else 0.0
             limit = min(max(QUIET_FACTOR * least, QUIET_FACTOR * step, ROUNDING), most)
             out[own, k] = b.sd[own, k] <= limit
         return out
 
     def rests(self, channel: int | None = None) -> Mask:
-        """Blocks at rest by the word of all channels, or of all but one, (blocks,)."""
+        """Stationary blocks according to all channels, or to all but one, (blocks,)."""
         others = [k for k in range(len(self.names)) if k != channel]
         quiet, valid = self.quiet()[:, others], self.blocks.valid[:, others]
         return np.asarray(quiet.all(axis=1) & (valid.sum(axis=1) >= LEAST_WITNESSES))
@@ -196,7 +195,7 @@ class HealthLog:
     ) -> ChannelFault:
         """Make a fault of samples ``span[0]`` to ``span[1]``, both included.
 
-        The data of its finding are `values`, and the ``channel`` in words, ``begin`` and ``end``
+        The data of its finding are `values`, plus the ``channel`` in words, ``begin`` and ``end``
         in s, ``size`` and ``limit``, and the ``unit`` of the channel.
         """
         name = channel if isinstance(channel, str) else self.names[channel]
@@ -224,12 +223,12 @@ def health_log(
     gravity: tuple[float, float],
     false_alarm: float,
 ) -> HealthLog:
-    """Take a table, whose values need not be finite, for testing.
+    """Prepare a table for testing; its values may be NaN.
 
     Raises
     ------
     DataError
-        A column is missing, time does not advance, or there are too few samples.
+        A column is missing, time does not increase, or there are too few samples.
     """
     source = source_of(imu)
     check_columns(imu, GYRO, source)
@@ -251,7 +250,7 @@ def health_log(
 
 
 def intervals_of(flags: Mask, join: int = 0) -> list[tuple[int, int]]:
-    """First and last place of each run of true, those with at most `join` false between as one."""
+    """First and last index of each run of true; gaps of at most `join` false are bridged."""
     edges = np.diff(np.r_[False, flags, False].astype(np.int8))
     starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
     if not starts.size:
@@ -291,43 +290,42 @@ def _blocks(log: HealthLog) -> Blocks:
 
 
 def usual(values: Array) -> float:
-    """Median, nan of nothing."""
+    """Median, NaN for an empty array."""
     return float(np.median(values)) if values.size else math.nan
 
 
-# What a quantity exceeds by chance, told by the tail of its own values over a record.
+# Chance limit of a quantity, extrapolated from the tail of its own values over a record.
 
 
 def tail_limit(
     values: ArrayLike, near: int, far: int, false_alarm: float, *, slack: float = 1.0
 ) -> float:
-    """Extrapolate the tail of a record's own values.
+    """Extrapolate the upper tail of a record's own values.
 
     Parameters
     ----------
     values : array_like, (m,)
-        Most of them sound.
+        Mostly from sound samples.
     near, far : int
-        Ranks from the largest, ``near > far``, between which the tail is told. Fewer than `far`
-        that are not sound hardly move it.
+        Ranks from the largest, ``near > far``, between which the tail is estimated. Fewer than
+        `far` faulty values hardly change it.
     false_alarm : float
-        Probability that the largest of the sound ones exceeds the limit.
+        Probability that the largest sound value exceeds the limit.
     slack : float
         Factor on the scale of the tail.
 
     Returns
     -------
     float
-        ``u + slack e ln(far / false_alarm)`` with u of rank `far` and the scale
-        ``e = (u - v) / ln(near / far)``, v of rank `near`: exact for a geometric or exponential
-        tail, too high for a normal one. Infinite where there are fewer than `near` values, or
-        `far` is none.
+        ``u + slack e ln(far / false_alarm)`` with u of rank `far` and the scale ``e = (u - v) /
+        ln(near / far)``, v of rank `near`: exact for a geometric or exponential tail, too high for
+        a normal one. Infinite with fewer than `near` values, or where `far` is zero.
 
     Notes
     -----
-    Peaks over a threshold with the shape parameter zero (Coles 2001, An Introduction to
-    Statistical Modeling of Extreme Values, section 4.2), the scale from two order statistics,
-    which a few outliers do not move.
+    Peaks over a threshold with shape parameter zero (Coles 2001, An Introduction to Statistical
+    Modeling of Extreme Values, section 4.2); the scale is from two order statistics, which are
+    robust to a few outliers.
     """
     x = np.asarray(values, dtype=np.float64)
     if far < 1 or near <= far or x.size < near:
@@ -337,13 +335,13 @@ def tail_limit(
     return u + slack * (u - v) / math.log(near / far) * math.log(far / false_alarm)
 
 
-# Runs of samples that repeat a value, and how long they are where nothing is wrong.
+# Runs of repeated values, and their lengths without a fault.
 
 Indices = NDArray[np.int64]
 
 
 def equal_runs(v: Array) -> tuple[Indices, Indices]:
-    """Beginnings and lengths of runs of equal values; a NaN is equal to none.
+    """Starts and lengths of runs of equal values; a NaN equals no other value.
 
     Parameters
     ----------
@@ -358,22 +356,22 @@ def equal_runs(v: Array) -> tuple[Indices, Indices]:
 
 
 def longest_by_chance(repeats: Array, samples: int, false_alarm: float) -> Array:
-    """Length that a run of independent repetitions exceeds with a given probability at most.
+    """Length that a run of independent repetitions exceeds with at most a given probability.
 
     Parameters
     ----------
     repeats : ndarray, (k,)
-        Probability that a sample repeats the one before it, from 0 to 1.
+        Probability that a sample repeats the previous one, from 0 to 1.
     samples : int
-        Of the record: a run may begin at each.
+        Number of samples of the record; a run may start at each.
     false_alarm : float
         Probability that any run of the record is longer.
 
     Returns
     -------
     ndarray, (k,)
-        ``1 + ln(false_alarm / n) / ln(r)``: the expected number of runs of L and more,
-        ``n (1 - r) r^(L-1)``, is then below `false_alarm`. Infinite for r = 1.
+        ``1 + ln(false_alarm / n) / ln(r)``, for which the expected number of runs of L or more
+        samples, ``n (1 - r) r^(L-1)``, is below `false_alarm`. Infinite for r = 1.
     """
     r = np.clip(repeats, 1e-300, 1.0)
     with np.errstate(divide="ignore"):
@@ -381,11 +379,11 @@ def longest_by_chance(repeats: Array, samples: int, false_alarm: float) -> Array
     return np.where(r < 1.0, limit, np.inf)
 
 
-# The median of what is known.
+# Median without NaN.
 
 
 def known_median(values: Array, axis: int) -> Array:
-    """Return the median along an axis of what is no NaN; NaN, without a warning, of nothing."""
+    """Return the median of the non-NaN values along an axis; NaN, without a warning, if none."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         return np.asarray(np.nanmedian(values, axis=axis))

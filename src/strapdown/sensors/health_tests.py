@@ -1,4 +1,4 @@
-"""Channels at the end of their range."""
+"""Health tests of log channels: saturation, implausible means, noise, stuck values, jumps."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ SAME_FAULT = 1.0  # s
 
 
 def find_saturated(log: HealthLog) -> list[ChannelFault]:
-    """Samples at the stated full scale, or on a flat top (`saturation.find_limits`)."""
+    """Find samples at the stated full scale, or on a flat top (`saturation.find_limits`)."""
     faults = []
     join = max(round(SAME_FAULT * log.rate), 1)
     for k in range(len(log.names)):
         known = ~log.wrong[k]
-        # Two readings make no top that is flat, nor does a channel that never moves.
+        # Two samples do not form a flat top, nor does a channel that is constant.
         if known.sum() < 3:
             continue
         stated = log.stated(k)
@@ -71,21 +71,21 @@ def find_saturated(log: HealthLog) -> list[ChannelFault]:
     return faults
 
 
-# Whether what is read at rest can be gravity and the Earth's rate.
+# Consistency of the means at rest with gravity and the Earth's rate.
 
 
 Array = NDArray[np.float64]
 
-# Blocks at rest that follow each other, for a mean.
+# Consecutive stationary blocks required for a mean.
 LEAST_REST = 3
 
 
 def find_implausible(log: HealthLog) -> list[ChannelFault]:
-    """Means at rest that neither gravity nor the Earth's rate explains within what is stated.
+    """Find means at rest that differ from gravity or the Earth's rate beyond the stated errors.
 
-    A single channel reads no more than gravity (the Earth's rate) and its own errors; the length
-    of the three is that, to within their errors along the direction. Only with a stated
-    uncertainty, over the longest rest by the word of all channels.
+    A single channel reads at most gravity (the Earth's rate) plus its errors; the length of the
+    vector equals that, to within the errors along its direction. Requires a stated uncertainty, and
+    uses the longest stretch that all channels show as stationary.
     """
     if log.sensors is None:
         return []
@@ -128,11 +128,12 @@ def _triad(
     length = float(np.sqrt(mean @ mean))
     along = mean / length if length > 0.0 else np.zeros(3)
     spread = float(np.sqrt((along**2) @ (sd**2)))
-    # Errors across add to the length by their square: chi-square of two over twice the length.
+    # Errors across the vector increase its length by their square over twice the length: chi-square
+    # with two degrees of freedom.
     across = float((sd**2).max()) * k_sd**2 / (2.0 * size[0])
     low, high = size[0] - k_sd * spread, size[1] + k_sd * spread + across
     if columns is GYRO and low <= 0.0:
-        # The grade does not see the Earth turn; the channels have been held against their biases.
+        # Gyros of this grade cannot measure the Earth's rate; their biases were tested above.
         return []
     if low <= length <= high:
         return []
@@ -168,39 +169,40 @@ def _sd(log: HealthLog, columns: list[str], mean: Array, size: float, duration: 
     return out
 
 
-# Channels that are noisier than their data sheet, their neighbours or their own past.
+# Channels noisier than their data sheet, their neighbors or their own past.
 
 
-# Data sheets that state noise by axis have one axis with twice that of another, and units differ
-# from one another by half.
+# In data sheets that state noise by axis, one axis has twice that of another, and units differ from
+# one another by half.
 NOISE_FACTOR = 3.0
-# Blocks in a row, where not all of a rest; a slammed door passes within less.
+# Consecutive blocks, other than a whole stationary stretch; a slammed door is shorter.
 LASTING = 3
-# Of the second over the first differences of white noise, squared, one block being known to a
-# tenth or so; what is slower than 0.28 of the rate has less.
+# Limit of the squared ratio of second to first differences: one for white noise, known to a tenth
+# or so in one block, and lower for signals slower than 0.28 of the rate.
 WHITE = 0.8
-# Of the scatter of its own ratio to the others over the record.
+# Standard deviations of the channel's own noise ratio to the others over the record.
 OWN_SCATTER = 6.0
-# In noise all second differences are large, in a burst those about the outliers alone: a quarter of
+# In noise all second differences are large, in a burst only those about the outliers: a quarter of
 # those of normal noise is below 0.3186 of their rms.
 OUTLIER, LEAST_OUTLIERS = 6.0, 3
 QUARTER, BURST_SHARE = 0.3186, 0.5
 HEALTH_NOISE_SAME_FAULT = 10  # blocks
-# Variance of a median over that of a mean, of normal values.
+# Variance of a median over that of a mean, for normal values.
 MEDIAN = math.pi / 2.0
 
 
 def find_noisy(log: HealthLog) -> list[ChannelFault]:
-    """Blocks whose noise from sample to sample is beyond 3 times what it may be.
+    """Find blocks with more than 3 times the allowed sample-to-sample noise.
 
-    At rest, by the word of the other channels: beyond the data sheet's (with the noise of its
-    quantization), or the middle one of its triad. Anywhere, if it is white: beyond its own middle
-    over the record, each block being held against what the other channels do in it, and beyond 6
-    times the scatter of that ratio. All blocks of the rest together, or three blocks of a second
-    in a row; a single one, where it is a handful of outliers (``burst``).
+    At rest according to the other channels, the limit is from the data sheet (including
+    quantization noise) or from the median channel of the triad. Anywhere, if the noise is white, it
+    is from the channel's own median over the record, relative to the other channels in the block,
+    and at least 6 times the scatter of that ratio. A fault is all stationary blocks together, or
+    three consecutive blocks of a second; a single block, if it contains only a few outliers
+    (``burst``).
 
-    The rms of the second differences of n white samples is known to 0.99/√n (their correlations are
-    -2/3 and 1/6): limits are raised by the quantile of that.
+    The rms of the second differences of n white samples has a relative standard deviation of
+    0.99/√n (their correlations are -2/3 and 1/6); the limits are raised by its quantile.
     """
     faults = []
     b = log.blocks
@@ -251,12 +253,12 @@ def _throughout(
     reason: NDArray[np.int64],
     sizes: Array,
 ) -> Mask:
-    """All blocks at rest, where they together are above a limit that is surer the more they are."""
+    """Test all stationary blocks together, with a margin that decreases with their number."""
     out = np.zeros_like(rest)
     count = int(rest.sum())
     if count < LASTING:
         return out
-    # What is noisy for a part of the rest only does not move the median.
+    # Noise in less than half of the stationary blocks does not change the median.
     noise = np.median(log.blocks.noise[rest], axis=0)
     known = math.sqrt(MEDIAN / (count * log.blocks.samples))
     slack = NOISE_FACTOR * (1.0 + _quantile(log, 1) * known)
@@ -271,9 +273,10 @@ def _throughout(
 
 
 def _quantile(log: HealthLog, together: int) -> float:
-    """Of the normal distribution, that so many blocks in a row exceed by chance once."""
+    """Normal quantile that this many consecutive blocks exceed by chance once per record."""
     chance = log.false_alarm / max(log.blocks.sd.shape[0], 1)
-    # A block's noise and the middle one's are both known to 1/√n: √2 for their ratio.
+    # The noise of a block and of the median block both have a relative error of 1/√n: √2 in the
+    # ratio.
     return -math.sqrt(2.0) * NormalDist().inv_cdf(chance ** (1.0 / together))
 
 
@@ -287,7 +290,7 @@ def _stated(log: HealthLog, k: int) -> float:
 
 
 def _relative(log: HealthLog) -> Array:
-    """Logarithm of the noise of each channel over its middle, less the middle of the others'."""
+    """Logarithm of each channel's noise over its median, minus the median of the other channels."""
     b = log.blocks
     with np.errstate(divide="ignore", invalid="ignore"):
         size = np.where(b.valid & (b.noise > 0.0), np.log(b.noise), np.nan)
@@ -299,7 +302,7 @@ def _relative(log: HealthLog) -> Array:
 
 
 def _past(log: HealthLog, k: int, relative: Array, slack: float) -> Array:
-    """Noise of each block that its own past and the other channels allow."""
+    """Noise limit of each block from the channel's own past and the other channels."""
     known = np.isfinite(relative)
     if known.sum() < 4 * LASTING:
         return np.full(relative.shape, np.inf)
@@ -307,31 +310,31 @@ def _past(log: HealthLog, k: int, relative: Array, slack: float) -> Array:
     scatter = MAD_TO_SD * float(np.median(np.abs(relative[known] - middle)))
     room = max(math.log(slack), OWN_SCATTER * scatter)
     out = np.full(relative.shape, np.inf)
-    # noise e^(middle + room - relative) is where the ratio would stand at its limit.
+    # At noise e^(middle + room - relative) the ratio equals its limit.
     out[known] = log.blocks.noise[known, k] * np.exp(middle + room - relative[known])
     return out
 
 
 def _second(log: HealthLog, k: int, blocks: NDArray[np.int64]) -> Array:
-    """Sizes of the second differences of some blocks."""
+    """Absolute second differences of given blocks."""
     size, count = log.blocks.samples, log.blocks.sd.shape[0]
     cut = log.values[k, : count * size].reshape(count, size)[blocks]
     return np.abs(np.diff(cut, 2, axis=1))
 
 
 def _struck(second: Array, base: float) -> Mask:
-    """Blocks with a few outliers among samples that are as they were."""
+    """Blocks with a few outliers among otherwise unchanged samples."""
     if not base > 0.0:
         return np.zeros(len(second), dtype=bool)
     large = second > OUTLIER * math.sqrt(6.0) * base
-    # An outlier is in three second differences.
+    # An outlier affects three second differences.
     few = large.sum(axis=1) >= 3 * LEAST_OUTLIERS
     few[few] = [_is_burst(row) for row in second[few]]
     return np.asarray(few)
 
 
 def _is_burst(second: Array) -> bool:
-    """Whether the quieter half is much quieter than all are: so it is not where all is noise."""
+    """Whether the lower quartile is well below the rms, unlike in noise throughout."""
     return float(np.quantile(second, 0.25)) / QUARTER < BURST_SHARE * float(
         np.sqrt((second**2).mean())
     )
@@ -352,29 +355,29 @@ def _fault(
     worst = int(at[np.argmax(sizes[at] / limits[at])])
     size, limit = float(sizes[worst]), float(limits[worst])
     than = ("data-sheet", "triad", "past")[int(reasons[worst])]
-    # Of a burst, that is `sensors.burst-beyond-triad` and so on.
+    # For a burst, the code is `sensors.burst-beyond-triad` and so on.
     code = f"sensors.{kind}-beyond-{than}"
     ratio = NOISE_FACTOR * size / limit
     return log.fault(k, kind, log.span_of(first, last), size, limit, code, ratio=ratio)
 
 
-# Channels that repeat one reading for longer than their noise allows, or are dead.
+# Stuck or dead channels: one value repeated for longer than the noise allows.
 
 
-# Samples about a run from which the share of repetitions is taken.
+# Samples about a run from which the fraction of repetitions is estimated.
 AROUND = 256
 LEAST_RUN = 10  # samples
-# Ranks of the runs from whose lengths the tail is taken: ten that are stuck hardly move the 20th
-# longest, whose place in a geometric tail is known to a fifth; runs are whole numbers besides.
+# Ranks of the run lengths that define the tail: ten stuck runs hardly change the 20th longest,
+# whose position in a geometric tail has a relative error of a fifth; run lengths are also integers.
 NEAR_RANK, FAR_RANK, TAIL_SLACK = 200, 20, 1.5
-# Of the share of repetitions in so few samples, this many standard deviations are added.
+# Standard deviations added to the fraction of repetitions from so few samples.
 SHARE_SLACK = 4.0
-# Drop-outs that are nearer to each other than this are one burst.
+# Dropouts closer together than this are one burst.
 SAME_BURST = 1.0  # s
 
 
 def find_missing(log: HealthLog) -> list[ChannelFault]:
-    """Samples that are no finite number; bursts of them within a second are one."""
+    """Find samples that are not finite; bursts within a second are merged."""
     faults = []
     join = max(round(SAME_BURST * log.rate), 1)
     for k in range(len(log.names)):
@@ -390,16 +393,16 @@ def find_missing(log: HealthLog) -> list[ChannelFault]:
 
 
 def find_stuck(log: HealthLog) -> list[ChannelFault]:
-    """Runs of one value that neither its noise nor its steps nor a rest explains.
+    """Find runs of one value that neither noise nor quantization nor rest explains.
 
-    A run is stuck where it is longer than each of
+    A run is stuck if it is longer than each of
 
-    - ``1 + ln(P/n)/ln(r)``, with r the share of samples that repeat the one before: of the channel
-      in the 256 samples before and after the run (where they are independent, the sum of the
-      squares of their histogram), and of its two neighbours during the run, for what keeps all
-      of them still is a rest in coarse steps;
-    - what the tail of its own runs over the record tells (`tail_limit` of the 200th and the
-      20th longest; of fewer than 2000, of those that a tenth and a hundredth exceed);
+    - ``1 + ln(P/n)/ln(r)``, with r the fraction of samples that repeat the previous one: for the
+      channel in the 256 samples before and after the run (for independent samples, the sum of the
+      squares of their histogram), and for its two neighbors during the run, because a rest in
+      coarse quantization steps keeps all three constant;
+    - the limit from the tail of its own runs over the record (`tail_limit` of the 200th and the
+      20th longest; with fewer than 2000, of those exceeded by a tenth and a hundredth);
     - 10 samples.
     """
     same = np.zeros((len(log.names), log.time.size), dtype=bool)
@@ -425,7 +428,7 @@ def _channel(log: HealthLog, k: int, sums: Array) -> list[ChannelFault]:
     )
     for other in log.triad(k):
         if other != k and not log.wrong[other].all() and not _constant(sums[other], n):
-            # Pairs within the run, its first sample excepted.
+            # Pairs within the run, without its first sample.
             shared = (sums[other, b] - sums[other, a + 1]) / np.maximum(b - a - 1, 1)
             limit = np.maximum(limit, longest_by_chance(shared, n, log.false_alarm))
     found = lengths[most] > limit
@@ -439,18 +442,18 @@ def _channel(log: HealthLog, k: int, sums: Array) -> list[ChannelFault]:
 def _tail(lengths: NDArray[np.int64], false_alarm: float) -> float:
     near, far = min(NEAR_RANK, lengths.size // 10), min(FAR_RANK, lengths.size // 100)
     limit = tail_limit(lengths, near, far, false_alarm, slack=TAIL_SLACK)
-    # Fewer than 100 runs tell no tail; the other limits stand.
+    # Fewer than 100 runs do not define a tail; the other limits apply.
     return limit if math.isfinite(limit) else 0.0
 
 
 def _around(sums: Array, a: NDArray[np.int64], b: NDArray[np.int64], n: int) -> Array:
-    """Share of repetitions about each run, its upper bound."""
+    """Upper bound of the fraction of repetitions about each run."""
     left, right = np.maximum(a - AROUND, 0), np.minimum(b + AROUND, n)
     repeats = sums[a] - sums[left] + sums[right] - sums[b]
     pairs = a - left + right - b
     share = repeats / np.maximum(pairs, 1)
-    # At least one is allowed for: none seen in so few says no more than that. A run over the whole
-    # record has nothing about it, and its neighbours speak alone.
+    # Allow for at least one repetition, because none among so few samples does not prove zero. A
+    # run over the whole record has no samples about it; then only its neighbors are used.
     least = 1.0 / np.maximum(pairs, 1)
     bound = np.minimum(share + SHARE_SLACK * np.sqrt(np.maximum(share, least) * least), 1.0)
     return np.asarray(np.where(pairs > LEAST_RUN, bound, 0.0))
@@ -461,7 +464,7 @@ def _constant(sums: Array, n: int) -> bool:
 
 
 def _others_live(sums: Array, k: int, a: int, b: int) -> bool:
-    """Whether any other channel changes meanwhile: else nothing is measured, or made up."""
+    """Whether any other channel changes meanwhile; otherwise the whole log is constant."""
     moved = (sums[:, b] - sums[:, a + 1]) < b - a - 1
     moved[k] = False
     return bool(moved.any())
@@ -480,28 +483,29 @@ def _fault_health_stuck(log: HealthLog, k: int, a: int, b: int, limit: float) ->
     return log.fault(k, "stuck", (a, b), float(count), limit, code, **said)
 
 
-# Channels whose level steps although nothing moves.
+# Level jumps of a channel while the body is stationary.
 
 
-# Blocks whose mean is taken before and after the one in which a step may lie.
+# Blocks averaged before and after the block in which a step may lie.
 SIDE = 3
-# Windows at rest that tell what is usual: fewer have no tail.
+# Fewest stationary windows that define a typical change; fewer have no tail.
 LEAST_WINDOWS = 40
-# Of what a turn would make of the specific force: that much is seen, by so many of its sd.
+# Fraction of the specific force change due to a rotation that must be seen, and the required number
+# of its standard deviations.
 SEEN, SURE = 0.5, 3.0
-# Of the step: how well the means at both its sides are known where its abruptness is judged.
+# Relative standard deviation of the means on both sides of a step when its abruptness is tested.
 KNOWN = 0.05
 
 
 def find_jumps(log: HealthLog) -> list[ChannelFault]:
-    """Steps of the mean of three seconds and more between blocks at rest by the others' word.
+    """Find steps of the mean over three or more seconds between stationary blocks.
 
-    The limit is what the tail of the record's own changes over the same time tells, those about
-    the step left out (`tail_limit` of those that a fifth and a fiftieth exceed), and no less than
-    what noise from sample to sample and the stated drift give. A step of an accelerometer must
-    also be left when the turning that the gyros tell in between is taken off, and one of a gyro is
-    none where the accelerometers turn with it, or where it takes time: a body needs some to begin
-    to turn.
+    The other channels determine which blocks are stationary. The limit is the tail of the record's
+    own changes over the same time, without those about the step (`tail_limit` of those exceeded by
+    a fifth and a fiftieth), and at least the effect of sample-to-sample noise and the stated drift.
+    A step of an accelerometer must remain after subtraction of the rotation measured by the gyros
+    in between. A step of a gyro is rejected if the accelerometers rotate with it, or if it is
+    gradual, as the start of a real rotation is.
     """
     if log.blocks.sd.shape[0] < 2 * SIDE + 1:
         return []
@@ -535,14 +539,14 @@ def find_jumps(log: HealthLog) -> list[ChannelFault]:
 
 
 def _change(mean: Array) -> Array:
-    """Mean of the three blocks after less that of the three before each block that has them."""
+    """Mean of the three blocks after minus the mean of the three before, for each such block."""
     sums = np.concatenate([[0.0], np.cumsum(mean - mean[0])])
     of_three = (sums[SIDE:] - sums[:-SIDE]) / SIDE
     return np.asarray(of_three[SIDE + 1 :] - of_three[: -SIDE - 1])
 
 
 def _least(log: HealthLog, k: int, count: int) -> float:
-    """What white noise, the steps of the output and the stated drift give."""
+    """Change due to white noise, the output quantization and the stated drift."""
     b = log.blocks
     noise = float(np.median(b.noise[:, k][b.valid[:, k]]))
     white = noise * math.sqrt(2.0 / (SIDE * b.samples))
@@ -551,7 +555,7 @@ def _least(log: HealthLog, k: int, count: int) -> float:
 
 
 def _usual(size: Array, still: Mask, at: int, false_alarm: float) -> float:
-    """What the changes elsewhere in the record tell."""
+    """Limit from the changes elsewhere in the record."""
     elsewhere = still.copy()
     elsewhere[max(at - 2 * SIDE, 0) : at + 2 * SIDE + 1] = False
     others = size[elsewhere]
@@ -559,7 +563,7 @@ def _usual(size: Array, still: Mask, at: int, false_alarm: float) -> float:
 
 
 def _quantum(log: HealthLog, k: int) -> float:
-    """Step of the output where its noise is less than that, so that means do not average it."""
+    """Output quantization step where the noise is smaller, so that means do not average it."""
     stated = log.stated(k)
     step = 0.0 if stated is None else stated[0].axis("quantization")[stated[1]]
     if step == 0.0:
@@ -571,7 +575,7 @@ def _quantum(log: HealthLog, k: int) -> float:
 
 
 def _drift(log: HealthLog, k: int) -> float:
-    """What the stated wandering of the bias gives over the 4 blocks between both means."""
+    """Change due to the stated bias drift over the 4 blocks between both means."""
     if log.sensors is None:
         return 0.0
     name = log.names[k]
@@ -583,7 +587,7 @@ def _drift(log: HealthLog, k: int) -> float:
 
 
 def _tilted(log: HealthLog) -> Array | None:
-    """Change of the specific force that the gyros' turning between both means makes, (b - 6, 3)."""
+    """Specific force change due to the gyros' rotation between both means, (b - 6, 3)."""
     if ACCEL[0] not in log.names:
         return None
     mean = log.blocks.mean
@@ -593,18 +597,18 @@ def _tilted(log: HealthLog) -> Array | None:
     block = log.blocks.samples / log.rate
     gyro = mean[:, :3] - np.median(mean[rest, :3], axis=0)
     force = mean[:, 3:]
-    # From the middle of the three before to the middle of the three after.
+    # From the midpoint of the three blocks before to the midpoint of the three after.
     edges = np.vstack([np.zeros(3), np.cumsum(gyro, axis=0)]) * block
     middle = 0.5 * (edges[1:] + edges[:-1])
     of_three = np.lib.stride_tricks.sliding_window_view(middle, SIDE, axis=0).mean(axis=2)
     turned = of_three[SIDE + 1 :] - of_three[: -SIDE - 1]
     before = np.lib.stride_tricks.sliding_window_view(force, SIDE, axis=0).mean(axis=2)
-    # Axes that turn by θ see a constant vector turn by -θ.
+    # In axes that rotate by θ a constant vector rotates by -θ.
     return np.asarray(-np.cross(turned, before[: -SIDE - 1]))
 
 
 def _turned(log: HealthLog, k: int, at: int, step: float) -> bool:
-    """Whether the accelerometers have turned as this step of a gyro tells."""
+    """Whether the accelerometers confirm the rotation indicated by this step of a gyro."""
     if ACCEL[0] not in log.names:
         return False
     block = log.blocks.samples / log.rate
@@ -612,26 +616,26 @@ def _turned(log: HealthLog, k: int, at: int, step: float) -> bool:
     before, after = force[at : at + SIDE].mean(axis=0), force[at + SIDE + 1 : at + 2 * SIDE + 1]
     axis = np.zeros(3)
     axis[k] = 1.0
-    # Half a block of the one in which it steps, and the blocks after.
+    # Half the block that contains the step, and the blocks after.
     angles = step * block * (0.5 + 0.5 + np.arange(SIDE))
     told = -np.cross(axis, before)
     seen = after - before
     told_size = float(told @ told)
     if told_size < 1e-6 * float(before @ before):
-        return False  # about the vertical: nothing is seen
+        return False  # rotation about the vertical: not observable
     share = float((seen @ told) @ angles) / (told_size * float(angles @ angles))
-    # Where their noise would say so by chance they say nothing.
+    # Inconclusive where accelerometer noise could confirm the rotation by chance.
     noise = float(np.median(log.blocks.noise[:, 3:].max(axis=1))) / math.sqrt(log.blocks.samples)
     unsure = noise / math.sqrt(told_size * float(angles @ angles))
     return share > SEEN and SURE * unsure < SEEN
 
 
 def _where(log: HealthLog, k: int, block: int, step: float) -> int | None:
-    """Sample from which the level is another, or None where it changes slowly."""
+    """First sample of the new level, or None for a gradual change."""
     size = log.blocks.samples
     a, b = (block - 1) * size, (block + 2) * size
     y = log.values[k, a:b] - log.values[k, a:b].mean()
-    # Change point of the least squares of two levels.
+    # Least-squares change point between two levels.
     n = y.size
     sums = np.cumsum(y)[:-1]
     places = np.arange(1, n)
@@ -654,7 +658,7 @@ def _fault_health_jump(log: HealthLog, k: int, at: int, step: float, limit: floa
 
 
 def _until_next(log: HealthLog, faults: list[ChannelFault]) -> list[ChannelFault]:
-    """Each jump ends where the same channel jumps again."""
+    """End each jump where the same channel jumps again."""
     out = []
     for fault in faults:
         later = [f.first for f in faults if f.channel == fault.channel and f.first > fault.first]

@@ -1,4 +1,4 @@
-"""Whether the channels of an inertial log can be believed: minutes to hours, any grade."""
+"""Health tests of the channels of an inertial log of minutes to hours, any sensor grade."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from strapdown.sensors.uncertainty import ImuUncertainty
 
 __all__ = ["FALSE_ALARM", "TESTS", "ChannelFault", "HealthTest", "ImuHealth", "check_imu_channels"]
 
-#: Of each test, channel and record, where the limit is one of chance.
+#: Probability per test, channel and record, for limits set by chance.
 FALSE_ALARM = 1e-6
-# Heights at which anybody's sensor rests.
+# Range of heights at which a sensor may rest.
 LOWEST, HIGHEST = -500.0, 9000.0  # m
-# Anomalies of gravity are below; NGA's EGM2008 has none of 1000 mGal.
+# Gravity anomalies are smaller; none in NGA's EGM2008 reaches 1000 mGal.
 ANOMALY = 0.005  # m/s²
 
 
@@ -40,12 +40,12 @@ class HealthTest:
     ----------
     title : str
     limit : str
-        What it holds a channel against.
+        Reference with which a channel is compared.
     false_alarm : str
-        Where its rate of false alarms is from.
+        Source of its false-alarm rate.
     find : callable
     takes_out : bool
-        Whether later tests leave out the samples that it found.
+        Whether later tests exclude the samples that it found.
     """
 
     title: str
@@ -55,7 +55,7 @@ class HealthTest:
     takes_out: bool
 
 
-#: In this order: what is no number or no reading has no noise and no level.
+#: In this order, because noise and level are defined only for valid samples.
 TESTS: dict[str, HealthTest] = {
     "missing": HealthTest(
         "no number",
@@ -104,19 +104,19 @@ TESTS: dict[str, HealthTest] = {
 
 @dataclass(frozen=True, eq=False)
 class ImuHealth:
-    """What the tests say of a log.
+    """Test results of a log.
 
     Attributes
     ----------
     channels : tuple of str
-        That were tested.
+        Tested channels.
     faults : tuple of ChannelFault
         In order of time.
     rest_time : float, s
-        For so long the body was at rest by the word of all its sound channels. The tests of
-        noise against the neighbours, of jumps, and of what gravity allows see no more.
+        Time for which the body was stationary according to all sound channels. The tests of noise
+        against the neighbors, of jumps, and against gravity use only this time.
     noise : dict of str to float, rad/s or m/s²
-        From sample to sample, the middle of the record.
+        Sample-to-sample standard deviation, median over the record.
     """
 
     channels: tuple[str, ...]
@@ -126,12 +126,12 @@ class ImuHealth:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """One for each fault."""
+        """One finding per fault."""
         return tuple(f.finding for f in self.faults)
 
     @property
     def healthy(self) -> tuple[str, ...]:
-        """Channels without a fault, of their own or of their triad."""
+        """Channels without a fault of their own or of their triad."""
         bad = {f.channel for f in self.faults}
         return tuple(c for c in self.channels if c not in bad and c.split("_")[0] not in bad)
 
@@ -140,7 +140,7 @@ class ImuHealth:
         return tuple(f for f in self.faults if f.channel == channel)
 
     def sound(self, imu: pd.DataFrame) -> pd.DataFrame:
-        """Samples that no fault covers.
+        """Samples not covered by any fault.
 
         Parameters
         ----------
@@ -150,7 +150,7 @@ class ImuHealth:
         Returns
         -------
         DataFrame of bool
-            A row for each of the table, a column for each channel.
+            One row per row of the table, one column per channel.
         """
         out = np.ones((len(imu), len(self.channels)), dtype=bool)
         for fault in self.faults:
@@ -167,20 +167,20 @@ def check_imu_channels(
     gravity: float | None = None,
     false_alarm: float = FALSE_ALARM,
 ) -> ImuHealth:
-    """Test each channel of an inertial log: by itself, beside the others, against a data sheet.
+    """Test each channel of an inertial log by itself, against the others and its data sheet.
 
     Parameters
     ----------
     imu : DataFrame
-        Columns of an Imu table, rad/s and m/s²; a value may be NaN, which is then found.
-        Accelerometers may be absent.
+        Columns of an Imu table, rad/s and m/s²; NaN values are reported. Accelerometers may be
+        absent.
     sensors : ImuUncertainty, optional
-        What is stated of the unit. Left out, a channel is held against itself and the others.
+        Stated uncertainty. If not given, a channel is compared with itself and the others.
     gravity : float, m/s², optional
-        Where the log was made. Left out, anything from the equator at 9 km to a pole.
+        Gravity at the site. If not given, any value from the equator at 9 km to a pole.
     false_alarm : float
-        Probability with which a sound channel fails one test over the whole record, where the limit
-        is one of chance (`TESTS`).
+        Probability that a sound channel fails one test over the whole record, for limits set by
+        chance (`TESTS`).
 
     Returns
     -------
@@ -189,18 +189,18 @@ def check_imu_channels(
     Raises
     ------
     DataError
-        A column is missing, time does not advance, or there are fewer than 64 samples.
+        A column is missing, time does not increase, or there are fewer than 64 samples.
     ConfigError
-        `false_alarm` or `gravity` is none.
+        `false_alarm` or `gravity` is invalid.
 
     Notes
     -----
-    A fault of one channel is told from motion only where the body rests, or where no motion can
-    do it: what drives and has one unit alone has no test for a zero that moves
-    (`redundant_units` has). What all channels do together is taken for motion. The last part of a
-    second that fills no block has no test for noise and jumps.
+    A fault of one channel can be separated from motion only at rest, or where no motion can cause
+    it: a moving vehicle with a single unit has no test for a bias jump (`redundant_units` has one).
+    Changes common to all channels are attributed to motion. The last incomplete block of less than
+    a second is not tested for noise and jumps.
 
-    It costs some 30 operations a sample and channel: 1 h of 1 kHz takes seconds.
+    The cost is about 30 operations per sample and channel: 1 h at 1 kHz takes seconds.
     """
     if not 0.0 < false_alarm < 0.5:
         raise ConfigError(

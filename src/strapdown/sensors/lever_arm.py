@@ -1,4 +1,4 @@
-"""Specific force at another point of a rigid body."""
+"""Lever arm correction: specific force at another point of a rigid body."""
 
 from __future__ import annotations
 
@@ -25,22 +25,22 @@ __all__ = ["MovedImu", "lever_matrix", "move_imu", "move_unit"]
 
 @dataclass(frozen=True, eq=False)
 class MovedImu:
-    """What an ideal accelerometer at another point of the body would read.
+    """Readings of an ideal accelerometer at another point of the body.
 
     Attributes
     ----------
     imu : DataFrame
-        Imu table; the rates are those that were given.
+        Imu table; the rates are those given.
     lever_arm : ndarray, (3,), m
-        From where it was to where it is, body axes.
+        From the original to the new point, body axes.
     angular_acceleration : ndarray, (n, 3), rad/s²
     added : ndarray, (n, 3, 3), (m/s²)²
-        Covariance that the noise of the gyro adds to each sample. Neighbours are correlated:
-        `slope` has the weights.
+        Covariance that gyro noise adds to each sample. Neighboring samples are correlated: `slope`
+        has the weights.
     bandwidth : float, Hz
-        Of the angular acceleration: what turns faster is moved by less than it should be.
+        Bandwidth of the angular acceleration; for faster rotation the correction is too small.
     slope : LocalSlope
-        The filter that made it.
+        Differentiation filter used.
     """
 
     imu: pd.DataFrame
@@ -52,16 +52,16 @@ class MovedImu:
 
     @cached_property
     def turning(self) -> Array:
-        """Rates where the angular acceleration is taken, (n, 3), rad/s."""
+        """Rates at which the angular acceleration is evaluated, (n, 3), rad/s."""
         return self.slope.value_of(self.imu[GYRO].to_numpy(dtype=np.float64))
 
     @cached_property
     def lever(self) -> Array:
-        """What a longer lever arm adds to each sample, (n, 3, 3), 1/s²."""
+        """Sensitivity of each sample to the lever arm, (n, 3, 3), 1/s²."""
         return lever_matrix(self.angular_acceleration, self.turning)
 
     def of_rate(self, rate: Array) -> Array:
-        """What small errors of the rates add to the specific force through the lever arm.
+        """Specific force error due to small rate errors through the lever arm.
 
         Parameters
         ----------
@@ -76,12 +76,12 @@ class MovedImu:
         return np.asarray(np.cross(self.slope.slope_of(rate), self.lever_arm) + turned)
 
     def of_rates_in_sums(self, weights: Array) -> Array:
-        """Weights of the errors of the rates in sums of the specific force.
+        """Weights of the rate errors in sums of the specific force.
 
         Parameters
         ----------
         weights : ndarray, (m, n)
-            Of the samples of the specific force in each of m sums.
+            Weights of the specific force samples in each of m sums.
 
         Returns
         -------
@@ -106,22 +106,22 @@ def move_imu(
     window: float | None = None,
     gyro_delay: float = 0.0,
 ) -> MovedImu:
-    """Move the specific force of an Imu table from S to P.
+    """Move the specific force of an Imu table from point S to point P.
 
     Parameters
     ----------
     imu : DataFrame
-        Imu table with acceleration, any axes fixed in the body.
+        Imu table with acceleration, in any body-fixed axes.
     lever_arm : array_like, (3,), m
         From S to P in those axes.
     gyro_noise : array_like, rad/s
-        Of a sample: a number, (3,), (n, 3) standard deviations, or (n, 3, 3) covariances; white.
-        Of a gyro that was interpolated from a slower one, multiply it by the root of the ratio
-        of the steps, and let the window cover several steps of the slower one.
+        Standard deviation of a sample, white: a number, (3,), (n, 3) standard deviations, or (n, 3,
+        3) covariances. For a gyro interpolated from a lower rate, multiply by the root of the ratio
+        of the steps, and let the window cover several of its original steps.
     window : float, s, optional
-        As `local_slope`: of the polynomial whose slope is the angular acceleration.
+        As `local_slope`: window of the polynomial whose slope is the angular acceleration.
     gyro_delay : float, s
-        By how much the gyro lags the accelerometer: the difference of the group delays of their
+        Delay of the gyro relative to the accelerometer: the difference of the group delays of their
         filters, ``1 / (2 pi bandwidth)`` for a single pole.
 
     Returns
@@ -130,15 +130,14 @@ def move_imu(
 
     Notes
     -----
-    ``f_P = f_S + dω/dt × r + ω × (ω × r)``. It is linear in r: with the same window, S to P to S
-    gives back what there was, to rounding. With means over the samples, ``ω × (ω × r)`` of the
-    mean rate is short of its mean by ``|r| α² dt² / 12``. The body must be rigid between S and
-    P.
+    ``f_P = f_S + dω/dt × r + ω × (ω × r)``. The correction is linear in r: with the same window, S
+    to P to S restores the input to rounding. For mean samples, ``ω × (ω × r)`` of the mean rate is
+    smaller than its mean by ``|r| α² dt² / 12``. The body must be rigid between S and P.
 
     Raises
     ------
     DataError
-        The table is no Imu table with acceleration.
+        The table is not an Imu table with acceleration.
     ConfigError
         The lever arm is not three finite numbers; as `local_slope`.
     """
@@ -172,7 +171,7 @@ def move_unit(
     window: float | None = None,
     gyro_delay: float = 0.0,
 ) -> MovedImu:
-    """Move a prepared unit from its place to a point of the vehicle.
+    """Move a prepared unit from its position to a point of the vehicle.
 
     Parameters
     ----------
@@ -194,7 +193,7 @@ def move_unit(
 
 
 def lever_matrix(alpha: Array, omega: Array) -> Array:
-    """The matrices with which a lever arm makes a difference of specific force.
+    """Matrices that map a lever arm to a specific force difference.
 
     Parameters
     ----------
@@ -203,14 +202,14 @@ def lever_matrix(alpha: Array, omega: Array) -> Array:
     Returns
     -------
     ndarray, (n, 3, 3), 1/s²
-        ``[α×] + [ω×]²``: times r it is ``α × r + ω × (ω × r)``.
+        ``[α×] + [ω×]²``; times r, ``α × r + ω × (ω × r)``.
     """
     turning = cross_matrix(omega)
     return cross_matrix(alpha) + turning @ turning
 
 
 def rate_effect(omega: Array, r: Array) -> Array:
-    """What an error of the rate does to ``ω × (ω × r)``.
+    """Derivative of ``ω × (ω × r)`` with respect to the rate.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A single-pole low-pass over samples whose spacing may vary."""
+"""Single-pole low-pass for samples with variable spacing."""
 
 from __future__ import annotations
 
@@ -11,27 +11,26 @@ Array = NDArray[np.float64]
 
 
 def time_constant(bandwidth: float) -> float:
-    """Time constant in s of a single pole that is 3 dB down at `bandwidth` Hz."""
+    """Time constant in s of a single pole with its -3 dB point at `bandwidth` Hz."""
     return 1.0 / (2.0 * math.pi * bandwidth)
 
 
 def low_pass(time: Array, values: Array, bandwidth: float) -> Array:
-    """Pass samples through the filter, exactly where the input is linear between them.
+    """Apply the low-pass, exactly for an input linear between samples.
 
     Parameters
     ----------
     time : ndarray, (n,), s
     values : ndarray, (n, 3)
     bandwidth : float, Hz
-        Its -3 dB frequency; infinity changes nothing.
+        -3 dB frequency; with infinity the output equals the input.
 
     Returns
     -------
     ndarray, (n, 3)
-        The output at the stamps, at rest with the first value before the first stamp. With
-        ``h = dt/τ`` and ``a = exp(-h)``, a step goes from y0 to
-        ``a y0 + ((1-a)/h - a) u0 + (1 - (1-a)/h) u1``, which solves ``τ y' = u - y`` for u
-        linear in between.
+        Output at the stamps, settled at the first value before the first stamp. With ``h = dt/τ``
+        and ``a = exp(-h)``, a step goes from y0 to ``a y0 + ((1-a)/h - a) u0 + (1 - (1-a)/h) u1``,
+        the solution of ``τ y' = u - y`` for u linear in between.
     """
     if math.isinf(bandwidth):
         return values
@@ -48,15 +47,14 @@ def low_pass(time: Array, values: Array, bandwidth: float) -> Array:
 
 
 def mean_of_filtered(ends: Array, mean: Array, steps: Array, bandwidth: float) -> Array:
-    """Mean of the filter's output over each step, from the mean of its input.
+    """Mean of the filter output over each step, from the mean of its input.
 
     ``τ y' = u - y`` integrated over a step: ``mean(y) = mean(u) - τ (y1 - y0)/dt``.
 
     Parameters
     ----------
     ends : ndarray, (n, 3)
-        The output at the end of each step; before the first step it is at rest with the mean
-        over it.
+        Output at the end of each step; before the first step the filter is settled at its mean.
     mean : ndarray, (n, 3)
         Mean of the input over each step.
     steps : ndarray, (n,), s

@@ -1,4 +1,4 @@
-"""The stretch before a crash from which biases and attitude are taken."""
+"""Stretch before a crash that determines biases and attitude, and the prepared unit."""
 
 from __future__ import annotations
 
@@ -28,24 +28,25 @@ __all__ = ["BiasEstimate", "find_pre_crash_rest", "gyro_bias_from", "in_axes"]
 
 Array = NDArray[np.float64]
 
-# Parts of a stretch are compared by their means: long where the record is, short where it
-# starts a tenth of a second before the impact.
+# Block lengths for comparing means within a stretch: long for long records, short for records that
+# start a tenth of a second before the impact.
 LONG_BLOCK, SHORT_BLOCK = 0.5, 0.02  # s
 LEAST_IN_BLOCK = 5
 LEAST_STEADY = 0.04  # s
-# How far back a short stretch is looked for.
+# Search range for a short stretch.
 SHORT_REACH = 1.0  # s
-# Quiet is what stays within three times the quietest twentieth, as in `rest`.
+# Quiet means within three times the noise of the quietest twentieth, as in `rest`.
 QUIET_QUANTILE, QUIET_FACTOR = 0.05, 3.0
-# A sensor without noise (a simulation) is quiet where it is constant to rounding.
+# A noise-free (simulated) sensor is quiet where it is constant to rounding.
 ROUNDING_GYRO, ROUNDING_ACCEL = 1e-9, 1e-6  # rad/s, m/s²
-# Driving shakes a floor by more than this, and no standing car without an engine does.
+# Driving vibrates the floor by more than this; a stationary car without its engine does not.
 MAX_ACCEL_SD = 0.3  # m/s², of an axis, beyond the sensor's own noise
-# Means of parts of one rest agree to their noise and to this: people move in a car.
+# Means within one stationary stretch agree to their noise plus this: people move in a car.
 SAME_FORCE, SAME_FORCE_SIGMAS = 0.05, 5.0  # m/s², standard deviations
-# A vehicle that moves when it is struck did not stand this shortly before.
+# A vehicle that moves at the impact was not stationary this shortly before.
 LAST_STOP = 0.5  # s
-# Biases wander with warmth: a rest within this time before the impact comes first.
+# Biases drift with temperature, so a stationary stretch this shortly before the impact is
+# preferred.
 RECENT = 60.0  # s
 
 
@@ -57,35 +58,34 @@ def find_pre_crash_rest(
     accel_noise: float = 0.0,
     gyro_noise: float = 0.0,
 ) -> RestStretch | None:
-    """Find the stationary, else a steady, stretch before a crash.
+    """Find a stationary, or else a steady, stretch before a crash.
 
     Parameters
     ----------
     imu : DataFrame
         Imu table with acceleration of the lowest range.
     impact : float, s
-        Nothing after it is looked at.
+        Samples after it are not used.
     moving_at_impact : bool
-        A vehicle that moves when it is struck did not stand just before: what is quiet up to
-        the impact is then a coast, grade ``steady``. Say False for one that was struck
-        standing.
+        A vehicle that moves at the impact was not stationary just before: a quiet stretch up to the
+        impact is then coasting, grade ``steady``. False for a vehicle struck while stationary.
     accel_noise, gyro_noise : float, m/s² and rad/s
-        Stated standard deviation of a sample of an axis: no stretch can be quieter.
+        Stated standard deviation of a sample of an axis: a lower limit of the noise.
 
     Returns
     -------
     RestStretch or None
         Of grade ``still``: the longest that ended within a minute before the impact, else the
-        latest. Without any, ``steady``: no turning, a constant specific force, at least 40 ms;
-        constant velocity cannot be told from rest by an inertial sensor, nor can a constant
-        acceleration from a tilt. None where the record has neither.
+        latest. Otherwise ``steady``: no rotation and constant specific force for at least 40 ms. An
+        inertial sensor cannot distinguish constant velocity from rest, nor constant acceleration
+        from a tilt. None if the record has neither.
 
     Notes
     -----
-    The gyro finds the candidates (`sensors.rest.find_rests`). A gyro does not feel how a car
-    drives off: so each is cut where the mean specific force changes by more than 50 mm/s² and
-    five standard deviations, and where it is noisier than three times the quietest of the
-    record.
+    The gyro selects the candidates (`sensors.rest.find_rests`). Because a gyro does not sense a car
+    driving off, each candidate is divided where the mean specific force changes by more than 50
+    mm/s² and five standard deviations, and where it is noisier than three times the quietest part
+    of the record.
     """
     before = imu[imu.index.to_numpy(dtype=np.float64) < impact]
     if len(before) < LEAST_IN_BLOCK:
@@ -93,7 +93,7 @@ def find_pre_crash_rest(
     floors = (accel_noise, gyro_noise)
     stamps = before.index.to_numpy(dtype=np.float64)
     candidates = [(r.start, r.end) for r in find_rests(before[GYRO])]
-    # A fast gyro is noisier in each sample than any that `find_rests` takes for quiet.
+    # Sample noise of a fast gyro exceeds the limit that `find_rests` applies.
     if not candidates:
         candidates = [(float(stamps[0]), float(stamps[-1]))]
     spans = [
@@ -124,13 +124,13 @@ def _length(span: tuple[float, float]) -> float:
 def _parts(
     imu: pd.DataFrame, block: float, floors: tuple[float, float]
 ) -> list[tuple[float, float]]:
-    """First and last stamp of the parts that are quiet and feel one force."""
+    """First and last stamp of the parts that are quiet and have one mean specific force."""
     time = imu.index.to_numpy(dtype=np.float64)
     if time.size < 2 * LEAST_IN_BLOCK:
         return []
     accel, gyro = imu[ACCEL].to_numpy(dtype=np.float64), imu[GYRO].to_numpy(dtype=np.float64)
     size = max(LEAST_IN_BLOCK, round(block / float(np.median(np.diff(time)))))
-    # Whole blocks, the last one ending where the stretch does.
+    # Whole blocks; the last one ends with the stretch.
     starts = np.arange(time.size % size, time.size, size)
     if starts.size < 2:
         return []
@@ -139,7 +139,7 @@ def _parts(
     force_sd, rate_sd = force.std(axis=1), np.sqrt(rate.var(axis=1).sum(axis=1))
     limit = _threshold(force_sd, size - 1, size, floors[0], ROUNDING_ACCEL, MAX_ACCEL_SD)
     quiet = (force_sd <= limit).all(axis=1)
-    # Of three axes together.
+    # Of the three axes combined.
     stated = math.sqrt(3.0) * floors[1]
     degrees = 3 * (size - 1)
     quiet &= rate_sd <= _threshold(rate_sd, degrees, 3 * size, stated, ROUNDING_GYRO, MAX_GYRO_SD)
@@ -156,10 +156,10 @@ def _parts(
 def _threshold(
     sd: Array, degrees: int, values: int, stated: float, rounding: float, most: float
 ) -> Array:
-    """Per column: three times the quietest or the stated noise, no more than a cap above it."""
+    """Per column, three times the quietest or the stated noise, limited by a cap."""
     from scipy.stats import chi2
 
-    # The quietest of short blocks is quiet by chance: this is how much, for normal noise.
+    # The quietest of many short blocks is low by chance; this is the factor for normal noise.
     chance = math.sqrt(float(chi2.ppf(QUIET_QUANTILE, degrees)) / values)
     quietest = np.quantile(sd, QUIET_QUANTILE, axis=0) / chance
     cap = np.hypot(most, QUIET_FACTOR * stated)
@@ -168,7 +168,7 @@ def _threshold(
 
 
 def _groups(quiet: NDArray[np.bool_], means: Array, noise: Array) -> list[list[int]]:
-    """Neighbouring quiet blocks whose means agree with the mean of those before."""
+    """Consecutive quiet blocks whose means agree with the mean of the preceding ones."""
     groups: list[list[int]] = []
     total = np.zeros(3)
     for k in range(len(means)):
@@ -188,7 +188,7 @@ def _groups(quiet: NDArray[np.bool_], means: Array, noise: Array) -> list[list[i
 
 @dataclass(frozen=True)
 class BiasEstimate:
-    """Bias of a triad and how well it is known.
+    """Bias of a triad and its standard deviation.
 
     Attributes
     ----------
@@ -202,24 +202,24 @@ class BiasEstimate:
 def gyro_bias_from(
     rest: RestStretch | None, stated: tuple[float, float, float], *, steady_rate: float = 0.01
 ) -> BiasEstimate:
-    """Bias of a gyro from a stretch before the crash.
+    """Gyro bias from a stretch before the crash.
 
     Parameters
     ----------
     rest : RestStretch, optional
         In the axes of the gyro.
     stated : tuple of float, rad/s
-        Standard deviation of the bias before anything is known of it.
+        Prior standard deviation of the bias.
     steady_rate : float, rad/s
-        How fast a vehicle may turn over a ``steady`` stretch, standard deviation: 0.6 deg/s is
-        a bend of 1.5 km radius at 15 m/s.
+        Standard deviation of the vehicle's rate over a ``steady`` stretch: 0.6 deg/s is a bend of
+        1.5 km radius at 15 m/s.
 
     Returns
     -------
     BiasEstimate
-        Zero with the stated sd where there is no rest. At rest the mean, and the sd of the
-        mean; the rate of the Earth, up to 7.3e-5 rad/s in all, is part of it and of its sd.
-        Over a steady stretch the mean and the stated bias are weighed by their variances.
+        Without a stretch, zero with the stated sd. At rest, the mean and its sd; the Earth's rate,
+        up to 7.3e-5 rad/s, is part of the bias and is included in the sd. Over a steady stretch the
+        mean and the stated bias are weighted by their variances.
     """
     if rest is None:
         return BiasEstimate((0.0, 0.0, 0.0), stated)
@@ -237,14 +237,14 @@ def gyro_bias_from(
 
 
 def in_axes(rest: RestStretch, C: Array) -> RestStretch:
-    """The same stretch in other axes.
+    """Rotate a stretch into other axes.
 
     Parameters
     ----------
     rest : RestStretch
     C : ndarray, (3, 3)
-        Turns vectors into the other axes. Standard deviations are turned as if the axes'
-        noises were independent.
+        Rotates vectors into the other axes. Standard deviations are rotated as for independent
+        axes.
 
     Returns
     -------
@@ -268,25 +268,25 @@ def in_axes(rest: RestStretch, C: Array) -> RestStretch:
     )
 
 
-# A unit after preparation: common clock, vehicle axes, one range, biases taken off.
+# A unit after preparation: common clock, vehicle axes, one range, biases removed.
 
 
-# In `PreparedUnit.bias_from`: from gravity in the stated attitude.
+# In `PreparedUnit.bias_from`: bias from gravity in the stated attitude.
 FROM_GRAVITY = -1
 
 
 @dataclass(frozen=True)
 class Levelling:
-    """Roll and pitch of the vehicle at rest, and how they are known.
+    """Roll and pitch of the vehicle at rest, and their source.
 
     Attributes
     ----------
     roll_deg, pitch_deg : float, deg
     sd_deg : float, deg
-        Of each, without what a bias of the accelerometer does: noise of the mean and what the
-        user states. The bias's share is a contributor of its own, since it also acts later.
+        Standard deviation of each, from the noise of the mean and the user's statement, without
+        accelerometer bias. The bias is a separate contributor because it also acts later.
     from_rest : bool
-        Found from the accelerometers at rest (or at constant velocity); otherwise stated.
+        Determined from the accelerometers at rest (or at constant velocity); otherwise stated.
     """
 
     roll_deg: float
@@ -297,41 +297,41 @@ class Levelling:
 
 @dataclass(frozen=True, eq=False)
 class PreparedUnit:
-    """What a unit says after everything that is done before navigation.
+    """Data of a unit after all processing that precedes navigation.
 
     Attributes
     ----------
     unit : CrashUnit
         As recorded.
     imu : DataFrame
-        Imu table in vehicle axes, at the unit's own place, time from the common trigger in s;
-        biases that were found are taken off.
+        Imu table in vehicle axes, at the unit's own position, time from the common trigger in s;
+        estimated biases are removed.
     range_spoken : ndarray of int8, (n, 3)
-        Which of `unit.accelerometers` spoke, in each sensor axis.
+        Index in `unit.accelerometers` of the range used, for each sensor axis.
     clipped : ndarray of bool, (n, 3)
-        Whether even the one that spoke was at its end, in each sensor axis.
+        Whether even that range was saturated, for each sensor axis.
     gyro_clipped : ndarray of bool, (n, 3)
     noise : ndarray, (n, 3), m/s²
-        Standard deviation of each sample of the specific force, in sensor axes.
+        Standard deviation of each specific force sample, in sensor axes.
     gyro_noise : ndarray, (n, 3), rad/s
-        The same of the rates.
+        Standard deviation of each rate sample, likewise.
     rest : RestStretch or None
-        The stationary (or steady) stretch before the crash, as measured by the lowest range, in
-        vehicle axes, common clock.
+        Stationary (or steady) stretch before the crash, from the lowest range, in vehicle axes,
+        common clock.
     rest_accel_sd : float, m/s²
-        What is not known of the vehicle's own acceleration over it, each axis: zero at rest.
+        Standard deviation of the vehicle's own acceleration over it, per axis: zero at rest.
     levelling : Levelling
     gyro_bias_sd : triad, rad/s
-        Left after the rest; sensor axes of the unit that has the gyro.
+        Remaining after the stretch; sensor axes of the unit that has the gyro.
     bias_from : tuple of int or None
-        For every range, the range that its bias was taken from, `FROM_GRAVITY` where it was
-        taken from gravity in the stated attitude, None where its own is left.
+        For every range, the range that its bias was taken from; `FROM_GRAVITY` for gravity in the
+        stated attitude; None if its own bias was not removed.
     bias_sd : tuple of triad, m/s²
-        How well that difference is known (noise of the means), for every range.
+        Standard deviation of that difference (noise of the means), for every range.
     gravity_matched : bool
-        Whether a correction along the specific force at rest makes its length gravity's.
+        Whether the specific force at rest was corrected to the magnitude of gravity.
     gravity_correction : float, m/s²
-        That was added along the specific force at rest.
+        Correction added along the specific force at rest.
     findings : tuple of Finding
     """
 
@@ -354,12 +354,12 @@ class PreparedUnit:
 
     @property
     def noise_covariance(self) -> Array:
-        """Covariance of each sample of the specific force, vehicle axes, (n, 3, 3), (m/s²)²."""
+        """Covariance of each specific force sample, vehicle axes, (n, 3, 3), (m/s²)²."""
         return self._in_vehicle_axes(self.noise)
 
     @property
     def gyro_noise_covariance(self) -> Array:
-        """Covariance of each sample of the rates, vehicle axes, (n, 3, 3), (rad/s)²."""
+        """Covariance of each rate sample, vehicle axes, (n, 3, 3), (rad/s)²."""
         return self._in_vehicle_axes(self.gyro_noise)
 
     def _in_vehicle_axes(self, sd: Array) -> Array:

@@ -1,4 +1,4 @@
-"""One signal from sensors of several ranges."""
+"""Merging of accelerometer ranges into one signal, and their consistency."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ __all__ = [
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# After an end the filter before the sampler still holds what was cut off: e⁻⁵ = 0.7 % of it
-# after five of its time constants.
+# After saturation the filter before the sampler still contains the clipped part: e⁻⁵ = 0.7 % after
+# five of its time constants.
 MEMORY = 5.0
 
 
 @dataclass(frozen=True, eq=False)
 class MergedRanges:
-    """One triad made of several.
+    """One triad merged from several ranges.
 
     Attributes
     ----------
@@ -44,16 +44,16 @@ class MergedRanges:
     noise : ndarray, (n, 3), u
         Standard deviation of each sample.
     spoken : ndarray of int8, (n, 3)
-        Which range spoke; within a cross-fade the one with more weight.
+        Range used; within a cross-fade, the one with the larger weight.
     clipped : ndarray of bool, (n, 3)
-        Whether even the one that spoke was at its end.
+        Whether even that range was saturated.
     step : ndarray, (m - 1, 3), u
-        Mean difference of two neighbouring ranges at their switch-overs in each axis, what lies
-        above minus the lower; zero where the lower one always speaks.
+        Mean difference of neighboring ranges at their switch-overs in each axis, upper minus lower;
+        zero where the lower range is always used.
     step_sd : ndarray, (m - 1, 3), u
-        Of that, from the noise of both.
+        Standard deviation of that, from the noise of both.
     switches : ndarray of int, (m - 1, 3)
-        How often the lower one fell silent or spoke again.
+        Number of switch-overs between them.
     """
 
     values: Array
@@ -77,29 +77,29 @@ def merge_ranges(
     hysteresis: float = 0.1,
     fade: float = 0.0,
 ) -> MergedRanges:
-    """Let the lowest range speak while it is clear of its end, and the next beyond.
+    """Use the lowest range while it is clear of its end, and the next one beyond.
 
     Parameters
     ----------
     time : ndarray, (n,), s
     values : sequence of ndarray, (n, 3), u
-        As recorded, the lowest range first, all at the same stamps in the same axes.
+        As recorded, in order of increasing range, all at the same stamps in the same axes.
     limits : sequence of RangeLimits
-        As `saturation.find_limits` gives them.
+        From `saturation.find_limits`.
     noise : sequence of ndarray, (n, 3), u
         Standard deviation of each sample.
     bias : sequence of ndarray, (3,), u, optional
-        Taken off each range after it was judged, so that the ranges meet without a step.
+        Subtracted from each range after the saturation test, so that the ranges join without a
+        step.
     bandwidth : sequence of float, Hz, optional
-        Of the low-pass before each sampler.
+        Bandwidth of the low-pass before each sampler.
     margin : float
-        Part of the full scale: a range is left within this of its end.
+        Fraction of full scale from its end at which a range is left.
     hysteresis : float
-        Part of the full scale: it speaks again once it is this much further inside, so that
-        noise about the threshold does not make it chatter.
+        Fraction of full scale by which a range must be further inside before it is used again, so
+        that noise about the threshold does not cause repeated switching.
     fade : float, s
-        Length over which the weight goes from the one range to the other, on the side where
-        both are clear; zero for none.
+        Length of the cross-fade, on the side where both ranges are clear; zero for none.
 
     Returns
     -------
@@ -107,15 +107,15 @@ def merge_ranges(
 
     Notes
     -----
-    Each axis is on its own. The sample before an excursion is left to the higher range, too,
-    and so is what follows it, for one sample and for five time constants ``1 / (2 pi
-    bandwidth)``: a filter behind the element that was held at its end still gives out what was
-    cut. Within a cross-fade with weight w the variance is ``w² s_low² + (1 - w)² s_high²``.
+    Each axis is treated separately. The higher range is also used for the sample before an
+    excursion, and afterwards for one sample and for five time constants ``1 / (2 pi bandwidth)``,
+    because a filter behind the saturated element still outputs the clipped signal. Within a
+    cross-fade with weight w the variance is ``w² s_low² + (1 - w)² s_high²``.
 
     Raises
     ------
     DataError
-        A value is not a finite number, time does not advance, or shapes disagree.
+        A value is not finite, time does not increase, or shapes disagree.
     ConfigError
         Margins are not within [0, 1), or the fade is negative.
     """
@@ -130,7 +130,8 @@ def merge_ranges(
     step, step_sd = np.zeros((count - 1, 3)), np.zeros((count - 1, 3))
     switches = np.zeros((count - 1, 3), dtype=np.int64)
     for k in range(3):
-        # From the top down: what is merged so far speaks wherever the next lower may not.
+        # From the top down: the signal merged so far is used wherever the next lower range is not
+        # clear.
         top = count - 1
         y, s = values[top][:, k] - offsets[top][k], np.array(noise[top][:, k])
         who, cut = np.full(n, top, dtype=np.int8), limits[top].clipped[:, k].copy()
@@ -162,16 +163,16 @@ def _clear(
     hysteresis: float,
     memory: float,
 ) -> Mask:
-    """Where a range is clear of its end, with hysteresis, neighbours and the filter's memory."""
+    """Where a range is clear of its end, with hysteresis, neighbors and the filter's memory."""
     low, high = float(limits.lower[k]), float(limits.upper[k])
     if not (math.isfinite(low) or math.isfinite(high)):
         return np.ones(y.size, dtype=np.bool_)
-    # How far out, as part of the full scale of that side.
+    # Position in the range as a fraction of the full scale of that side.
     with np.errstate(invalid="ignore"):
         part = np.maximum(y / high, y / low)
     near = (part > 1.0 - margin) | limits.clipped[:, k]
     back = part <= 1.0 - margin - hysteresis
-    # Between the two thresholds the state stays what it was at the last sample outside them.
+    # Between the two thresholds the state is that of the last sample outside them.
     known = near | back
     last = np.maximum.accumulate(np.where(known, np.arange(y.size), -1))
     away = np.where(last >= 0, near[np.maximum(last, 0)], False)
@@ -188,7 +189,7 @@ def _clear(
 
 
 def _weight(time: Array, clear: Mask, fade: float) -> Array:
-    """Weight of the lower range: one where it is clear, falling towards a switch-over."""
+    """Weight of the lower range: one where it is clear, decreasing toward a switch-over."""
     if fade <= 0.0 or clear.all() or not clear.any():
         return clear.astype(np.float64)
     bad = time[~clear]
@@ -199,7 +200,7 @@ def _weight(time: Array, clear: Mask, fade: float) -> Array:
 
 
 def _step(clear: Mask, difference: Array, variance: Array) -> tuple[float, float, int]:
-    """Weighted mean difference at the switch-overs, its sd, and how many there are."""
+    """Weighted mean difference at the switch-overs, its sd, and their number."""
     change = np.diff(clear.astype(np.int8))
     rows = np.r_[np.flatnonzero(change == -1), np.flatnonzero(change == 1) + 1]
     if not rows.size:
@@ -249,22 +250,22 @@ def _check(
         raise ConfigError("sensors.no-length-cross-fade", quantity="fade", fade=fade)
 
 
-# Whether two ranges of one unit feel the same motion along the same axes.
+# Whether two ranges of one unit measure the same motion along the same axes.
 
 
-# Rows of the regression that are known worse than this say nothing.
+# Rows of the regression with a larger standard deviation are inconclusive.
 MOST_SD = 0.1
-# An element this far from the unit matrix is another axis or another sign, no scale factor.
+# A larger deviation from the unit matrix means swapped or inverted axes, not a scale factor.
 OTHER_AXIS = 0.5
 LEAST_SAMPLES = 20
-# An axis that moves by less than this part of what another does is told by the other's errors.
+# An axis that moves less than this fraction of another is dominated by errors of the other.
 LEAST_PART = 0.05
-# Scale factors make less of a difference than this.
+# Scale factors differ by less than this.
 NEAR_G = 0.15
 
 
 def regress_range(higher: Array, lower: Array) -> tuple[Array, Array]:
-    """Each axis of the higher range as a sum of the lower one's axes.
+    """Regress each axis of the higher range on the axes of the lower range.
 
     Parameters
     ----------
@@ -274,14 +275,14 @@ def regress_range(higher: Array, lower: Array) -> tuple[Array, Array]:
     Returns
     -------
     matrix : ndarray, (3, 3)
-        Least squares of ``higher = matrix lower + constant``; the identity where they agree.
+        Least-squares solution of ``higher = matrix lower + constant``; the identity if they agree.
     sd : ndarray, (3, 3)
-        From the residuals; infinite where the lower one did not vary.
+        From the residuals; infinite where the lower range did not vary.
     """
     x = lower - lower.mean(axis=0)
     y = higher - higher.mean(axis=0)
     normal = x.T @ x
-    # An axis that does not move has no word in it.
+    # An axis without motion carries no information.
     values, vectors = np.linalg.eigh(normal)
     seen = values > 1e-12 * max(float(values[-1]), 1e-300)
     inverse = (vectors[:, seen] / values[seen]) @ vectors[:, seen].T
@@ -289,7 +290,7 @@ def regress_range(higher: Array, lower: Array) -> tuple[Array, Array]:
     left = y - x @ matrix.T
     freedom = max(len(x) - 4, 1)
     variance = (left**2).sum(axis=0) / freedom
-    # Filters and steps make residuals that hang together: so many are independent.
+    # Filters and quantization correlate the residuals; this is the number of independent ones.
     hangs = _correlation(left)
     variance = variance * (1.0 + hangs) / (1.0 - hangs)
     sd = np.sqrt(np.maximum(variance, 1e-300)[:, None] * np.diag(inverse)[None, :])
@@ -310,7 +311,7 @@ def agreement_findings(
     limits: Sequence[RangeLimits],
     noise: Sequence[Array],
 ) -> list[Finding]:
-    """Ranges with swapped or inverted axes, or that are never both within their range.
+    """Find ranges with swapped or inverted axes, or that are never both unsaturated.
 
     Parameters
     ----------
@@ -322,8 +323,8 @@ def agreement_findings(
     Returns
     -------
     list of Finding
-        Empty where the motion does not tell: gravity alone cannot, since the higher range's
-        bias may be as large.
+        Empty if the motion is insufficient: gravity alone is, because the bias of the higher range
+        may be as large.
     """
     found: list[Finding] = []
     for j in range(1, len(limits)):
@@ -343,14 +344,14 @@ def agreement_findings(
             )
             continue
         upper, lower = data.accelerometers[j][clear], data.accelerometers[j - 1][clear]
-        # Noise in the lower range pulls the slope towards zero: only what moves well above it.
+        # Noise in the lower range biases the slope toward zero: use only motion well above it.
         swing = lower.std(axis=0)
         moved = swing > np.maximum(3.0 * np.median(noise[j - 1], axis=0), LEAST_PART * swing.max())
         matrix, sd = regress_range(upper, lower)
         for row, axis in enumerate("xyz"):
             told = (sd[row] < MOST_SD) & moved
             if low.absent:
-                # What moves along the axis that is not there leaks into the others.
+                # Motion along the absent axis leaks into the others.
                 told &= np.arange(3) == row
             wrong = told & (np.abs(matrix[row] - np.eye(3)[row]) > OTHER_AXIS)
             if not wrong.any():
@@ -380,33 +381,33 @@ def agreement_findings(
 
 
 def _in_g(ratio: float) -> bool:
-    """Whether a ratio of two accelerations is that of their units."""
+    """Whether the ratio of two accelerations equals that of g to m/s²."""
     size = max(ratio, 1.0 / ratio) if ratio > 0.0 else 1.0
     return abs(size / STANDARD_GRAVITY - 1.0) < NEAR_G
 
 
-# The bias of a high range from the range below it.
+# Bias of a high range from the range below it.
 
 
 HIGH_G_BIAS_LEAST_SAMPLES = 5
-# A converter whose input does not wander over a good part of a step does not average it out
-# (the error of the mean is below q/100 where the noise exceeds 0.7 q, and q/√12 without any).
+# If the input does not vary over a good part of a quantization step, averaging does not help (the
+# error of the mean is below q/100 for noise above 0.7 q, and q/√12 without noise).
 DITHERED = 0.5
 
 
 @dataclass(frozen=True)
 class RangeBias:
-    """Difference of two ranges that feel the same.
+    """Difference of two ranges with the same input.
 
     Attributes
     ----------
     bias : tuple of float, u
-        Of the higher range, relative to the lower.
+        Bias of the higher range relative to the lower.
     sd : tuple of float, u
-        Of that difference: noise of the mean, and the part of a step that no noise averages
-        out. The lower range's own bias is in the difference and not in this.
+        Standard deviation of that difference: noise of the mean, and quantization that noise does
+        not average out. The lower range's own bias is in the difference but not in this.
     samples : tuple of int
-        How many there were, per axis.
+        Number of samples per axis.
     """
 
     bias: tuple[float, float, float]
@@ -422,7 +423,7 @@ def bias_from_lower_range(
     *,
     quantization: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> RangeBias | None:
-    """Take the bias of a range from the next lower one.
+    """Estimate the bias of a range from the next lower one.
 
     Parameters
     ----------
@@ -432,19 +433,19 @@ def bias_from_lower_range(
     use : ndarray of bool, (n, 3)
         Samples at which the lower range is clear of its end and the vehicle is quiet.
     quantization : tuple of float, m/s²
-        Step of the higher range.
+        Quantization step of the higher range.
 
     Returns
     -------
     RangeBias or None
-        None where an axis has fewer than five samples to use.
+        None if an axis has fewer than five usable samples.
 
     Notes
     -----
-    Mean of ``higher - lower``: whatever the vehicle does cancels, but for the difference of the
-    two scale factors times the specific force over the stretch (at rest: gravity), which is
-    found as bias. So was the paper's bias of up to 11.91 m/s² found (Tadic and Vukajlovic 2016,
-    section 3), and it says as well that the low range's own, 0.2 m/s² there, stays.
+    Mean of ``higher - lower``. Vehicle motion cancels, except for the difference of the two scale
+    factors times the specific force over the stretch (gravity at rest), which appears as bias. The
+    paper's bias of up to 11.91 m/s² was found this way (Tadic and Vukajlovic 2016, section 3); the
+    low range's own bias, 0.2 m/s² there, remains.
     """
     bias, sd, samples = np.zeros(3), np.zeros(3), np.zeros(3, dtype=np.int64)
     for k in range(3):

@@ -1,4 +1,4 @@
-"""Two channels that should tell the same."""
+"""Comparison of two redundant channels."""
 
 from __future__ import annotations
 
@@ -15,35 +15,35 @@ __all__ = ["RedundantComparison", "compare_redundant"]
 
 Array = NDArray[np.float64]
 
-# Two good sensors side by side share what the structure does; above this each has the ringing
+# Two sound adjacent sensors share the structural motion; above this frequency each has the ringing
 # of its own mount.
 BANDWIDTH = 300.0  # Hz
 LEAST_CORRELATION = 0.98
-# Sensitivities are known to one or two per cent each, and a mount adds its cosine.
+# Sensitivities are known to 1 or 2 % each, and mounting adds its cosine.
 GAIN_ERROR = 0.05
 INTEGRAL_SHARE = 0.05
 
 
 @dataclass(frozen=True)
 class RedundantComparison:
-    """How two channels agree.
+    """Agreement of two channels.
 
     Attributes
     ----------
     correlation : float
         After a low-pass of 300 Hz on both.
     gain : float
-        Of the second on the first, by least squares.
+        Of the second relative to the first, by least squares.
     rms_share : float
-        Root mean square of the difference over that of the first.
+        Root mean square difference divided by that of the first.
     integral_difference : float
-        Greatest difference of the integrals, in the unit times s.
+        Largest difference of the integrals, in the unit times s.
     integral_share : float
-        The same over the greatest integral of the first.
+        The same divided by the largest integral of the first.
     apart_at : float, s, or None
-        From when on the integrals differ by more than allowed, to the end.
+        Time from which the integrals differ by more than allowed, to the end.
     findings : tuple of Finding
-        Empty where they agree.
+        Empty if they agree.
     """
 
     correlation: float
@@ -56,7 +56,7 @@ class RedundantComparison:
 
     @property
     def agree(self) -> bool:
-        """Whether nothing was found."""
+        """Whether the channels agree."""
         return not self.findings
 
 
@@ -72,35 +72,34 @@ def compare_redundant(
     gain_error: float = GAIN_ERROR,
     integral_share: float = INTEGRAL_SHARE,
 ) -> RedundantComparison:
-    """Compare two channels of one place and axis.
+    """Compare two channels at one point and along one axis.
 
     Parameters
     ----------
     a, b : array_like, (n,)
-        On the same stamps; where one ends early, both up to there.
+        On the same stamps; compared up to the end of the shorter.
     time : array_like, (n,), s
     names : pair of str
         For messages.
     rest_until : float, s, optional
-        Each one's mean before this is its zero; left out, they are taken as they are.
+        End of the time whose mean is each channel's zero; if not given, no zero is subtracted.
     bandwidth : float, Hz
-        Of the low-pass before they are compared.
+        Low-pass applied before the comparison.
     correlation, gain_error, integral_share : float
-        What is allowed: the least correlation, the greatest error of the gain, and of the
-        integral as a share of its greatest size.
+        Limits: the smallest correlation, the largest gain error, and the largest integral error as
+        a fraction of the largest integral.
 
     Returns
     -------
     RedundantComparison
-        Which of the two is wrong cannot be told from two alone; a third, or `channel_health`,
-        can.
+        Two channels alone do not show which one is faulty; a third, or `channel_health`, can.
 
     Raises
     ------
     DataError
-        The shapes disagree, a value is not finite, or the first does not move at all.
+        The shapes disagree, a value is not finite, or the first channel is constant.
     ConfigError
-        The bandwidth is none.
+        The bandwidth is invalid.
     """
     t, first, second = (np.asarray(x, dtype=np.float64) for x in (time, a, b))
     label = f"{names[0]} and {names[1]}"
@@ -170,7 +169,7 @@ def compare_redundant(
 
 
 def _apart_for_good(time: Array, apart: Array, limit: float) -> float | None:
-    """Beginning of the last stretch over the limit, if it goes on to the end."""
+    """Start of the last stretch over the limit, if it continues to the end."""
     within = np.flatnonzero(apart <= limit)
     if not within.size:
         return float(time[0])

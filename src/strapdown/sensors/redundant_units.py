@@ -1,4 +1,4 @@
-"""Two or more inertial units on one body: mutual testing, voting, and one table of all."""
+"""Voting of two or more inertial units on one body, fused into one table."""
 
 from __future__ import annotations
 
@@ -44,17 +44,17 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class VotedImu:
-    """What the healthy channels of all units tell.
+    """Fused measurements of the healthy channels of all units.
 
     Attributes
     ----------
     imu : DataFrame
         Imu table in body axes.
     used : DataFrame of bool
-        A row a sample, a column a channel (``A.gyro_x``).
+        One row per sample, one column per channel (``A.gyro_x``).
     events : tuple of VoteEvent
     noise_density : DataFrame
-        Of the fused channels at each sample, in u/√Hz: it grows where a channel is left out.
+        Of the fused channels at each sample, in u/√Hz; it increases where a channel is excluded.
     """
 
     imu: pd.DataFrame
@@ -64,13 +64,13 @@ class VotedImu:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """One for each event."""
+        """One finding per event."""
         return tuple(e.finding for e in self.events)
 
 
 @dataclass(frozen=True, eq=False)
 class UnitVotingState:
-    """Where a vote of units stands."""
+    """State of a vote of units."""
 
     gyro: VotingState
     accel: VotingState
@@ -79,28 +79,28 @@ class UnitVotingState:
 
 @dataclass(frozen=True, eq=False)
 class UnitVoting:
-    """Units that vote.
+    """Voting over several units.
 
     Attributes
     ----------
     units : sequence of MountedUnit
-        Two show that they disagree; three show which channel, or which unit, has failed.
+        Two units detect a disagreement; three identify the failed channel or unit.
     rate : float, Hz
     rule : VotingRule
 
     Raises
     ------
     ConfigError
-        There are fewer than two, or two have one name.
+        Fewer than two units are given, or two have the same name.
 
     Notes
     -----
-    Gyros and accelerometers are voted on apart (`AxisVoting`). Where axes of units are parallel,
-    and only two measure along a direction, a disagreement along it is told, and which of the two
-    is wrong is not: both go on being used. Units that are skewed against each other tell more with
-    fewer. Lever arms are not corrected: accelerometers that are r apart differ by up to
-    ``r (ω² + |dω/dt|)``, which `VotingRule.apart` allows for as to ω²; move readings to one point
-    before (`sensors.lever_arm`) where that is more than their uncertainty.
+    Gyros and accelerometers are voted on separately (`AxisVoting`). Where axes of units are
+    parallel and only two measure along a direction, a disagreement along it is reported without
+    identifying the faulty one, and both remain in use. Units skewed relative to each other allow
+    identification with fewer axes. Lever arms are not corrected: accelerometers a distance r apart
+    differ by up to ``r (ω² + |dω/dt|)``, of which `VotingRule.apart` allows for the ω² part. Where
+    that exceeds their uncertainty, move the readings to one point first (`sensors.lever_arm`).
     """
 
     units: Sequence[MountedUnit]
@@ -126,20 +126,20 @@ class UnitVoting:
             object.__setattr__(self, name, voting)
 
     def begin(self) -> UnitVotingState:
-        """Stand before the first sample."""
+        """Return the state before the first sample."""
         return UnitVotingState(self.gyro.begin(), self.accel.begin())
 
     def advance(
         self, state: UnitVotingState, tables: Mapping[str, pd.DataFrame]
     ) -> tuple[UnitVotingState, VotedImu]:
-        """Vote over a segment; a log cut anywhere gives the same numbers.
+        """Vote over a chunk; the results do not depend on how the log is divided.
 
         Parameters
         ----------
         state : UnitVotingState
         tables : mapping of str to DataFrame
-            By name of the unit: Imu tables in the unit's own axes, with the same stamps; a value
-            may be NaN, and is left out there.
+            Imu tables by unit name, in the unit's own axes, with the same stamps; NaN values are
+            ignored.
 
         Returns
         -------
@@ -148,8 +148,8 @@ class UnitVoting:
         Raises
         ------
         DataError
-            A table or a column is missing, stamps differ or do not advance, or too few healthy
-            channels are left.
+            A table or a column is missing, stamps differ or do not increase, or too few channels
+            are healthy.
         """
         time, gyro, accel, sampling = self._readings(state, tables)
         turned = np.stack(
@@ -158,13 +158,13 @@ class UnitVoting:
                 for k, u in enumerate(self.units)
             ]
         )
-        # The middle one, so that a unit that fails does not loosen the test of the gyros; zero
-        # where none has a reading.
+        # The median, so that a failed unit does not loosen the test of the gyros; zero where no
+        # unit has a reading.
         force = np.nan_to_num(known_median(turned, 0))
         gyro_state, rates = self.gyro.advance(state.gyro, gyro, force)
         accel_state, forces = self.accel.advance(state.accel, accel, rates.values)
         names = [u.name for u in self.units]
-        # Not `imu_table`: a segment may be one sample, and the values are finite.
+        # Not `imu_table`: a chunk may be one sample, and the values are finite.
         imu = pd.DataFrame(
             np.hstack([rates.values, forces.values]),
             index=pd.Index(time, name="time"),
@@ -197,13 +197,13 @@ class UnitVoting:
         )
 
     def uncertainty(self) -> ImuUncertainty:
-        """What is not known of the fused table while all channels are healthy.
+        """Uncertainty of the fused table while all channels are healthy.
 
         Returns
         -------
         ImuUncertainty
-            Noise, bias, drift; scale factor and misalignment as of a mean of independent units.
-            Range, quantization and bandwidth have no place in a mean, and are left open.
+            Noise, bias, drift, and scale factor and misalignment of the mean of independent units.
+            Range, quantization and bandwidth are not defined for a mean and are omitted.
         """
         return ImuUncertainty(
             fused_uncertainty(self.gyro),
@@ -251,7 +251,7 @@ class UnitVoting:
             accel.append(values_of(table, ACCEL))
         if len(samplings) > 1:
             raise DataError("sensors.some-units-give-instantaneous-values", quantity="sampling")
-        assert time is not None  # two units at least
+        assert time is not None  # at least two units
         return time, np.hstack(gyro), np.hstack(accel), samplings.pop()
 
 
@@ -266,7 +266,7 @@ def vote_units(
     ----------
     units : sequence of MountedUnit
     tables : mapping of str to DataFrame
-        As of `UnitVoting.advance`; the rate is the mean one of the first.
+        As in `UnitVoting.advance`; the rate is the mean rate of the first.
     rule : VotingRule, optional
 
     Returns
@@ -287,30 +287,30 @@ def vote_units(
     return voting.advance(voting.begin(), tables)[1]
 
 
-# One of several inertial units on a body: its errors, and how it is turned in the body.
+# One of several inertial units on a body: its errors and its orientation.
 
 
-# Of a mounting: how far it may be from a rotation.
+# Tolerance for a mounting matrix to be a rotation.
 ROTATION = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class MountedUnit:
-    """What is known of a unit before it is switched on.
+    """A unit's stated errors and mounting.
 
     Attributes
     ----------
     name : str
     uncertainty : ImuUncertainty
-        Its noise, bias, scale factor and so on, of its own axes; the misalignment with that of its
+        Noise, bias, scale factor and so on, in its own axes; the misalignment includes that of its
         mounting.
     mounting : array_like, (3, 3)
-        ``C``, with which a vector in the unit's axes becomes one in body axes, ``C v``.
+        ``C``, which rotates a vector v from the unit's axes to body axes, ``C v``.
 
     Raises
     ------
     ConfigError
-        The mounting is no rotation.
+        The mounting is not a rotation.
     """
 
     name: str
@@ -325,22 +325,22 @@ class MountedUnit:
         object.__setattr__(self, "mounting", c)
 
 
-# What a vote of units decided, in words.
+# Events of a vote of units, with their findings.
 
 
 @dataclass(frozen=True)
 class VoteEvent:
-    """Something that the vote decided.
+    """A decision of the vote.
 
     Attributes
     ----------
     kind : {'excluded', 'readmitted', 'disagree'}
     channels : tuple of str
-        As ``A.gyro_x``; of a disagreement the most likely.
+        Such as ``A.gyro_x``; for a disagreement, the most likely ones.
     time, since : float, s
-        When it was decided, and from when on the disagreement has lasted.
+        Time of the decision, and start of the disagreement.
     size : float, rad/s or m/s²
-        How far the first channel is off what the others tell.
+        Deviation of the first channel from the others.
     chi_square, limit : float
     finding : Finding
     """
@@ -358,7 +358,7 @@ class VoteEvent:
 def told_events(
     vote: AxisVote, time: Array, columns: Sequence[str], unit: str, before: int
 ) -> list[VoteEvent]:
-    """Events of a vote in words; `before` samples went before the segment."""
+    """Convert the events of a vote to findings; `before` samples preceded the chunk."""
     return [_event(e, time, columns, unit, before) for e in vote.events]
 
 
@@ -399,19 +399,19 @@ def _words(channel: str) -> str:
     return f"{WORDS[column]} of unit {name}"
 
 
-# What is not known of the vector that redundant axes tell together.
+# Uncertainty of the vector fused from redundant axes.
 
 Mask = NDArray[np.bool_]
 
 
 def fused_noise(voting: AxisVoting, used: Mask) -> Array:
-    """Noise density of the fused axes at each sample.
+    """Noise density of the fused vector at each sample.
 
     Parameters
     ----------
     voting : AxisVoting
     used : ndarray of bool, (n, m)
-        Axes that the vector is made of.
+        Axes included in the vector.
 
     Returns
     -------
@@ -442,5 +442,5 @@ def fused_drift(voting: AxisVoting) -> BiasDrift:
     """Drift of the bias of the vector of all axes."""
     e, everything = voting.errors, np.ones(len(voting.errors.bias), dtype=bool)
     x, y, z = np.sqrt(np.diagonal(voting.covariance(everything, e.drift**2))).tolist()
-    # The shortest: what the slower ones do is allowed for too early.
+    # The shortest time, which allows for the slower drifts too early.
     return BiasDrift((x, y, z), float(e.correlation_time.min()))

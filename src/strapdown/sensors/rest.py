@@ -1,4 +1,4 @@
-"""Stretches of a log in which the sensor did not turn."""
+"""Stationary stretches of a log, and the gyro bias from them."""
 
 from __future__ import annotations
 
@@ -26,31 +26,31 @@ __all__ = [
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-# A window is judged as a whole: long enough for a standard deviation that means something,
-# short enough that a pause of a second shows.
+# Window length: long enough for a meaningful standard deviation, short enough to detect a pause of
+# a second.
 WINDOW = 0.5  # s
 LEAST_SAMPLES = 5
 LEAST_LENGTH = 1.0  # s
-# The quietest twentieth of the windows sets the noise of this sensor; rest is what stays
+# The quietest twentieth of the windows defines the noise of this sensor; the sensor is stationary
 # within three times that.
 QUIET_QUANTILE = 0.05
 QUIET_FACTOR = 3.0
-# What no consumer sensor exceeds at rest, and every hand does: so that a log that is never at
-# rest does not have its least busy moment taken for one.
+# Consumer sensors at rest stay below this and every hand exceeds it, so that the quietest moment of
+# a log in continuous motion is not taken for rest.
 MAX_GYRO_SD = 0.03  # rad/s, of the three axes together
 MAX_ACCEL_SD = 0.3  # m/s²
-# The zero-rate output of a cheap gyro may be 20 deg/s off (MPU-6050 data sheet, revision 3.4,
+# The zero-rate output of a low-cost gyro may be off by 20 deg/s (MPU-6050 data sheet, revision 3.4,
 # section 6.1).
 MAX_MEAN_RATE = 0.36  # rad/s
 SAME_BIAS = 0.01  # rad/s: rests of one log share their bias to within this
-# A sensor without noise (a simulation) is at rest where it reads a constant, to rounding.
+# A noise-free (simulated) sensor is at rest where it is constant to rounding.
 ROUNDING = 1e-9  # rad/s
-# Parts of a rest whose means tell how well the mean of the whole is known.
+# Number of parts of a rest whose means give the standard deviation of the overall mean.
 LEAST_PARTS, MOST_PARTS = 4, 20
 
 
 def find_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
-    """Find the stationary stretches of a log, from its own noise.
+    """Find the stationary stretches of a log from its own noise.
 
     Parameters
     ----------
@@ -60,9 +60,9 @@ def find_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
     Returns
     -------
     tuple of RestStretch
-        In order of time, each at least 1 s long. A slow turn at a constant rate about the
-        vertical cannot be told from a bias by a single stretch; it is refused here only where
-        another stretch of the log shows a bias that differs by more than 0.01 rad/s.
+        In order of time, each at least 1 s long. A single stretch does not distinguish a slow
+        rotation at a constant rate about the vertical from a bias. It is rejected only if another
+        stretch of the log has a bias that differs by more than 0.01 rad/s.
     """
     time = imu.index.to_numpy(dtype=np.float64)
     gyro = imu[GYRO].to_numpy(dtype=np.float64)
@@ -88,7 +88,7 @@ def _windows(time: Array) -> tuple[Indices, Indices]:
     """First and one-past-last sample of windows that overlap by half."""
     first: list[Indices] = [np.empty(0, dtype=np.int64)]
     past: list[Indices] = [np.empty(0, dtype=np.int64)]
-    # Piece by piece: a grid across a clock that was set would have no end.
+    # Segment by segment, because a grid across a clock reset could be arbitrarily long.
     holes = np.flatnonzero(np.diff(time) > LEAST_LENGTH) + 1
     for piece in np.split(np.arange(time.size), holes):
         end = time[piece[-1]]
@@ -108,15 +108,15 @@ def _window_mean(values: Array, starts: Indices, ends: Indices) -> Array:
 def _window_sd(values: Array, starts: Indices, ends: Indices) -> Array:
     """Root of the summed variances of the axes, per window.
 
-    Window by window, and not by running sums, whose rounding would look like noise in a
-    record that has none.
+    Computed per window rather than by running sums, whose rounding would appear as noise in a
+    noise-free record.
     """
     variances = [values[a:b].var(axis=0).sum() for a, b in zip(starts, ends, strict=True)]
     return np.asarray(np.sqrt(variances), dtype=np.float64)
 
 
 def _runs(still: NDArray[np.bool_], joined: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and last window of each run of still windows, no hole of a second between them."""
+    """First and last window of each run of quiet windows, without gaps of a second."""
     runs: list[tuple[int, int]] = []
     for k in np.flatnonzero(still).tolist():
         if runs and runs[-1][1] == k - 1 and joined[k - 1]:
@@ -129,27 +129,27 @@ def _runs(still: NDArray[np.bool_], joined: NDArray[np.bool_]) -> list[tuple[int
 def rest_between(
     imu: pd.DataFrame, start: float, end: float, *, grade: str = "stated"
 ) -> RestStretch:
-    """Take a stretch of a log for a rest, whatever it looks like.
+    """Make a rest from a given stretch of a log, without testing it.
 
     Parameters
     ----------
     imu : DataFrame
         An Imu table.
     start, end : float, s
-        The samples from the one to the other, both included.
+        First and last stamp, both included.
     grade : str, optional
-        What to call it.
+        Grade assigned to it.
 
     Returns
     -------
     RestStretch
-        Its ``*_mean_sd`` tell how far the means can be trusted: a hand that holds the sensor
-        shows there.
+        Its ``*_mean_sd`` are the standard deviations of the means: they show a hand that holds the
+        sensor.
 
     Raises
     ------
     DataError
-        There are fewer than five samples in it.
+        The stretch has fewer than five samples.
     """
     time = imu.index.to_numpy(dtype=np.float64)
     a, b = int(np.searchsorted(time, start)), int(np.searchsorted(time, end, side="right"))
@@ -169,7 +169,7 @@ def rest_between(
 
 
 def sd_of_mean(time: Array, values: Array) -> Array:
-    """How well the mean of a stretch is known.
+    """Standard deviation of the mean of a stretch.
 
     Parameters
     ----------
@@ -179,10 +179,10 @@ def sd_of_mean(time: Array, values: Array) -> Array:
     Returns
     -------
     ndarray, (k,)
-        The larger of ``sd / sqrt(n)``, which is right for white noise, and the same from the
-        means of 4 to 20 parts of at least half a second, which is right for noise that is
-        correlated over less than a part (batch means; Law and Kelton 1984,
-        doi:10.1287/opre.32.6.1241). A stretch of less than 2 s has the first only.
+        The larger of ``sd / sqrt(n)``, valid for white noise, and the estimate from the means of 4
+        to 20 parts of at least half a second, valid for noise correlated over less than a part
+        (batch means; Law and Kelton 1984, doi:10.1287/opre.32.6.1241). A stretch of less than 2 s
+        has only the first.
     """
     white = values.std(axis=0, ddof=1) / np.sqrt(len(values))
     parts = min(MOST_PARTS, int((time[-1] - time[0]) / WINDOW))
@@ -210,7 +210,7 @@ def _stretch(time: Array, gyro: Array, accel: Array | None, a: int, b: int) -> R
 
 
 def of_one_bias(rests: list[RestStretch]) -> tuple[RestStretch, ...]:
-    """Rests whose bias is like the least of them: a steady slow turn is no rest."""
+    """Select rests whose bias agrees with the smallest; a steady slow rotation is not a rest."""
     if not rests:
         return ()
     least = min(rests, key=lambda r: float(np.linalg.norm(r.gyro_mean)))
@@ -219,26 +219,26 @@ def of_one_bias(rests: list[RestStretch]) -> tuple[RestStretch, ...]:
     )
 
 
-# Rests that are shaken: a parked car with people in it, a sensor on a running machine.
+# Stationary but vibrating: a parked car with people in it, a sensor on a running machine.
 
 
-# What shakes about one attitude has means over half a second that stay; what drives does not.
-# In a car of 2 to 14 m/s on streets and in one on a motorway, no window of 4 s had means that
-# scatter by less than 0.33 deg/s and 0.084 m/s² (both axes' worth together); parked with people
+# Vibration about one attitude leaves half-second means constant; driving does not. In a car at 2 to
+# 14 m/s on streets and in one on a motorway, no window of 4 s had means that scatter by less than
+# 0.33 deg/s and 0.084 m/s² (root of the summed variances of the axes). In a parked car with people
 # getting in and doors slammed they scatter by 0.03 to 0.19 deg/s and 0.004 to 0.061 m/s².
 SHAKING_REST_WINDOW = 4.0  # s
 BLOCKS = 8
 STEP = 1.0  # s
 MAX_GYRO_SCATTER = 0.0044  # rad/s, 0.25 deg/s: root of the summed variances of the block means
 MAX_ACCEL_SCATTER = 0.065  # m/s²
-# A hand or a foot exceeds these whatever its means do, and so does a vibrating motor mount.
+# A hand or a foot exceeds these regardless of its means, and so does a vibrating motor mount.
 SHAKING_REST_MAX_GYRO_SD = 0.1  # rad/s
 SHAKING_REST_MAX_ACCEL_SD = 1.0  # m/s²
 NEAR_GRAVITY = (0.8 * 9.81, 1.2 * 9.81)  # m/s²
 
 
 def find_shaking_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
-    """Find stretches that shake about one attitude, from what is slow in the signals.
+    """Find stretches that vibrate about one attitude, from the slow part of the signals.
 
     Parameters
     ----------
@@ -248,16 +248,16 @@ def find_shaking_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
     Returns
     -------
     tuple of RestStretch
-        In order of time, each at least 4 s long, of grade ``shaking``; those that
-        `sensors.rest.find_rests` finds are found again where they last so long. Empty without
-        an accelerometer: a gyro alone cannot tell a parked car from a straight road.
+        In order of time, each at least 4 s long, of grade ``shaking``. They include those that
+        `sensors.rest.find_rests` finds, if long enough. Empty without an accelerometer, because a
+        gyro alone does not distinguish a parked car from a straight road.
 
     Notes
     -----
-    A window of 4 s is cut into eight parts. It is a rest where the means of the parts of the
-    gyro stay within 0.25 deg/s, and those of the specific force within 65 mm/s². Motion at a
-    constant velocity on a perfect road is the same to every inertial sensor: this is why the
-    limits are what roads do not keep, and why the grade says so.
+    A window of 4 s is divided into eight parts. It is a rest where the means of the parts stay
+    within 0.25 deg/s for the gyro and 65 mm/s² for the specific force. Constant velocity on a
+    perfectly smooth road is indistinguishable for an inertial sensor. The limits are therefore set
+    below the scatter on real roads, and the grade marks the remaining risk.
     """
     if not set(ACCEL) <= set(imu.columns):
         return ()
@@ -299,7 +299,7 @@ def _shakes_in_place(time: Array, values: Array, start: float) -> bool:
 
 
 def find_rests_of_every_grade(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
-    """Find the still rests of a log, and between them those that shake.
+    """Find the ``still`` rests of a log, and between them those with vibration.
 
     Parameters
     ----------
@@ -309,9 +309,9 @@ def find_rests_of_every_grade(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
     Returns
     -------
     tuple of RestStretch
-        In order of time, none overlapping another. A shaking rest that meets a still one is
-        one rest: it reaches as far as both do, and is of grade ``shaking``, where it is longer
-        by more than a window on either side; else the still one stands as it is.
+        In order of time, without overlaps. A shaking rest that touches a still one is merged with
+        it into one rest over both, of grade ``shaking``, if it is longer by more than a window on
+        either side; otherwise the still one is unchanged.
     """
     still = list(find_rests(imu))
     found: list[RestStretch] = []
@@ -339,34 +339,33 @@ def _apart(rests: list[RestStretch], imu: pd.DataFrame) -> tuple[RestStretch, ..
     return tuple(apart)
 
 
-# The bias of a gyro over a log, from its rests.
+# Gyro bias over a log, from its rests.
 
 
-# A simulation without noise knows its means to rounding.
+# In a noise-free simulation the means are exact to rounding.
 LEAST_SD = 1e-12  # rad/s
 
 
 def gyro_bias_from_rests(rests: Sequence[RestStretch]) -> GyroBiasCourse:
-    """Estimate the bias of a gyro, and how it drifts, from the rests of a log.
+    """Estimate the bias of a gyro, and its drift, from the rests of a log.
 
     Parameters
     ----------
     rests : sequence of RestStretch
-        At least one, in order of time. The rate of the Earth is part of what is found: up to
-        15 deg/h, and not the same in two poses.
+        At least one, in order of time. The estimate includes the Earth's rate: up to 15 deg/h, and
+        different in different attitudes.
 
     Returns
     -------
     GyroBiasCourse
         A weighted average, a straight line by least squares, and the rests themselves, between
-        which `gyro_bias_at` interpolates. Where the rests scatter by more than their own sd,
-        the sd of average and slope are widened by the ratio (Birge 1932,
-        doi:10.1103/PhysRev.40.207).
+        which `gyro_bias_at` interpolates. Where the rests scatter by more than their own sd, the sd
+        of average and slope are scaled by the ratio (Birge 1932, doi:10.1103/PhysRev.40.207).
 
     Raises
     ------
     DataError
-        There is no rest, or they are not in order of time.
+        The rests are empty or not in order of time.
     """
     if not rests:
         raise DataError("sensors.no-stationary-stretch-found-take", quantity="gyro bias")
@@ -399,7 +398,7 @@ def gyro_bias_from_rests(rests: Sequence[RestStretch]) -> GyroBiasCourse:
 
 
 def _mean_sd(rest: RestStretch) -> tuple[float, float, float]:
-    # A rest that was made by hand may carry no sd of its mean; that of its samples is wider.
+    # A rest made directly may have no sd of its mean; that of its samples is larger.
     return rest.gyro_sd if rest.gyro_mean_sd is None else rest.gyro_mean_sd
 
 
@@ -425,7 +424,7 @@ def _triples(rows: ArrayLike) -> tuple[tuple[float, float, float], ...]:
 
 
 def gyro_bias_at(course: GyroBiasCourse, time: ArrayLike) -> Array:
-    """Bias at any instants.
+    """Gyro bias at given instants.
 
     Parameters
     ----------
@@ -435,20 +434,19 @@ def gyro_bias_at(course: GyroBiasCourse, time: ArrayLike) -> Array:
     Returns
     -------
     ndarray, (n, 3), rad/s
-        On straight lines between the middles of the rests; that of the first rest before it,
-        and that of the last after it.
+        Linear between the midpoints of the rests; constant before the first and after the last.
     """
     at, mean = np.asarray(time, dtype=np.float64), np.array(course.mean)
     return np.column_stack([np.interp(at, course.time, mean[:, k]) for k in range(3)])
 
 
 def without_gyro_bias(imu: pd.DataFrame, course: GyroBiasCourse) -> pd.DataFrame:
-    """Take the bias off the rates of a log.
+    """Subtract the bias from the rates of a log.
 
     Parameters
     ----------
     imu : DataFrame
-        An Imu table; it is not changed.
+        An Imu table; not changed.
     course : GyroBiasCourse
 
     Returns

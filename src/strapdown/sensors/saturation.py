@@ -1,4 +1,4 @@
-"""Where a sensor is at the end of its range, also where that is not where its data sheet says."""
+"""Saturation of a sensor, also at range limits that differ from the data sheet."""
 
 from __future__ import annotations
 
@@ -13,39 +13,39 @@ Mask = NDArray[np.bool_]
 
 __all__ = ["RangeLimits", "find_limits"]
 
-# A crash holds a sensor at its end for tens of milliseconds; what is flat for longer is a rest.
+# A crash saturates a sensor for tens of milliseconds; a longer flat stretch is a rest.
 LONGEST_FLAT = 0.5  # s
 LEAST_FLAT = 3  # samples
-# The top of a smooth pulse in coarse steps is flat, too, but is left by one step.
+# The top of a smooth pulse with coarse quantization is also flat, but is left by one step.
 LEAST_JUMP = 3.0  # steps
-# Readings that scatter over several steps repeat one now and then: the jump must also stand out of
-# the scatter from sample to sample, that of the middle of all.
+# Readings that scatter over several steps sometimes repeat, so the jump must also exceed the median
+# sample-to-sample scatter.
 LEAST_STANDING_OUT = 5.0
-# So many cannot be where a fast rise meets a slow fall, unless there is no noise at all.
+# This many repeats cannot occur between a fast rise and a slow fall, except without any noise.
 SURE_FLAT = 10
-# A flat extreme below this part of the stated range, or of the largest reading, is an end only
-# where it is surely flat, left by jumps on both sides, and this many steps off the usual value:
-# a rest between two pulses is flat, too.
+# A flat extreme below this fraction of the stated range, or of the largest reading, is an end only
+# if it is long, left by jumps on both sides, and this many steps off the median, because a rest
+# between two pulses is also flat.
 LEAST_PART = 0.1
 OFF_REST = 10.0
-# Of a full scale: what is nearer to it than this, or than a step, is at it.
+# Values within this fraction of full scale, or within a step, are at full scale.
 ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class RangeLimits:
-    """Ends of the range of a triad, and who stood there.
+    """Ends of the range of a triad, and the samples there.
 
     Attributes
     ----------
     lower, upper : ndarray, (3,)
-        Ends of the range, as stated or as found, in the unit of the values.
+        Ends of the range, as stated or as detected, in the unit of the values.
     clipped : ndarray of bool, (n, 3)
         Samples at either end.
     found : ndarray of bool, (3,)
-        Axes with an end that was found within the stated range.
+        Axes with an end detected within the stated range.
     beyond : ndarray of bool, (3,)
-        Axes that read more than their stated full scale.
+        Axes with readings beyond their stated full scale.
     """
 
     lower: Array
@@ -64,21 +64,21 @@ def find_limits(
     *,
     longest_flat: float = LONGEST_FLAT,
 ) -> RangeLimits:
-    """Find the ends of a triad's range and the samples that stand there.
+    """Find the ends of a triad's range and the saturated samples.
 
     Parameters
     ----------
     time : ndarray, (n,), s
     values : ndarray, (n, k)
-        Any axes, usually three, as recorded: saturation happens before any bias is taken off.
+        Any axes, usually three, as recorded: saturation occurs before any bias is removed.
     full_scale : ndarray, (3,)
         As stated; may be infinite.
     quantization : ndarray, (3,)
-        Step of the output; zero where there is none.
+        Quantization step; zero if unknown.
     held : ndarray of bool, (n, k), optional
-        Samples in which others count that stood at an end: a low-pass swings beyond it there.
+        Samples that include saturated ones; there the low-pass can overshoot the end.
     longest_flat : float, s
-        For how long a flat extreme may last.
+        Longest duration of a flat extreme.
 
     Returns
     -------
@@ -86,12 +86,12 @@ def find_limits(
 
     Notes
     -----
-    A sample is clipped where it is within a step of the stated full scale. Besides, an axis has
-    an end where it stays on the very same extreme value of the record for three samples or
-    more, up to `longest_flat`, and jumps by three steps or more on both sides (ten samples or more:
-    on one side): the top of a smooth pulse is left by fewer steps. Fewer than ten must also jump by
-    five times the scatter, for noise in steps repeats a number. Below a tenth of the range,
-    or of the largest reading, it needs ten samples and jumps on both sides.
+    A sample is clipped within a step of the stated full scale. In addition, an axis has an end
+    where it repeats the extreme value of the record for three or more samples, up to
+    `longest_flat`, and jumps by three or more steps on both sides (ten or more samples: on one
+    side); the top of a smooth pulse is left by fewer steps. With fewer than ten samples the jump
+    must also be five times the scatter, because quantized noise repeats values. Below a tenth of
+    the range, or of the largest reading, ten samples and jumps on both sides are required.
     """
     lower, upper = -np.asarray(full_scale, dtype=np.float64), np.array(full_scale, dtype=np.float64)
     axes = values.shape[1]
@@ -119,14 +119,14 @@ def find_limits(
 
 
 def _flat_extreme(time: Array, y: Array, full: float, longest: float) -> Mask | None:
-    """Samples on the largest value, where it looks like an end of the range."""
+    """Samples at the largest value, if it appears to be an end of the range."""
     if y.size < LEAST_FLAT:
         return None
     top = float(y.max())
     at = y == top
     edges = np.diff(np.r_[False, at, False].astype(np.int8))
     starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
-    # Most records stop here, before all that is sorted.
+    # Most records return here, before the sort below.
     if (ends - starts).max() < LEAST_FLAT:
         return None
     floor = LEAST_PART * max(full if np.isfinite(full) else 0.0, float(np.abs(y).max()))
@@ -141,7 +141,8 @@ def _flat_extreme(time: Array, y: Array, full: float, longest: float) -> Mask | 
         sides = [float(y[i]) for i in (a - 1, b) if 0 <= i < y.size]
         jumps = [top - side for side in sides] or [0.0]
         short = time[b - 1] - time[a] <= longest
-        # The top of a parabola that stays within a step for n samples is left by ((n + 2)/n)².
+        # The top of a parabola that stays within a step for n samples is left by ((n + 2)/n)²
+        # steps.
         n = b - a
         least = max(LEAST_JUMP - 0.5, (1.0 + 2.0 / n) ** 2 + 0.5) * step
         if n < SURE_FLAT:
@@ -154,15 +155,15 @@ def _flat_extreme(time: Array, y: Array, full: float, longest: float) -> Mask | 
 
 
 def _least_step(y: Array) -> float:
-    """Smallest difference of two values that occur: the converter's step, or rounding."""
+    """Smallest difference of two values that occur: the quantization step, or rounding."""
     gaps = np.diff(np.unique(y))
     return float(gaps.min()) if gaps.size else 0.0
 
 
 def _scatter(y: Array) -> float:
-    """Standard deviation from sample to sample, by the median of second differences."""
+    """Sample-to-sample standard deviation, from the median of second differences."""
     if y.size < LEAST_FLAT:
         return 0.0
-    # Of three independent samples the second difference has sqrt(6) times one's, and the median
-    # of its size is 0.6745 of that.
+    # The second difference of three independent samples has sqrt(6) times the standard deviation of
+    # one, and the median of its absolute value is 0.6745 of that.
     return float(np.median(np.abs(np.diff(y, 2)))) / (0.6745 * math.sqrt(6.0))

@@ -1,4 +1,4 @@
-"""All channels of all units at common stamps of one clock, zero at the trigger."""
+"""Synchronization of all units to common stamps of one clock, zero at the trigger."""
 
 from __future__ import annotations
 
@@ -50,22 +50,22 @@ class SynchronisedUnit:
     Attributes
     ----------
     unit : CrashUnit
-        Tables on the common clock, all at the same stamps; `trigger` 0 and `trigger_sd` that of
-        the clock. A borrowed gyro stands in `gyro`, in the unit's own sensor axes, and `gyro_from`
-        says whose it was.
+        Tables on the common clock, all at the same stamps; `trigger` is 0 and `trigger_sd` that of
+        the clock. A borrowed gyro is in `gyro`, in the unit's own sensor axes, and `gyro_from`
+        names its unit.
     accelerometers : tuple of TriadAtStamps
-        The same triads with noise, clipping and ends.
+        The same triads with noise, clipping and range ends.
     gyro : TriadAtStamps or None
     offset : float, s
-        Common time is the recorded stamp less this.
+        Recorded stamp minus common time.
     time_sd : float, s
-        How well `offset` is known.
+        Standard deviation of `offset`.
     how : str
-        From what.
+        Source of `offset`.
     lender : str or None
         Name of the unit whose gyro is borrowed.
     gyro_time_sd : float, s
-        Of the borrowed gyro against this unit's accelerometers; 0 for an own one.
+        Of the borrowed gyro relative to this unit's accelerometers; 0 for the unit's own gyro.
     """
 
     unit: CrashUnit
@@ -87,13 +87,13 @@ class SynchronisedUnits:
     units : tuple of SynchronisedUnit
         In the order given.
     time : ndarray, (n,), s
-        Common stamps ``k/rate``, zero at the trigger, that all units share.
+        Common stamps ``k/rate``, zero at the trigger, shared by all units.
     rate : float, Hz
     reference : str or None
-        Unit whose clock is the common one, with method 'correlation'.
+        Unit whose clock is the common one, for method 'correlation'.
     trigger_sd : float, s
-        How well the zero is known where all units share its error; else 0, and each unit's
-        `time_sd` has it.
+        Standard deviation of the zero if all units share its error; otherwise 0, and it is in each
+        unit's `time_sd`.
     findings : tuple of Finding
     """
 
@@ -105,12 +105,12 @@ class SynchronisedUnits:
     findings: tuple[Finding, ...]
 
     def unit(self, name: str) -> SynchronisedUnit:
-        """Find a unit by its name.
+        """Return the unit with a given name.
 
         Raises
         ------
         ConfigError
-            There is none of that name.
+            The name is unknown.
         """
         for u in self.units:
             if u.unit.name == name:
@@ -134,44 +134,43 @@ def synchronise(
     attenuation: float = 80.0,
     cut: bool = True,
 ) -> SynchronisedUnits:
-    """Bring units onto one clock and common stamps.
+    """Synchronize units to one clock and common stamps.
 
     Parameters
     ----------
     units : sequence of CrashUnit
-        On one rigid vehicle, of any rates and starts, each on its own clock.
+        On one rigid vehicle, with any rates and starts, each on its own clock.
     method : {'trigger', 'correlation'}
-        Zero is each unit's own trigger; or the reference unit's, and the others are laid over it by
-        the lengths of their specific forces or rates, whichever says more.
+        Zero is each unit's own trigger; or the reference unit's trigger, to which the others are
+        aligned by correlating the magnitudes of specific force or rate, whichever is more precise.
     rate : float, Hz
         Of the common stamps.
     reference : str, optional
-        Name of that unit; the first with a trigger where nothing is given.
+        Name of the reference unit; default, the first with a trigger.
     sampling : {'instantaneous', 'mean'}
-        What the samples shall be: values of a signal that is limited to half the output's Nyquist
-        frequency (to twice of that the low-pass falls by `attenuation`), or true means over the
-        step that ends at the stamp, whose sums are the integral.
+        Kind of the output: values of a signal band-limited to half the output's Nyquist frequency
+        (the low-pass reaches `attenuation` at twice that), or true means over the step ending at
+        the stamp, whose sums are the integral.
     attenuation : float, dB
     cut : bool
-        To what all units cover; otherwise each unit, with the gyro that it borrows, keeps what it
-        covers itself, as the rest before the crash that a laboratory's record does not have.
+        Cut all units to their common interval; otherwise each unit, with the gyro it borrows, keeps
+        its own interval, including a rest before the crash that another record lacks.
 
     Returns
     -------
     SynchronisedUnits
-        The delay of the low-pass before each sampler, its time
-        constant for signals slow against it, is taken off every channel's stamps. Faster channels
-        are decimated (or averaged), without delay;
-        others are interpolated where they were not sampled at the common stamps, and a finding
-        says so.
+        The stamps of every channel are corrected for the delay of the low-pass before its sampler,
+        the time constant for slow signals. Faster channels are decimated (or averaged) without
+        delay; others are interpolated where they were not sampled at the common stamps, which a
+        finding reports.
 
     Raises
     ------
     ConfigError
-        `method`, `rate`, `reference`, `sampling` or a unit's `gyro_from` is not understood, or two
-        units have one name.
+        `method`, `rate`, `reference`, `sampling` or a unit's `gyro_from` is invalid, or two units
+        have the same name.
     DataError
-        A unit has no trigger, a bad table, or no stretch in common with the others.
+        A unit has no trigger, an invalid table, or no overlap with the others.
     """
     check_options(units, method, rate, reference, sampling)
     units = [with_filled_axes(u) for u in units]
@@ -180,7 +179,7 @@ def synchronise(
     given = [_channels(u) for u in units]
     check_rate(rate, [g.step for u in given for t in _triads(u) for g in t.groups])
     findings = [f for u in given for t in _triads(u) for f in t.findings]
-    # Of fewer axes a vector is shorter, whatever it is in.
+    # With missing axes the vector is shorter, so its magnitude does not indicate the unit.
     findings += compare_sizes(
         [
             (
@@ -204,7 +203,7 @@ def synchronise(
     }
     time = _stamps([s for own in spans.values() for s in own], rate)
     done: dict[str, SynchronisedUnit] = {}
-    # Lenders first: borrowers take what has been made of theirs.
+    # Lenders first, because borrowers use their processed gyro.
     for u, clock in sorted(zip(given, clocks, strict=True), key=lambda p: p[0].gyro is None):
         triads = []
         borrowed = u.unit.gyro_from if u.gyro is None else None
@@ -263,7 +262,7 @@ def _made(
 
 
 def _marked(at: TriadAtStamps) -> RecordedTriad:
-    """A triad that knows where its record was held, if a low-pass hides it from its values."""
+    """Mark held samples of a record where a low-pass hides saturation in the values."""
     hidden = at.method in ("decimated", "averaged")
     return replace(at.triad, held=at.clipped) if hidden else at.triad
 
@@ -276,7 +275,7 @@ def _parts(u: UnitChannels) -> list[tuple[TriadChannels, RecordedTriad, list[str
 
 
 def _delay(triad: RecordedTriad) -> float:
-    """By how much the low-pass before the sampler is late for slow signals, s."""
+    """Delay of the low-pass before the sampler for slow signals, s."""
     bandwidth = triad.uncertainty.bandwidth
     return 0.0 if math.isinf(bandwidth) else time_constant(bandwidth)
 
@@ -313,7 +312,7 @@ def _reference(given: list[UnitChannels], name: str | None) -> UnitChannels:
 def _spans(
     u: UnitChannels, clock: UnitClock, rate: float, sampling: str
 ) -> list[tuple[str, float, float]]:
-    """What each triad of a unit can serve: its name, the first and the last common instant."""
+    """Interval each triad of a unit can supply: name, first and last common instant."""
     return [
         (channels.source, *allowed_stamps(channels, clock.offset + _delay(triad), rate, sampling))
         for channels, triad, _ in _parts(u)
@@ -321,7 +320,7 @@ def _spans(
 
 
 def _stamps(spans: list[tuple[str, float, float]], rate: float) -> Array:
-    """Common stamps that all of the triads can serve."""
+    """Common stamps that all triads can supply."""
     latest = max(spans, key=lambda s: s[1])
     earliest = min(spans, key=lambda s: s[2])
     first = math.ceil(latest[1] * rate - 1e-6)
@@ -345,21 +344,21 @@ def _own(u: SynchronisedUnit) -> tuple[TriadAtStamps, ...]:
 
 
 def _last(u: SynchronisedUnit) -> tuple[TriadAtStamps, ...]:
-    """The parts behind which there is no wider range."""
+    """The widest accelerometer range and the unit's own gyro: no wider range replaces them."""
     return (*u.accelerometers[-1:], *(() if u.gyro is None or u.lender else (u.gyro,)))
 
 
-# What a person should know of records that were brought to common stamps.
+# Findings about records resampled to common stamps.
 
 
-# Less of a record than this may be left out without a word.
+# A shorter omitted part of a record is not reported.
 WORTH_A_WORD = 0.1  # s
 
 
 def end_findings(
     units: Sequence[tuple[str, Sequence[TriadAtStamps]]],
 ) -> list[Finding]:
-    """Samples near the ends of a record, which a low-pass had to continue."""
+    """Report samples near the ends of a record, where the low-pass extrapolated it."""
     found = []
     for name, parts in units:
         for t in parts:
@@ -382,7 +381,7 @@ def end_findings(
 def clipped_findings(
     units: Sequence[tuple[str, Sequence[TriadAtStamps]]],
 ) -> list[Finding]:
-    """Samples at the end of the range, where the low-pass hides them from all that comes later."""
+    """Report saturated samples where the low-pass hides them from later processing."""
     found = []
     for name, parts in units:
         for t in parts:
@@ -409,14 +408,14 @@ def clipped_findings(
 
 
 def cut_findings(spans: Sequence[tuple[str, float, float]], time: Array) -> list[Finding]:
-    """What was left out of the longest record, because another is shorter.
+    """Report the part of the longest record omitted because another is shorter.
 
     Parameters
     ----------
     spans : sequence of (source, first, last)
-        What every part can serve, s on the common clock.
+        Interval each part can supply, s on the common clock.
     time : ndarray, (n,), s
-        What all serve.
+        Common stamps.
     """
     latest, earliest = max(spans, key=lambda s: s[1]), min(spans, key=lambda s: s[2])
     first, last = min(spans, key=lambda s: s[1]), max(spans, key=lambda s: s[2])
@@ -446,27 +445,27 @@ def cut_findings(spans: Sequence[tuple[str, float, float]], time: Array) -> list
     return found
 
 
-# What units of one vehicle must be together: names, options, sizes of what they measured.
+# Consistency of the units of one vehicle: names, options, sizes of the measurements.
 
 
 METHODS = ("trigger", "correlation")
-# Rates of one rigid body differ by this factor when one is in deg/s.
+# Rates on one rigid body differ by this factor if one is in deg/s.
 DEGREES_APART = (40.0, 80.0)
-# And specific forces by this when one is in g; they differ from place to place, too.
+# Specific forces differ by this factor if one is in g; they also vary with position.
 G_APART = (8.0, 12.0)
-# Common stamps that are closer than this make work, and no knowledge.
+# Denser common stamps cost time without adding information.
 MOST_FASTER = 10.0
 
 
 def check_options(
     units: Sequence[CrashUnit], method: str, rate: float, reference: str | None, sampling: str
 ) -> None:
-    """Check what was asked of `synchronise`.
+    """Check the options of `synchronise`.
 
     Raises
     ------
     ConfigError
-        There is no unit, two have one name, or an option is not understood.
+        No unit is given, two units have the same name, or an option is invalid.
     """
     if not units:
         raise ConfigError("sensors.no-units-given", quantity="units")
@@ -503,7 +502,7 @@ def check_options(
 
 
 def check_rate(rate: float, steps: Sequence[float]) -> None:
-    """Refuse common stamps that no record has anything to say of.
+    """Raise if the common rate far exceeds that of every record.
 
     Parameters
     ----------
@@ -530,7 +529,7 @@ def check_rate(rate: float, steps: Sequence[float]) -> None:
 def compare_sizes(
     units: Sequence[tuple[TriadChannels | None, tuple[TriadChannels, ...]]],
 ) -> list[Finding]:
-    """Compare what units of one rigid body measured, for units of measurement.
+    """Compare measurements of one rigid body to detect wrong units of measurement.
 
     Parameters
     ----------
@@ -539,12 +538,12 @@ def compare_sizes(
     Returns
     -------
     list of Finding
-        Specific forces that differ by about 9.8.
+        For specific forces that differ by a factor of about 9.8.
 
     Raises
     ------
     DataError
-        Rates differ by about 57, and they are the same everywhere on the body.
+        Rates differ by a factor of about 57, though equal everywhere on the body.
     """
     turning = [(gyro.source, _spread(gyro)) for gyro, _ in units if gyro is not None]
     for one, size in turning:

@@ -1,4 +1,4 @@
-"""The channels of a recorded triad, checked: axes, stamps, numbers, units."""
+"""Validated channels of a recorded triad: axes, stamps, values, units of measurement."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ Array = NDArray[np.float64]
 __all__ = ["AxisGroup", "TriadChannels", "triad_channels"]
 
 LEAST_SAMPLES = 6
-# Length of the mean specific force at rest that is gravity in g, and none at all.
+# Mean magnitude of the specific force at rest that indicates g as unit, and one without gravity.
 IN_G = (0.85, 1.15)
 NO_GRAVITY = 2.0  # m/s²
-# A bias that could look like either.
+# Largest bias that could cause either.
 BIAS_SPEAKS = 1.0  # m/s²
-# No vehicle turns so fast; 100 deg/s is what a hard crash does.
+# Vehicles rotate more slowly; 100 deg/s occurs in a severe crash.
 FASTEST_TURN = 50.0  # rad/s
 OVER_RANGE = 1.05
-# A sample each 100 ms sees no crash.
+# A longer sample interval, such as 100 ms, does not resolve a crash.
 SLOWEST_STEP = 0.1  # s
 DEGREES = 180.0 / math.pi
-# What is stated of an axis that is not there.
+# Attribute of `Assumed` that replaces a missing axis, by kind of triad.
 _ASSUMED = {ACCEL[0]: "delta_v_sd", GYRO[0]: "turn_sd_deg"}
 
 
@@ -45,7 +45,7 @@ class AxisGroup:
     time : ndarray, (n,), s
     values : ndarray, (n, len(axes))
     step : float, s
-        The usual one.
+        Nominal sample interval.
     """
 
     axes: tuple[int, ...]
@@ -56,14 +56,14 @@ class AxisGroup:
 
 @dataclass(frozen=True, eq=False)
 class TriadChannels:
-    """A triad as it can be brought to other stamps.
+    """A triad ready for resampling.
 
     Attributes
     ----------
     source : str
         Unit and part, for messages.
     groups : tuple of AxisGroup
-        One, where all axes were sampled together.
+        One group if all axes were sampled together.
     sampling : str
     findings : tuple of Finding
     """
@@ -75,24 +75,24 @@ class TriadChannels:
 
     @property
     def start(self) -> float:
-        """First stamp that all axes have, s."""
+        """First stamp common to all axes, s."""
         return float(max(g.time[0] for g in self.groups))
 
     @property
     def end(self) -> float:
-        """Last stamp that all axes have, s."""
+        """Last stamp common to all axes, s."""
         return float(min(g.time[-1] for g in self.groups))
 
 
 def triad_channels(unit: CrashUnit, triad: RecordedTriad, columns: list[str]) -> TriadChannels:
-    """Check a triad and take out its channels.
+    """Check a triad and extract its channels.
 
     Parameters
     ----------
     unit : CrashUnit
     triad : RecordedTriad
-        Its table may hold axes of different rates and starts: rows that an axis does not have are
-        NaN then.
+        Its table may hold axes with different rates and starts, with NaN in rows where an axis has
+        no sample.
     columns : list of str
         `ACCEL` or `GYRO`.
 
@@ -103,8 +103,8 @@ def triad_channels(unit: CrashUnit, triad: RecordedTriad, columns: list[str]) ->
     Raises
     ------
     DataError
-        An axis is missing, time does not advance, a number is not finite, there is a gap or there
-        are fewer than six samples, or the units are evidently others.
+        An axis is missing, time does not increase, a value is not finite, a gap occurs, there are
+        fewer than six samples, or the units of measurement are evidently wrong.
     """
     source = f"{unit.name}, {triad.name}"
     table = triad.table
@@ -177,7 +177,7 @@ def _group(
     rows = np.flatnonzero(~np.isnan(block[:, 0]))
     time, block = stamps[rows], np.ascontiguousarray(block[rows])
     if rows.size >= 2:
-        # Rows of the other axes are between the samples; a hole is where a sample is left out.
+        # NaN rows belong to other axes; a gap is a missing sample of this axis.
         steps = np.diff(time)
         hole = (np.diff(rows) > 1) & (steps > 1.5 * np.median(steps))
         if hole.any():
@@ -249,7 +249,7 @@ def _numbers(column: pd.Series, name: str, source: str) -> Array:
 
 
 def _quiet_mean(unit: CrashUnit, groups: tuple[AxisGroup, ...]) -> Array:
-    """Mean before the trigger; of the first tenth where there is none, or little before it."""
+    """Mean before the trigger; of the first tenth without a trigger or with too few samples."""
     out = np.zeros(3)
     for g in groups:
         before = g.time < (math.inf if unit.trigger is None else unit.trigger - 10.0 * g.step)
@@ -264,7 +264,7 @@ def _judge_force(
 ) -> list[Finding]:
     found = _over_range(source, triad, groups, "sensors.acceleration-beyond-range")
     if triad.absent:
-        # Gravity may be along the axis that is not there.
+        # Gravity may be along the absent axis.
         return found
     length = float(np.linalg.norm(_quiet_mean(unit, groups)))
     if IN_G[0] <= length <= IN_G[1]:

@@ -1,4 +1,4 @@
-"""The specification of what a triad of sensors does to the truth."""
+"""Error specification of a triad of sensors, of an IMU, and of its axes matrix."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ __all__ = ["NAMED_AXES", "axes_letters", "check_axes_matrix", "report_transposed
 
 Triad = tuple[float, float, float]
 Matrix = tuple[Triad, Triad, Triad]
-# What the user may write where a triad is meant.
+# Accepted input for a triad.
 TriadLike = float | Sequence[float]
 
 ZERO: Triad = (0.0, 0.0, 0.0)
 NO_MATRIX: Matrix = (ZERO, ZERO, ZERO)
 
-# Per axis; what is of one value for the triad; and the matrices.
+# Attributes per axis; with one value for the triad; and matrices.
 TRIADS = (
     "noise_density",
     "bias",
@@ -51,56 +51,55 @@ POSITIVE = ("correlation_time", "full_scale", "bandwidth", "warm_up_time")
 
 @dataclass(frozen=True)
 class TriadErrors:
-    """Errors of one triad of sensors, the same meaning at every rate.
+    """Errors of one triad of sensors, independent of the sample rate.
 
-    The unit u is rad/s for gyros and m/s² for accelerometers. Where an attribute is per axis, a
-    single number means the same on all three. `error_chain` says how and in which order they
-    act.
+    The unit u is rad/s for gyros and m/s² for accelerometers. For a per-axis attribute, a single
+    number applies to all three axes. `error_chain` defines their effect and order.
 
     Attributes
     ----------
     noise_density : triad, u/√Hz
-        White noise: a sample that stands for an interval dt has the standard deviation
-        ``noise_density / √dt``, and the integral walks by ``noise_density √t``.
+        White noise: a sample over an interval dt has the standard deviation ``noise_density /
+        √dt``, and the integral has ``noise_density √t``.
     bias : triad, u
     bias_instability : triad, u
         Standard deviation of a stationary first-order Gauss-Markov process.
     correlation_time : float, s
-        Of that process: its autocorrelation is ``exp(-|t| / correlation_time)``.
+        Correlation time of that process: its autocorrelation is ``exp(-|t| / correlation_time)``.
     random_walk : triad, u/√s
-        The bias walks by ``random_walk √t`` from zero at the first sample.
+        Bias random walk: standard deviation ``random_walk √t``, zero at the first sample.
     trend : triad, u/s
-        Growth of the bias with time, zero at time zero.
+        Bias change per time, zero at time zero.
     scale : triad
-        Relative error of the scale factor: an axis reads ``1 + scale`` times its input.
+        Relative scale factor error: an axis outputs ``1 + scale`` times its input.
     misalignment : 3x3, rad
-        ``misalignment[i][j]``, i ≠ j, is the part of the input along body axis j that the sensor
-        of axis i feels (small angles; six cross-axis terms). The diagonal is zero: `scale` has it.
+        ``misalignment[i][j]``, i ≠ j, is the fraction of the input along body axis j sensed by axis
+        i (small angles; six cross-axis terms). The diagonal is zero; see `scale`.
     g_sensitivity : 3x3, u per m/s²
-        Of gyros: what axis i reads for a specific force along body axis j.
+        For gyros: output of axis i per specific force along body axis j.
     nonlinearity_2, nonlinearity_3 : triad
-        Error of second and third order, relative to full scale, at an input of full scale.
+        Error of second and third order, relative to full scale, at full-scale input.
     quantization : triad, u
-        Step of the output; zero is none. For an increment sensor that is read as a mean rate,
-        the step of the increment times the rate; no remainder is carried over.
+        Quantization step; zero for none. For an increment sensor read as a mean rate, the step of
+        the increment times the sample rate; no remainder is carried over.
     full_scale : triad, u
-        The output is held within ± this.
+        The output is clipped to ± this.
     bandwidth : float, Hz
-        Frequency at which a single-pole low-pass between motion and sampler has fallen to
-        1/√2 (-3 dB). Noise and drifts are those of the output, and do not pass it.
+        -3 dB frequency of a single-pole low-pass between motion and sampler. Noise and drifts are
+        those of the output and do not pass through it.
     jitter : float, s
         Standard deviation of the sampling instant about the stamp.
     warm_up : triad, u
-        Part of the bias at time zero that dies away as ``exp(-t / warm_up_time)``.
+        Part of the bias at time zero that decays as ``exp(-t / warm_up_time)``.
     warm_up_time : float, s
     vibration_rectification : triad, u per (m/s²)²
-        Shift of the output per mean square of the vibration along the axis.
+        Output shift per mean square vibration along the axis.
 
     Raises
     ------
     ConfigError
-        A number is not finite or out of range, or the nonlinearity would fold the range onto
-        itself.
+        A number is not finite or out of range, or the nonlinearity makes the transfer curve
+        non-monotone.
     """
 
     noise_density: TriadLike = ZERO
@@ -147,9 +146,9 @@ class ImuErrors:
     Attributes
     ----------
     gyro : TriadErrors
-        In rad/s; free of errors, if not given.
+        In rad/s; default, error-free.
     accel : TriadErrors, optional
-        In m/s²; None is an accelerometer free of errors.
+        In m/s²; None is an error-free accelerometer.
     """
 
     gyro: TriadErrors = field(default_factory=TriadErrors)
@@ -178,7 +177,7 @@ def triad_of(values: Any) -> Triad:
 
 
 def _shape(name: str) -> str:
-    """Return the code that says which shape it should have."""
+    """Return the error code for the expected shape."""
     if name in TRIADS:
         return "sensors.not-one-or-three-numbers"
     if name in ("misalignment", "g_sensitivity"):
@@ -242,22 +241,22 @@ def _refused(name: str, code: str, **values: Any) -> ConfigError:
     return ConfigError(code, quantity=name, data=values)
 
 
-# Three numbers of a person, or one.
+# Validation of user input: three numbers, or one.
 
 
-#: No point of a road vehicle is farther from another: beyond it, a place is in mm.
+#: Largest distance between two points of a road vehicle; a larger position is in mm.
 FARTHEST = 30.0  # m
 
 
 def triple(given: Any, quantity: str, code: str, file: str | None = None, **values: Any) -> Triad:
-    """Three finite numbers.
+    """Return three finite numbers as a triad.
 
     Parameters
     ----------
     given : object
     quantity : str
     code : str
-        Of the error, whose data hold `given` and `values`.
+        Of the error, whose data include `given` and `values`.
     file : str, optional
     **values
         Further data of the error.
@@ -265,7 +264,7 @@ def triple(given: Any, quantity: str, code: str, file: str | None = None, **valu
     Raises
     ------
     ConfigError
-        They are others.
+        The input is not three finite numbers.
     """
     try:
         x, y, z = (float(v) for v in given)
@@ -277,7 +276,7 @@ def triple(given: Any, quantity: str, code: str, file: str | None = None, **valu
 
 
 def finite(given: Any) -> bool:
-    """Whether this is one real and finite number."""
+    """Whether the value is one real, finite number."""
     return is_number(given) and math.isfinite(given)
 
 
@@ -287,7 +286,7 @@ def check_sd(given: Any, quantity: str, unit: str, file: str | None = None) -> N
     Raises
     ------
     ConfigError
-        It is no number, negative or not finite.
+        The value is not a number, negative or not finite.
     """
     if not finite(given) or given < 0.0:
         raise ConfigError(
@@ -299,27 +298,25 @@ def check_sd(given: Any, quantity: str, unit: str, file: str | None = None) -> N
         )
 
 
-# The matrix that turns a sensor's axes into those of the body: what it may be, and its checks.
-#
-# Its rows are the body's forward, right and down, each in components along the sensor's x, y, z:
-# ``v_body = M v_sensor``.
+# Checks of the matrix M from sensor axes to body axes. Its rows are the body's forward, right and
+# down, each in components along the sensor's x, y, z: ``v_body = M v_sensor``.
 
 
 Array = NDArray[np.float64]
 
-#: Designs of units by name. Of Chernodarov (2009): with its (1,4) made -Θz, the printed matrix of
-#: (1) is that of ``2 dq/dt = q (0, ω)`` for ``ω = (-Θy, Θx, Θz)``: gyros turned by 90° about z.
+#: Unit designs by name. Chernodarov (2009): with its (1,4) set to -Θz, the printed matrix of (1) is
+#: that of ``2 dq/dt = q (0, ω)`` for ``ω = (-Θy, Θx, Θz)``: gyros rotated by 90° about z.
 NAMED_AXES: dict[str, tuple[tuple[float, float, float], ...]] = {
     "chernodarov-2009": ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
 }
-#: How far ``M M'`` may be from 1: three decimals of a cosine, and no misalignment.
+#: Tolerance of ``M M'`` about 1: cosines with three decimals, but no misalignment.
 ROUNDING = 2e-3
-# A vehicle that is aligned stands within so much of level, and far from it where axes are wrong.
+# A vehicle during alignment is within this of level, and far from level with wrong axes.
 _LEVEL, _FAR = 0.94, 0.7  # cosines of 20° and 45°
 
 
 def check_axes_matrix(matrix: ArrayLike, quantity: str = "matrix") -> Array:
-    """Check that a matrix turns one right-handed triad into another.
+    """Check that a matrix rotates one right-handed triad into another.
 
     Parameters
     ----------
@@ -331,13 +328,13 @@ def check_axes_matrix(matrix: ArrayLike, quantity: str = "matrix") -> Array:
     Returns
     -------
     ndarray, (3, 3)
-        The rotation nearest to it: what the rounding of its decimals left out is put back.
+        The nearest rotation, without the rounding of the input decimals.
 
     Raises
     ------
     ConfigError
-        It is not three by three finite numbers, its rows are not unit vectors at right angles to
-        2e-3, or it is a mirror image (determinant -1).
+        It is not 3x3 finite numbers, its rows are not orthonormal to 2e-3, or it is a mirror image
+        (determinant -1).
     """
     try:
         m = np.array(matrix, dtype=np.float64)
@@ -353,7 +350,7 @@ def check_axes_matrix(matrix: ArrayLike, quantity: str = "matrix") -> Array:
         raise ConfigError(
             "sensors.matrix-mirror-image",
             quantity=quantity,
-            # Most likely two rows were exchanged, or one lost its sign.
+            # Most likely two rows were swapped, or one lost its sign.
             down=np.cross(m[0], m[1]) + 0.0,
         )
     u, _, vt = np.linalg.svd(m)
@@ -384,20 +381,20 @@ def _not_square(product: Array, worst: tuple[int, int], quantity: str) -> Config
 
 
 def axes_letters(matrix: Array) -> tuple[str, Array]:
-    """Split a rotation into axes with signs, as ``--axes`` names them, and a turn after them.
+    """Split a rotation into signed axes, as in ``--axes``, and a remaining rotation.
 
     Parameters
     ----------
     matrix : ndarray, (3, 3)
-        As `check_axes_matrix` returns it.
+        As returned by `check_axes_matrix`.
 
     Returns
     -------
     letters : str
-        ``x,-y,-z`` and the like: which sensor axis is nearest to forward, right and down, of all
+        Such as ``x,-y,-z``: the sensor axes nearest to forward, right and down, among all
         right-handed choices.
     turn : ndarray, (3, 3)
-        What is left: ``matrix = turn @ letters``; 1 where the axes lie along the body's.
+        Remaining rotation: ``matrix = turn @ letters``; the identity if the axes are parallel.
     """
     best, found = -np.inf, np.eye(3)
     for plain in _right_handed():
@@ -412,7 +409,7 @@ def axes_letters(matrix: Array) -> tuple[str, Array]:
 
 
 def _right_handed() -> list[Array]:
-    """The 24 turns that lay axes along axes."""
+    """The 24 rotations that map axes to axes."""
     out = []
     for order in ((0, 1, 2), (1, 2, 0), (2, 0, 1), (0, 2, 1), (2, 1, 0), (1, 0, 2)):
         for signs in np.ndindex(2, 2, 2):
@@ -425,13 +422,13 @@ def _right_handed() -> list[Array]:
 def report_transposed(
     matrix: Array, force: Sequence[float] | Array, file: str, quantity: str = "matrix"
 ) -> tuple[Finding, ...]:
-    """Say where a matrix looks transposed: it lays gravity aside, and its transpose does not.
+    """Report a matrix that appears transposed: gravity is level only with its transpose.
 
     Parameters
     ----------
     matrix : ndarray, (3, 3)
     force : array_like, (3,), m/s²
-        Mean specific force in body axes, after the matrix.
+        Mean specific force in body axes, after applying the matrix.
     file, quantity : str
         For messages.
 

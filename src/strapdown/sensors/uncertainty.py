@@ -1,4 +1,4 @@
-"""What is not known of a triad of sensors."""
+"""Stated uncertainty of a triad of sensors, from data sheets or the user; unit draws."""
 
 from __future__ import annotations
 
@@ -27,40 +27,39 @@ __all__ = [
 ]
 
 
-# Facts about the range, which are not standard deviations, and may be infinite.
+# Known properties of the range, not standard deviations; they may be infinite.
 FACTS = ("full_scale", "quantization", "bandwidth")
 WHERE_ZERO_IS_NOTHING = ("full_scale", "bandwidth")
 
 
 @dataclass(frozen=True)
 class TriadUncertainty:
-    """Standard deviations of what a triad does to the truth, and the facts of its range.
+    """Standard deviations of the errors of a triad, and the known properties of its range.
 
-    The unit u is rad/s for gyros and m/s² for accelerometers. Each is the same on all axes where
-    one number is given. All errors are independent of one another, normal and of mean zero; they
-    act as in `error_chain`.
+    The unit u is rad/s for gyros and m/s² for accelerometers. A single number applies to all axes.
+    All errors are independent and normal with zero mean; they act as in `error_chain`.
 
     Attributes
     ----------
     noise_density : triad, u/√Hz
-        White noise: a sample that stands for an interval dt has the standard deviation
-        ``noise_density / √dt``.
+        White noise: a sample over an interval dt has the standard deviation ``noise_density /
+        √dt``.
     bias : triad, u
-        Of a record, before any of it is estimated.
+        Bias of a record, before any estimation.
     scale : triad
         Relative.
     misalignment : triad, rad
-        Of each of the two angles with which an axis feels the other two.
+        Each of the two angles by which an axis senses the other two.
     nonlinearity_2 : triad
-        Relative to full scale, at an input of full scale.
+        Relative to full scale, at full-scale input.
     g_sensitivity : triad, u per m/s²
-        Of gyros: each of the three terms of an axis.
+        For gyros: each of the three terms of an axis.
     vibration_rectification : triad, u per (m/s²)²
-        Shift of the output per variance of the vibration on the axis.
+        Output shift per vibration variance along the axis.
     full_scale : triad, u
-        The output is held within ± this.
+        The output is clipped to ± this.
     quantization : triad, u
-        Step of the output.
+        Quantization step.
     bandwidth : float, Hz
         Of the single-pole low-pass before the sampler.
 
@@ -111,7 +110,7 @@ class TriadUncertainty:
         return value
 
     def variance_by_input(self, value: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return what scale factors and misalignments make of an input that stays the same.
+        """Return the error variance from scale factors and misalignments for a constant input.
 
         Parameters
         ----------
@@ -138,11 +137,11 @@ def _numbers(given: Any, name: str) -> tuple[float, ...]:
         raise ConfigError("sensors.uncertainty-not-a-number", quantity=name, given=given) from None
 
 
-# What a data sheet leaves unknown of a unit, as standard deviations.
+# Unit-to-unit uncertainty from a data sheet, as standard deviations.
 
 
 TRIADS = ("gyro", "accel")
-# Quantities of a data sheet, and the attribute of `TriadUncertainty` that holds their spread.
+# Quantities of a data sheet, and the attributes of `TriadUncertainty` for their spread.
 SPREADS = {
     "bias": "bias",
     "scale": "scale",
@@ -154,28 +153,28 @@ SENSOR_UNCERTAINTY_FACTS = ("noise_density", "full_scale", "quantization", "band
 
 
 def uncertainty_of(sensor: Sensor, triad: str, **overrides: TriadLike) -> TriadUncertainty:
-    """Turn a sensor of the catalogue into what is not known of one of its units.
+    """Convert a catalogue sensor to the uncertainty of one of its units.
 
     Parameters
     ----------
     sensor : Sensor
     triad : {'gyro', 'accel'}
     **overrides : triad
-        Attributes of `TriadUncertainty`, in its units, that replace the data sheet's: what a
-        calibration or a record has told.
+        Attributes of `TriadUncertainty`, in its units, that replace the data sheet's, for example
+        from a calibration.
 
     Returns
     -------
     TriadUncertainty
-        A standard deviation of the data sheet as it stands, a bound over √3 (that of a uniform
-        distribution). The bound of a nonlinearity is given to its second order as a whole: the
-        third leaves no mean, and a data sheet does not tell them apart. Drifts within a record
-        (bias instability, random walk, trend) have no place here.
+        A standard deviation of the data sheet is used unchanged; a bound is divided by √3 (uniform
+        distribution). The bound of a nonlinearity is assigned entirely to its second order: the
+        third has zero mean, and a data sheet does not separate them. Drifts within a record (bias
+        instability, random walk, trend) are not included.
 
     Raises
     ------
     ConfigError
-        The sensor has no such triad, or an override is none of the attributes.
+        The sensor lacks that triad, or an override is not one of the attributes.
     """
     if triad not in TRIADS or not any(f.key.startswith(f"{triad}.") for f in sensor.sources):
         raise ConfigError(
@@ -205,19 +204,19 @@ def _sd(spread: Spread) -> Triad:
     return (x * part, y * part, z * part)
 
 
-# What is not known of gyros and accelerometers that are to be aligned or navigated by.
+# Uncertainty of gyros and accelerometers for alignment and navigation.
 
 
 @dataclass(frozen=True)
 class BiasDrift:
-    """How a bias changes within a record: a first-order Gauss-Markov process.
+    """Bias drift within a record: a first-order Gauss-Markov process.
 
     Attributes
     ----------
     sd : triad, rad/s or m/s²
-        Of the process, once it has run for long.
+        Steady-state standard deviation of the process.
     correlation_time : float, s
-        Infinite where the bias is constant.
+        Infinite for a constant bias.
     """
 
     sd: TriadLike = 0.0
@@ -245,14 +244,14 @@ class BiasDrift:
 
 @dataclass(frozen=True)
 class ImuUncertainty:
-    """Standard deviations of what gyros and accelerometers do to the truth, in SI.
+    """Standard deviations of the errors of gyros and accelerometers, in SI.
 
     Attributes
     ----------
     gyro, accel : TriadUncertainty
-        What stays over a record, and white noise.
+        Errors constant over a record, and white noise.
     gyro_drift, accel_drift : BiasDrift
-        What changes within it.
+        Bias drift within it.
     """
 
     gyro: TriadUncertainty
@@ -262,7 +261,7 @@ class ImuUncertainty:
 
     @classmethod
     def of_sensor(cls, sensor: Sensor) -> ImuUncertainty:
-        """Take a data sheet.
+        """Make the uncertainty from a data sheet.
 
         Parameters
         ----------
@@ -290,7 +289,7 @@ def _drift(errors: TriadErrors) -> BiasDrift:
     return BiasDrift(errors.bias_instability, time if time > 0.0 else math.inf)
 
 
-# What a person states of a triad, in the keys of the catalogue of sensors.
+# Uncertainty of a triad stated by the user, in the keys of the sensor catalogue.
 
 
 Stated = float | Sequence[float]
@@ -304,23 +303,23 @@ def _usable(keys: Mapping[str, Key]) -> dict[str, Key]:
     }
 
 
-#: By triad, the keys that may be stated, each with its unit.
+#: Allowed keys by triad, each with its unit.
 STATED_KEYS: dict[str, dict[str, Key]] = {triad: _usable(keys) for triad, keys in KEYS.items()}
 
 
 def stated_uncertainty(
     triad: str, stated: Mapping[str, Stated], sensor: Sensor | None = None
 ) -> TriadUncertainty:
-    """Turn what is stated of a triad into its uncertainty.
+    """Convert the stated values of a triad to its uncertainty.
 
     Parameters
     ----------
     triad : {'gyro', 'accel'}
     stated : dict
-        By key of the catalogue (``bias_sd_mg``, ``full_scale_g``): one number, or three; a
-        bound counts as the standard deviation of a uniform distribution.
+        By catalogue key (``bias_sd_mg``, ``full_scale_g``): one number, or three. A bound is
+        converted to the standard deviation of a uniform distribution.
     sensor : Sensor, optional
-        What is not stated is as its data sheet has it.
+        Supplies the values that are not stated.
 
     Returns
     -------
@@ -329,7 +328,7 @@ def stated_uncertainty(
     Raises
     ------
     ConfigError
-        A key is unknown, a quantity is stated twice, or a number is none.
+        A key is unknown, a quantity is stated twice, or a value is not a number.
     """
     keys = STATED_KEYS[triad]
     values: dict[str, Any] = {}
@@ -356,11 +355,11 @@ def stated_uncertainty(
     return replace(TriadUncertainty(), **values)
 
 
-# What a person states of gyros and accelerometers together: a data sheet, and what replaces it.
+# Uncertainty of gyros and accelerometers together: a data sheet with overrides.
 
 DRIFT = ("bias_instability", "correlation_time")
 
-#: By triad, the keys that may be stated, each with its unit.
+#: Allowed keys by triad, each with its unit.
 STATED_IMU_KEYS: dict[str, tuple[str, ...]] = {
     triad: (*STATED_KEYS[triad], *(k for k, key in KEYS[triad].items() if key.quantity in DRIFT))
     for triad in ("gyro", "accel")
@@ -371,14 +370,14 @@ _NEEDED = {"bias": "bias_sd", "noise_density": "noise_density"}
 def stated_imu(
     sensor: Sensor | None, gyro: Mapping[str, Stated], accel: Mapping[str, Stated]
 ) -> ImuUncertainty:
-    """Turn a sensor of the catalogue, and what is stated beside it, into an uncertainty.
+    """Combine a catalogue sensor and stated values into an uncertainty.
 
     Parameters
     ----------
     sensor : Sensor, optional
-        What is not stated is as its data sheet has it.
+        Supplies the values that are not stated.
     gyro, accel : dict
-        By key of the catalogue: one number, or three.
+        By catalogue key: one number, or three.
 
     Returns
     -------
@@ -387,8 +386,8 @@ def stated_imu(
     Raises
     ------
     ConfigError
-        A key is unknown, a number is none, or bias or noise of a triad is neither stated nor in
-        the data sheet: with zero in their place every bound would be one of a perfect sensor.
+        A key is unknown, a value is not a number, or bias or noise of a triad is neither stated nor
+        in the data sheet. Zero instead would give the bounds of a perfect sensor.
     """
     base = None if sensor is None else ImuUncertainty.of_sensor(sensor)
     triads: dict[str, TriadUncertainty] = {}
@@ -401,7 +400,7 @@ def stated_imu(
         try:
             triads[triad] = stated_uncertainty(triad, fixed, sensor)
         except ConfigError as error:
-            # A sensor's triad is stated under its own name.
+            # Name the triad itself in the finding.
             place = (error.finding.quantity or "").replace("uncertainty", triad)
             raise error.replaced(quantity=place) from None
         drifts[triad] = _drift_stated_imu(
@@ -447,14 +446,14 @@ def _require(triad: str, known: TriadUncertainty) -> None:
         )
 
 
-# One unit of a triad, drawn from what is not known of it.
+# Random draw of one unit of a triad from its uncertainty.
 
 
 Array = NDArray[np.float64]
 
-# Places of the quantities in the tree of seeds; a number is never given to another quantity.
+# Keys of the quantities in the seed tree; a number is never reused for another quantity.
 BIAS, SCALE, MISALIGNMENT, G_SENSITIVITY, NONLINEARITY, RECTIFICATION = range(6)
-# The slope 1 + s + 2 n2 x must stay positive within the range, |x| <= 1; at 0.5 it just vanishes.
+# The slope 1 + s + 2 n2 x must stay positive within the range, |x| <= 1; at 0.5 it vanishes.
 MOST_NONLINEARITY = 0.49
 
 
@@ -465,23 +464,23 @@ def draw_errors(uncertainty: TriadUncertainty, seed: Seed, *streams: int) -> Tri
     ----------
     uncertainty : TriadUncertainty
     seed : int or SeedSequence
-        The unit.
+        Identifies the unit.
     *streams : int
-        Place below the seed, where one seed serves several triads.
+        Path below the seed, where one seed serves several triads.
 
     Returns
     -------
     TriadErrors
-        All draws are normal and independent, each quantity and axis from a stream of its own: a
-        spread that is set to zero leaves the other draws as they were. The second order of the
-        curve is held to 0.49 of the slope, so that no reading has two inputs; a draw gets there
-        only where the standard deviation is tenths of full scale. Noise, range, step and
-        low-pass are those of the uncertainty.
+        All draws are normal and independent. Each quantity and axis has its own stream, so setting
+        one spread to zero does not change the other draws. The second order of the curve is limited
+        to 0.49 of the slope, so that the inverse is unique; this takes effect only for standard
+        deviations of tenths of full scale. Noise, range, quantization and low-pass are those of the
+        uncertainty.
 
     Raises
     ------
     ConfigError
-        The draw is no sensor: a scale factor of -1 or less, or angles that sum to a radian.
+        The draw is not a valid sensor: a scale factor of -1 or less, or angles that sum to 1 rad.
     """
     bias = _numbers_uncertainty_draws(uncertainty.axis("bias"), seed, *streams, BIAS)[:, 0]
     scale = _numbers_uncertainty_draws(uncertainty.axis("scale"), seed, *streams, SCALE)[:, 0]
@@ -514,7 +513,7 @@ def draw_errors(uncertainty: TriadUncertainty, seed: Seed, *streams: int) -> Tri
 
 
 def _numbers_uncertainty_draws(sd: Triad, seed: Seed, *place: int) -> Array:
-    """Three numbers an axis, (3, 3), each axis with its standard deviation."""
+    """Three numbers per axis, (3, 3), each axis with its own standard deviation."""
     rows = np.empty((3, 3))
     for axis in range(3):
         generator = np.random.Generator(np.random.PCG64(child(seed, *place, axis)))
@@ -530,20 +529,20 @@ def _matrix(rows: Array) -> Matrix:
 
 
 def crash_priors(rate: float = 200.0) -> dict[str, TriadUncertainty]:
-    """Give the error model that a merged recorder of consumer grade was found to have.
+    """Return the error model of a merged consumer-grade crash recorder.
 
     Parameters
     ----------
     rate : float, Hz
-        At which a sample of the specific force has the noise that is stated.
+        Sample rate for which the specific force noise per sample is stated.
 
     Returns
     -------
     dict
-        ``accel``: bias 0.2 m/s² (Tadic and Vukajlovic 2016, section 3: the low-g parts' own),
-        scale factor 2 %, noise 0.4 m/s² a sample. ``gyro``: bias 0.3 deg/s. All standard
-        deviations, of every axis; nothing else is uncertain, and no range ends. Scale, noise
-        and gyro bias are choices: the paper has no figures of them.
+        ``accel``: bias 0.2 m/s² (Tadic and Vukajlovic 2016, section 3: the low-g parts' own), scale
+        factor 2 %, noise 0.4 m/s² per sample. ``gyro``: bias 0.3 deg/s. All are standard deviations
+        of every axis. All other errors are zero, and the range is unlimited. Scale, noise and gyro
+        bias are chosen; the paper gives no values.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""How the clocks of units on one vehicle relate: by the common trigger, or by what they felt."""
+"""Clock offsets of units on one vehicle, from the common trigger or by correlation."""
 
 from __future__ import annotations
 
@@ -34,24 +34,24 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-# Triggers and correlation that differ by more standard deviations contradict each other.
+# Trigger and correlation disagree if they differ by more standard deviations than this.
 CONTRADICTION = 4.0
-# A trigger that is farther outside of its record is one of another clock.
+# A trigger further outside its record belongs to another clock.
 OUTSIDE = 1.0  # s
 FORCE, RATES = "specific force", "rates"
 
 
 @dataclass(frozen=True)
 class UnitClock:
-    """A unit's clock against the common one.
+    """Offset of a unit's clock from the common one.
 
     Attributes
     ----------
     offset : float, s
-        Common time is the unit's stamp less this.
+        Unit's stamp minus common time.
     sd : float, s
     how : str
-        For people.
+        Method, for display.
     """
 
     offset: float
@@ -69,12 +69,12 @@ class UnitChannels:
 
 
 def clocks_by_trigger(units: Sequence[UnitChannels]) -> list[UnitClock]:
-    """Take each unit's own trigger as zero.
+    """Use each unit's own trigger as zero.
 
     Raises
     ------
     DataError
-        A unit has none.
+        A unit has no trigger.
     """
     return [UnitClock(_trigger_within(u), u.unit.trigger_sd, "trigger") for u in units]
 
@@ -82,26 +82,26 @@ def clocks_by_trigger(units: Sequence[UnitChannels]) -> list[UnitClock]:
 def clocks_by_correlation(
     units: Sequence[UnitChannels], reference: UnitChannels
 ) -> tuple[list[UnitClock], list[Finding]]:
-    """Lay each unit's specific force, or rates, over the reference unit's.
+    """Align each unit's specific force, or rates, with the reference unit's by correlation.
 
     Parameters
     ----------
     units : sequence of UnitChannels
     reference : UnitChannels
-        One of them; its trigger is the common zero.
+        One of the units; its trigger is the common zero.
 
     Returns
     -------
     clocks : list of UnitClock
-        The delays less what each part's stated bandwidth accounts for. The reference unit's has
-        the standard deviation 0: what its trigger is off by, all share.
+        The delays, corrected for each part's stated bandwidth. The reference unit's clock has the
+        standard deviation 0, because all units share its trigger error.
     findings : list of Finding
 
     Raises
     ------
     DataError
-        The reference unit has no trigger, or a unit has too little in common with it, or the
-        motion repeats itself.
+        The reference unit has no trigger, a unit has too little overlap with it, or the motion is
+        periodic.
     """
     zero = _trigger(reference.unit)
     clocks, findings = [], []
@@ -163,7 +163,7 @@ def _trigger_within(u: UnitChannels) -> float:
 
 
 def _lag(u: UnitChannels, what: str) -> float:
-    """What the part's own low-pass delays slow signals by: the time constant of its single pole."""
+    """Delay of the part's own low-pass for slow signals: the time constant of its single pole."""
     triad = u.unit.gyro if what == RATES else u.unit.accelerometers[-1]
     assert triad is not None
     bandwidth = triad.uncertainty.bandwidth
@@ -171,9 +171,9 @@ def _lag(u: UnitChannels, what: str) -> float:
 
 
 def _delay(reference: UnitChannels, u: UnitChannels) -> tuple[Delay, str]:
-    """Best of what both have: lengths do not know of mountings, and bodies turn everywhere alike.
+    """Best delay estimate from the triads that both have; magnitudes do not depend on the mounting.
 
-    The widest range is used, as what is held at the end of a range has no shape.
+    The widest range is used, because a saturated signal has lost its shape.
     """
     pairs = [(FORCE, reference.accelerometers, u.accelerometers)]
     if not _lacks(reference.unit.gyro) and not _lacks(u.unit.gyro):
@@ -199,12 +199,12 @@ def _delay(reference: UnitChannels, u: UnitChannels) -> tuple[Delay, str]:
 
 
 def _lacks(gyro: RecordedTriad | None) -> bool:
-    """Whether there is no gyro, or none about all axes: the length of its rates is then another."""
+    """Whether the gyro, or any of its axes, is missing: the magnitude of its rates then differs."""
     return gyro is None or bool(gyro.absent)
 
 
 def _length(channels: TriadChannels) -> EvenSignal:
-    """Length of the vector on an even grid, on the unit's clock."""
+    """Magnitude of the vector on an even grid, on the unit's clock."""
     step = max(g.step for g in channels.groups)
     n = int((channels.end - channels.start) / step * (1.0 + 1e-9)) + 1
     time = channels.start + step * np.arange(n)
@@ -216,15 +216,15 @@ def _length(channels: TriadChannels) -> EvenSignal:
     return EvenSignal(channels.start - shift, step, np.sqrt(square)[:, None])
 
 
-# Channels of a triad at common stamps: a faster one without aliasing, a slower interpolated.
+# Resampling of a triad to common stamps: faster ones without aliasing, slower ones interpolated.
 
 Flags = NDArray[np.bool_]
 
-# Stamps that agree to this part of a step are the same.
+# Stamps that agree to within this fraction of a step are equal.
 SAME_STAMP = 1e-3
-# A rate that is higher by less is the same, of a clock that is off.
+# Rates within this factor are equal, apart from clock drift.
 SAME_RATE = 1.01
-# A sample at this part of the range was held there.
+# A sample beyond this fraction of the range is saturated.
 AT_END = 0.999
 
 
@@ -235,17 +235,17 @@ class TriadAtStamps:
     Attributes
     ----------
     triad : RecordedTriad
-        Its `uncertainty` is the recorded one: the density of the noise at low frequencies, which
-        is what integrals see, is as it was. What a single sample scatters by is `noise`.
+        Its `uncertainty` is the recorded one, because the noise density at low frequencies, which
+        determines integrals, is unchanged. `noise` is the standard deviation of a single sample.
     noise_factor : ndarray, (n, 3)
-        Standard deviation of a sample per that of a recorded sample, exact for white noise.
+        Standard deviation of a sample divided by that of a recorded sample, exact for white noise.
     noise : ndarray, (n, 3), u
-        Standard deviation of each sample by the stated density: ``density/√dt``, dt the recorded
+        Standard deviation of each sample from the stated density: ``density/√dt``, dt the recorded
         step, times `noise_factor`.
     clipped : ndarray of bool, (n, 3)
-        Whether a recorded sample at the end of the range counts in the sample.
+        Whether a saturated recorded sample contributes to the sample.
     whole : ndarray of bool, (n,)
-        False where the end of the record was continued to make the sample.
+        False where the record was extrapolated beyond its end to form the sample.
     method : str
         'as recorded', 'decimated', 'averaged' or 'interpolated'.
     """
@@ -261,13 +261,13 @@ class TriadAtStamps:
 def allowed_stamps(
     channels: TriadChannels, offset: float, rate: float, sampling: str
 ) -> tuple[float, float]:
-    """First and last common stamp that a triad can serve.
+    """First and last common stamp that a triad can supply.
 
     Parameters
     ----------
     channels : TriadChannels
     offset : float, s
-        Common time is the unit's stamp less this.
+        Unit's stamp minus common time.
     rate : float, Hz
     sampling : {'instantaneous', 'mean'}
         Of the output.
@@ -277,7 +277,7 @@ def allowed_stamps(
         own = g.step if channels.sampling == "mean" else 0.0
         low, high = g.time[0], g.time[-1]
         if _is_faster(g, rate):
-            # Means of means need the whole of the first step; a kernel its middle.
+            # Means of means need the whole of the first step; a kernel needs its midpoint.
             low, high = (low - own, high) if sampling == "mean" else (low - own / 2, high - own / 2)
             low += 1.0 / rate if sampling == "mean" else 0.0
         elif not _same_kind_and_rate(g, channels.sampling, rate, sampling):
@@ -300,27 +300,27 @@ def onto_stamps(
     sampling: str,
     attenuation: float,
 ) -> tuple[TriadAtStamps, list[Finding]]:
-    """Bring a triad to common stamps.
+    """Resample a triad to common stamps.
 
     Parameters
     ----------
     channels : TriadChannels
     triad : RecordedTriad
-        What `channels` are of.
+        Triad that `channels` belong to.
     columns : list of str
     offset : float, s
-        Common time is the unit's stamp less this.
+        Unit's stamp minus common time.
     stamps : ndarray, (n,), s
         On the common clock, within `allowed_stamps`.
     rate : float, Hz
     sampling : {'instantaneous', 'mean'}
     attenuation : float, dB
-        Of what would be aliased, for instantaneous output.
+        Attenuation of aliased signals, for instantaneous output.
 
     Raises
     ------
     DataError
-        Faster samples are not even, or the record is shorter than the low-pass.
+        Faster samples are not evenly spaced, or the record is shorter than the low-pass.
     """
     n = len(stamps)
     values, factor, noise = (np.empty((n, 3)) for _ in range(3))
@@ -331,7 +331,8 @@ def onto_stamps(
     methods, findings = [], []
     for g in channels.groups:
         axes = list(g.axes)
-        # What reads more than it is said to be able to has another end, and is not cut there.
+        # An axis that reads beyond its stated range has another end and is not clipped at the
+        # stated one.
         over = np.abs(g.values).max(axis=0) > OVER_RANGE * limits[axes]
         stated = np.where(over, np.inf, limits[axes])
         ends = find_limits(g.time, g.values, stated, steps[axes])
@@ -386,9 +387,9 @@ def at_rows(triad: TriadAtStamps, stamps: Array, rate: float) -> TriadAtStamps:
 
 
 def _held(g: AxisGroup, held: Flags, values: Array, at: Array, ends: RangeLimits) -> Array:
-    """Values between samples, at the end of the range where the nearest sample was held there.
+    """Interpolated values, set to the end of the range where the nearest sample was saturated.
 
-    A polynomial through a held stretch swings about it: the end would no longer be seen for one.
+    A polynomial through a saturated stretch oscillates about it, which would hide the saturation.
     """
     nearest = np.clip(np.rint((at - g.time[0]) / g.step).astype(np.int64), 0, len(g.time) - 1)
     inside = np.clip(values, ends.lower, ends.upper)
@@ -455,7 +456,7 @@ def _resample(
 
 def _said(source: str, names: list[str], g: AxisGroup, method: str, rate: float) -> list[Finding]:
     own = 1.0 / g.step
-    # Of a like rate and other instants only, nothing is lost that a person should know of.
+    # Interpolation at a similar rate loses no information worth reporting.
     if method != "interpolated" or own * SAME_RATE > rate:
         return []
     return [

@@ -1,4 +1,4 @@
-"""Units with axes that were not recorded, made whole by what is assumed of them."""
+"""Units with unmeasured axes, completed by stated assumptions."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ AXES = ("forward", "right", "down")
 TURNS = ("roll", "pitch", "heading")
 ALL = (0, 1, 2)
 NO_GYRO = "no gyro"
-# A vehicle axis that a missing one has this part of is one of those assumed (squared cosine).
+# Smallest squared cosine with which a missing axis makes a vehicle axis an assumed one.
 PART = 0.1
 
 
 def with_filled_axes(unit: CrashUnit) -> CrashUnit:
-    """Put columns of zeros where axes are missing and something is assumed of them.
+    """Fill missing axes with zeros where an assumption is given for them.
 
     Parameters
     ----------
@@ -46,14 +46,14 @@ def with_filled_axes(unit: CrashUnit) -> CrashUnit:
     Returns
     -------
     CrashUnit
-        Its triads say in `absent` which axes those are; their stated errors are none. Gravity's
-        part is put in where the attitude at rest is known (`prepare_unit`). A unit without missing
-        axes, or without `assumed`, is returned as it is.
+        Its triads list those axes in `absent`, with zero stated errors. The gravity component is
+        added where the attitude at rest is known (`prepare_unit`). A unit without missing axes, or
+        without `assumed`, is returned unchanged.
 
     Raises
     ------
     DataError
-        Not all of its ranges miss the same axes, or an accelerometer has none at all.
+        Its ranges miss different axes, or an accelerometer has no axis.
     """
     if unit.assumed is None:
         return unit
@@ -76,7 +76,7 @@ def with_filled_axes(unit: CrashUnit) -> CrashUnit:
 
 
 def with_gyro(unit: CrashUnit) -> CrashUnit:
-    """Put a gyro that does not turn where there is none and that is assumed."""
+    """Add a gyro with zero rate to a unit without one, if `assumed` allows for it."""
     if unit.gyro is not None or unit.gyro_from is not None or not unit.accelerometers:
         return unit
     if unit.assumed is None or unit.assumed.turn_sd_deg is None:
@@ -88,20 +88,20 @@ def with_gyro(unit: CrashUnit) -> CrashUnit:
 
 
 def unmeasured_axes(unit: CrashUnit) -> Array:
-    """Projection onto what no accelerometer of the unit measures, (3, 3), vehicle axes."""
+    """Projection onto directions that no accelerometer measures, vehicle axes, (3, 3)."""
     absent = unit.accelerometers[0].absent if unit.accelerometers else ()
     return _projection(unit.mounting.C_vs, absent)
 
 
 def unmeasured_turns(unit: CrashUnit) -> Array:
-    """Projection onto what no gyro of the unit, own or borrowed, measures, (3, 3)."""
+    """Projection onto the directions no gyro, own or borrowed, measures, (3, 3)."""
     lender = unit.lender or unit
     absent = () if lender.gyro is None else lender.gyro.absent
     return _projection(lender.mounting.C_vs, absent)
 
 
 def axis_names(axes: Array, turns: Array) -> tuple[str, ...]:
-    """Names of the vehicle's axes that are assumed: forward right down, roll pitch heading."""
+    """Names of the assumed vehicle axes: forward right down, roll pitch heading."""
     return tuple(
         name
         for names, projection in ((AXES, axes), (TURNS, turns))
@@ -111,7 +111,7 @@ def axis_names(axes: Array, turns: Array) -> tuple[str, ...]:
 
 
 def assumed_findings(unit: CrashUnit) -> list[Finding]:
-    """What is assumed of a unit, in words."""
+    """Report the assumptions made for a unit."""
     found = []
     assumed = unit.assumed
     if assumed is None:
@@ -169,13 +169,13 @@ def _missing(triad: RecordedTriad, columns: Sequence[str]) -> tuple[int, ...]:
 
 def _filled(triad: RecordedTriad, columns: list[str]) -> RecordedTriad:
     absent = _missing(triad, columns)
-    # Without any of its columns it is a triad of another kind, and is refused as such.
+    # Without any of its columns it is a triad of another kind, which is rejected later.
     if not absent or triad.absent or len(absent) == 3:
         return triad
     table = triad.table.copy()
     there = next(c for k, c in enumerate(columns) if k not in absent)
     for k in absent:
-        # Rows that another axis does not have, this one has not either.
+        # Rows missing for another axis are missing for this one as well.
         table[columns[k]] = table[there] * 0.0
     table = table[[*columns, *(c for c in triad.table.columns if c not in columns)]]
     table.attrs = dict(triad.table.attrs)

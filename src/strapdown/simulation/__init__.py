@@ -1,4 +1,4 @@
-"""Motions with exact truth, and the sensor data they would give."""
+"""Motions with exact truth, and simulated sensor data for them."""
 
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation.cameras import film, paper_cameras, path_from_cameras

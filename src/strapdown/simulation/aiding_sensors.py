@@ -1,4 +1,4 @@
-"""When an aid that rides on a motion measures, and how its point of the body moves then."""
+"""Simulated measurements of barometer, velocity log, compass and odometer on a motion."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def instants(motion: EarthMotion, rate: float) -> Array:
     Raises
     ------
     ConfigError
-        There is no more than one, or there are too many.
+        The instants are fewer than two, or too many.
     """
     count = math.floor(rate * motion.duration * (1.0 + 1e-12)) + 1
     if not 2 <= count <= _MOST:
@@ -54,17 +54,17 @@ def instants(motion: EarthMotion, rate: float) -> Array:
 
 
 def place_of_point(motion: EarthMotion, time: Array, arm: ArrayLike) -> Array:
-    """Return where a point of the body is, (n, 3): latitude, longitude in deg, height in m."""
+    """Return the position of a body point, (n, 3): latitude, longitude in deg, height in m."""
     return _point(motion, time, arm)[0]
 
 
 def velocity_of_point(motion: EarthMotion, time: Array, arm: ArrayLike) -> Array:
-    """Return how a point of the body moves relative to the Earth, body axes, (n, 3), m/s."""
+    """Return the velocity of a body point relative to the Earth, body axes, (n, 3), m/s."""
     return rotation.rotate(rotation.conjugate(motion.attitude(time)), _point(motion, time, arm)[1])
 
 
 def check_numbers(sensor: object, *names: str, above: bool = False) -> None:
-    """Refuse attributes that are negative or not finite; or zero, if they must be above it."""
+    """Raise for attributes that are not finite, negative, or (with `above`) zero."""
     for name in names:
         value = np.asarray(getattr(sensor, name), dtype=np.float64)
         if not np.isfinite(value).all() or (value < 0.0).any() or (above and (value == 0.0).any()):
@@ -87,7 +87,7 @@ def _point(motion: EarthMotion, time: Array, arm: ArrayLike) -> tuple[Array, Arr
     )
 
 
-# A barometer that rides on a motion, in weather that changes.
+# Barometer with noise and a wandering bias.
 
 
 _NOISE, _WALK = 0, 1
@@ -96,19 +96,19 @@ _HOUR = 3600.0
 
 @dataclass(frozen=True)
 class PressureHeight:
-    """What a barometer does to the truth: ``height + bias + noise``.
+    """Error model of a barometer: ``height + bias + noise``.
 
     Attributes
     ----------
     rate : float, Hz
     noise : float, m
-        Standard deviation, new with each row.
+        Standard deviation, independent for each row.
     bias : float, m
         At time zero.
     walk : float, m/√h
-        By which the bias walks.
+        Random walk of the bias.
     point : triad, m
-        Of the barometer, from the point that the motion describes, in its body axes.
+        Position of the barometer relative to the motion's reference point, body axes.
 
     Raises
     ------
@@ -130,7 +130,7 @@ class PressureHeight:
 def simulate_barometer(
     motion: EarthMotion, barometer: PressureHeight, *, seed: Seed = 0, source: str | None = None
 ) -> pd.DataFrame:
-    """Heights of a barometer over a motion.
+    """Simulate barometric heights over a motion.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def simulate_barometer(
     return barometer_table(time, height + barometer.bias + walk + noise, barometer.noise, source)
 
 
-# A Doppler log, or another instrument that measures its velocity, on a motion.
+# Doppler log or another instrument that measures the velocity in its own axes.
 
 
 _BODY_VELOCITY_NOISE = 0
@@ -163,19 +163,19 @@ _BODY_VELOCITY_NOISE = 0
 
 @dataclass(frozen=True)
 class VelocityLog:
-    """What an instrument does to the truth: ``(1 + scale) C_ib v_b + noise``.
+    """Error model of a velocity log: ``(1 + scale) C_ib v_b + noise``.
 
     Attributes
     ----------
     rate : float, Hz
     noise : triad, m/s
-        Standard deviation along each of its axes, new with each row.
+        Standard deviation along each instrument axis, independent for each row.
     scale : float
-        Relative error of the scale factor.
+        Relative scale factor error.
     point : triad, m
-        Of the instrument, from the point that the motion describes, in its body axes.
+        Position of the instrument relative to the motion's reference point, body axes.
     angles_deg : triad, deg
-        Roll, pitch, yaw of these body axes in the instrument (`aiding.vehicle_axes`).
+        Roll, pitch, yaw of the body axes in the instrument axes (`aiding.vehicle_axes`).
 
     Raises
     ------
@@ -196,12 +196,12 @@ class VelocityLog:
 def simulate_body_velocity(
     motion: EarthMotion, log: VelocityLog, *, seed: Seed = 0, source: str | None = None
 ) -> pd.DataFrame:
-    """Velocities of an instrument over a motion.
+    """Simulate the velocities of an instrument over a motion.
 
     Parameters
     ----------
     motion : EarthMotion
-        Of the inertial sensors.
+        Motion of the inertial sensors.
     log : VelocityLog
     seed : int or SeedSequence
         Of the noise.
@@ -220,7 +220,7 @@ def simulate_body_velocity(
     return body_velocity_table(time, along + noise, log.noise, source)
 
 
-# A compass, or a baseline of two antennas, on a motion.
+# Compass, or baseline of two antennas.
 
 
 _HEADING_NOISE = 0
@@ -228,16 +228,16 @@ _HEADING_NOISE = 0
 
 @dataclass(frozen=True)
 class Compass:
-    """What a compass does to the truth: ``azimuth of an axis + misalignment + noise``.
+    """Error model of a compass: ``azimuth of an axis + misalignment + noise``.
 
     Attributes
     ----------
     rate : float, Hz
     noise_deg : float, deg
-        Standard deviation, new with each row.
+        Standard deviation, independent for each row.
     misalignment_deg : float, deg
     axis_deg : float, deg
-        Of the axis in the body, from forward to the right.
+        Direction of the axis in the body, from forward to the right.
 
     Raises
     ------
@@ -257,7 +257,7 @@ class Compass:
 def simulate_heading(
     motion: EarthMotion, compass: Compass, *, seed: Seed = 0, source: str | None = None
 ) -> pd.DataFrame:
-    """Headings of a compass over a motion.
+    """Simulate the headings of a compass over a motion.
 
     Parameters
     ----------
@@ -282,7 +282,7 @@ def simulate_heading(
     return heading_table(time, np.mod(read, 360.0), compass.noise_deg, source)
 
 
-# A wheel that rolls along on a motion.
+# Odometer on a rolling wheel.
 
 
 _ODOMETER_NOISE = 0
@@ -290,19 +290,19 @@ _ODOMETER_NOISE = 0
 
 @dataclass(frozen=True)
 class WheelSpeed:
-    """What a wheel does to the truth: ``(1 + scale) v_forward + noise``.
+    """Error model of a wheel odometer: ``(1 + scale) v_forward + noise``.
 
     Attributes
     ----------
     rate : float, Hz
     noise : float, m/s
-        Standard deviation, new with each row.
+        Standard deviation, independent for each row.
     scale : float
-        Relative error of the scale factor.
+        Relative scale factor error.
     point : triad, m
-        Of the wheel, from the point that the motion describes, in its body axes.
+        Position of the wheel relative to the motion's reference point, body axes.
     angles_deg : triad, deg
-        Roll, pitch, yaw of these body axes in the vehicle (`aiding.vehicle_axes`).
+        Roll, pitch, yaw of the body axes in the vehicle axes (`aiding.vehicle_axes`).
 
     Raises
     ------
@@ -323,12 +323,12 @@ class WheelSpeed:
 def simulate_odometer(
     motion: EarthMotion, wheel: WheelSpeed, *, seed: Seed = 0, source: str | None = None
 ) -> pd.DataFrame:
-    """Speeds of a wheel over a motion.
+    """Simulate the speeds of a wheel over a motion.
 
     Parameters
     ----------
     motion : EarthMotion
-        Of the inertial sensors.
+        Motion of the inertial sensors.
     wheel : WheelSpeed
     seed : int or SeedSequence
         Of the noise.

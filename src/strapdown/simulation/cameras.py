@@ -1,4 +1,4 @@
-"""High-speed cameras that film markers on a vehicle, and what becomes of two views."""
+"""High-speed cameras filming markers on a vehicle, and triangulation from two views."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ __all__ = ["Camera", "film", "paper_cameras", "path_from_cameras"]
 
 Array = NDArray[np.float64]
 
-# Places below the seed of a camera.
+# Stream keys below the seed of a camera.
 POSE, LENS, READING = range(3)
 
 
@@ -38,34 +38,34 @@ def film(
     start: float | None = None,
     end: float | None = None,
 ) -> pd.DataFrame:
-    """Film markers on a vehicle.
+    """Simulate the image coordinates of markers on a vehicle.
 
     Parameters
     ----------
     motion : Motion
-        Of the vehicle's origin, with a ``position`` (flat Earth) or a ``trajectory``.
+        Motion of the vehicle's origin, with a ``position`` (flat Earth) or a ``trajectory``.
     markers : dict
-        Name, and place on the vehicle: forward, right, down from its origin, m.
+        Marker name and its position on the vehicle: forward, right, down from the origin, m.
     camera : Camera
-        Its true pose, focal length and distortion are drawn about what it tells.
+        Nominal calibration; the true pose, focal length and distortion are drawn about it.
     impact : float, s
-        Instant of the common trigger on the motion's clock. Stamps count from it, and the
-        frame of the scene has its origin where the vehicle's origin is then, its axes north,
-        east, down there.
+        Instant of the common trigger on the motion's clock. Stamps count from it. The scene frame
+        has its origin at the vehicle's origin at that instant, with axes north, east, down there.
     seed : int
     start, end : float, s, optional
-        On the motion's clock; the whole motion, if not given.
+        On the motion's clock; default, the whole motion.
 
     Returns
     -------
     DataFrame
         Index ``time``, s, on the camera's clock; for each marker the columns ``<name>_u`` and
-        ``<name>_v``, px, NaN where it is not seen; ``attrs["camera"]`` is the camera's name.
+        ``<name>_v``, px, NaN where it is not visible; ``attrs["camera"]`` is the camera's name.
 
     Raises
     ------
     ConfigError
-        There is no marker or no place, or fewer than two frames; the message names the camera.
+        No marker or no position is given, or fewer than two frames result; the message names the
+        camera.
     """
     if not markers:
         raise ConfigError("simulation.camera-nothing-look", quantity="markers", name=camera.name)
@@ -99,20 +99,19 @@ def film(
 
 
 def paper_cameras(distance: float = 8.0) -> tuple[Camera, Camera]:
-    """Give a top and a side camera as in the crash test of Tadic and Vukajlovic (2016).
+    """Return a top and a side camera as in the crash test of Tadic and Vukajlovic (2016).
 
     Parameters
     ----------
     distance : float, m
-        From the vehicle's origin at the impact.
+        Distance from the vehicle's origin at the impact.
 
     Returns
     -------
     top, side : Camera
-        1000 frames/s and 1.3 megapixels are the paper's. Chosen: distance, a lens of 1300 px
-        with a barrel distortion of which the calibration leaves a tenth, readings to half a
-        pixel, a pose known to 5 mm and 0.05 deg, a focal length to 0.1 %. The side camera stands
-        in the west and looks east.
+        1000 frames/s and 1.3 megapixels are the paper's. Chosen here: distance, a lens of 1300 px
+        with a barrel distortion calibrated to a tenth, readings to half a pixel, a pose known to 5
+        mm and 0.05 deg, a focal length to 0.1 %. The side camera is in the west and looks east.
     """
     top = Camera(
         "top",
@@ -132,7 +131,7 @@ def paper_cameras(distance: float = 8.0) -> tuple[Camera, Camera]:
 
 
 def _scene(motion: Any, time: Array, impact: float) -> tuple[Array, Array]:
-    """Place of the vehicle's origin and attitude, in the axes of the scene."""
+    """Position of the vehicle's origin and attitude, in scene axes."""
     if hasattr(motion, "position"):
         origin = motion.position(np.array([impact]))
         return motion.position(time) - origin, motion.attitude(time)
@@ -140,7 +139,7 @@ def _scene(motion: Any, time: Array, impact: float) -> tuple[Array, Array]:
         raise ConfigError("simulation.motion-does-not-know", quantity="motion")
     here = motion.trajectory(np.array([impact]))[GEODETIC].to_numpy()
     place = motion.trajectory(time)[GEODETIC].to_numpy()
-    # From the level at the vehicle to that of the scene, through the Earth's axes.
+    # From local level at the vehicle to local level at the scene origin, through Earth axes.
     scene, there = frames.q_ne(*here[0, :2]), frames.q_ne(place[:, 0], place[:, 1])
     turn = rotation.compose(scene, rotation.conjugate(there))
     ned = frames.ned_from_geodetic(place, origin=here[0], ellipsoid=motion.ellipsoid)
@@ -148,7 +147,7 @@ def _scene(motion: Any, time: Array, impact: float) -> tuple[Array, Array]:
 
 
 def _drawn(camera: Camera, root: np.random.SeedSequence) -> tuple[Camera, Array]:
-    """The camera as it really is, and its axes."""
+    """Draw the true camera and its axes."""
     moved = _normal((6,), root, POSE)
     turned = rotation.dcm_from_rotation_vector(np.radians(camera.angles_sd_deg) * moved[3:])
     lens = _normal((2,), root, LENS)
@@ -169,55 +168,55 @@ def _normal(shape: tuple[int, ...], root: np.random.SeedSequence, *place: int) -
     return generator.standard_normal(shape)
 
 
-# A camera that stands still: what it sees of a point, and back.
+# Camera model: projection and its inverse.
 
 
-# Newton squares the error at each step; a lens that bends less than its limit needs few.
+# Newton's error is squared at each step; a lens within its distortion limit needs few steps.
 MOST_ITERATIONS = 30
 
 
 @dataclass(frozen=True)
 class Camera:
-    """A camera that stands still, as its calibration tells it.
+    """A stationary camera with its calibration.
 
-    A point at the distance d along the looking direction, and a to the right of and b below it,
-    has ``x = a/d`` and ``y = b/d``, and is seen ``focal x (1 + k1 r²)`` px to the right of and
-    ``focal y (1 + k1 r²)`` px below the middle of the image, ``r² = x² + y²``.
+    A point at distance d along the looking direction, a to the right and b below it, has ``x =
+    a/d`` and ``y = b/d`` and appears ``focal x (1 + k1 r²)`` px to the right of and ``focal y (1 +
+    k1 r²)`` px below the image center, ``r² = x² + y²``.
 
     Attributes
     ----------
     name : str
-        Two cameras of one seed differ by it.
+        Also selects the random stream: two cameras with one seed differ by it.
     position : triad, m
-        North, east, down in the frame of the scene.
+        North, east, down in the scene frame.
     looking : triad
-        Direction north, east, down; its length does not count.
+        Direction north, east, down; any length.
     up : triad
-        Direction that is up in the image, not along `looking`.
+        Direction that is up in the image, not parallel to `looking`.
     focal : float, px
     size : tuple of int, px
         Width and height.
     rate : float, Hz
-        Frames fall on whole multiples of its inverse on the camera's own clock.
+        Frames fall on integer multiples of its inverse on the camera's own clock.
     reading_sd : float, px
-        Of each coordinate of a marker in a frame.
+        Standard deviation of each image coordinate of a marker.
     k1 : float
-        Radial distortion.
+        Radial distortion coefficient.
     position_sd, angles_sd_deg : float, m and deg
-        Of each coordinate of the position, and of each turn about the camera's axes.
+        Standard deviations of each position coordinate and of each rotation about the camera axes.
     focal_sd : float
-        Relative.
+        Relative standard deviation of the focal length.
     k1_sd : float
-        What the calibration leaves of the distortion.
+        Standard deviation of the distortion after calibration.
     clock_offset : float, s
-        By how much its stamps are late; the evaluation does not know it.
+        Delay of the stamps, unknown to the evaluation.
     clock_sd : float, s
-        How well the evaluation knows that it is zero.
+        Standard deviation that the evaluation assigns to a clock offset of zero.
 
     Raises
     ------
     ConfigError
-        A number is out of range, or there is no direction up.
+        A number is out of range, or `up` gives no direction in the image.
     """
 
     name: str
@@ -256,7 +255,7 @@ class Camera:
 
     @property
     def axes(self) -> Array:
-        """Right, down and forward of the image as rows, north-east-down, (3, 3)."""
+        """Right, down and forward axes of the image as rows, north-east-down, (3, 3)."""
         forward = np.asarray(self.looking, dtype=np.float64)
         forward = forward / np.linalg.norm(forward)
         right = np.cross(forward, self.up)
@@ -265,11 +264,11 @@ class Camera:
 
     @property
     def widest(self) -> float:
-        """Greatest r that the lens shows only once; infinite without barrel distortion."""
+        """Largest r that the lens images uniquely; infinite without barrel distortion."""
         return math.inf if self.k1 >= 0.0 else 1.0 / math.sqrt(-3.0 * self.k1)
 
     def pixels(self, points: ArrayLike) -> Array:
-        """Where points are seen.
+        """Project points to pixels.
 
         Parameters
         ----------
@@ -279,13 +278,13 @@ class Camera:
         Returns
         -------
         ndarray, (n, 2), px
-            To the right and down from the upper left corner; NaN behind the camera, beyond what
-            the lens shows, and outside of the image.
+            To the right and down from the upper left corner; NaN behind the camera, beyond the
+            range of the lens, and outside the image.
         """
         return project(self, self.axes, np.asarray(points, dtype=np.float64))
 
     def directions(self, pixels: ArrayLike) -> Array:
-        """Turn pixels back to x and y, free of distortion, (n, 2)."""
+        """Convert pixels to x and y without distortion, (n, 2)."""
         seen = (np.asarray(pixels, dtype=np.float64) - _middle(self)) / self.focal
         if self.k1 == 0.0:
             return seen
@@ -300,7 +299,7 @@ class Camera:
 
 
 def project(camera: Camera, axes: Array, points: Array) -> Array:
-    """Where a camera whose axes have been turned to `axes` sees points; as `Camera.pixels`."""
+    """Project points into a camera whose axes have been rotated to `axes`; as `Camera.pixels`."""
     away = (points - np.asarray(camera.position)) @ axes.T
     depth = np.where(away[:, 2] > 0.0, away[:, 2], np.nan)
     xy = away[:, :2] / depth[:, None]
@@ -319,12 +318,12 @@ def _refused(camera: Camera, quantity: str, value: object, code: str) -> ConfigE
     return ConfigError(code, quantity=quantity, name=camera.name, value=value)
 
 
-# A path in space from what two cameras saw of a marker.
+# Triangulation of a marker's path from two cameras.
 
 
-# The weights settle with the relative error of the depth, which each round squares or better.
+# The weights converge with the relative depth error, which each iteration at least squares.
 ROUNDS = 4
-# Velocity is taken over so many frames either way: what a reading's error makes of it falls.
+# Velocity is differenced over this many frames either way, which reduces the reading noise.
 SPAN = 10
 
 
@@ -336,44 +335,44 @@ def path_from_cameras(
     marker: str,
     central: float = math.inf,
 ) -> pd.DataFrame:
-    """Combine two views into a path.
+    """Triangulate the path of a marker from two views.
 
     Parameters
     ----------
     tracks_top, tracks_side : DataFrame
-        As of `cameras.film`.
+        As returned by `cameras.film`.
     cameras : tuple of Camera
-        That of the first and that of the second tracks, as calibrated.
+        Cameras of the first and the second tracks, as calibrated.
     marker : str
-        Whose path it is.
+        Marker to triangulate.
     central : float, px
-        Readings farther from the middle of the image than this are not used: what the
-        calibration leaves of the distortion grows with the cube of it.
+        Radius about the image center beyond which readings are not used, because the residual
+        distortion grows with its cube.
 
     Returns
     -------
     DataFrame
         Index ``time``, s, of the frames of the first camera at which both see the marker, not
-        corrected for any offset; ``north east down`` in m in the frame of the scene;
-        ``north_sd east_sd down_sd`` in m; ``residual`` in px, root of the mean square of what
-        the four readings leave over. The second camera's readings are interpolated linearly
-        between its frames, which at 1000 frames/s and 130 m/s² leaves 2e-5 m.
+        corrected for any offset; ``north east down`` in m in the scene frame; ``north_sd east_sd
+        down_sd``, standard deviations in m; ``residual`` in px, root mean square residual of the
+        four readings. The second camera's readings are interpolated linearly between its frames,
+        which leaves 2e-5 m at 1000 frames/s and 130 m/s².
 
     Raises
     ------
     DataError
-        A camera has not seen the marker, or never together with the other; the message names
+        A camera has not seen the marker, or never simultaneously with the other; the message names
         camera and marker.
     ConfigError
-        `central` is not positive, or the cameras look along one line.
+        `central` is not positive, or the viewing directions are parallel.
 
     Notes
     -----
-    In each frame the place minimises the squares of the four differences between the readings,
-    freed of distortion, and where the place would be seen. The standard deviations are those of
-    the readings and, common to all frames, those that the cameras state of position, directions,
-    focal length, distortion and clock, propagated to first order (`_of_calibration`); a clock
-    acts by the velocity of the path over 20 frames.
+    In each frame the position minimizes the squared differences between the four readings,
+    corrected for distortion, and the projected position. The standard deviations combine those of
+    the readings with those, common to all frames, that the cameras state for position, directions,
+    focal length, distortion and clock, propagated to first order (`_of_calibration`). A clock error
+    acts through the velocity of the path over 20 frames.
     """
     if not central > 0.0:
         raise ConfigError("simulation.px-leaves-no-image", quantity="central", central=central)
@@ -390,7 +389,7 @@ def path_from_cameras(
             marker=marker,
         )
     views = [top.directions(seen), side.directions(matched)]
-    # An interpolated reading has the errors of two.
+    # An interpolated reading carries the errors of two readings.
     shares = [np.ones(time.size), np.hypot(1.0 - part, part)]
     place, rows, residuals = _triangulated(views, cameras)
     covariance = _of_readings(rows, views, cameras, shares)
@@ -414,7 +413,7 @@ def path_from_cameras(
 def _readings(
     tracks: pd.DataFrame, camera: Camera, marker: str, central: float
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Stamps and pixels where the marker is seen, and whether the next frame saw it too."""
+    """Stamps and pixels of visible markers, and whether the next frame also saw the marker."""
     columns = [f"{marker}_u", f"{marker}_v"]
     if any(c not in tracks.columns for c in columns):
         raise DataError(
@@ -446,12 +445,12 @@ def _readings(
 def _matched(
     time: Array, seen: Array, other: Array, also: Array, whole: NDArray[np.bool_]
 ) -> tuple[Array, Array, Array, Array]:
-    """The second view at the stamps of the first, and how far between two of its frames."""
+    """Interpolate the second view to the stamps of the first, with the fraction of a frame."""
     before = np.clip(np.searchsorted(other, time + 1e-9, side="right") - 1, 0, None)
     after = np.minimum(before + 1, other.size - 1)
     gap = np.where(after > before, other[after] - other[before], 1.0)
     part = (time - other[before]) / gap
-    # Rounding of a stamp is no interval.
+    # Ignore intervals within the rounding of a stamp.
     part = np.where(np.abs(time - other[before]) < 1e-9, 0.0, part)
     there = (part == 0.0) | ((part > 0.0) & (part <= 1.0) & whole[before])
     between = also[before] + part[:, None] * (also[after] - also[before])
@@ -459,7 +458,7 @@ def _matched(
 
 
 def _triangulated(views: list[Array], cameras: tuple[Camera, Camera]) -> tuple[Array, Array, Array]:
-    """Places, derivatives of the four directions by the place (n, 4, 3), and residuals (n, 4)."""
+    """Positions, derivatives of the four directions by position (n, 4, 3), residuals (n, 4)."""
     rows, offsets = [], []
     for xy, camera in zip(views, cameras, strict=True):
         axes = camera.axes
@@ -484,7 +483,7 @@ def _triangulated(views: list[Array], cameras: tuple[Camera, Camera]) -> tuple[A
 
 
 def _gain(rows: Array) -> Array:
-    """What an error of each direction makes of the place, (n, 3, 4)."""
+    """Sensitivity of the position to each direction error, (n, 3, 4)."""
     normal = np.einsum("nij,nik->njk", rows, rows)
     return np.asarray(np.linalg.solve(normal, rows.transpose(0, 2, 1)), dtype=np.float64)
 
@@ -494,7 +493,7 @@ def _of_readings(
 ) -> Array:
     sds = []
     for xy, camera, share in zip(views, cameras, shares, strict=True):
-        # The lens stretches by 1 + k1 r² across and 1 + 3 k1 r² along r: their mean.
+        # The lens stretches by 1 + k1 r² across r and 1 + 3 k1 r² along it; the mean is used.
         stretch = 1.0 + 2.0 * camera.k1 * (xy * xy).sum(axis=1)
         sds += [camera.reading_sd / camera.focal / stretch * share] * 2
     spread = _gain(rows) * np.stack(sds, axis=1)[:, None, :]
@@ -504,12 +503,12 @@ def _of_readings(
 def _of_calibration(
     rows: Array, views: list[Array], cameras: tuple[Camera, Camera], velocity: Array
 ) -> Array:
-    """Covariance by what the cameras state of themselves.
+    """Position covariance from the stated calibration uncertainty of the cameras.
 
-    With the directions ``x, y`` of a camera: a turn e about its axes right, down, forward moves
-    them by ``e2 (1 + x²) - e1 x y - e3 y`` and ``-e1 (1 + y²) + e2 x y + e3 x``; a relative
-    change of the focal length by ``x, y`` times it; one of k1 by ``x r², y r²`` times it; a
-    shift of the camera by minus that of the place; and a late clock by minus the velocity.
+    With the directions ``x, y`` of a camera: a rotation e about its axes right, down, forward moves
+    them by ``e2 (1 + x²) - e1 x y - e3 y`` and ``-e1 (1 + y²) + e2 x y + e3 x``; a relative change
+    of the focal length by ``x, y`` times it; a change of k1 by ``x r², y r²`` times it; a camera
+    shift by minus that of the position; a clock delay by minus the velocity.
     """
     gain = _gain(rows)
     total = np.zeros((len(rows), 3, 3))

@@ -1,4 +1,4 @@
-"""Coning: an axis of the body that runs around a cone, in closed form."""
+"""Coning and sculling motions in closed form."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Coning(FlatMotion):
-    """Classical coning: tilted by a constant angle about an axis that itself turns.
+    """Classical coning: a tilt of constant angle about a rotating axis.
 
     ``q(t) = q_nb exp(β e(t))`` with ``e(t) = u cos Ωt + v sin Ωt``; u, v and the cone axis n are
-    right-handed. The cone axis is the same in the body and in the mean attitude, and the body
-    comes back after each cycle, while each gyro on its own sees a steady turn about n.
+    right-handed. The cone axis is the same in the body and in the mean attitude. The body returns
+    to its attitude after each cycle, while the mean gyro rate about n is not zero.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class Coning(FlatMotion):
     frequency : float, Hz
     duration : float, s
     axis : tuple of float
-        n, in body axes; any length but zero.
+        n, in body axes; any nonzero length.
     q_nb : tuple of float
         Mean attitude, scalar first.
 
@@ -41,8 +41,8 @@ class Coning(FlatMotion):
 
     Notes
     -----
-    The body rate is ``Ω sin β (v cos Ωt - u sin Ωt) - 2 Ω sin²(β/2) n``, from
-    ``2 q* dq/dt``. Its last term is what the naive sum takes for a turn about n.
+    The body rate is ``Ω sin β (v cos Ωt - u sin Ωt) - 2 Ω sin²(β/2) n``, from ``2 q* dq/dt``.
+    Summing rates without coning correction takes its last term for a rotation about n.
     """
 
     half_angle: float
@@ -123,15 +123,15 @@ class Coning(FlatMotion):
         return rotation.compose(np.asarray(self.q_nb, dtype=np.float64), tilt)
 
     def acceleration(self, time: ArrayLike) -> Array:
-        """Zero: the body stays in its place; (n, 3), m/s²."""
+        """Zero, (n, 3), m/s²: the position is constant."""
         return np.zeros((np.size(time), 3))
 
     def velocity(self, time: ArrayLike) -> Array:
-        """Zero: the body stays in its place; (n, 3), m/s."""
+        """Zero, (n, 3), m/s: the position is constant."""
         return np.zeros((np.size(time), 3))
 
     def position(self, time: ArrayLike) -> Array:
-        """Zero: the body stays in its place; (n, 3), m."""
+        """Zero, (n, 3), m: the position is constant."""
         return np.zeros((np.size(time), 3))
 
     @property
@@ -147,7 +147,7 @@ class Coning(FlatMotion):
         return float(2.0 * self._omega * np.sin(0.5 * self._beta) ** 2)
 
     def _cycle(self, time: ArrayLike) -> tuple[Array, Array]:
-        # Whole cycles are taken away before pi makes them inexact.
+        # Whole cycles are removed before the multiplication by pi rounds them.
         cycles = np.fmod(np.asarray(time, dtype=np.float64) * self.frequency, 1.0)
         phase = 2.0 * np.pi * cycles[:, None]
         return np.cos(phase), np.sin(phase)
@@ -155,7 +155,8 @@ class Coning(FlatMotion):
     def _triad(self) -> tuple[Array, Array, Array]:
         n = np.asarray(self.axis, dtype=np.float64)
         n = n / np.linalg.norm(n)
-        # u in the plane of n and the body axis after n's largest: forward for a cone about down.
+        # u lies in the plane of n and the body axis after n's largest: forward for a cone about
+        # down.
         u = np.zeros(3)
         u[(int(np.argmax(np.abs(n))) + 1) % 3] = 1.0
         u -= (u @ n) * n
@@ -163,7 +164,7 @@ class Coning(FlatMotion):
         return u, np.cross(n, u), n
 
 
-# Sculling: a body that swings about one axis and is shaken along another, in closed form.
+# Sculling: angular vibration about one axis and linear vibration along another, in closed form.
 
 Complex = NDArray[np.complex128]
 Whole = NDArray[np.int64]
@@ -173,12 +174,12 @@ HARMONICS = 28
 
 @dataclass(frozen=True)
 class Sculling(FlatMotion):
-    """An angular vibration, and a linear one of the same frequency along a body axis across it.
+    """An angular vibration and a linear vibration of the same frequency along a perpendicular axis.
 
-    The body turns by ``α sin Ωt`` about n. Along the body axis e, which stands across n, it is
-    accelerated by ``B sin(Ωt + ψ)``. In phase (ψ = 0) this drives it along n x e with a steady
-    ``B J1(α)``, though no accelerometer reads a steady force; in quadrature (ψ = 90°) what is
-    left of a cycle is distance.
+    The body rotates by ``α sin Ωt`` about n. Along the body axis e, perpendicular to n, it is
+    accelerated by ``B sin(Ωt + ψ)``. In phase (ψ = 0) this gives a steady acceleration ``B J1(α)``
+    along n x e, although no accelerometer has a steady output; in quadrature (ψ = 90°) the residual
+    of a cycle is a distance.
 
     Attributes
     ----------
@@ -191,20 +192,20 @@ class Sculling(FlatMotion):
     phase : float, deg
         ψ.
     swing_axis, push_axis : tuple of float
-        n and e in body axes, across each other; any length but zero.
+        n and e in body axes, perpendicular; any nonzero length.
     q_nb : tuple of float
         Mean attitude, scalar first.
 
     Raises
     ------
     ConfigError
-        A number is out of its range, or the axes do not stand across each other.
+        A number is out of its range, or the axes are not perpendicular.
 
     Notes
     -----
-    With ``z = e + i (n x e)`` the acceleration is ``B exp(iα sin Ωt) sin(Ωt + ψ)``, by
-    Jacobi and Anger (DLMF 10.12.1) a sum of ``B/2i (J[m-1](α) exp(iψ) - J[m+1](α) exp(-iψ))
-    exp(imΩt)``, whose integrals are closed.
+    With ``z = e + i (n x e)`` the acceleration is ``B exp(iα sin Ωt) sin(Ωt + ψ)``, by the
+    Jacobi-Anger expansion (DLMF 10.12.1) a sum of ``B/2i (J[m-1](α) exp(iψ) - J[m+1](α)
+    exp(-iψ)) exp(imΩt)``, whose integrals are closed.
     """
 
     swing: float
@@ -247,7 +248,7 @@ class Sculling(FlatMotion):
 
     @property
     def drift(self) -> float:
-        """The steady acceleration along n x e, ``B J1(α) cos ψ``, m/s²."""
+        """Steady acceleration along n x e, ``B J1(α) cos ψ``, m/s²."""
         from scipy.special import j1
 
         return float(self.push * j1(self._alpha) * np.cos(self._psi))
@@ -263,7 +264,7 @@ class Sculling(FlatMotion):
         return np.asarray(self._alpha * np.sin(phase)[:, None] * self._triad[0])
 
     def shake(self, time: ArrayLike) -> Array:
-        """Acceleration in body axes, (n, 3), m/s²: specific force but for gravity."""
+        """Acceleration in body axes, (n, 3), m/s²: specific force without gravity."""
         phase = self._cycle(time) + self._psi
         return np.asarray(self.push * np.sin(phase)[:, None] * self._triad[1])
 
@@ -290,13 +291,13 @@ class Sculling(FlatMotion):
     def position(self, time: ArrayLike) -> Array:
         """Exact position since time zero, north-east-down, (n, 3), m."""
         t, m, g, turned = self._harmonics(time)
-        # Of a velocity (exp(imp) - 1)/(im Omega) the integral is that again over im Omega, less
+        # The integral of a velocity term (exp(imp) - 1)/(im Omega) is the term over im Omega, minus
         # t over im Omega.
         slow = np.where(m == 0, 0.0, g / (1j * np.where(m == 0, 1, m) * self._omega))
         return self._local(0.5 * t * t * g[HARMONICS] + turned @ slow - t * slow.sum())
 
     def _harmonics(self, time: ArrayLike) -> tuple[Array, Whole, Complex, Complex]:
-        """Times, numbers of the harmonics, their amplitudes, and ``int exp(im Omega t) dt``."""
+        """Times, harmonic numbers, their amplitudes, and ``int exp(im Omega t) dt``."""
         from scipy.special import jv
 
         t = np.asarray(time, dtype=np.float64)
@@ -324,7 +325,7 @@ class Sculling(FlatMotion):
         return 2.0 * np.pi * self.frequency
 
     def _cycle(self, time: ArrayLike) -> Array:
-        # Whole cycles are taken away before pi makes them inexact.
+        # Whole cycles are removed before the multiplication by pi rounds them.
         cycles = np.fmod(np.asarray(time, dtype=np.float64) * self.frequency, 1.0)
         return np.asarray(2.0 * np.pi * cycles)
 

@@ -1,4 +1,4 @@
-"""Crashes with the recorders that write them: what is true, and what is said of it."""
+"""Simulated crash cases: crash, recorders, stated configuration, recordings and truth."""
 
 from __future__ import annotations
 
@@ -28,20 +28,20 @@ __all__ = ["CASES", "CaseRecorder", "CrashCase", "find_case"]
 
 @dataclass(frozen=True)
 class CaseRecorder:
-    """A recorder of a case.
+    """A recorder of a crash case.
 
     Attributes
     ----------
     design : RecorderDesign
-        How it is built and mounted.
+        Construction and mounting.
     begins : float, s, optional
-        From the impact, where its record begins; with the motion, if not given.
+        Start of its record relative to the impact; default, the start of the motion.
     stated : Mounting, optional
-        What the case file says of its mounting, where that is not its design's.
+        Mounting stated in the case file, if different from the design's.
     assumed_turn_sd_deg : float, optional
-        Of a recorder without gyro: by how much the vehicle may have turned in the crash.
+        Standard deviation of the vehicle's rotation in the crash, for a recorder without gyro.
     because : str
-        Why that is assumed.
+        Reason for that assumption.
     """
 
     design: RecorderDesign
@@ -61,9 +61,9 @@ class CrashCase:
     crash : CrashScenario
     recorders : tuple of CaseRecorder
     usual : tuple of str
-        Names of the recorders that write, if none is named.
+        Recorders used if none is named.
     remark : str
-        What is wrong on purpose, for the case file; empty, where nothing is.
+        Deliberate error in the case, for the case file; empty if there is none.
     """
 
     name: str
@@ -74,12 +74,12 @@ class CrashCase:
     remark: str = ""
 
     def chosen(self, names: Sequence[str] = ()) -> tuple[CaseRecorder, ...]:
-        """Recorders by their names.
+        """Select recorders by name.
 
         Parameters
         ----------
         names : sequence of str
-            Of recorders, in any case; ``all`` for every one; the usual ones, if empty.
+            Names, in any letter case; ``all`` for every recorder; if empty, the usual ones.
 
         Returns
         -------
@@ -89,7 +89,7 @@ class CrashCase:
         Raises
         ------
         ConfigError
-            There is no such recorder, or one borrows the gyro of another that is not named.
+            A name is unknown, or a recorder uses the gyro of another that is not selected.
         """
         known = {r.design.name: r for r in self.recorders}
         wanted = [n.upper() for n in names] or list(self.usual)
@@ -117,11 +117,11 @@ class CrashCase:
         return taken
 
 
-# The paper's laboratory recorded from here on.
+# Start of the records of the paper's laboratory.
 LAB_BEGINS = -0.1  # s
-# Of the records with a short rest: in which no bias is found to better than the sensor's noise.
+# Records with a short stationary stretch: the bias is determined no better than the sensor noise.
 SHORT_REST = 0.3  # s
-# Of a high range that is none: half of what the impact on a wall comes to on the floor.
+# Insufficient high range: half the peak acceleration of the wall impact at the floor.
 LOW_CEILING = 16.0 * STANDARD_GRAVITY  # m/s²
 
 
@@ -136,7 +136,7 @@ def _paper() -> tuple[CaseRecorder, ...]:
 
 
 def _turned() -> tuple[CaseRecorder, ...]:
-    """The paper's, of which IMU2 sits 20 deg to the right and is said to sit straight."""
+    """The paper's recorders; IMU2 is yawed 20 deg to the right but stated as straight."""
     first, second, *others = _paper()
     straight = second.design.mounting
     skew = replace(second.design, mounting=replace(straight, angles_deg=(0.0, 0.0, 20.0)))
@@ -144,7 +144,7 @@ def _turned() -> tuple[CaseRecorder, ...]:
 
 
 def _low_ceiling() -> tuple[CaseRecorder, ...]:
-    """IMU1 and IMU2 of the paper, whose high range ends early."""
+    """IMU1 and IMU2 of the paper with a high range that saturates early."""
     found = []
     for recorder in _paper()[:2]:
         low, high = recorder.design.accelerometers
@@ -155,7 +155,7 @@ def _low_ceiling() -> tuple[CaseRecorder, ...]:
 
 
 def _short_rest(crash: CrashScenario) -> tuple[CaseRecorder, ...]:
-    """IMU1 and IMU2 of the paper, switched on just before the car is towed."""
+    """IMU1 and IMU2 of the paper, switched on just before the tow."""
     begins = min(p.start for p in crash.motion.pulses) - SHORT_REST - crash.start
     return tuple(replace(r, begins=begins) for r in _paper()[:2])
 
@@ -219,7 +219,7 @@ _SPECIAL = (
         "assumption, and the report must say so.",
     ),
 )
-#: Every crash with the paper's recorders, and some where something is the matter.
+#: Every crash with the paper's recorders, and cases with a deliberate defect.
 CASES: dict[str, CrashCase] = {
     **{name: CrashCase(name, c.summary, c, _paper(), _IMUS) for name, c in CRASHES.items()},
     **{case.name: case for case in _SPECIAL},
@@ -227,12 +227,12 @@ CASES: dict[str, CrashCase] = {
 
 
 def find_case(name: str) -> CrashCase:
-    """Return the case of that name.
+    """Return the case with that name.
 
     Raises
     ------
     ConfigError
-        There is none; the message names the nearest.
+        The name is unknown; the message gives the nearest.
     """
     if name not in CASES:
         raise ConfigError(
@@ -241,37 +241,37 @@ def find_case(name: str) -> CrashCase:
     return CASES[name]
 
 
-# What the recorders and the cameras of a simulated crash deliver, and what really happened.
+# Data that recorders and cameras of a simulated crash deliver, with the truth.
 
 
 Array = NDArray[np.float64]
 
-# After the impact: the path's 0.75 s, and what filters and late triggers need.
+# After the impact: 0.75 s of path, plus the margin for filters and late triggers.
 RECORDED = 0.85  # s
-BEFORE, AFTER = 0.1, 0.75  # s, of the path, which the cameras film
+BEFORE, AFTER = 0.1, 0.75  # s, interval filmed by the cameras
 TRUTH_STEP = 0.001  # s
-# The image is 1300 px deep and 512 px high from its middle: what moves 1 m is seen whole from
-# 2.5 m, and from 1 m farther where it comes nearer.
-DISTANCES, NEAREST = 4.0, 8.0  # of the way that is filmed, and m
-# A light gate of two beams.
+# From its center the image spans 1300 px in depth and 512 px in height: a motion of 1 m is fully
+# visible from 2.5 m, plus 1 m where the vehicle approaches.
+DISTANCES, NEAREST = 4.0, 8.0  # multiple of the filmed displacement, and m
+# Light gate with two beams.
 SPEED_SD = 0.05  # m/s
-# Draws like a recorder or a camera, by its name.
+# Random stream key, by name as for a recorder or a camera.
 LIGHT_GATE = b"light gate"
 
 
 @dataclass(frozen=True)
 class EntryTruth:
-    """How the vehicle came to the impact, and what is told of it.
+    """True state of the vehicle at the impact, and its measured speed.
 
     Attributes
     ----------
     speed : float, m/s
-        Of the centre of mass over ground, exactly.
+        Exact speed of the center of mass over ground.
     told_speed, speed_sd : float, m/s
-        As the light gate has it.
+        Speed measured by the light gate, and its standard deviation.
     heading_deg : float, deg
     slip_deg : float, deg
-        Direction of travel less heading, in (-180, 180].
+        Direction of travel minus heading, in (-180, 180].
     """
 
     speed: float
@@ -283,7 +283,7 @@ class EntryTruth:
 
 @dataclass(frozen=True, eq=False)
 class RecordedUnit:
-    """A recorder, what it wrote and what it really did."""
+    """A recorder, its record and its true errors."""
 
     recorder: CaseRecorder
     unit: CrashUnit = field(repr=False)
@@ -292,7 +292,7 @@ class RecordedUnit:
 
 @dataclass(frozen=True, eq=False)
 class RecordedCase:
-    """Everything that comes of a simulated crash.
+    """All data of a simulated crash.
 
     Attributes
     ----------
@@ -300,10 +300,10 @@ class RecordedCase:
     units : tuple of RecordedUnit
     cameras : tuple of Camera
     camera_path : DataFrame
-        As `path_from_cameras`, of the centre of mass, by time from the impact.
+        As `path_from_cameras`, for the center of mass, by time from the impact.
     truth : DataFrame
-        As `point_path`, of the centre of mass, by time from the impact, each ms from 0.1 s before
-        to 0.85 s after it; places count from that at the impact.
+        As `point_path`, for the center of mass, by time from the impact, each ms from 0.1 s before
+        to 0.85 s after it; positions are relative to the position at the impact.
     entry : EntryTruth
     """
 
@@ -331,11 +331,10 @@ def record_case(
     units : sequence of str
         As `CrashCase.chosen`.
     rate : float, Hz, optional
-        Of the recorders that carry their own name of the paper, IMU1 and IMU2; the laboratory
-        keeps its 10 kHz.
+        Sample rate of IMU1 and IMU2 of the paper; the laboratory recorder keeps its 10 kHz.
     sampling : {'instantaneous', 'mean'}
     seed : int
-        Of everything that is drawn.
+        Seed of all random draws.
 
     Returns
     -------
@@ -380,7 +379,7 @@ def record_case(
 
 
 def _at_rate(design: RecorderDesign, rate: float | None) -> RecorderDesign:
-    """The recorder at another rate; a laboratory's, which borrows its gyro, as it is."""
+    """Return the recorder at another rate; a laboratory recorder, with borrowed gyro, unchanged."""
     if rate is None or design.gyro_from is not None:
         return design
     return replace(
@@ -393,7 +392,7 @@ def _at_rate(design: RecorderDesign, rate: float | None) -> RecorderDesign:
 
 
 def _cameras(truth: pd.DataFrame) -> tuple[Camera, Camera]:
-    """The paper's, as far away as they must be to see all of it."""
+    """The paper's cameras, at the distance needed to see the whole motion."""
     filmed = truth.loc[-BEFORE:AFTER, ["north", "east", "down"]].to_numpy()
     reach = float(np.linalg.norm(filmed, axis=1).max())
     return paper_cameras(max(NEAREST, math.ceil(DISTANCES * reach)))

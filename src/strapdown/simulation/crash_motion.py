@@ -1,4 +1,4 @@
-"""A vehicle that is struck: pulses of acceleration and of turning, on the Earth."""
+"""Motions of a struck vehicle on the Earth: pulses of linear and angular acceleration."""
 
 from __future__ import annotations
 
@@ -22,18 +22,17 @@ Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 _ZERO: Triple = (0.0, 0.0, 0.0)
-# A pulse that ends with the motion still does where rounding puts the sum just behind it.
+# Tolerance for a pulse that ends with the motion, whose sum of times may round past the end.
 _ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
 class HaversinePulse:
-    """A change of velocity and of the rates of the angles, spread over a time.
+    """A haversine pulse that changes velocity and Euler-angle rates.
 
     With ``x`` from 0 to 1 over the pulse, the acceleration is ``2 D/T sin²(pi x)``, the velocity
-    has changed by ``D (x - sin(2 pi x)/2 pi)`` and the place by
-    ``D T (x²/2 + (cos(2 pi x) - 1)/4 pi²)``; D is the change, T the length. The angles take the
-    same course.
+    changes by ``D (x - sin(2 pi x)/2 pi)`` and the position by ``D T (x²/2 + (cos(2 pi x) - 1)/4
+    pi²)``; D is the total change, T the length. The Euler angles follow the same profile.
 
     Attributes
     ----------
@@ -41,12 +40,12 @@ class HaversinePulse:
     velocity_change : tuple of float, m/s
         North, east, down.
     rate_change : tuple of float, deg/s
-        Of the derivatives of roll, pitch, heading.
+        Change of the derivatives of roll, pitch, heading.
 
     Raises
     ------
     ConfigError
-        A number is not finite, it begins before zero, or its length is not positive.
+        A number is not finite, the start is before zero, or the length is not positive.
     """
 
     start: float
@@ -69,11 +68,11 @@ class HaversinePulse:
 
     @property
     def end(self) -> float:
-        """When it is over, s."""
+        """End of the pulse, s."""
         return self.start + self.length
 
     def over(self, time: Array) -> Array:
-        """How much of it is over, from 0 to 1, (n,)."""
+        """Elapsed fraction of the pulse, 0 to 1, (n,)."""
         return np.asarray(np.clip((time - self.start) / self.length, 0.0, 1.0))
 
     def slope(self, time: Array) -> Array:
@@ -82,12 +81,12 @@ class HaversinePulse:
         return np.asarray(2.0 / self.length * s * s)
 
     def done(self, time: Array) -> Array:
-        """Part of the change that has come, from 0 to 1, (n,)."""
+        """Fraction of the change reached, 0 to 1, (n,)."""
         x = self.over(time)
         return np.asarray(x - np.sin(2.0 * math.pi * x) / (2.0 * math.pi))
 
     def gathered(self, time: Array) -> Array:
-        """Integral of `done` from the beginning, (n,), s."""
+        """Integral of `done` from the start, (n,), s."""
         x = self.over(time)
         within = 0.5 * x * x - np.sin(math.pi * x) ** 2 / (2.0 * math.pi**2)
         return np.asarray(self.length * within + np.maximum(time - self.start - self.length, 0.0))
@@ -95,10 +94,9 @@ class HaversinePulse:
 
 @dataclass(frozen=True)
 class CrashMotion(EarthMotion):
-    """Constant velocity and constant rates of the angles, but for any number of pulses.
+    """Constant velocity and constant Euler-angle rates, changed by any number of pulses.
 
-    Pulses may overlap: their accelerations add up, and so do the second derivatives of roll,
-    pitch and heading.
+    Overlapping pulses add in acceleration and in the second derivatives of roll, pitch and heading.
 
     Attributes
     ----------
@@ -118,8 +116,8 @@ class CrashMotion(EarthMotion):
 
     Notes
     -----
-    Velocity, angles and their derivatives are closed forms; the place is their integral over the
-    ellipsoid within 1e-10 m a panel (`place_integral.integrate_velocity`).
+    Velocity, angles and their derivatives are closed forms; the position is their integral over the
+    ellipsoid, within 1e-10 m per panel (`place_integral.integrate_velocity`).
     """
 
     duration: float
@@ -146,12 +144,12 @@ class CrashMotion(EarthMotion):
 
     @property
     def breaks(self) -> Sequence[float]:
-        """Start, the edges of the pulses, end, s."""
+        """Start, edges of the pulses, end, s."""
         edges = {e for p in self.pulses for e in (p.start, p.end) if e < self.duration}
         return sorted({0.0, self.duration} | edges)
 
     def kinematics(self, time: Array) -> Kinematics:
-        """State at instants; as `EarthMotion.kinematics`."""
+        """State at given instants; as `EarthMotion.kinematics`."""
         acceleration, rates, swing = (np.zeros((time.size, 3)) for _ in range(3))
         angles = np.tile([self.roll_deg, self.pitch_deg, self.heading_deg], (time.size, 1))
         for pulse in self.pulses:
@@ -181,39 +179,39 @@ class CrashMotion(EarthMotion):
         return integrate_velocity(self._velocity, self.breaks, self.origin, self.ellipsoid)
 
 
-# What happens to a vehicle before, in and after an impact, laid down as pulses one by one.
+# Course of a vehicle before, during and after an impact, built pulse by pulse.
 
 
 Kind = Literal["front", "side", "rear", "rollover"]
 
-#: Where the numbers of a scenario come from, if from nowhere else.
+#: Default source of a scenario's numbers.
 CHOSEN = "chosen here"
 ROLL, PITCH, HEADING = 0, 1, 2
-# In which brakes take hold, about.
+# Approximate rise time of the brakes.
 _RAMP = 0.2  # s
 
 
 @dataclass(frozen=True)
 class Setting:
-    """Where and how a vehicle comes to what happens, and how it comes to rest.
+    """Approach to an event and the motion after it.
 
     Attributes
     ----------
     origin : Origin
-        Of the vehicle's centre of mass at time zero.
+        Center of mass of the vehicle at time zero.
     heading_deg : float, deg
     stand : float, s
-        Stationary stretch at the beginning, level.
+        Stationary stretch at the start, level.
     towing : float, m/s²
-        Mean of the acceleration up to the speed of entry; it peaks at twice that.
+        Mean acceleration up to the entry speed; the peak is twice that.
     coast : float, s
-        At that speed, until it happens.
+        Time at that speed before the event.
     friction : float
-        Of the tyres on the road afterwards, on the mean over the slide, which peaks at twice it;
-        times g, it takes the speed, and it stops the yaw, half a wheelbase of 1.3 m from the
-        centre of mass. Zero for none.
+        Mean tire friction coefficient over the slide afterwards; the peak is twice that. Times g it
+        removes the speed; acting at half a wheelbase, 1.3 m from the center of mass, it stops the
+        yaw. Zero for none.
     after : float, s
-        How long the motion goes on after the last impact is over, at the least.
+        Minimum duration of the motion after the end of the last impact.
     ellipsoid : Ellipsoid
 
     Raises
@@ -240,10 +238,9 @@ class Setting:
 
 
 class CrashCourse:
-    """Pulses as they are laid down; `time` is where the next begins.
+    """Builder of a pulse sequence; `time` is the start of the next pulse.
 
-    Vectors come in the axes of the vehicle as it heads at the beginning of the pulse, and level:
-    forward, right, down.
+    Vectors are in level vehicle axes at the heading where the pulse starts: forward, right, down.
     """
 
     def __init__(self, setting: Setting) -> None:
@@ -252,7 +249,7 @@ class CrashCourse:
         self.pulses: list[HaversinePulse] = []
 
     def approach(self, speed: float) -> None:
-        """Come to a speed from rest, and coast."""
+        """Accelerate from rest to a speed, and coast."""
         if not 0.0 <= speed < math.inf:
             raise ConfigError("simulation.speed", quantity="entry_speed", speed=speed)
         if speed > 0.0:
@@ -264,9 +261,9 @@ class CrashCourse:
     def push(
         self, length: float, change: Triple = _ZERO, rates: Triple = _ZERO, *, delay: float = 0.0
     ) -> None:
-        """Change velocity (vehicle axes, m/s) and rates of the angles (deg/s) in one pulse.
+        """Change velocity (vehicle axes, m/s) and Euler-angle rates (deg/s) in one pulse.
 
-        Time does not go on: what is pushed next overlaps.
+        Time does not advance: the next pulse overlaps.
         """
         start = self.time + delay
         heading = math.radians(self.heading(start))
@@ -276,29 +273,29 @@ class CrashCourse:
         self.pulses.append(HaversinePulse(start, length, (north, east, down), rates))
 
     def lean(self, axis: int, angle_deg: float, length: float, *, delay: float = 0.0) -> None:
-        """Turn by an angle, from rest to rest, in two pulses."""
+        """Rotate by an angle, from rest to rest, in two pulses."""
         half, rates = 0.5 * length, [0.0, 0.0, 0.0]
         for k, sign in enumerate((1.0, -1.0)):
             rates[axis] = sign * angle_deg / half
             self.push(half, rates=(rates[0], rates[1], rates[2]), delay=delay + k * half)
 
     def nod(self, axis: int, angle_deg: float, there: float = 0.2, back: float = 0.4) -> None:
-        """Turn by an angle in one time, and back in another."""
+        """Rotate by an angle in one time, and back in another."""
         if angle_deg != 0.0:
             self.lean(axis, angle_deg, there)
             self.lean(axis, -angle_deg, back, delay=there)
 
     def shift(self, way: Triple, length: float, *, delay: float = 0.0) -> None:
-        """Move by a way in m beside the motion, from rest to rest, in two pulses."""
+        """Add a displacement in m to the motion, from rest to rest, in two pulses."""
         half = 0.5 * length
         for k, sign in enumerate((1.0, -1.0)):
             x, y, z = (sign * w / half for w in way)
             self.push(half, (x, y, z), delay=delay + k * half)
 
     def brake(self, deceleration: float) -> None:
-        """Brake to a stop at a constant deceleration that comes and goes in about 0.2 s.
+        """Brake to a stop at a constant deceleration with ramps of about 0.2 s.
 
-        Pulses that each begin in the middle of the one before add up to a constant between.
+        Pulses that each start in the middle of the previous one add up to a constant in between.
         """
         speed = float(np.hypot(*self.velocity()[:2]))
         count = max(1, round(speed / (deceleration * _RAMP)))
@@ -308,7 +305,7 @@ class CrashCourse:
         self.time += (count + 1) * ramp
 
     def slide(self, gyration_squared: float) -> None:
-        """Let friction take all speed over ground and all yaw rate, in one pulse."""
+        """Remove all speed over ground and all yaw rate by friction, in one pulse."""
         grip = self.setting.friction * STANDARD_GRAVITY
         north, east, _ = self.velocity()
         yaw = sum(p.rate_change[HEADING] for p in self.pulses)
@@ -327,12 +324,12 @@ class CrashCourse:
         return self.setting.heading_deg + math.fsum(turned)
 
     def velocity(self) -> Triple:
-        """Velocity north, east, down when all pulses so far are over, m/s."""
+        """Velocity north, east, down after all pulses so far, m/s."""
         north, east, down = (math.fsum(p.velocity_change[k] for p in self.pulses) for k in range(3))
         return north, east, down
 
     def motion(self) -> CrashMotion:
-        """Motion from time zero until all is over, and `after` from now."""
+        """Motion from time zero until `after` from now or the last pulse's end, the later."""
         end = max([self.time + self.setting.after, *(p.end for p in self.pulses)])
         return CrashMotion(
             end,
@@ -346,26 +343,26 @@ class CrashCourse:
 
 @dataclass(frozen=True)
 class CrashScenario:
-    """A motion with an impact in it, or with what could be taken for one.
+    """A motion with an impact, or with an event that could be mistaken for one.
 
     Attributes
     ----------
     name, summary : str
     source : str
-        Where its numbers come from.
+        Source of its numbers.
     motion : CrashMotion
-        Of the vehicle's centre of mass.
+        Motion of the vehicle's center of mass.
     start : float, s
-        When it happens, on the clock of the motion.
+        Start of the event on the motion's clock.
     impacts : tuple of float, s
-        When each impact begins; none where there is no crash.
+        Start of each impact; empty without a crash.
     delta_v : tuple of triples, m/s
-        What each impact does to the velocity of the centre of mass: forward, right, down as the
-        vehicle heads when it begins.
+        Velocity change of the center of mass in each impact: forward, right, down at the vehicle's
+        heading when it starts.
     kind : {'front', 'side', 'rear', 'rollover'}, optional
-        Of the first impact.
+        Kind of the first impact.
     parameters : mapping
-        What it was made with, SI and deg.
+        Parameters of the scenario, SI and deg.
     """
 
     name: str
@@ -380,5 +377,5 @@ class CrashScenario:
 
     @property
     def is_crash(self) -> bool:
-        """Whether there is an impact."""
+        """Whether the scenario contains an impact."""
         return bool(self.impacts)

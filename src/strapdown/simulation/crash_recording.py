@@ -1,4 +1,4 @@
-"""What a crash recorder writes of a motion."""
+"""Simulated records of a crash recorder."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from strapdown.tables import ACCEL, GYRO, SAMPLINGS
 
 Array = NDArray[np.float64]
 
-# From sample to sample the motion is taken to run straight, for the low-pass, where it is found
-# within this: a hundredth of the finest step of a recorder's converter.
+# The low-pass treats the motion as linear between samples where it is so within this tolerance: a
+# hundredth of the finest quantization step of a recorder.
 STRAIGHT_FORCE = 1e-4  # m/s²
 STRAIGHT_RATE = 1e-6  # rad/s
-# A sample that rounding puts just outside still belongs.
+# A sample that rounding puts just outside is kept.
 SLACK = 1e-6  # of an interval
 
 
@@ -45,38 +45,39 @@ def record_crash(
     sampling: str = "instantaneous",
     mounted: bool = False,
 ) -> tuple[CrashUnit, RecorderTruth]:
-    """Let a recorder on a vehicle write.
+    """Simulate the record of a crash recorder on a vehicle.
 
     Parameters
     ----------
     motion : Motion
-        Of the vehicle's origin in vehicle axes, or (`mounted`) of the sensors in sensor axes.
+        Motion of the vehicle's origin in vehicle axes, or (`mounted`) of the sensors in sensor
+        axes.
     design : RecorderDesign
     impact : float, s
         Instant of the trigger on the motion's clock.
     seed : int
-        Of everything that is drawn: errors, noise, mounting, trigger. Recorders of different
-        names draw differently from one seed, and every part from a stream of its own.
+        Seed of all random draws: errors, noise, mounting, trigger. Recorders with different names
+        draw independently from one seed, and every part has its own stream.
     start, end : float, s, optional
-        Of the record, on the motion's clock; the whole motion, if not given.
+        Interval of the record on the motion's clock; default, the whole motion.
     ringing : sequence of Ringing
-        Of the structure where the recorder is mounted.
+        Ringing of the structure at the mounting point.
     sampling : {'instantaneous', 'mean'}
     mounted : bool
-        The motion is that of the sensors: mounting and ringing are already in it.
+        The motion is that of the sensors and already includes mounting and ringing.
 
     Returns
     -------
     unit : CrashUnit
-        Samples fall on whole multiples of the interval on the unit's own clock. Its mounting
-        and uncertainties are those that the design tells.
+        Samples fall on integer multiples of the interval on the unit's own clock. Its mounting and
+        uncertainties are those stated in the design.
     truth : RecorderTruth
 
     Raises
     ------
     ConfigError
-        The record or the impact is not within the motion, or is shorter than two samples; the
-        message names the recorder.
+        The record or the impact is not within the motion, or the record is shorter than two
+        samples; the message names the recorder.
     """
     begin, stop = _bounds(motion, design, impact, start, end, sampling)
     root = child(seed, zlib.crc32(design.name.encode()))
@@ -156,7 +157,7 @@ def _bounds(
 def _felt(
     motion: Motion, mounting: Mounting, ringing: tuple[Any, ...], mounted: bool
 ) -> tuple[Motion, Callable[[Array], Array] | None]:
-    """The motion of the sensors, and the vibration in it."""
+    """Motion of the sensors, and the vibration it contains."""
     plain = not ringing and not any(mounting.position) and not any(mounting.angles_deg)
     if mounted or plain:
         return motion, None
@@ -212,7 +213,7 @@ def _record_accelerometer(
 
 
 def _mean_square(vibration: Callable[[Array], Array], at: Array, duration: float) -> Array:
-    """Of an interval about each sample, in two halves: to 1e-3 up to four periods in it."""
+    """Mean square over an interval about each sample, in two halves: to 1e-3 up to four periods."""
     half = 0.5 * (at[1] - at[0])
     low, high = np.maximum(at - half, 0.0), np.minimum(at + half, duration)
     middle = 0.5 * (low + high)
@@ -227,7 +228,7 @@ def _stamps(
     begin: float,
     stop: float,
 ) -> tuple[Array, Array]:
-    """Stamps on the recorder's clock, and the instants of the motion, equally spaced."""
+    """Stamps on the recorder's clock, and the equally spaced instants of the motion."""
     first = math.ceil(truth.clock(begin) * triad.rate - SLACK)
     last = math.floor(truth.clock(stop) * triad.rate + SLACK)
     if last - first < 1:
@@ -258,21 +259,21 @@ def _table(
     return table
 
 
-# What a recorder really does, drawn from how it is built.
+# True errors of a recorder, drawn from its design.
 
 
-# Places below the seed of a recorder: of errors and noise, each of accelerometers and gyro.
+# Stream keys below a recorder's seed: errors and noise, each for accelerometers and gyro.
 ACCEL_ERRORS, GYRO_ERRORS, ACCEL_NOISE, GYRO_NOISE, MOUNTING, TRIGGER, WARM_UP, HIGH_G = range(8)
 
 
 def draw_truth(design: RecorderDesign, root: Seed) -> RecorderTruth:
-    """Draw errors, mounting and trigger of one recorder.
+    """Draw errors, mounting and trigger error of one recorder.
 
     Parameters
     ----------
     design : RecorderDesign
     root : int or SeedSequence
-        Of the recorder; each part has a stream of its own below it.
+        Seed of the recorder; each part has its own stream below it.
 
     Returns
     -------
@@ -334,7 +335,7 @@ def _triad(values: Array) -> Triad:
 
 
 def _turned(told: Mounting, by: Array) -> Triad:
-    """Angles after a small turn about the vehicle's axes, so that none is known better."""
+    """Euler angles after a small rotation about vehicle axes, equally uncertain about each axis."""
     if told.angles_sd_deg == 0.0:
         return told.angles_deg
     turn = rotation.quaternion_from_rotation_vector(np.radians(told.angles_sd_deg) * by)
@@ -347,16 +348,16 @@ def _shifted(triad: Triad, by: Triad) -> Triad:
     return (x, y, z)
 
 
-# A motion that remembers its answers.
+# Cache of a motion's samples.
 
 
 class RememberedMotion:
-    """A motion that several triads ask the same, and that is worked out once.
+    """A motion that caches its samples for several triads.
 
     Parameters
     ----------
     motion : Motion
-        Its rates and specific forces are kept for every array of instants that was asked for.
+        Its rates and specific forces are cached for each array of instants.
     """
 
     def __init__(self, motion: Motion) -> None:
@@ -376,7 +377,7 @@ class RememberedMotion:
         return self._ask("rate", time)
 
     def specific_force(self, time: ArrayLike) -> Array:
-        """What an ideal accelerometer reads, as of `Motion`."""
+        """Specific force, as of `Motion`."""
         return self._ask("specific_force", time)
 
     def angle(self, time: ArrayLike) -> Array:

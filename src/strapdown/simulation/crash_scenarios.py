@@ -1,9 +1,8 @@
-"""Crashes, and what is none, as motions of a car with exact truth.
+"""Crashes, and events that are not crashes, as motions of a car with exact truth.
 
-The pole impact is that of Tadic and Vukajlovic (2016): its speed and offset are the paper's, its
-other numbers are chosen, as are all those of the others; each is a parameter of the function that
-makes it. The vehicle's origin is its centre of mass. No scenario has structural ringing: that is a
-matter of the mounting (`MountedMotion`).
+The pole impact is that of Tadic and Vukajlovic (2016): its speed and offset are the paper's. All
+other numbers are chosen; each is a parameter of its function. The vehicle's origin is its center of
+mass. Structural ringing is not part of a scenario but of the mounting (`MountedMotion`).
 """
 
 from __future__ import annotations
@@ -23,10 +22,10 @@ from strapdown.simulation.crash_motion import (
     Triple,
 )
 
-# Impacts on a car from the side and from behind, two in sequence, and a rollover.
+# Side and rear impacts on a car, two impacts in sequence, and a rollover.
 
 
-#: Moment of inertia of a car in roll over its mass, m².
+#: Roll moment of inertia of a car over its mass, m².
 ROLL_GYRATION = 0.40
 
 
@@ -40,21 +39,21 @@ def side_impact(
     roll_deg: float = -3.0,
     setting: Setting | None = None,
 ) -> CrashScenario:
-    """Struck on the side by another car while driving.
+    """Side impact by another car while driving.
 
     Parameters
     ----------
     entry_speed : float, m/s
     change : float, m/s
-        Of velocity, along the force.
+        Velocity change along the force.
     direction_deg : float, deg
-        Where the force comes from; -90 is the left.
+        Direction the force comes from; -90 is the left.
     arm : float, m
-        Of the force about the centre of mass; positive turns the car to the right.
+        Arm of the force about the center of mass; positive yaws the car to the right.
     length : float, s
-        Of the pulse.
+        Length of the pulse.
     roll_deg : float, deg
-        Towards what strikes, which hits below the centre of mass; in 0.2 s, and back in 0.4 s.
+        Toward the striking car, which hits below the center of mass; in 0.2 s, and back in 0.4 s.
     setting : Setting, optional
 
     Returns
@@ -96,16 +95,16 @@ def rear_impact(
     pitch_deg: float = 1.5,
     setting: Setting | None = None,
 ) -> CrashScenario:
-    """Struck from behind while rolling slowly.
+    """Rear impact while rolling slowly.
 
     Parameters
     ----------
     entry_speed, change : float, m/s
-        Speed, and by how much it rises.
+        Speed, and its increase.
     offset : float, m
-        Of the force to the right of the centre of mass; positive turns the car to the left.
+        Offset of the force to the right of the center of mass; positive yaws the car to the left.
     length : float, s
-        Of the pulse.
+        Length of the pulse.
     pitch_deg : float, deg
         The nose rises in 0.2 s and comes back in 0.4 s.
     setting : Setting, optional
@@ -147,16 +146,16 @@ def two_impacts(
     between: float = 0.5,
     setting: Setting | None = None,
 ) -> CrashScenario:
-    """Front left, and while the car turns a blow on the right from behind.
+    """Front-left impact, then a right-rear impact while the car yaws.
 
     Parameters
     ----------
     entry_speed : float, m/s
     first, second : float, m/s
-        Changes of velocity, from -20 deg in 110 ms with an arm of 0.35 m, and from 130 deg in
-        90 ms with one of -0.3 m.
+        Velocity changes: from -20 deg in 110 ms with an arm of 0.35 m, and from 130 deg in 90 ms
+        with an arm of -0.3 m.
     between : float, s
-        From the end of the first pulse to the beginning of the second.
+        From the end of the first pulse to the start of the second.
     setting : Setting, optional
 
     Returns
@@ -194,26 +193,26 @@ def rollover(
     lift: float = 1.0,
     setting: Setting | None = None,
 ) -> CrashScenario:
-    """Skid sideways into a kerb that trips the car: the first half turn of a rollover.
+    """Skid sideways into a curb that trips the car: the first half turn of a rollover.
 
     Parameters
     ----------
     entry_speed : float, m/s
     change : float, m/s
-        What the kerb takes of the speed sideways, in 0.15 s.
+        Lateral speed removed by the curb in 0.15 s.
     skid_deg : float, deg
-        Turn of the heading in 1.2 s before; negative to the left: the right wheels then strike.
-        Friction brakes meanwhile.
+        Heading change in the preceding 1.2 s; negative is to the left, so that the right wheels
+        strike. Friction brakes meanwhile.
     height : float, m
-        Of the centre of mass over the kerb: the roll rate is ``change height/k²``.
+        Height of the center of mass over the curb: the roll rate is ``change height/k²``.
     lift : float, m/s
-        Upward, by the blow; gravity, and the wheels that still carry, take it back.
+        Upward velocity from the blow, removed by gravity and by the wheels still in contact.
     setting : Setting, optional
 
     Returns
     -------
     CrashScenario
-        It rolls on at the end.
+        Still rolling at the end.
     """
     course = CrashCourse(setting or Setting())
     course.approach(entry_speed)
@@ -226,7 +225,7 @@ def rollover(
     roll_rate = math.degrees(side * change * height / ROLL_GYRATION)
     delta_v = (0.0, -side * change, -lift)
     course.push(0.15, delta_v, (roll_rate, 0.0, 0.0))
-    # Up and down again in the air; then on the ground.
+    # Up and down in the air, then on the ground.
     course.push(0.4, (0.0, 0.0, 2.0 * lift), delay=0.15)
     course.push(0.08, (0.0, 0.0, -lift), delay=0.55)
     course.time += 0.15
@@ -249,7 +248,7 @@ def rollover(
     )
 
 
-# What a car goes through that is no crash, and could be taken for one.
+# Events that are not crashes but could be mistaken for one.
 
 
 def hard_braking(
@@ -259,15 +258,15 @@ def hard_braking(
     pitch_deg: float = -1.5,
     setting: Setting | None = None,
 ) -> CrashScenario:
-    """Brake to a stop as hard as tyres can.
+    """Brake to a stop as hard as tires can.
 
     Parameters
     ----------
     entry_speed : float, m/s
     deceleration : float, m/s²
-        Constant but for 0.2 s at both ends.
+        Constant except for 0.2 s at both ends.
     pitch_deg : float, deg
-        While it brakes; it comes and goes in 0.4 s.
+        While braking; it builds up and decays in 0.4 s.
     setting : Setting, optional
 
     Returns
@@ -308,14 +307,14 @@ def pothole(
     roll_deg: float = 1.5,
     setting: Setting | None = None,
 ) -> CrashScenario:
-    """One wheel through a pothole.
+    """Drive one wheel through a pothole.
 
     Parameters
     ----------
     entry_speed : float, m/s
     depth : float, m
-        By which the centre of mass falls, in 60 ms; the edge throws it back in 70 ms, and takes
-        0.15 m/s of the speed in 40 ms.
+        Drop of the center of mass in 60 ms. The edge throws it back in 70 ms and removes 0.15 m/s
+        of speed in 40 ms.
     roll_deg : float, deg
         Meanwhile; positive for a wheel on the right.
     setting : Setting, optional
@@ -345,13 +344,13 @@ def pothole(
 def kerb(
     entry_speed: float = 6.0, height: float = 0.10, *, setting: Setting | None = None
 ) -> CrashScenario:
-    """Over a kerb, head on: front wheels, and rear wheels 2.7 m later.
+    """Drive over a curb, head on: front wheels, then rear wheels 2.7 m later.
 
     Parameters
     ----------
     entry_speed : float, m/s
     height : float, m
-        Of the kerb; each axle lifts the middle by half of it, in 0.12 s, and takes 0.3 m/s.
+        Height of the curb. Each axle lifts the middle by half that in 0.12 s and removes 0.3 m/s.
     setting : Setting, optional
 
     Returns
@@ -384,14 +383,14 @@ def kerb(
 def door_slam(
     speed: float = 0.05, roll_deg: float = -0.05, *, setting: Setting | None = None
 ) -> CrashScenario:
-    """A door of the parked car is slammed.
+    """Slam a door of the parked car.
 
     Parameters
     ----------
     speed : float, m/s
-        To which the body is pulled sideways and thrown back, all within 50 ms.
+        Lateral speed of the body out and back, all within 50 ms.
     roll_deg : float, deg
-        Towards the door, in 50 ms, and back in 150 ms.
+        Toward the door in 50 ms, and back in 150 ms.
     setting : Setting, optional
 
     Returns
@@ -416,15 +415,15 @@ def door_slam(
     )
 
 
-# Plane impact of a rigid vehicle: what a blow beside the centre of mass does.
+# Plane impact of a rigid vehicle: effect of an eccentric blow.
 
 
-#: Moment of inertia of a car in yaw over its mass, as for the paper's test, m².
+#: Yaw moment of inertia of a car over its mass, as for the paper's test, m².
 YAW_GYRATION = 1.90
 
 
 def blow(direction_deg: float, change: float) -> Triple:
-    """Change of velocity in vehicle axes by a force that comes from a direction.
+    """Velocity change in vehicle axes for a given principal direction of force.
 
     Parameters
     ----------
@@ -438,7 +437,7 @@ def blow(direction_deg: float, change: float) -> Triple:
         Forward, right, down.
     """
     angle = math.radians(direction_deg)
-    # What is only the rounding of pi is no component.
+    # A component at the rounding level of pi is set to zero.
     parts = (-math.cos(angle), -math.sin(angle))
     ahead, right = (change * x if abs(x) > 1e-15 else 0.0 for x in parts)
     return ahead, right, 0.0
@@ -447,18 +446,18 @@ def blow(direction_deg: float, change: float) -> Triple:
 def velocity_change(
     closing_speed: float, arm: float, restitution: float, gyration_squared: float
 ) -> float:
-    """Change of a vehicle's velocity in a plane impact against what does not yield.
+    """Velocity change of a vehicle in a plane impact against a rigid object.
 
     Parameters
     ----------
     closing_speed : float, m/s
-        Of the centre of mass, along the force.
+        Speed of the center of mass along the force.
     arm : float, m
-        Of the force about the centre of mass.
+        Arm of the force about the center of mass.
     restitution : float
-        Speed of separation over speed of approach, at the contact and along the force.
+        Separation speed over approach speed, at the contact and along the force.
     gyration_squared : float, m²
-        Moment of inertia in yaw over mass.
+        Yaw moment of inertia over mass.
 
     Returns
     -------
@@ -467,14 +466,14 @@ def velocity_change(
 
     Notes
     -----
-    An impulse P changes the velocity by P/m and the yaw rate by ``P d/(m k²)``, and so the speed
-    of the contact along it by ``P/m (1 + d²/k²)``; restitution says that this is ``(1 + e) V0``.
+    An impulse P changes the velocity by P/m and the yaw rate by ``P d/(m k²)``, hence the contact
+    speed along it by ``P/m (1 + d²/k²)``; the restitution sets this to ``(1 + e) V0``.
     """
     return closing_speed * (1.0 + restitution) / (1.0 + arm * arm / gyration_squared)
 
 
 def yaw_rate_change(change: float, arm: float, gyration_squared: float) -> float:
-    """Change of the yaw rate that goes with one of velocity: ``dV d/k²``, in deg/s."""
+    """Yaw rate change that belongs to a velocity change: ``dV d/k²``, in deg/s."""
     return math.degrees(change * arm / gyration_squared)
 
 
@@ -486,7 +485,7 @@ def strike(
     length: float,
     gyration_squared: float = YAW_GYRATION,
 ) -> Triple:
-    """Lay down one blow with the yaw rate that its arm gives, and go on to its end.
+    """Add one blow, with the yaw rate that its arm gives, and advance to its end.
 
     Parameters
     ----------
@@ -494,14 +493,14 @@ def strike(
     direction_deg, change
         As `blow`.
     arm : float, m
-        Of the force about the centre of mass; positive turns the vehicle to the right.
+        Arm of the force about the center of mass; positive yaws the vehicle to the right.
     length : float, s
     gyration_squared : float, m²
 
     Returns
     -------
     tuple of float, m/s
-        The change of velocity: forward, right, down.
+        Velocity change: forward, right, down.
     """
     delta_v = blow(direction_deg, change)
     course.push(length, delta_v, (0.0, 0.0, yaw_rate_change(change, arm, gyration_squared)))
@@ -509,7 +508,7 @@ def strike(
     return delta_v
 
 
-# Impacts on the front of a car: a pole, a wall, a corner.
+# Frontal impacts of a car: pole, wall, corner.
 
 
 def pole_impact(
@@ -522,20 +521,20 @@ def pole_impact(
     pitch_deg: float = -2.0,
     setting: Setting | None = None,
 ) -> CrashScenario:
-    """Front against a pole beside the middle, which turns the car about the pole.
+    """Off-center frontal pole impact, which yaws the car about the pole.
 
     Parameters
     ----------
     entry_speed : float, m/s
     offset : float, m
-        Of the pole to the right of the centre of mass: the car then turns to the right.
+        Offset of the pole to the right of the center of mass: the car then yaws to the right.
     restitution : float
     gyration_squared : float, m²
         In yaw.
     length : float, s
-        Of the pulse.
+        Length of the pulse.
     pitch_deg : float, deg
-        The nose goes down in 0.2 s and comes up in 0.4 s.
+        Nose-down pitch, reached in 0.2 s and reversed in 0.4 s.
     setting : Setting, optional
 
     Returns
@@ -577,7 +576,7 @@ def frontal_impact(
     pitch_deg: float = -3.0,
     setting: Setting | None = None,
 ) -> CrashScenario:
-    """Full width of the front against a rigid wall; parameters as `pole_impact`."""
+    """Full-width frontal impact on a rigid wall; parameters as `pole_impact`."""
     course = CrashCourse(setting or Setting())
     course.approach(entry_speed)
     start = course.time
@@ -613,15 +612,15 @@ def oblique_impact(
     pitch_deg: float = -2.0,
     setting: Setting | None = None,
 ) -> CrashScenario:
-    """Corner of the front against what does not yield.
+    """Impact of a front corner on a rigid object.
 
     Parameters
     ----------
     entry_speed : float, m/s
     direction_deg : float, deg
-        Where the force comes from: 0 the front, positive the right; within 80 deg of the front.
+        Direction the force comes from: 0 front, positive right; within 80 deg of the front.
     arm : float, m
-        Of the force about the centre of mass; positive turns the car to the right.
+        Arm of the force about the center of mass; positive yaws the car to the right.
     restitution, length, pitch_deg, setting
         As `pole_impact`.
 
@@ -663,7 +662,7 @@ def oblique_impact(
     )
 
 
-#: Each with its own parameters; the functions make others.
+#: Scenarios with default parameters; the functions make others.
 CRASHES: dict[str, CrashScenario] = {
     "pole": pole_impact(),
     "frontal": frontal_impact(),
@@ -680,7 +679,7 @@ CRASHES: dict[str, CrashScenario] = {
 
 
 def find_crash(name: str) -> CrashScenario:
-    """Return the crash, or what is none, of that name.
+    """Return the crash or non-crash scenario with that name.
 
     Parameters
     ----------
@@ -693,7 +692,7 @@ def find_crash(name: str) -> CrashScenario:
     Raises
     ------
     ConfigError
-        There is none; the message names the nearest.
+        The name is unknown; the message gives the nearest.
     """
     if name not in CRASHES:
         raise ConfigError(

@@ -1,4 +1,4 @@
-"""Motions on an ellipsoidal Earth that turns, with everything that follows from their course."""
+"""Base of motions on a rotating ellipsoidal Earth: sensor truth from a course."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from strapdown.tables import trajectory_table
 
 Array = NDArray[np.float64]
 
-# Nearer to a pole than this, heading and longitude turn faster than a vehicle does.
+# Closer to a pole, heading and longitude turn faster than a vehicle does.
 MOST_NORTHERN = 89.0  # deg
-# Normal gravity is continued so far.
+# Height limit for normal gravity.
 FARTHEST = 1e6  # m
 
 
 @dataclass(frozen=True)
 class Origin:
-    """Where a motion begins.
+    """Start position of a motion.
 
     Attributes
     ----------
     lat_deg, lon_deg : float, deg
-        Geodetic.
+        Geodetic coordinates.
     alt : float, m
-        Over the ellipsoid.
+        Height above the ellipsoid.
 
     Raises
     ------
@@ -64,7 +64,7 @@ class Origin:
             )
 
     def place(self, moved: Array) -> Array:
-        """Latitude and longitude in rad and height in m, (n, 3), of what was moved from here."""
+        """Latitude and longitude in rad and height in m, (n, 3), after a displacement from here."""
         start = np.array([math.radians(self.lat_deg), math.radians(self.lon_deg), self.alt])
         return np.asarray(moved + start)
 
@@ -76,21 +76,21 @@ class Kinematics:
     Attributes
     ----------
     moved : ndarray, (n, 3)
-        Latitude and longitude in rad and height in m, less those of the origin: what is small
-        is not rounded as if it were large.
+        Latitude and longitude in rad and height in m, relative to the origin, so that small
+        displacements keep their precision.
     velocity : ndarray, (n, 3), m/s
         Relative to the Earth: north, east, down.
     acceleration : ndarray, (n, 3), m/s²
-        Derivatives by time of the three components of the velocity.
+        Time derivatives of the three velocity components.
     q_nb : ndarray, (n, 4)
         Body to local north-east-down.
     turning : ndarray, (n, 3), rad/s
-        Rate of the body relative to local level, in body axes.
+        Angular rate of the body relative to local level, in body axes.
     angles : ndarray, (n, 3), deg, optional
-        Roll, pitch, heading, where the motion is made of them: a truth without the rounding of
-        what is taken back from `q_nb`.
+        Roll, pitch, heading, for motions defined by them: a truth without the rounding of a
+        conversion from `q_nb`.
     swinging : ndarray, (n, 3), rad/s², optional
-        Derivative by time of `turning`, where the motion knows it.
+        Time derivative of `turning`, for motions that provide it.
     """
 
     moved: Array
@@ -103,9 +103,9 @@ class Kinematics:
 
 
 class EarthMotion(ABC):
-    """Base of motions on the Earth: a course, and what sensors feel on it.
+    """Base of motions on the Earth; derives sensor inputs from the course.
 
-    What a course is not smooth at, it names as `breaks`.
+    `breaks` lists the instants where the course is not smooth.
     """
 
     duration: float
@@ -114,7 +114,7 @@ class EarthMotion(ABC):
 
     @abstractmethod
     def kinematics(self, time: Array) -> Kinematics:
-        """State at instants, (n,) in s."""
+        """State at instants (n,), s."""
 
     @property
     @abstractmethod
@@ -136,7 +136,7 @@ class EarthMotion(ABC):
         return self._feel(time)[0]
 
     def specific_force(self, time: ArrayLike) -> Array:
-        """What an ideal accelerometer reads.
+        """Specific force in body axes.
 
         Parameters
         ----------
@@ -150,7 +150,7 @@ class EarthMotion(ABC):
         return self._feel(time)[1]
 
     def angular_acceleration(self, time: ArrayLike) -> Array:
-        """Derivative by time of the body rate relative to inertial space.
+        """Time derivative of the body rate relative to inertial space.
 
         Parameters
         ----------
@@ -159,13 +159,13 @@ class EarthMotion(ABC):
         Returns
         -------
         ndarray, (n, 3), rad/s²
-            Of the components of `rate` in body axes, with how the Earth's and the transport rate
-            turn and change along the course.
+            Derivatives of the components of `rate` in body axes, including the rotation and change
+            of the Earth's rate and the transport rate along the course.
 
         Raises
         ------
         ConfigError
-            The motion does not know the second derivative of its attitude.
+            The motion does not provide the second derivative of its attitude.
         """
         from strapdown._kernels.earth_motion import swing
 
@@ -199,7 +199,7 @@ class EarthMotion(ABC):
         Returns
         -------
         ndarray, (n, 3), rad
-            Within 1e-14 rad a panel and rounding (`rate_integral.integrate_rate`).
+            Within 1e-14 rad per panel, plus rounding (`rate_integral.integrate_rate`).
         """
         return self._integral(time)
 
@@ -208,7 +208,7 @@ class EarthMotion(ABC):
         return self.kinematics(_instants(time)).q_nb
 
     def trajectory(self, time: ArrayLike, source: str | None = None) -> pd.DataFrame:
-        """Place, velocity and attitude.
+        """Position, velocity and attitude.
 
         Parameters
         ----------
@@ -219,7 +219,7 @@ class EarthMotion(ABC):
         Returns
         -------
         DataFrame
-            Trajectory table. Longitude is continuous: it is not wrapped at 180 deg.
+            Trajectory table. Longitude is continuous, not wrapped at 180 deg.
         """
         t = _instants(time)
         k = self.kinematics(t)
@@ -257,7 +257,7 @@ class EarthMotion(ABC):
 
 
 def check_duration(duration: float) -> None:
-    """Refuse what is no length of time."""
+    """Raise unless the duration is finite and positive."""
     if not 0.0 < duration < math.inf:
         raise ConfigError("simulation.motion-cannot-last", quantity="duration", duration=duration)
 
@@ -268,7 +268,7 @@ def _euler(k: Kinematics) -> Array:
         return rotation.euler_from_quaternion(k.q_nb)
     angles = k.angles.copy()
     heading = np.mod(angles[:, 2], 360.0)
-    # What is just under zero rounds to a whole turn.
+    # A heading just below zero rounds to 360 deg.
     angles[:, 2] = np.where(heading < 360.0, heading, 0.0)
     return angles
 
@@ -277,12 +277,12 @@ def _instants(time: ArrayLike) -> Array:
     return np.ascontiguousarray(np.asarray(time, dtype=np.float64))
 
 
-# A body that does not move on an Earth that turns.
+# Stationary body on a rotating Earth.
 
 
 @dataclass(frozen=True)
 class StationaryMotion(EarthMotion):
-    """Rest: the gyros read the Earth's rate, the accelerometers normal gravity.
+    """Stationary: gyros measure the Earth's rate, accelerometers normal gravity.
 
     Attributes
     ----------
@@ -313,7 +313,7 @@ class StationaryMotion(EarthMotion):
         return (0.0, self.duration)
 
     def kinematics(self, time: Array) -> Kinematics:
-        """The same at every instant; as `EarthMotion.kinematics`."""
+        """Constant state; as `EarthMotion.kinematics`."""
         still = np.zeros((time.size, 3))
         angles = np.array([self.roll_deg, self.pitch_deg, self.heading_deg])
         q_nb = np.tile(rotation.quaternion_from_euler(angles), (time.size, 1))
@@ -321,6 +321,6 @@ class StationaryMotion(EarthMotion):
         return Kinematics(still, still, still, q_nb, still, turned, still)
 
     def angle(self, time: ArrayLike) -> Array:
-        """Integral of the body rate from time zero; (n, 3), rad: the constant rate, times time."""
+        """Integral of the body rate from time zero, (n, 3), rad: the constant rate times time."""
         t = np.asarray(time, dtype=np.float64)
         return np.asarray(self.rate(np.zeros(1)) * t[:, None])

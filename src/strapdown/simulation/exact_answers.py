@@ -1,4 +1,4 @@
-"""What a reconstruction should have said, exactly."""
+"""Exact reference results for a crash reconstruction."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from strapdown.simulation.vehicle_points import point_kinematics
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
-# Panels of a quadrature with 8 nodes: a haversine of 80 ms is a polynomial of its order there.
+# Panel length for 8-node quadrature: a haversine of 80 ms is a polynomial of its order there.
 PANEL = 0.01  # s
 
 
 @dataclass(frozen=True)
 class ExactAnswers:
-    """Truth of one point of a vehicle, its time counted from the impact.
+    """Truth of one vehicle point, with time counted from the impact.
 
     Attributes
     ----------
     motion : CrashMotion
-        Of the vehicle's origin.
+        Motion of the vehicle's origin.
     impact : float, s
-        On the motion's clock: zero of the common time.
+        On the motion's clock; zero of the common time.
     point : tuple of float, m
         Vehicle axes, from the vehicle's origin.
     """
@@ -39,10 +39,10 @@ class ExactAnswers:
     point: Triple = (0.0, 0.0, 0.0)
 
     def along_body(self, start: float, end: float) -> Array:
-        """Integral of the specific force less that at rest, along the turning axes, (3,), m/s.
+        """Integral of the specific force minus its initial value, rotating axes, (3,), m/s.
 
-        What a recorder without any error would integrate from one instant to the other; the rest
-        is that at the beginning of the motion.
+        An error-free recorder would integrate this between the two instants. The initial value is
+        the specific force at the start of the motion.
         """
         first, last = self.impact + start, self.impact + end
         edges = np.linspace(first, last, max(2, int(np.ceil((last - first) / PANEL)) + 1))
@@ -57,9 +57,9 @@ class ExactAnswers:
         return np.asarray(velocity[1] - velocity[0])
 
     def course(self, time: ArrayLike) -> tuple[Array, Array]:
-        """Place and velocity, (n, 3) each, m and m/s, in the axes of the place at the impact.
+        """Position and velocity, (n, 3) each, m and m/s, in local-level axes at the impact.
 
-        Places count from that of the point at the impact.
+        Positions are relative to the point's position at the impact.
         """
         at = self.impact + np.r_[0.0, np.asarray(time, dtype=np.float64)]
         found = point_kinematics(self.motion, self.point, at, epoch=self.impact)

@@ -1,4 +1,4 @@
-"""A satellite receiver that rides on a motion, and what a crash does to it."""
+"""Simulated GNSS receiver on a motion, its response to a crash, and injected faults."""
 
 from __future__ import annotations
 
@@ -33,48 +33,48 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-#: What a receiver does beyond its limits: gives no fix, gives false ones, or bears it.
+#: Response of a receiver beyond its limits: no fixes, false fixes, or no effect.
 ON_EXCESS = ("lost", "garbage", "unaffected")
 
-# Streams below the seed of the receiver. A number is never given to another.
+# Stream keys below the receiver's seed. A number is never reused.
 _POSITION, _DRIFT, _VELOCITY, _FALSE = range(4)
-# What the tracking loops have in mind, s: acceleration and jerk are means over it.
+# Memory of the tracking loops, s: acceleration and jerk are averaged over it.
 LOOP_MEMORY = 0.05
-# So finely the motion is searched for what is beyond the limits, s.
+# Step of the search for instants beyond the limits, s.
 _SEARCH = 0.005
-# Standard deviations of the fixes of a receiver that has lost its way.
+# Standard deviations of the false fixes.
 FALSE_POSITION, FALSE_VELOCITY = 100.0, 30.0  # m, m/s
 _MOST_FIXES = 1_000_000
 
 
 @dataclass(frozen=True)
 class GnssReceiver:
-    """What a receiver does to the truth. Triads are north, east, down.
+    """Error model of a GNSS receiver. Triads are north, east, down.
 
     Attributes
     ----------
     rate : float, Hz
-        Of fixes, 1 to 10 usually.
+        Fix rate, usually 1 to 10.
     position_noise : triad, m
-        Standard deviation, new with each fix.
+        Standard deviation, independent for each fix.
     position_drift : triad, m
         Standard deviation of a stationary Gauss-Markov process: orbits, clocks, atmosphere.
     correlation_time : float, s
-        Of that process.
+        Correlation time of that process.
     velocity_noise : triad, m/s
     antenna : triad, m
-        In body axes, from the point that the motion describes.
+        In body axes, from the motion's reference point.
     time_offset : float, s
-        A fix that is stamped t is of the instant ``t - time_offset``.
+        A fix stamped t is valid at ``t - time_offset``.
     largest_acceleration : float, m/s²
     largest_jerk : float, m/s³
-        Of the antenna, as means over 50 ms, the memory of tracking loops.
+        Limits for the antenna, averaged over 50 ms, the memory of the tracking loops.
     on_excess : {'lost', 'garbage', 'unaffected'}
-        What comes of the fixes from the first instant beyond a limit until `outage` after the
-        last: none; false ones, with the usual claims of precision; or fixes as ever.
+        Fixes from the first instant beyond a limit until `outage` after the last: none; false fixes
+        with the usual stated precision; or unaffected fixes.
     outage : float, s
     stated_position_sd, stated_velocity_sd : triad, optional
-        What the receiver claims; where it is left out, the truth.
+        Standard deviations that the receiver states; default, the true ones.
 
     Raises
     ------
@@ -150,15 +150,14 @@ def simulate_gnss(
     seed: Seed = 0,
     source: str | None = None,
 ) -> pd.DataFrame:
-    """Fixes of a receiver over a motion.
+    """Simulate the fixes of a receiver over a motion.
 
     Parameters
     ----------
     motion : EarthMotion
     receiver : GnssReceiver
     seed : int or SeedSequence
-        Of everything that is random. What a seed draws for a fix does not depend on whether
-        others were lost.
+        Seed of all random draws. The draws for a fix do not depend on whether others were lost.
     source : str, optional
         Name for messages.
 
@@ -170,7 +169,7 @@ def simulate_gnss(
     Raises
     ------
     ConfigError
-        There is no more than a fix, or there are too many.
+        The fixes are fewer than two, or too many.
     """
     count = math.floor(receiver.rate * motion.duration * (1.0 + 1e-12)) + 1
     if not 2 <= count <= _MOST_FIXES:
@@ -228,7 +227,7 @@ def _antenna(motion: EarthMotion, time: Array, receiver: GnssReceiver) -> tuple[
 
 
 def moved_places(place: Array, off: Array, ellipsoid: Ellipsoid = WGS84) -> Array:
-    """Return places that are wrong by metres north, east, down, (n, 3)."""
+    """Displace positions by meters north, east, down, (n, 3)."""
     from strapdown.earth import radii_of_curvature
 
     meridian, transverse = radii_of_curvature(place[:, 0], ellipsoid=ellipsoid)
@@ -241,7 +240,7 @@ def moved_places(place: Array, off: Array, ellipsoid: Ellipsoid = WGS84) -> Arra
 
 
 def _beyond(motion: EarthMotion, receiver: GnssReceiver, instants: Array) -> NDArray[np.bool_]:
-    """Fixes within reach of an instant beyond the limits."""
+    """Mark fixes affected by an instant beyond the limits."""
     per = round(LOOP_MEMORY / _SEARCH)
     time = np.arange(math.floor(motion.duration / _SEARCH) + 1, dtype=np.float64) * _SEARCH
     struck = np.zeros(len(instants), dtype=np.bool_)
@@ -257,27 +256,27 @@ def _beyond(motion: EarthMotion, receiver: GnssReceiver, instants: Array) -> NDA
     return struck
 
 
-# What goes wrong with a satellite receiver, put into a Gnss table.
+# GNSS receiver faults injected into a Gnss table.
 
 Flags = NDArray[np.bool_]
 
-# Place in the tree of seeds, beside those of a receiver's own streams.
+# Key in the seed tree, beside those of a receiver's own streams.
 FAULT_SEED = 4
 
 
 @dataclass(frozen=True)
 class GnssFault(ABC):
-    """A failure of a receiver over an interval; its kinds are the classes of this module.
+    """A receiver fault over an interval; its kinds are the classes of this module.
 
     Attributes
     ----------
     begin, end : float, s
-        Fixes from the one, included, to the other, excluded.
+        Interval of the fixes, `begin` included, `end` excluded.
 
     Raises
     ------
     ConfigError
-        The interval is none, or a number is out of range.
+        The interval is empty, or a number is out of range.
     """
 
     begin: float = -math.inf
@@ -296,7 +295,7 @@ class GnssFault(ABC):
     def broken(
         self, table: pd.DataFrame, within: Flags, random: np.random.Generator
     ) -> pd.DataFrame:
-        """Return the table with the fault in the rows that are marked; those given are left."""
+        """Return the table with the fault applied to the marked rows; the input is not changed."""
 
     def _checked(self, name: str, low: float, high: float = math.inf) -> None:
         value = getattr(self, name)
@@ -314,7 +313,7 @@ class GnssFault(ABC):
 
 @dataclass(frozen=True)
 class Outage(GnssFault):
-    """It gives no fixes: their rows are missing."""
+    """GNSS outage: the rows are removed."""
 
     def broken(
         self, table: pd.DataFrame, within: Flags, random: np.random.Generator
@@ -325,16 +324,16 @@ class Outage(GnssFault):
 
 @dataclass(frozen=True)
 class Outliers(GnssFault):
-    """Some of its fixes are far off, in a direction of their own, as by reflected signals.
+    """Outliers: random fixes are displaced in random directions, as by multipath.
 
     Attributes
     ----------
     share : float
-        Of the fixes, each by chance.
+        Probability that a fix is an outlier.
     size : float
-        In stated standard deviations, of every component of the place.
+        Position error of every component, in stated standard deviations.
     velocity_size : float
-        The same of the velocity.
+        The same for the velocity.
     """
 
     share: float = 0.1
@@ -363,12 +362,12 @@ class Outliers(GnssFault):
 
 @dataclass(frozen=True)
 class GrowingBias(GnssFault):
-    """Its places go away slowly, from nothing at the begin, as where it is misled.
+    """Position error that grows linearly from zero at `begin`, as under spoofing.
 
     Attributes
     ----------
     rate : tuple of float, (3,), m/s
-        North, east, down; the velocity that it states is not touched.
+        North, east, down; the stated velocity is unchanged.
     """
 
     rate: tuple[float, float, float] = (0.1, 0.0, 0.0)
@@ -393,7 +392,7 @@ class GrowingBias(GnssFault):
 
 @dataclass(frozen=True)
 class Frozen(GnssFault):
-    """It repeats the fix that it had, place, velocity and precision, with stamps that go on."""
+    """Repeat the last fix: position, velocity and precision are constant while stamps advance."""
 
     def broken(
         self, table: pd.DataFrame, within: Flags, random: np.random.Generator
@@ -406,13 +405,13 @@ class Frozen(GnssFault):
 
 @dataclass(frozen=True)
 class WrongSd(GnssFault):
-    """What it states of its precision is not so.
+    """Wrong stated precision.
 
     Attributes
     ----------
     position_factor, velocity_factor : float
-        By which the standard deviations are multiplied: a third where it is three times as bad as
-        it says.
+        Factors on the stated standard deviations: 1/3 if the true error is three times the stated
+        one.
     """
 
     position_factor: float = 1.0 / 3.0
@@ -439,16 +438,16 @@ class WrongSd(GnssFault):
 def inject_gnss_faults(
     table: pd.DataFrame, faults: Sequence[GnssFault], *, seed: int = 0
 ) -> pd.DataFrame:
-    """Put failures into a Gnss table.
+    """Inject faults into a Gnss table.
 
     Parameters
     ----------
     table : DataFrame
-        It is left as it is.
+        Not changed.
     faults : sequence of GnssFault
-        In order: a later one acts on what an earlier one left.
+        Applied in order: a later fault acts on the output of an earlier one.
     seed : int
-        Of what is random; each fault has a stream of its own.
+        Seed of the random draws; each fault has its own stream.
 
     Returns
     -------
@@ -457,7 +456,7 @@ def inject_gnss_faults(
     Raises
     ------
     ConfigError
-        There is no fix within an interval, or an outage leaves none.
+        An interval contains no fix, or an outage removes all fixes.
     """
     out = table
     for k, fault in enumerate(faults):
@@ -480,5 +479,5 @@ def inject_gnss_faults(
 
 
 def _finite(sd: Array) -> Array:
-    """Nothing where nothing was measured."""
+    """Replace standard deviations that are not finite by zero."""
     return np.where(np.isfinite(sd), sd, 0.0)

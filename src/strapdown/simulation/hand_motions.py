@@ -1,4 +1,4 @@
-"""The hand motions of the scenarios, pose by pose."""
+"""Hand motions of the scenarios, pose by pose."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from strapdown.simulation.minimum_jerk import STILL, Track
 from strapdown.simulation.motion import FlatMotion, Quaternion, euler_attitude, euler_body_rate
 from strapdown.simulation.rate_integral import RateIntegral, integrate_rate
 
-# Motions of a hand: from rest to rest, in rotation and in place.
+# Hand motions from rest to rest, in rotation and position.
 
 
 Array = NDArray[np.float64]
@@ -22,11 +22,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Gesture(FlatMotion):
-    """Six coordinates, each moving from value to value with least jerk.
+    """Six coordinates, each following a minimum-jerk profile from value to value.
 
-    Where all tracks hold, the rate, the velocity and the acceleration are exactly zero, and
-    wherever the values are those of another rest, or whole turns away, the pose is that pose to
-    the last bit (the quaternion apart from its sign).
+    Where all tracks are constant, rate, velocity and acceleration are exactly zero. Where the
+    values equal those of another rest, or differ by whole turns, the pose is identical to the last
+    bit (the quaternion except for its sign).
 
     Attributes
     ----------
@@ -78,12 +78,12 @@ class Gesture(FlatMotion):
         Parameters
         ----------
         time : array_like, (n,), s
-            Before zero and after the end the integral stays as it is there.
+            Before zero and after the end the integral is held constant.
 
         Returns
         -------
         ndarray, (n, 3), rad
-            Within 1e-14 rad and rounding (`rate_integral.integrate_rate`); exactly constant at
+            Within 1e-14 rad, plus rounding (`rate_integral.integrate_rate`); exactly constant at
             rest.
         """
         return self._integral(time)
@@ -128,7 +128,7 @@ class Gesture(FlatMotion):
 
 
 def gesture(poses: Sequence[Sequence[float]], duration: float) -> Gesture:
-    """Make a gesture from a list of poses at which everything stops.
+    """Make a gesture from a list of poses with a stop at each.
 
     Parameters
     ----------
@@ -155,8 +155,8 @@ def _evaluate(tracks: tuple[Track, Track, Track], time: ArrayLike) -> tuple[Arra
     return np.column_stack(values), np.column_stack(first), np.column_stack(second)
 
 
-# Lies for 5 s, is turned about as fast as a hand can, and lies again from 9 s on. The three
-# angles change at different times, so that the axis of the turn never stays.
+# Rests for 5 s, is rotated about as fast as a hand can, and rests again from 9 s on. The three
+# angles change at different times, so that the rotation axis never stays constant.
 TABLE_TO_TABLE = Gesture(
     11.0,
     roll=Track((5.0, 5.5, 6.1, 6.8, 7.4, 8.2, 9.0), (0, 110, -80, 140, -60, 90, 0)),
@@ -167,7 +167,7 @@ TABLE_TO_TABLE = Gesture(
     down=Track((5.0, 5.6, 8.3, 9.0), (0, -0.3, -0.25, 0)),
 )
 
-# Ten turns of roll and two of heading there and one beyond back, with the pitch thrown about.
+# Ten turns of roll, two of heading forward and three back, with large pitch swings.
 INTENSIVE = Gesture(
     10.0,
     roll=Track((2.0, 8.0), (0, 3600)),
@@ -179,26 +179,26 @@ INTENSIVE = Gesture(
 PHONE = gesture(
     [
         (0.0, 0, 0, 0, 0, 0, 0),
-        # Taken up, looked at, put back.
+        # Picked up, looked at, put back.
         (2.0, 0, 0, 0, 0, 0, 0),
         (3.0, 10, 50, -20, -0.15, 0.05, -0.30),
         (4.0, -5, 60, -10, -0.20, 0.05, -0.35),
         (5.2, 0, 0, 0, 0, 0, 0),
-        # Taken up and turned to the long side and back.
+        # Picked up, turned to landscape and back.
         (7.2, 0, 0, 0, 0, 0, 0),
         (8.2, 0, 45, 0, -0.10, 0, -0.30),
         (9.0, -40, 30, 80, -0.10, 0.05, -0.30),
         (10.0, -40, 30, 80, -0.10, 0.05, -0.30),
         (10.7, 5, 45, 0, -0.10, 0, -0.30),
         (11.8, 0, 0, 0, 0, 0, 0),
-        # Laid a quarter turn to the right, half a metre on, and back.
+        # Rotated a quarter turn to the right, moved half a meter, and back.
         (14.0, 0, 0, 0, 0, 0, 0),
         (14.8, 0, 20, 40, 0.20, 0.20, -0.15),
         (15.8, 0, 0, 90, 0.30, 0.40, 0),
         (17.8, 0, 0, 90, 0.30, 0.40, 0),
         (18.6, -15, 15, 50, 0.20, 0.20, -0.15),
         (19.6, 0, 0, 0, 0, 0, 0),
-        # Turned over, face down and on round: a whole turn of roll.
+        # Turned over, face down and around: a full turn of roll.
         (21.6, 0, 0, 0, 0, 0, 0),
         (22.4, 90, 10, 0, 0, 0.05, -0.20),
         (23.0, 180, 0, 0, 0, 0.05, -0.20),
@@ -214,24 +214,24 @@ PHONE = gesture(
 )
 
 
-# A phone that is taken up and put back again and again, as drawn by a seed.
+# A phone that is repeatedly picked up and put back, randomly from a seed.
 
 
 @dataclass(frozen=True)
 class Handling(FlatMotion):
-    """Random gestures, each from a place on the table back to that very pose.
+    """Random gestures, each from a pose on the table and back to exactly that pose.
 
-    Between two gestures it lies for 1.5 to 5 s. A gesture has three to seven moves of 0.6 to 1.6 s
-    with least jerk, to rolls of up to ±60°, pitches of up to ±70°, headings of up to ±120°, and
-    places up to 0.3 m north or south, east or west, and 0.1 to 0.5 m above the table; then 1 to
-    1.5 s back to where it lay.
+    Between gestures the phone rests for 1.5 to 5 s. A gesture has three to seven minimum-jerk moves
+    of 0.6 to 1.6 s, to rolls of up to ±60°, pitches of up to ±70°, headings of up to ±120°, and
+    positions up to 0.3 m north or south, east or west, and 0.1 to 0.5 m above the table; then it
+    returns in 1 to 1.5 s.
 
     Attributes
     ----------
     duration : float, s
-        At least 5; the last rest takes what no gesture fits into.
+        At least 5; the last rest takes the time that no gesture fits into.
     seed : int
-        The same seed is the same motion on every machine.
+        The same seed gives the same motion on every machine.
 
     Raises
     ------
@@ -250,11 +250,11 @@ class Handling(FlatMotion):
 
     @cached_property
     def gestures(self) -> Gesture:
-        """The motion that was drawn."""
+        """The generated motion."""
         draw = np.random.Generator(np.random.PCG64(self.seed)).integers
         home = (0.0,) * 6
         poses: list[tuple[float, ...]] = [(0.0, *home)]
-        tenths = 0  # whole numbers, so that no machine rounds a time otherwise
+        tenths = 0  # integers, so that times are identical on every machine
         while True:
             tenths += int(draw(15, 51))
             rows: list[tuple[float, ...]] = [(tenths / 10, *home)]

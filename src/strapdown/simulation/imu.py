@@ -1,4 +1,4 @@
-"""Samples of gyros and accelerometers that move in a known way."""
+"""Simulated gyro and accelerometer samples of a known motion."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from strapdown.tables import SAMPLINGS, attitude_table, imu_table
 
 Array = NDArray[np.float64]
 
-# What a few gigabytes of memory hold with everything that is made of them.
+# Samples that fit in a few gigabytes of memory with all derived arrays.
 MOST_SAMPLES = 5_000_000
-# Places of the triads in the tree of seeds.
+# Keys of the triads in the seed tree.
 GYRO_SEED, ACCEL_SEED = 0, 1
 
 
@@ -34,27 +34,27 @@ def simulate_imu(
     source: str | None = None,
     accelerometer: bool = True,
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Sample a motion.
+    """Simulate the IMU samples of a motion.
 
     Parameters
     ----------
     motion : Motion
     errors : ImuErrors
-        Put on in the order of `sensors.error_chain`. Jitter and low-pass act on the motion
-        itself, which is evaluated at the jittered instants and between the samples.
+        Applied in the order of `sensors.error_chain`. Jitter and low-pass act on the motion itself,
+        which is evaluated at the jittered instants and between the samples.
     rate : float, Hz
-        Samples fall on ``k / rate``, from zero to the last that is within the motion.
+        Samples fall on ``k / rate``, from zero to the last within the motion.
     sampling : {'instantaneous', 'mean'}
-        The value at each stamp, or the mean over the interval that ends there: of rates exact,
-        from the motion's angle; of specific force by Gauss-Legendre quadrature with 8 nodes, cut
-        where the motion asks for it (`cuts`), as one that rings does.
-        Before time zero there is no motion: the first row of means holds the value at zero.
+        The value at each stamp, or the mean over the interval that ends there. Mean rates are
+        exact, from the motion's angle; mean specific forces use 8-node Gauss-Legendre quadrature,
+        divided at the motion's `cuts` (for ringing). The first row of means holds the value at
+        time zero.
     seed : int
-        Of everything that is random; the same seed gives the same samples on every machine.
+        Seed of all random draws; the same seed gives the same samples on every machine.
     source : str, optional
         Name for messages.
     accelerometer : bool
-        Whether there is one.
+        Whether to simulate an accelerometer.
 
     Returns
     -------
@@ -108,7 +108,7 @@ def sample_gyro(
     straight: float = 0.0,
     specific_force: Array | None = None,
 ) -> Array:
-    """Read a triad of gyros.
+    """Simulate a triad of gyros.
 
     Parameters
     ----------
@@ -118,12 +118,12 @@ def sample_gyro(
         Equally spaced, within the motion.
     sampling : {'instantaneous', 'mean'}
     seed : int or SeedSequence
-        Of the triad.
+        Seed of the triad.
     straight : float, rad/s
-        How far the rate may be from a straight line between two samples for the low-pass to
-        take it as one (`between_samples.low_passed`); zero is never.
+        Largest deviation from a straight line between two samples at which the low-pass treats the
+        rate as linear (`between_samples.low_passed`); zero disables this.
     specific_force : ndarray, (n, 3), m/s², optional
-        What an ideal accelerometer reads, where it is at hand.
+        Specific force in body axes, if already computed.
 
     Returns
     -------
@@ -155,7 +155,7 @@ def sample_accelerometer(
     vibration: Array | None = None,
     specific_force: Array | None = None,
 ) -> Array:
-    """Read a triad of accelerometers.
+    """Simulate a triad of accelerometers.
 
     Parameters
     ----------
@@ -207,7 +207,7 @@ def _stamps(motion: Motion, rate: float, sampling: str) -> Array:
             duration=motion.duration,
             duration_2=1.0 / motion.duration,
         )
-    # The last sample still belongs where rounding puts the product just under a whole number.
+    # Keep the last sample where rounding puts the product just below an integer.
     samples = np.floor(rate * motion.duration * (1.0 + 1e-12)) + 1.0
     if samples > MOST_SAMPLES:
         raise ConfigError(
@@ -222,7 +222,7 @@ def _stamps(motion: Motion, rate: float, sampling: str) -> Array:
 
 
 def _instants(motion: Motion, errors: TriadErrors, time: Array, seed: Seed) -> Array:
-    """When the sampler really looks; the motion is known from zero to its end."""
+    """True sampling instants; the motion is known from zero to its end."""
     if errors.jitter == 0.0:
         return time
     steps = np.full(time.size, time[1] - time[0])
@@ -261,7 +261,7 @@ def _force(
         return low_passed_at(force, at, errors.bandwidth, cuts, straight)
     mean = np.vstack([force(at[:1]), mean_between(force, at, cuts)])
     if errors.jitter > 0.0:
-        # The sensor divides what it has gathered by the interval that it knows of.
+        # The sensor divides the accumulated increment by its nominal interval.
         mean[1:] *= np.diff(at)[:, None] / step
     return _filtered_mean(force, at, mean, step, errors.bandwidth, cuts, straight)
 
@@ -281,27 +281,27 @@ def _filtered_mean(
     return mean_of_filtered(ends, mean, np.full(at.size, step), bandwidth)
 
 
-# A quantity that is known at every instant, as a sampler behind a low-pass or a mean sees it.
+# Low-pass and means of a continuous quantity, as a sampler sees it.
 
 Quantity = Callable[[Array], Array]
 
-# Gauss-Legendre nodes in each stretch: exact for polynomials of twice as many orders less one.
+# Gauss-Legendre nodes per stretch: n nodes are exact for polynomials up to degree 2n - 1.
 MEAN_NODES = 8
 FILTER_NODES = 6
-# Where a tolerance is given: 5e-7 of the amplitude of what turns by a radian in a time constant.
+# With a tolerance: 5e-7 of the amplitude for a rotation of 1 rad per time constant.
 ROUGH_NODES = 3
-# exp(-40) is less than the rounding of what it is added to.
+# exp(-40) is below the rounding error of the sum.
 MEMORY = 40.0  # time constants
-# Where a step is looked at: at odd places, which a vibration does not all pass at zero.
+# Probe positions within a step, irregular so that a vibration is not zero at all three.
 PROBES = (0.23, 0.57, 0.81)
-# Instants that are evaluated together, for the sake of memory.
+# Instants evaluated per batch, to bound memory.
 TOGETHER = 200_000
 
 
 def mean_over(quantity: Quantity, starts: Array, ends: Array) -> Array:
     """Mean over each interval, by Gauss-Legendre quadrature with 8 nodes, (n, 3).
 
-    Exact for polynomials up to order 15; of a sine with one period in the interval, to 1e-9.
+    Exact for polynomials up to order 15; for a sine with one period in the interval, to 1e-9.
     """
     nodes, weights = np.polynomial.legendre.leggauss(MEAN_NODES)
     parts = []
@@ -314,7 +314,7 @@ def mean_over(quantity: Quantity, starts: Array, ends: Array) -> Array:
 
 
 def mean_between(quantity: Quantity, instants: Array, cuts: Sequence[float]) -> Array:
-    """Mean from each instant to the next, as `mean_over`, from cut to cut; (n - 1, 3).
+    """Mean from each instant to the next, as `mean_over`, divided at cuts; (n - 1, 3).
 
     Parameters
     ----------
@@ -322,7 +322,7 @@ def mean_between(quantity: Quantity, instants: Array, cuts: Sequence[float]) -> 
     instants : ndarray, (n,), s
         Increasing.
     cuts : sequence of float, s
-        Where the quantity is not smooth, or so near that it is smooth between.
+        Instants where the quantity is not smooth, dense enough for it to be smooth between them.
 
     Returns
     -------
@@ -358,24 +358,23 @@ def low_passed(
     Parameters
     ----------
     quantity : callable
-        From (n,) instants to (n, 3) values.
+        Maps (n,) instants to (n, 3) values.
     instants : ndarray, (n,), s
-        At rest with the value at the first instant, until then.
+        Until the first instant the filter is settled at the value there.
     bandwidth : float, Hz
         -3 dB frequency.
     straight : float
-        From one instant to the next, a quantity that is found within this of a straight line is
-        taken to run along it, and the quadrature has 3 nodes elsewhere; zero never does so. It
-        saves evaluations where little happens.
+        A quantity within this of a straight line between two instants is treated as linear, and the
+        quadrature elsewhere has 3 nodes; zero disables both. This saves evaluations where the
+        quantity changes little.
 
     Returns
     -------
     ndarray, (n, 3)
-        ``y1 = exp(-dt/τ) y0 + ∫ exp(-(t1 - s)/τ) u(s) ds/τ`` from instant to instant, the
-        integral by Gauss-Legendre quadrature with 6 nodes in stretches no longer than τ. In
-        other words, the motion is evaluated at 6 or more instants a sample and time constant.
-        Smooth motion is exact to rounding; a jump of u is spread over the stretch that it falls
-        in.
+        ``y1 = exp(-dt/τ) y0 + ∫ exp(-(t1 - s)/τ) u(s) ds/τ`` from instant to instant, with the
+        integral by 6-node Gauss-Legendre quadrature in stretches no longer than τ, so that the
+        motion is evaluated at 6 or more instants per sample and time constant. Smooth motion is
+        exact to rounding; a jump of u is spread over its stretch.
     """
     if math.isinf(bandwidth):
         return quantity(instants)
@@ -409,7 +408,7 @@ def _weighted(quantity: Quantity, ends: Array, steps: Array, tau: float, count: 
     window = np.minimum(steps, MEMORY * tau)
     stretches = max(1, math.ceil(float(window.max()) / tau))
     nodes, weights = np.polynomial.legendre.leggauss(count)
-    # Places within the window from 0 to 1, and their weights.
+    # Nodes within the window from 0 to 1, and their weights.
     place = ((np.arange(stretches)[:, None] + 0.5 * (1.0 + nodes)) / stretches).ravel()
     weight = np.tile(0.5 * weights, stretches) / stretches
     parts = []
@@ -424,7 +423,7 @@ def _weighted(quantity: Quantity, ends: Array, steps: Array, tau: float, count: 
 def _curved(
     quantity: Quantity, instants: Array, values: Array, straight: float
 ) -> NDArray[np.intp]:
-    """Steps in which the quantity leaves the straight line, and their neighbours."""
+    """Steps in which the quantity deviates from the straight line, and their neighbors."""
     steps = np.diff(instants)
     bent = np.zeros(steps.size, dtype=bool)
     at = (instants[:-1, None] + steps[:, None] * np.array(PROBES)).ravel()
@@ -432,7 +431,7 @@ def _curved(
     for k, part in enumerate(PROBES):
         line = values[:-1] + part * (values[1:] - values[:-1])
         bent |= (np.abs(found[:, k] - line) > straight).any(axis=1)
-    # What begins late in a step may be missed by its probes, and shows in the next.
+    # Probes may miss a change that starts late in a step; it then shows in the next step.
     near = bent.copy()
     near[:-1] |= bent[1:]
     near[1:] |= bent[:-1]
@@ -440,7 +439,7 @@ def _curved(
 
 
 def _cut(instants: Array, cuts: Sequence[float]) -> tuple[Array, NDArray[np.intp]]:
-    """Instants and the cuts between them, and where the instants are among these."""
+    """Instants merged with the cuts between them, and the indices of the instants."""
     inner = np.asarray(cuts, dtype=np.float64)
     inner = inner[(inner > instants[0]) & (inner < instants[-1])]
     edges = np.unique(np.concatenate([instants, inner])) if inner.size else instants

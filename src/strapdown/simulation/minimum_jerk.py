@@ -1,4 +1,4 @@
-"""Moves from rest to rest as a hand makes them: the quintic of least jerk."""
+"""Minimum-jerk moves from rest to rest: the quintic."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ Array = NDArray[np.float64]
 
 
 def minimum_jerk(x: Array) -> tuple[Array, Array, Array]:
-    """Unit move ``10 x³ - 15 x⁴ + 6 x⁵`` and its first two derivatives by `x`.
+    """Unit move ``10 x³ - 15 x⁴ + 6 x⁵`` and its first two derivatives with respect to `x`.
 
     Parameters
     ----------
     x : ndarray
-        Part of the move's time that has passed; at rest outside [0, 1].
+        Elapsed fraction of the move; at rest outside [0, 1].
 
     Returns
     -------
@@ -28,12 +28,12 @@ def minimum_jerk(x: Array) -> tuple[Array, Array, Array]:
 
     Notes
     -----
-    Flash and Hogan (1985), J. Neurosci. 5(7), 1688-1703: the move between two rests that has the
-    least mean square of the third derivative. Its largest rate is 15/8 of its mean rate.
+    Flash and Hogan (1985), J. Neurosci. 5(7), 1688-1703: the move between two rests with the least
+    mean square third derivative. Its largest rate is 15/8 of its mean rate.
     """
     x = np.clip(x, 0.0, 1.0)
     rest = 1.0 - x
-    # Past the middle the mirrored move is taken from one: the polynomial cancels there.
+    # In the second half, subtract the mirrored move from one, because the polynomial cancels there.
     y = np.minimum(x, rest)
     moved = y * y * y * (10.0 - y * (15.0 - 6.0 * y))
     return (
@@ -45,20 +45,20 @@ def minimum_jerk(x: Array) -> tuple[Array, Array, Array]:
 
 @dataclass(frozen=True)
 class Track:
-    """One coordinate that moves from value to value and comes to rest at each.
+    """One coordinate that moves between values, with a stop at each.
 
     Attributes
     ----------
     times : tuple of float, s
-        Rising.
+        Increasing.
     values : tuple of float
-        One a time, in any unit. Two equal neighbours are a rest between them, and the first
-        and the last value hold before and after.
+        One per time, in any unit. Two equal neighbors are a rest; the first and the last value are
+        held before and after.
 
     Raises
     ------
     ConfigError
-        There is nothing in it, a number is not finite, or the times do not rise.
+        The track is empty, a number is not finite, or the times do not increase.
     """
 
     times: tuple[float, ...]
@@ -85,7 +85,7 @@ class Track:
             )
 
     def evaluate(self, time: ArrayLike) -> tuple[Array, Array, Array]:
-        """Value and its first two derivatives by time.
+        """Value and its first two time derivatives.
 
         Parameters
         ----------
@@ -94,15 +94,15 @@ class Track:
         Returns
         -------
         value, first, second : ndarray, (n,)
-            Unit of the values, that per s and per s². At rest the value is to the last bit the
-            one that was given, and both derivatives are exactly zero.
+            Unit of the values, that per s and per s². At rest the value is bit-identical to the
+            given one, and both derivatives are exactly zero.
         """
         t = np.asarray(time, dtype=np.float64)
         times, values = np.asarray(self.times), np.asarray(self.values)
         if len(times) == 1:
             return np.full(t.shape, values[0]), np.zeros(t.shape), np.zeros(t.shape)
         k = np.searchsorted(times, t, side="right") - 1
-        # From the last time on that value itself holds, not what a sum rounds it to.
+        # From the last time on use that value itself, not a rounded sum.
         ended = k == len(times) - 1
         k = np.clip(k, 0, len(times) - 2)
         length, change = np.diff(times)[k], np.diff(values)[k]
@@ -111,5 +111,5 @@ class Track:
         return value, change * first / length, change * second / (length * length)
 
 
-#: A coordinate that stays at zero.
+#: A coordinate that is constantly zero.
 STILL = Track((0.0,), (0.0,))

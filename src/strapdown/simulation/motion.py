@@ -1,4 +1,4 @@
-"""Rotations whose attitude is known in closed form at every instant."""
+"""Rotations with the attitude in closed form at every instant."""
 
 from __future__ import annotations
 
@@ -11,29 +11,29 @@ from numpy.typing import ArrayLike, NDArray
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
 
-# Attitude, body rate and angular acceleration of a motion that is given by its 3-2-1 angles.
+# Attitude, body rate and angular acceleration from 3-2-1 Euler angles.
 
 Quaternion = tuple[float, float, float, float]
 
 
 def euler_attitude(angles: Array, q_nb: Quaternion) -> Array:
-    """Attitude of a body that has turned by 3-2-1 angles from an initial attitude.
+    """Attitude of a body rotated by 3-2-1 angles from an initial attitude.
 
     Parameters
     ----------
     angles : ndarray, (n, 3), deg
-        Roll, pitch, heading, relative to the initial attitude; any number of turns, through
-        pitch ±90 deg too: nothing is divided here.
+        Roll, pitch, heading, relative to the initial attitude; any number of turns, and no
+        singularity at pitch ±90 deg.
     q_nb : tuple of float
         Initial attitude, scalar first.
 
     Returns
     -------
     ndarray, (n, 4)
-        ``q_nb Rz(heading) Ry(pitch) Rx(roll)``, continuous in sign. Whole turns leave the
-        attitude to the last bit, apart from that sign.
+        ``q_nb Rz(heading) Ry(pitch) Rx(roll)``, continuous in sign. Whole turns reproduce the
+        attitude to the last bit, except for that sign.
     """
-    # 360 deg fit in no binary fraction of pi, but they can be taken away without any rounding.
+    # 360 deg is not a binary fraction of pi, but whole turns can be removed without rounding.
     turns = np.rint(angles / 360.0)
     q = rotation.compose(
         np.asarray(q_nb, dtype=np.float64), rotation.quaternion_from_euler(angles - 360.0 * turns)
@@ -55,12 +55,12 @@ def euler_body_rate(angles: Array, rates: Array) -> Array:
     Returns
     -------
     ndarray, (n, 3), rad/s
-        Exactly zero where all three rates are.
+        Exactly zero where all three rates are zero.
 
     Notes
     -----
-    ``ω = [φ' - ψ' sin θ, θ' cos φ + ψ' sin φ cos θ, ψ' cos φ cos θ - θ' sin φ]``, of which
-    Alexiev (2021), Eqs. (8)-(10), are the inverse. It holds at every pitch.
+    ``ω = [φ' - ψ' sin θ, θ' cos φ + ψ' sin φ cos θ, ψ' cos φ cos θ - θ' sin φ]``, the inverse of
+    Alexiev (2021), Eqs. (8)-(10). Valid at every pitch.
     """
     roll, pitch = np.radians(angles[:, 0]), np.radians(angles[:, 1])
     d_roll, d_pitch, d_heading = np.radians(rates).T
@@ -75,7 +75,7 @@ def euler_body_rate(angles: Array, rates: Array) -> Array:
 
 
 def euler_body_acceleration(angles: Array, rates: Array, accelerations: Array) -> Array:
-    """Derivative by time of the body rate, from that of the rates of the 3-2-1 angles.
+    """Time derivative of the body rate from 3-2-1 angles and their derivatives.
 
     Parameters
     ----------
@@ -87,8 +87,8 @@ def euler_body_acceleration(angles: Array, rates: Array, accelerations: Array) -
     Returns
     -------
     ndarray, (n, 3), rad/s²
-        Of the components of `euler_body_rate` in body axes, at every pitch; exactly zero where
-        all derivatives are.
+        Derivative of the components of `euler_body_rate` in body axes, at every pitch; exactly zero
+        where all derivatives are zero.
     """
     roll, pitch = np.radians(angles[:, 0]), np.radians(angles[:, 1])
     d_roll, d_pitch, d_heading = np.radians(rates).T
@@ -106,7 +106,7 @@ def euler_body_acceleration(angles: Array, rates: Array, accelerations: Array) -
     )
 
 
-# What motions near the ground have in common: an Earth that is flat and at rest.
+# Base of motions near the ground: a flat, non-rotating Earth.
 
 
 class _Accelerated(Protocol):
@@ -116,10 +116,10 @@ class _Accelerated(Protocol):
 
 
 class FlatMotion:
-    """Base of motions that know position, velocity and acceleration in fixed north-east-down."""
+    """Base of motions with position, velocity and acceleration in fixed north-east-down."""
 
     def specific_force(self: _Accelerated, time: ArrayLike) -> Array:
-        """What an ideal accelerometer reads.
+        """Specific force in body axes.
 
         Parameters
         ----------
@@ -128,7 +128,7 @@ class FlatMotion:
         Returns
         -------
         ndarray, (n, 3), m/s²
-            ``C_nb^T (a_n - g_n)`` with the standard gravity straight down.
+            ``C_nb^T (a_n - g_n)`` with standard gravity straight down.
         """
         upward = self.acceleration(time) - np.array([0.0, 0.0, STANDARD_GRAVITY])
         return rotation.rotate(rotation.conjugate(self.attitude(time)), upward)
@@ -138,11 +138,11 @@ Array = NDArray[np.float64]
 
 
 class Motion(Protocol):
-    """What a simulation asks of a motion: the exact truth at any instant from 0 to `duration`.
+    """Interface of a motion: the exact truth at any instant from 0 to `duration`.
 
-    Each method takes instants, (n,) in s, and returns one row for each. Whether the Earth is flat
-    and at rest (`flat_motion.FlatMotion`) or turns (`earth_motion.EarthMotion`) is the motion's
-    own affair: sensors see their rate and their specific force.
+    Each method takes instants, (n,) in s, and returns one row for each. The motion decides whether
+    the Earth is flat and fixed (`flat_motion.FlatMotion`) or rotates (`earth_motion.EarthMotion`);
+    sensors use only rate and specific force.
     """
 
     @property
@@ -151,7 +151,7 @@ class Motion(Protocol):
         ...
 
     def rate(self, time: ArrayLike) -> Array:
-        """Body rate as a gyro reads it, (n, 3), rad/s."""
+        """Body rate relative to inertial space, (n, 3), rad/s."""
         ...
 
     def angle(self, time: ArrayLike) -> Array:
@@ -163,13 +163,13 @@ class Motion(Protocol):
         ...
 
     def specific_force(self, time: ArrayLike) -> Array:
-        """What an ideal accelerometer reads in body axes, (n, 3), m/s²."""
+        """Specific force in body axes, (n, 3), m/s²."""
         ...
 
 
 @dataclass(frozen=True)
 class Pulse:
-    """A constant rate about one body axis for a while.
+    """A constant rate about one body axis over an interval.
 
     Attributes
     ----------
@@ -179,9 +179,8 @@ class Pulse:
         The pulse acts on the half-open interval [start, end).
     rate : float, rad/s
     closed : bool
-        Let a sample that falls on `end` still read the rate. The motion is the same (one
-        instant turns nothing), but the samples then hold one pulse value too many: a way to
-        see the error that sampling makes at an edge.
+        Let a sample on `end` still read the rate. The motion is unchanged, but the samples then
+        contain one pulse value too many: a test of the sampling error at an edge.
     """
 
     axis: int
@@ -195,8 +194,8 @@ class Pulse:
 class PulseMotion(FlatMotion):
     """Any number of pulses, overlapping or not, from an initial attitude.
 
-    Between two edges the rate vector is constant in body axes, so that the attitude is an
-    exact product of exponentials, whatever overlaps.
+    Between edges the rate vector is constant in body axes, so the attitude is an exact product of
+    exponentials.
 
     Attributes
     ----------
@@ -211,7 +210,7 @@ class PulseMotion(FlatMotion):
     q_nb: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
 
     def rate(self, time: ArrayLike) -> Array:
-        """Body rate as a gyro reads it at each instant.
+        """Body rate at each instant.
 
         Parameters
         ----------
@@ -251,16 +250,16 @@ class PulseMotion(FlatMotion):
         Parameters
         ----------
         time : array_like, (n,), s
-            Not before zero.
+            Not negative.
 
         Returns
         -------
         ndarray, (n, 4)
-            ``q_nb``, correct to the rounding of one product for each edge passed.
+            ``q_nb``, exact to the rounding of one product per edge passed.
         """
         t = np.asarray(time, dtype=np.float64)
         edges = np.unique([0.0, *(e for p in self.pulses for e in (p.start, p.end))])
-        # Measured in the middle, where no edge can be ambiguous.
+        # Evaluated at mid-interval, away from the edges.
         middle = np.append(0.5 * (edges[:-1] + edges[1:]), edges[-1] + 1.0)
         rates = PulseMotion(tuple(_half_open(p) for p in self.pulses), 0.0).rate(middle)
         at_edge = [np.asarray(self.q_nb, dtype=np.float64)]
@@ -274,7 +273,7 @@ class PulseMotion(FlatMotion):
         )
 
     def acceleration(self, time: ArrayLike) -> Array:
-        """Zero, (n, 3), m/s²: the body turns about the sensor."""
+        """Zero, (n, 3), m/s²: the body rotates about the sensor."""
         return np.zeros((np.size(time), 3))
 
     def velocity(self, time: ArrayLike) -> Array:

@@ -1,4 +1,4 @@
-"""What a unit feels that is mounted somewhere on a moving vehicle."""
+"""Motion of a unit mounted on a moving vehicle, with lever arm, mounting angles and ringing."""
 
 from __future__ import annotations
 
@@ -30,23 +30,22 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class MountedMotion:
-    """The motion of a unit on a vehicle, as a `Motion`; several units are several of these.
+    """The motion of one mounted unit, as a `Motion`.
 
     Attributes
     ----------
     motion : EarthMotion
-        Of the vehicle's origin; it must know its angular acceleration, as `CrashMotion` does.
+        Motion of the vehicle's origin; must provide angular acceleration, as `CrashMotion` does.
     mounting : Mounting
-        Where the sensors sit, and how they are turned. Its standard deviations are not used: it
-        is the truth.
+        True position and orientation of the sensors; the standard deviations are not used.
     ringing : tuple of Ringing
-        By which the sensors swing about their place, without turning.
+        Translational oscillations of the sensors about their rigid position.
 
     Notes
     -----
-    Exact to rounding (`vehicle_points.moving_point`): the arm is that of the rigid vehicle and the
-    displacement of the ringing, with all that the turning of the vehicle makes of it. Attitude and
-    trajectory are those of the sensor axes, relative to the local level of the sensors.
+    Exact to rounding (`vehicle_points.moving_point`): the lever arm is the rigid arm plus the
+    ringing displacement, with all terms of the vehicle's rotation. Attitude and trajectory are
+    those of the sensor axes, relative to local level at the sensors.
     """
 
     motion: EarthMotion
@@ -63,9 +62,9 @@ class MountedMotion:
 
     @property
     def cuts(self) -> Array:
-        """Instants between which what is felt is smooth to quadratures of a few nodes, s.
+        """Instants between which the sensed motion is smooth for quadratures of a few nodes, s.
 
-        The edges of the pulses, and of each ringing the beginning and every quarter of a period.
+        The edges of the pulses, and for each ringing its start and every quarter period.
         """
         edges = [np.asarray(self.motion.breaks, dtype=np.float64)]
         edges += [r.quarters() for r in self.ringing]
@@ -84,7 +83,7 @@ class MountedMotion:
         return rotation.rotate(self._to_sensor, self.motion.angular_acceleration(time))
 
     def specific_force(self, time: ArrayLike) -> Array:
-        """What an ideal accelerometer reads in sensor axes.
+        """Specific force in sensor axes.
 
         Parameters
         ----------
@@ -106,7 +105,7 @@ class MountedMotion:
         return self._turned(point, self._places(point))
 
     def trajectory(self, time: ArrayLike, source: str | None = None) -> pd.DataFrame:
-        """Place and velocity of the sensors, and attitude of their axes.
+        """Position and velocity of the sensors, and attitude of their axes.
 
         Parameters
         ----------
@@ -117,7 +116,7 @@ class MountedMotion:
         Returns
         -------
         DataFrame
-            Trajectory table; places right to 5e-9 m.
+            Trajectory table; positions are accurate to 5e-9 m.
         """
         t = _instants(time)
         point = self._point(t)
@@ -132,23 +131,23 @@ class MountedMotion:
         )
 
     def kinematics_from(self, time: ArrayLike, *, epoch: float = 0.0) -> PointKinematics:
-        """Position, velocity and acceleration with the ringing, as `point_kinematics`.
+        """Position, velocity and acceleration including ringing, as `point_kinematics`.
 
         Parameters
         ----------
         time : array_like, (n,), s
         epoch : float, s
-            When the vehicle's origin is where the axes are.
+            Instant at which the local-level axes are fixed at the vehicle's origin.
 
         Returns
         -------
         PointKinematics
-            Of the sensors; ``q_nv`` is that of the vehicle.
+            For the sensors; ``q_nv`` is that of the vehicle.
 
         Raises
         ------
         ConfigError
-            The epoch is outside of the motion.
+            The epoch is outside the motion.
         """
         return in_axes_of(self.motion, self._point(_instants(time)), epoch)
 

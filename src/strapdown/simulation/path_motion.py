@@ -1,4 +1,4 @@
-"""Vehicles that follow a path: speed, climb and turn as tracks, with what the body does on it."""
+"""Motions along a path of given speed, climb and turn rate, with the attitude of the body."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from strapdown.simulation.place_integral import PlaceIntegral, integrate_velocit
 
 Array = NDArray[np.float64]
 
-# Beyond this pitch, heading and roll turn about nearly one axis and mean nothing to a vehicle.
+# At larger pitch, heading and roll axes nearly coincide and the angles lose their meaning.
 MOST_PITCH = 80.0  # deg
-# What a few hundred megabytes hold of an integral's panels, one a wave's period.
+# Limit on the panels of an integral, one per wave period: a few hundred megabytes.
 _MOST_WAVES = 100_000
 
 
 @dataclass(frozen=True)
 class PathMotion(EarthMotion):
-    """Velocity of a given speed, climb and course; the place is its integral to rounding.
+    """Motion from tracks of speed, climb and course; position is integrated to rounding.
 
-    Everything is in closed form but that integral. Where the speed is zero the vehicle stands,
-    to the last bit.
+    All other quantities are in closed form. Where the speed is zero the vehicle is stationary to
+    the last bit.
 
     Attributes
     ----------
@@ -45,27 +45,27 @@ class PathMotion(EarthMotion):
     turn_rate : Track, deg/s
         Derivative of the course, positive to the right; its first time is zero.
     climb : Track, deg
-        Angle of the path over the horizon.
+        Climb angle of the path above the horizon.
     coordinated : bool
-        Bank so that the turn is not felt sideways: ``tan roll = v cos(climb) turn_rate/g`` with
-        the standard gravity.
+        Bank for a coordinated turn: ``tan roll = v cos(climb) turn_rate/g`` with standard gravity.
     sway_roll, sway_pitch : float, deg/(m/s²)
-        What a body on springs does: it leans out of a turn by the one times the lateral
-        acceleration, and noses up by the other times the acceleration of its speed.
+        Lean of a sprung body: outward roll per lateral acceleration, and nose-up pitch per
+        longitudinal acceleration.
     roll_deg : float, deg
-        Added to every roll.
+        Constant added to roll.
     attack_deg : float, deg
-        Pitch over that of the path.
+        Angle of attack: pitch minus climb angle.
     roll_waves, pitch_waves, heading_waves : tuple of Wave, deg
         Added to the angles.
     heave_waves : tuple of Wave, m
-        Added to the place, downward.
+        Added to the position, downward.
     ellipsoid : Ellipsoid
 
     Raises
     ------
     ConfigError
-        The duration is not positive, the pitch goes beyond 80 deg, or a wave is too short for it.
+        The duration is not positive, the pitch exceeds 80 deg, or a wave is too short for the
+        duration.
     """
 
     duration: float
@@ -113,16 +113,16 @@ class PathMotion(EarthMotion):
 
     @property
     def breaks(self) -> Sequence[float]:
-        """Where a track begins another move, and as often that no wave is overlooked, s."""
+        """Starts of the moves of all tracks, and instants dense enough to resolve every wave, s."""
         step = min([self.duration, *(w.period for w in self._waves)])
         inner = {*self.speed.times, *self.turn_rate.times, *self.climb.times}
         inner |= {step * k for k in range(math.ceil(self.duration / step))}
         return [0.0, *sorted(t for t in inner if 0.0 < t < self.duration), self.duration]
 
     def kinematics(self, time: Array) -> Kinematics:
-        """State at instants; as `EarthMotion.kinematics`."""
+        """State at given instants; as `EarthMotion.kinematics`."""
         path = self._path(time)
-        # What is felt sideways, and how it changes.
+        # Lateral acceleration and its derivative.
         lateral = path.level * path.swing
         d_lateral = path.d_level * path.swing + path.level * path.d_swing
         roll, d_roll = self.roll_deg - self.sway_roll * lateral, -self.sway_roll * d_lateral
@@ -159,7 +159,7 @@ class PathMotion(EarthMotion):
         course = self.heading_deg + integrate_track(self.turn_rate, time)
         _, heave, d_heave = sum_waves(self.heave_waves, time)
         slope, d_slope, swing = np.radians(climb), np.radians(d_climb), np.radians(turn)
-        # Whole turns are taken away in degrees, where they have no rounding.
+        # Whole turns are removed in degrees, where this is exact.
         angle = np.radians(course - 360.0 * np.rint(course / 360.0))
         north, east, flat, steep = np.cos(angle), np.sin(angle), np.cos(slope), np.sin(slope)
         level, up = speed * flat, speed * steep
@@ -195,7 +195,7 @@ class PathMotion(EarthMotion):
 
 @dataclass(frozen=True)
 class _Path:
-    """What the tracks give: deg in climb, turn and course, rad/s in swing; level is a speed."""
+    """Values of the tracks: deg for climb, turn and course, rad/s for swing; level is a speed."""
 
     d_speed: Array
     dd_speed: Array
@@ -223,14 +223,14 @@ def rocking_stand(
     heading_waves: Sequence[Wave] = (),
     ellipsoid: Ellipsoid = WGS84,
 ) -> PathMotion:
-    """A body that rocks about a fixed place.
+    """A body that rocks about a fixed position.
 
     Parameters
     ----------
     duration : float, s
     origin : Origin
     roll_deg, pitch_deg, heading_deg : float, deg
-        Means of the angles.
+        Mean angles.
     roll_waves, pitch_waves, heading_waves : sequence of Wave, deg
     ellipsoid : Ellipsoid
 
@@ -256,22 +256,22 @@ def rocking_stand(
     )
 
 
-# A course as tracks of speed, turn rate and climb, laid by one manoeuvre after another.
+# A course as tracks of speed, turn rate and climb, built from a list of maneuvers.
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a vehicle can do.
+    """Performance limits of a vehicle.
 
     Attributes
     ----------
     acceleration : float, m/s²
-        Of its speed.
+        Longitudinal.
     lateral : float, m/s²
-        In a turn.
+        Centripetal, in a turn.
     bank_deg : float, deg
     climb_deg : float, deg
-        Up or down.
+        Largest climb or descent angle.
     """
 
     acceleration: float = 12.0
@@ -282,12 +282,12 @@ class Limits:
 
 @dataclass
 class Course:
-    """Tracks that grow by one manoeuvre after another.
+    """Tracks extended by one maneuver after another.
 
     Attributes
     ----------
     time : float, s
-        Up to here it is laid.
+        End of the tracks so far.
     limits : Limits
     speed, turn_rate, climb : list of (time, value)
         m/s, deg/s, deg.
@@ -302,7 +302,7 @@ class Course:
     def move(
         self, points: list[tuple[float, float]], start: float, length: float, to: float
     ) -> None:
-        """Let a coordinate hold until `start`, and come to a value with least jerk."""
+        """Hold a coordinate until `start`, then move it to a value with minimum jerk."""
         if start > points[-1][0]:
             points.append((start, points[-1][1]))
         if length > 0.0:
@@ -310,37 +310,37 @@ class Course:
 
     @property
     def speed_now(self) -> float:
-        """Speed at the end of what is laid, m/s."""
+        """Speed at the end of the tracks, m/s."""
         return self.speed[-1][1]
 
     @property
     def climb_now(self) -> float:
-        """Angle of climb there, deg."""
+        """Climb angle at the end of the tracks, deg."""
         return self.climb[-1][1]
 
     def moving_speed(self, code: str) -> float:
-        """Speed there; an error of this code where it is zero."""
+        """Speed at the end of the tracks; raises `code` if it is zero."""
         if self.speed_now <= 0.0:
             raise ConfigError(code, quantity="speed")
         return self.speed_now
 
     def level_speed(self, code: str) -> float:
-        """Horizontal part of it, m/s."""
+        """Horizontal component of that speed, m/s."""
         return self.moving_speed(code) * math.cos(math.radians(self.climb_now))
 
 
 class Manoeuvre(Protocol):
-    """What a vehicle is told to do."""
+    """Interface of a maneuver."""
 
     def lay(self, course: Course) -> None:
-        """Add it to a course."""
+        """Append it to a course."""
         ...
 
 
 def lay_course(
     manoeuvres: Sequence[tuple[str, Manoeuvre]], speed: float, limits: Limits
 ) -> tuple[float, Track, Track, Track]:
-    """Lay manoeuvres one after another.
+    """Build tracks from a list of maneuvers.
 
     Parameters
     ----------
@@ -359,7 +359,7 @@ def lay_course(
     Raises
     ------
     ConfigError
-        There is none, or one cannot be done; the message says which, counted from 1.
+        The list is empty, or a maneuver is infeasible; the message gives its number, from 1.
     """
     if not 0.0 <= speed < math.inf:
         raise ConfigError("simulation.vehicle-cannot-begin", quantity="speed", speed=speed)
@@ -381,7 +381,7 @@ def _track(points: list[tuple[float, float]]) -> Track:
 
 
 def check_length(value: float, name: str = "duration") -> None:
-    """Refuse what is no length of a manoeuvre."""
+    """Raise unless the length of a maneuver is finite and positive."""
     if not 0.0 < value < math.inf:
         raise ConfigError("simulation.not-above-zero", quantity=name, value=value)
 
@@ -420,7 +420,7 @@ class Wave:
 
 
 def sum_waves(waves: Sequence[Wave], time: Array) -> tuple[Array, Array, Array]:
-    """Sum of waves and its first two derivatives by time.
+    """Sum of waves and its first two time derivatives.
 
     Parameters
     ----------
@@ -435,7 +435,8 @@ def sum_waves(waves: Sequence[Wave], time: Array) -> tuple[Array, Array, Array]:
     value, first, second = np.zeros(time.size), np.zeros(time.size), np.zeros(time.size)
     for wave in waves:
         omega = 2.0 * math.pi / wave.period
-        # Whole periods are taken away without rounding, so that late phases are as good as early.
+        # Whole periods are removed without rounding, so that late phases are as precise as early
+        # ones.
         phase = 2.0 * math.pi * (np.fmod(time, wave.period) / wave.period)
         phase += math.radians(wave.phase_deg)
         high, level = wave.amplitude * np.sin(phase), wave.amplitude * np.cos(phase)
@@ -463,7 +464,7 @@ def integrate_track(track: Track, time: Array) -> Array:
 
     Notes
     -----
-    The integral of the quintic of least jerk is ``5/2 x^4 - 3 x^5 + x^6``, one half over the whole.
+    The integral of the minimum-jerk quintic is ``5/2 x^4 - 3 x^5 + x^6``, one half over the whole.
     """
     times, values = np.asarray(track.times), np.asarray(track.values)
     if len(times) == 1:

@@ -1,4 +1,4 @@
-"""Place of a vehicle whose velocity is known at every instant, to rounding."""
+"""Position of a vehicle from a velocity known at every instant, integrated to rounding."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from strapdown.simulation.rate_integral import RateIntegral, integrate_rate
 
 Array = NDArray[np.float64]
 
-# `integrate_rate` stops at 1e-14 of what it is given: with these factors at 1e-17 rad, which is
-# 6e-11 m on the ground, and at 8e-11 m of height. Powers of two round nothing.
+# `integrate_rate` converges to 1e-14 of its input: with these factors to 1e-17 rad, which is 6e-11
+# m on the ground, and to 8e-11 m in height. Scaling by powers of two is free of rounding.
 _SCALE = np.array([2.0**10, 2.0**10, 2.0**-13])
-# Latitude acts on its own rate by the radius of the meridian alone, 1 % a radian at most: each
-# round takes away a factor of a hundred and more.
+# Latitude affects its own rate only through the meridian radius, 1 % per radian at most: each
+# iteration reduces the error by a factor of a hundred or more.
 _ROUNDS = 16
 
 
 @dataclass(frozen=True)
 class PlaceIntegral:
-    """What a velocity adds to latitude, longitude (rad) and height (m) from time zero."""
+    """Change of latitude, longitude (rad) and height (m) since time zero."""
 
     scaled: RateIntegral
 
     def __call__(self, time: ArrayLike) -> Array:
-        """Latitude and longitude in rad and height in m less those of the origin, (n, 3)."""
+        """Latitude and longitude in rad and height in m relative to the origin, (n, 3)."""
         return np.asarray(self.scaled(time) / _SCALE)
 
 
@@ -40,21 +40,21 @@ def integrate_velocity(
     origin: Origin,
     ellipsoid: Ellipsoid,
 ) -> PlaceIntegral:
-    """Integrate a velocity that is smooth between breaks, over the ellipsoid.
+    """Integrate a piecewise smooth velocity over the ellipsoid.
 
     Parameters
     ----------
     velocity : callable
         (n,) instants in s to (n, 3) m/s: north, east, down.
     breaks : sequence of float, s
-        Where it or a derivative of it may jump; the first is zero, the last the end.
+        Instants where it or a derivative may jump; the first is zero, the last the end.
     origin : Origin
     ellipsoid : Ellipsoid
 
     Returns
     -------
     PlaceIntegral
-        Within 1e-10 m a panel, and rounding.
+        Within 1e-10 m per panel, plus rounding.
 
     Raises
     ------
@@ -63,9 +63,9 @@ def integrate_velocity(
 
     Notes
     -----
-    ``lat' = v_N/(R_M(lat) + h)``, ``lon' = v_E/((R_N(lat) + h) cos lat)``, ``h' = -v_D``, by
-    Picard's iteration: each round integrates the rates at the places of the one before, as
-    Legendre series over panels, until nothing moves by more than rounding.
+    ``lat' = v_N/(R_M(lat) + h)``, ``lon' = v_E/((R_N(lat) + h) cos lat)``, ``h' = -v_D``, by Picard
+    iteration: each iteration integrates the rates at the previous positions, as Legendre series
+    over panels, until the change is within rounding.
     """
     from strapdown._kernels.earth_motion import place_rates
 
@@ -85,7 +85,7 @@ def integrate_velocity(
     for _ in range(_ROUNDS):
         place = PlaceIntegral(integrate_rate(rates, breaks))
         now = place(ends)
-        # A hundredth of what a double resolves of a latitude.
+        # A hundredth of the double-precision resolution of a latitude.
         if np.all(np.abs(now - before) <= [1e-18, 1e-18, 1e-11] + 1e-16 * np.abs(now)):
             break
         before = now

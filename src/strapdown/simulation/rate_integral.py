@@ -1,4 +1,4 @@
-"""Integral of a body rate that has no closed form, to rounding."""
+"""Integral of a body rate without closed form, to rounding."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ Array = NDArray[np.float64]
 
 _NODES = 16
 _X, _W = legendre.leggauss(_NODES)
-# Rate at the nodes to Legendre coefficients: c_j = (2j + 1)/2 sum_i w_i P_j(x_i) f(x_i), exact
-# for polynomials that 16 nodes determine.
+# Rate at the nodes to Legendre coefficients: c_j = (2j + 1)/2 sum_i w_i P_j(x_i) f(x_i), exact for
+# polynomials that 16 nodes determine.
 _TO_COEFFICIENTS = (np.arange(_NODES) + 0.5)[:, None] * (
     legendre.legvander(_X, _NODES - 1) * _W[:, None]
 ).T
-# What the series leaves out of an integral within one panel, rad.
+# Truncation error of the series within one panel, rad.
 _TOLERANCE = 1e-14
-# Below this length rounding decides and not the series, s.
+# Shortest panel, s; below it rounding dominates the truncation error.
 _SHORTEST = 1e-5
 
 
@@ -34,7 +34,7 @@ class RateIntegral:
     before : ndarray, (p, 3), rad
         Integral up to the left edge of each panel.
     series : ndarray, (p, 17, 3), rad
-        Legendre coefficients of what each panel adds.
+        Legendre coefficients of the integral within each panel.
     """
 
     edges: Array
@@ -61,14 +61,14 @@ class RateIntegral:
 
 
 def integrate_rate(rate: Callable[[ArrayLike], Array], breaks: Sequence[float]) -> RateIntegral:
-    """Integrate a rate that is smooth between breaks.
+    """Integrate a piecewise smooth rate.
 
     Parameters
     ----------
     rate : callable
         (n,) instants in s to (n, 3) rates in rad/s.
     breaks : sequence of float, s
-        Where the rate or a derivative of it may jump; the first and the last are the ends.
+        Instants where the rate or a derivative may jump; the first and the last are the ends.
 
     Returns
     -------
@@ -76,12 +76,12 @@ def integrate_rate(rate: Callable[[ArrayLike], Array], breaks: Sequence[float]) 
 
     Notes
     -----
-    Sixteen Gauss-Legendre nodes a panel give the Legendre coefficients c_j of the rate. The
-    integral of P_n over any part of a panel of half-length h is at most 2h/(2n+1), so that the
-    first one left out adds at most ``2h |c_16| / 33``. Where the last two that are kept (two,
-    because symmetry can make one vanish) do not hold ``2h |c| / 29`` under 1e-14 rad, the panel
-    is halved; c falls geometrically for an analytic rate, and the integral over a whole panel
-    is exact to degree 31. The sums over the panels are compensated.
+    Sixteen Gauss-Legendre nodes per panel give the Legendre coefficients c_j of the rate. The
+    integral of P_n over any part of a panel of half-length h is at most 2h/(2n+1), so the first
+    omitted term contributes at most ``2h |c_16| / 33``. Where ``2h |c| / 29`` of the last two terms
+    kept (two, because symmetry can make one vanish) exceeds 1e-14 rad, the panel is halved. c
+    decreases geometrically for an analytic rate, and the integral over a whole panel is exact to
+    degree 31. The sums over the panels are compensated.
     """
     edges = np.unique(np.asarray(breaks, dtype=np.float64))
     left, right = edges[:-1], edges[1:]
@@ -112,7 +112,7 @@ def integrate_rate(rate: Callable[[ArrayLike], Array], breaks: Sequence[float]) 
 
 
 def _sums(terms: Array) -> Array:
-    """Sum of all terms before each, compensated (Neumaier 1974)."""
+    """Sum of all preceding terms, compensated (Neumaier 1974)."""
     out = np.zeros_like(terms)
     total, lost = np.zeros(3), np.zeros(3)
     for k in range(len(terms) - 1):

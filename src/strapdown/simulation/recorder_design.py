@@ -1,4 +1,4 @@
-"""How a crash recorder is built: its triads, its place, its clock and its trigger."""
+"""Design of a crash recorder: triads, mounting, clock and trigger."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from strapdown.sensors.crash_unit import Mounting
 from strapdown.sensors.triad_errors import Triad, TriadErrors
 from strapdown.sensors.uncertainty import TriadUncertainty, uncertainty_of
 
-# Faster than this, a crystal is broken.
+# A larger clock drift means a defective crystal.
 MOST_DRIFT = 1000.0  # ppm
 
 
@@ -27,10 +27,10 @@ class TriadDesign:
     part : str
         Name, for messages.
     uncertainty : TriadUncertainty
-        What is told of it: goes into the record.
+        Stated uncertainty, written to the record.
     rate : float, Hz
     errors : TriadErrors, optional
-        What it really does; drawn from the uncertainty, if not given.
+        True errors; drawn from the uncertainty if not given.
 
     Raises
     ------
@@ -52,17 +52,17 @@ class TriadDesign:
 
 @dataclass(frozen=True)
 class WarmUp:
-    """Biases that die away after a recorder is switched on.
+    """Biases that decay after a recorder is switched on.
 
     Attributes
     ----------
     accel : float, m/s²
-        Standard deviation at the instant of switching on, of every axis and triad.
+        Standard deviation at switch-on, for every axis and triad.
     gyro : float, rad/s
-        The same of the gyro.
+        The same for the gyro.
     time_constant : float, s
     elapsed : float, s
-        From switching on to the beginning of the motion: stated, and not simulated.
+        From switch-on to the start of the motion; stated, not simulated.
 
     Raises
     ------
@@ -85,7 +85,7 @@ class WarmUp:
 
     @property
     def left(self) -> float:
-        """What is left of it when the motion begins, relative."""
+        """Fraction of the warm-up bias left when the motion starts."""
         return math.exp(-self.elapsed / self.time_constant)
 
 
@@ -96,29 +96,29 @@ class RecorderDesign:
     Attributes
     ----------
     name : str
-        Two recorders of one seed differ by it.
+        Also selects the random stream: two recorders with one seed differ by it.
     accelerometers : tuple of TriadDesign
-        One or more, the lowest range first.
+        One or more, in order of increasing range.
     gyro : TriadDesign, optional
     mounting : Mounting
-        As it is told; the true one is drawn with its standard deviations.
+        Stated mounting; the true one is drawn with its standard deviations.
     gyro_from : str, optional
-        Of which recorder the gyro is borrowed, where there is none.
+        Recorder that supplies the gyro, for a recorder without one.
     warm_up : WarmUp, optional
     trigger_sd : float, s
-        Of the stamp of the trigger.
+        Standard deviation of the trigger stamp.
     clock_offset : float, s
-        What the recorder's clock shows when the motion begins.
+        Reading of the recorder's clock when the motion starts.
     clock_drift_ppm : float
-        By how much it runs fast.
+        Rate by which the clock runs fast.
     high_g_bias : float, m/s²
-        Bound of the biases, uniformly drawn, of every accelerometer but the first; zero leaves
-        them to their own uncertainty.
+        Half-width of the uniform bias distribution of every accelerometer except the first; zero
+        leaves them to their own uncertainty.
 
     Raises
     ------
     ConfigError
-        There is no accelerometer, or a number is out of range.
+        No accelerometer is given, or a number is out of range.
     """
 
     name: str
@@ -144,14 +144,14 @@ class RecorderDesign:
             raise _out(self, "clock_drift_ppm", "simulation.recorder-drift")
 
     def told(self, which: int) -> TriadUncertainty:
-        """What is told of an accelerometer: its own, its high-g bias, what is left of warm-up."""
+        """Stated uncertainty of an accelerometer, with high-g bias and residual warm-up bias."""
         own = self.accelerometers[which].uncertainty
         if which > 0 and self.high_g_bias > 0.0:
             own = replace(own, bias=self.high_g_bias / math.sqrt(3.0))
         return self._warm(own, self.warm_up.accel if self.warm_up else 0.0)
 
     def told_gyro(self) -> TriadUncertainty | None:
-        """The same of the gyro."""
+        """Stated uncertainty of the gyro, likewise."""
         if self.gyro is None:
             return None
         return self._warm(self.gyro.uncertainty, self.warm_up.gyro if self.warm_up else 0.0)
@@ -166,18 +166,18 @@ class RecorderDesign:
 
 @dataclass(frozen=True)
 class RecorderTruth:
-    """What a simulated recorder really did.
+    """True errors of a simulated recorder.
 
     Attributes
     ----------
     accelerometers : tuple of TriadErrors
     gyro : TriadErrors, optional
     mounting : Mounting
-        Where it really sat; without standard deviations.
+        True mounting, without standard deviations.
     clock_offset : float, s
     clock_drift_ppm : float
     trigger_error : float, s
-        By how much the stamp of the trigger is late.
+        Delay of the trigger stamp.
     """
 
     accelerometers: tuple[TriadErrors, ...]
@@ -188,7 +188,7 @@ class RecorderTruth:
     trigger_error: float
 
     def clock(self, time: float) -> float:
-        """What the recorder's clock shows at an instant of the motion, s."""
+        """Reading of the recorder's clock at an instant of the motion, s."""
         return self.clock_offset + (1.0 + 1e-6 * self.clock_drift_ppm) * time
 
 
@@ -200,34 +200,36 @@ def _out(design: RecorderDesign, name: str, code: str) -> ConfigError:
 # The four recorders of the crash test of Tadic and Vukajlovic (2016).
 
 
-# Section 3 of the paper: the worst bias that was found in a high-g part; the warm-up; Table 1.
+# Section 3 of the paper: the largest bias found in a high-g part; the warm-up; Table 1.
 HIGH_G_BIAS = 11.91  # m/s²
 ELAPSED = 600.0  # s
 IMU_RATE, LAB_RATE = 200.0, 10_000.0  # Hz
-# Chosen: the paper has no positions. From the vehicle's origin, which is taken 0.5 m above the
-# ground in the middle of the car: on the floor before the front seats, and half up the B-pillars.
+# Chosen, because the paper gives no positions. Relative to the vehicle's origin, taken 0.5 m above
+# the ground in the middle of the car: on the floor before the front seats, and halfway up the
+# B-pillars.
 FLOOR: Triad = (0.6, 0.5, 0.2)
 PILLAR: Triad = (-0.3, 0.7, -0.3)
-# Chosen: a converter of 12 bits over 3.3 V behind 20, 40 and 40 mV/g.
+# Chosen: a 12-bit converter over 3.3 V with 20, 40 and 40 mV/g.
 HIGH_G_STEP: Triad = (0.4, 0.2, 0.2)  # m/s²
 
 
 def paper_units(scale_sd: float = 0.02) -> tuple[RecorderDesign, ...]:
-    """Give the platforms of the paper: LAB1, LAB2, IMU1, IMU2; 1 is left, 2 is right.
+    """Return the platforms of the paper: LAB1, LAB2, IMU1, IMU2; 1 is left, 2 is right.
 
     Parameters
     ----------
     scale_sd : float
-        Of every MEMS triad, after a calibration; the data sheets alone leave more, up to ±10 %.
+        Scale factor standard deviation of every MEMS triad after calibration; the data sheets alone
+        allow up to ±10 %.
 
     Returns
     -------
     tuple of RecorderDesign
-        Of the paper: parts, rates and ranges (but see the catalogue's word on ±100 g), the
-        high-g bias of up to 11.91 m/s², the low-g bias of 0.2 m/s², 10 minutes of warm-up, the
-        common trigger, laboratory units without gyros (here they borrow IMU1's), B-pillars and
-        floor. Chosen here: positions and how well they are known, converters, clocks, warm-up
-        drift, and that a trigger is stamped with the sample in which it falls.
+        From the paper: parts, rates and ranges (but see the catalogue's note on ±100 g), the high-g
+        bias of up to 11.91 m/s², the low-g bias of 0.2 m/s², 10 minutes of warm-up, the common
+        trigger, laboratory units without gyros (here they use IMU1's), B-pillars and floor. Chosen
+        here: positions and their standard deviations, converters, clocks, warm-up drift, and
+        stamping a trigger with the sample in which it falls.
 
     Raises
     ------
@@ -283,5 +285,5 @@ def _beside(position: Triad, side: float) -> Triad:
 
 
 def _one_sample(rate: float) -> float:
-    """Standard deviation of an instant anywhere in an interval between samples, s."""
+    """Standard deviation of an instant uniformly distributed over a sample interval, s."""
     return 1.0 / rate / math.sqrt(12.0)

@@ -1,4 +1,4 @@
-"""Structural ringing: a part of the structure that swings to and fro after a blow."""
+"""Structural ringing: a damped oscillation of the mounting point after a blow."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from strapdown.errors import ConfigError
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
-# (1 - e)^2 of the onset, as the sum of its powers.
+# (1 - e)^2 of the onset, expanded in powers.
 _BINOMIAL = (1.0, -2.0, 1.0)
 # exp(-25) is 1.4e-11.
 _LEFT = 25.0
@@ -21,33 +21,33 @@ _LEFT = 25.0
 
 @dataclass(frozen=True)
 class Ringing:
-    """A damped oscillation of where a unit is mounted, about its place on the rigid vehicle.
+    """A damped oscillation of a mounting point about its position on the rigid vehicle.
 
-    Its displacement begins at rest, is bounded and dies away, so that it moves nothing for good:
+    The displacement starts at rest, is bounded and decays, so that it leaves no permanent change:
     ``X (1 - exp(-w t))² exp(-t/decay) sin(w t)`` with ``w = 2 pi frequency``. The factor in
-    brackets lets displacement, velocity and acceleration begin at zero without a jump; after one
-    period it is 0.996. A bare ``amplitude exp(-t/decay) sin(w t)`` as the acceleration would leave
-    the unit with a velocity of ``amplitude w/(w² + 1/decay²)`` for ever.
+    parentheses starts displacement, velocity and acceleration at zero without a jump; after one
+    period it is 0.996. A bare acceleration ``amplitude exp(-t/decay) sin(w t)`` would leave the
+    unit with a permanent velocity of ``amplitude w/(w² + 1/decay²)``.
 
     Attributes
     ----------
     start : float, s
-        On the clock of the motion.
+        On the motion's clock.
     amplitude : float, m/s²
-        Of the acceleration, on the envelope ``amplitude exp(-t/decay)`` that it follows after the
-        first period: ``X (w² + 1/decay²)``. The largest value falls into the onset, and is within
-        6 % of it where the ringing lasts (``w decay`` above 20).
+        Acceleration amplitude: after the first period the envelope is ``amplitude exp(-t/decay)``,
+        with ``amplitude = X (w² + 1/decay²)``. The maximum falls in the onset and is within 6 % of
+        the amplitude for long ringing (``w decay`` above 20).
     frequency : float, Hz
-        Of the damped oscillation.
+        Frequency of the damped oscillation.
     decay : float, s
-        In which the envelope falls to 1/e.
+        Time in which the envelope falls to 1/e.
     direction : tuple of float
-        Forward, right, down, in vehicle axes; its length does not count.
+        Forward, right, down, in vehicle axes; any length.
 
     Raises
     ------
     ConfigError
-        A number is not finite, a frequency or decay is not positive, or there is no direction.
+        A number is not finite, frequency or decay is not positive, or the direction is zero.
     """
 
     start: float
@@ -71,7 +71,7 @@ class Ringing:
                 raise ConfigError("simulation.cannot", quantity=name, value=getattr(self, name))
 
     def displacement(self, time: ArrayLike) -> Array:
-        """From its place on the rigid vehicle, in vehicle axes, (n, 3), m."""
+        """Displacement from the rigid position, in vehicle axes, (n, 3), m."""
         return self._derivative(time, 0)
 
     def velocity(self, time: ArrayLike) -> Array:
@@ -83,12 +83,12 @@ class Ringing:
         return self._derivative(time, 2)
 
     def quarters(self) -> Array:
-        """Instants from the start in steps of a quarter of a period, until 1e-11 is left; s."""
+        """Instants from the start in steps of a quarter period, until the envelope is 1e-11; s."""
         last = math.ceil(_LEFT * self.decay * 4.0 * self.frequency)
         return np.asarray(self.start + np.arange(last + 1) / (4.0 * self.frequency))
 
     def _derivative(self, time: ArrayLike, order: int) -> Array:
-        """Sum of three damped oscillations, each an exponential of a complex rate."""
+        """Sum of three damped oscillations, each an exponential with a complex rate."""
         t = np.maximum(np.asarray(time, dtype=np.float64) - self.start, 0.0)
         w = 2.0 * math.pi * self.frequency
         out = np.zeros(t.shape)

@@ -1,8 +1,8 @@
-"""Alexiev's generated gyro data, and motions beyond his, as named scenarios.
+"""Named scenarios: Alexiev's generated gyro data, and further motions.
 
-The figures of the paper did not survive scanning, so that the shapes are those of the
-captions and the text, and the numbers are chosen here, except for Fig. 4, whose numbers the
-text gives. Every scenario but coning rests at its start and end, for 1.5 s or more.
+The figures of the paper are illegible in the scan. Shapes follow captions and text; numbers are
+chosen here, except those of Fig. 4, which the text gives. Every scenario except coning is at rest
+at its start and end, for 1.5 s or more.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from strapdown.simulation.smooth_random import SmoothRandom
 
 X, Y, Z = 0, 1, 2
 _QUARTER_TURN = 1.5707963267948966  # rad
-# Some ten times that of a phone, so that it shows in a plot: 0.01 rad/s at 100 Hz.
+# About ten times that of a phone, to be visible in a plot: 0.01 rad/s at 100 Hz.
 _NOISE = 0.001  # rad/s/√Hz
 _BEYOND = "beyond the paper"
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """A motion with an exactly known attitude, and the errors of the sensors that measure it.
+    """A motion with exactly known attitude, and the errors of its sensors.
 
     Attributes
     ----------
     title : str
     origin : str
-        Where in Alexiev (2021) it stands, or that it is beyond the paper.
+        Source in Alexiev (2021), or that the scenario is not from the paper.
     motion : Motion
     errors : ImuErrors
     references : tuple of str
-        What is known of the attitude at some instants, in the words of `--reference`, as for a
-        recording that has no other truth.
+        Known attitude at some instants, in the syntax of `--reference`, as for a recording without
+        other truth.
     """
 
     title: str
@@ -47,7 +47,7 @@ class Scenario:
 
     @property
     def source(self) -> str:
-        """Where it comes from, with the name of the paper if it stands there."""
+        """Source of the scenario, with the name of the paper where it applies."""
         return self.origin if self.origin == _BEYOND else f"Alexiev 2021, {self.origin}"
 
 
@@ -57,7 +57,7 @@ _HOME = "end same as start"
 
 
 def _fig5(scale: float) -> PulseMotion:
-    # On the grid of 100 Hz and off that of 5 Hz, as pulses fall that nobody arranged.
+    # On the grid of 100 Hz but off that of 5 Hz, like unsynchronized pulses.
     return PulseMotion(
         (
             Pulse(X, 2.07, 3.53, 0.10 * scale),
@@ -174,7 +174,7 @@ SCENARIOS: dict[str, Scenario] = {
 
 
 def find_scenario(name: str) -> Scenario:
-    """Return the scenario of that name.
+    """Return the scenario with that name.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ def find_scenario(name: str) -> Scenario:
     Raises
     ------
     ConfigError
-        There is none; the message names the nearest.
+        The name is unknown; the message gives the nearest.
     """
     if name not in SCENARIOS:
         raise ConfigError(

@@ -1,4 +1,4 @@
-"""Failures of single channels, put into an Imu table: what a broken sensor does to a log."""
+"""Faults of single sensor channels, injected into an Imu table."""
 
 from __future__ import annotations
 
@@ -30,25 +30,25 @@ __all__ = [
 Array = NDArray[np.float64]
 
 CHANNELS = (*GYRO, *ACCEL)
-# Place in the tree of seeds, beside those of the triads and of a unit's draws.
+# Key in the seed tree, beside those of the triads and of a unit's draws.
 FAULT_SEED = 3
 
 
 @dataclass(frozen=True)
 class SensorFault:
-    """A failure of one channel over an interval; its kinds are the classes of this module.
+    """A fault of one channel over an interval; its kinds are the classes of this module.
 
     Attributes
     ----------
     channel : str
         ``gyro_x`` to ``accel_z``.
     begin, end : float, s
-        Samples from the one, included, to the other, excluded.
+        Interval of the samples, `begin` included, `end` excluded.
 
     Raises
     ------
     ConfigError
-        There is no such channel, or the interval is none.
+        The channel is unknown, or the interval is empty.
     """
 
     channel: str
@@ -73,7 +73,7 @@ class SensorFault:
             )
 
     def broken(self, values: Array, generator: np.random.Generator) -> Array:
-        """What the broken channel gives in place of these samples of the interval, (k,)."""
+        """Output of the faulty channel for these samples of the interval, (k,)."""
         raise NotImplementedError
 
     def _checked(self, name: str, least: float = 0.0) -> None:
@@ -84,7 +84,7 @@ class SensorFault:
 
 @dataclass(frozen=True)
 class Stuck(SensorFault):
-    """It repeats the reading that it had when it failed."""
+    """Stuck at the reading at the start of the fault."""
 
     def broken(self, values: Array, generator: np.random.Generator) -> Array:
         """As `SensorFault.broken`."""
@@ -93,7 +93,7 @@ class Stuck(SensorFault):
 
 @dataclass(frozen=True)
 class Dead(SensorFault):
-    """It gives exactly zero."""
+    """Output is exactly zero."""
 
     def broken(self, values: Array, generator: np.random.Generator) -> Array:
         """As `SensorFault.broken`."""
@@ -102,7 +102,7 @@ class Dead(SensorFault):
 
 @dataclass(frozen=True)
 class DropOut(SensorFault):
-    """It gives nothing: its values are NaN."""
+    """Missing output: the values are NaN."""
 
     def broken(self, values: Array, generator: np.random.Generator) -> Array:
         """As `SensorFault.broken`."""
@@ -111,7 +111,7 @@ class DropOut(SensorFault):
 
 @dataclass(frozen=True)
 class Jump(SensorFault):
-    """Its zero moves.
+    """Bias jump.
 
     Attributes
     ----------
@@ -131,12 +131,12 @@ class Jump(SensorFault):
 
 @dataclass(frozen=True)
 class Noisy(SensorFault):
-    """White noise is added.
+    """Added white noise.
 
     Attributes
     ----------
     sd : float, rad/s or m/s²
-        Of a sample.
+        Standard deviation of a sample.
     """
 
     sd: float = 0.0
@@ -152,12 +152,12 @@ class Noisy(SensorFault):
 
 @dataclass(frozen=True)
 class Saturated(SensorFault):
-    """Its range has become smaller: an amplifier, or the wrong setting.
+    """Reduced range, from an amplifier fault or a wrong setting.
 
     Attributes
     ----------
     limit : float, rad/s or m/s²
-        The output is held within ± this.
+        The output is clipped to ± this.
     """
 
     limit: float = math.inf
@@ -174,14 +174,14 @@ class Saturated(SensorFault):
 
 @dataclass(frozen=True)
 class Burst(SensorFault):
-    """Some of its samples are far off, to either side.
+    """Random samples far off, to either side.
 
     Attributes
     ----------
     size : float, rad/s or m/s²
-        How far.
+        Magnitude of the error.
     share : float
-        Of the samples, each by chance.
+        Probability that a sample is affected.
     """
 
     size: float = 0.0
@@ -203,21 +203,21 @@ class Burst(SensorFault):
 def inject_faults(
     imu: pd.DataFrame, faults: Sequence[SensorFault], *, seed: int = 0
 ) -> pd.DataFrame:
-    """Break channels of an Imu table.
+    """Inject faults into channels of an Imu table.
 
     Parameters
     ----------
     imu : DataFrame
-        An Imu table; it is left as it is.
+        An Imu table; not changed.
     faults : sequence of SensorFault
-        In order: a later one acts on what an earlier one left.
+        Applied in order: a later fault acts on the output of an earlier one.
     seed : int
-        Of what is random; each fault has a stream of its own.
+        Seed of the random draws; each fault has its own stream.
 
     Returns
     -------
     DataFrame
-        With NaN where a `DropOut` was asked for, which `check_imu` refuses.
+        With NaN for a `DropOut`, which `check_imu` rejects.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Smooth random motion in a stated band, from rest to rest."""
+"""Smooth random motion in a given band, from rest to rest."""
 
 from __future__ import annotations
 
@@ -16,43 +16,43 @@ from strapdown.simulation.rate_integral import RateIntegral, integrate_rate
 
 Array = NDArray[np.float64]
 
-# Instants at once, so that what a series needs for them stays in the cache.
+# Instants per batch, so that the intermediate arrays stay in the cache.
 _CHUNK = 16384
 
 
 @dataclass(frozen=True)
 class SmoothRandom(FlatMotion):
-    """Fourier series of random phase for the 3-2-1 angles and for the position.
+    """Random-phase Fourier series for the 3-2-1 angles and the position.
 
-    The rates of the three angles and the three accelerations are each flat over the band: equal
-    amplitudes at all multiples of one cycle per moving time. A ramp of least jerk takes the
-    motion out of rest and back to it, to exactly the same pose.
+    The spectra of the three angle rates and the three accelerations are flat over the band: equal
+    amplitudes at all multiples of one cycle per moving time. A minimum-jerk ramp starts the motion
+    from rest and returns it to exactly the same pose.
 
     Attributes
     ----------
     duration : float, s
-        With both rests.
+        Including both rests.
     seed : int
-        Of the phases; the same seed is the same motion on every machine.
+        Seed of the phases; the same seed gives the same motion on every machine.
     rms_rate : float, deg/s
-        Root mean square of the length of (roll', pitch', heading') under the full ramp. The
-        three are independent, so that the body rate has the same in the mean over seeds.
+        Root mean square length of (roll', pitch', heading') under the full ramp. The three are
+        independent, so the body rate has the same value in the mean over seeds.
     rms_acceleration : float, m/s²
-        The same of the acceleration.
+        Root mean square length of the acceleration under the full ramp.
     band : tuple of float, Hz
-        Lowest and highest frequency of the series. The body rate, a product of them, has a
-        little above.
+        Lowest and highest frequency of the series. The body rate, a product of several series,
+        extends slightly above.
     ramp : float, s
-        From rest to full motion, and back.
+        Duration of the ramp from rest to full motion, and back.
     rest : float, s
-        Before the first ramp, and after the last.
+        Rest before the first ramp, and after the last.
     q_nb : tuple of float
         Initial attitude, scalar first.
 
     Raises
     ------
     ConfigError
-        The ramps and rests do not fit, or no multiple of a cycle per moving time is in the band.
+        Ramps and rests do not fit, or the band contains no multiple of a cycle per moving time.
     """
 
     duration: float
@@ -105,12 +105,12 @@ class SmoothRandom(FlatMotion):
         Parameters
         ----------
         time : array_like, (n,), s
-            Before zero and after the end the integral stays as it is there.
+            Before zero and after the end the integral is held constant.
 
         Returns
         -------
         ndarray, (n, 3), rad
-            Within 1e-14 rad and rounding (`rate_integral.integrate_rate`).
+            Within 1e-14 rad, plus rounding (`rate_integral.integrate_rate`).
         """
         return self._integral(time)
 
@@ -147,7 +147,7 @@ class SmoothRandom(FlatMotion):
     @property
     def _orders(self) -> tuple[int, int]:
         """First and last multiple of a cycle per moving time within the band."""
-        # A bound that is a multiple belongs to it, whatever the product rounds to.
+        # A band limit that is itself a multiple is included, independent of rounding.
         first = np.ceil(self.band[0] * self._moving * (1.0 - 1e-12))
         last = np.floor(self.band[1] * self._moving * (1.0 + 1e-12))
         return int(first), int(last)

@@ -1,4 +1,4 @@
-"""Motions through given places: a spline is the truth."""
+"""Motions through waypoints: a quintic spline defines the truth."""
 
 from __future__ import annotations
 
@@ -27,40 +27,40 @@ from strapdown.tables import EULER, check_trajectory, places_of
 
 Array = NDArray[np.float64]
 
-# Looks between two knots for what a spline does there.
+# Checks of the spline between two knots.
 _LOOKS = 16
-# Part of the greatest horizontal speed under which a path has no direction.
+# Fraction of the largest horizontal speed below which a path has no direction.
 _LEAST = 1e-3
-# Cosine of the turn from one look to the next over which a path turns back.
+# Cosine of the turn between two checks below which the path counts as reversing.
 _BEND = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class SplineMotion(EarthMotion):
-    """Places at instants, joined by a quintic spline; attitudes likewise, or along the path.
+    """Positions joined by a quintic spline, with attitudes splined likewise or along the path.
 
-    The spline is the truth: velocity, acceleration and rates are its derivatives, not those of
-    what the places were taken from.
+    The spline is the truth: velocity, acceleration and rates are its derivatives, which may differ
+    from those of the source of the positions.
 
     Attributes
     ----------
     time : ndarray, (n,), s
-        From zero, rising; two or more.
+        From zero, increasing; two or more.
     place : ndarray, (n, 3)
-        Latitude and longitude in deg, height in m.
+        Positions: latitude and longitude in deg, height in m.
     euler : ndarray, (n, 3), deg, optional
-        Roll, pitch, heading, splined likewise, headings along the shorter way. Without it the nose
+        Roll, pitch, heading, splined likewise, headings along the shorter way. Default: the nose
         points along the velocity and the roll is zero.
     ellipsoid : Ellipsoid
     most_acceleration : float, m/s²
-        The spline may not take more than this.
+        Largest acceleration allowed on the spline.
 
     Raises
     ------
     ConfigError
-        A number is not finite, time does not begin at zero or advance, a latitude is out of range
-        or near a pole, a place is repeated, the pitch goes beyond 80 deg, the path stops or turns
-        back where the nose is to follow it, or the acceleration is too large.
+        A number is not finite, time does not start at zero or increase, a latitude is out of range
+        or near a pole, a position is repeated, the pitch exceeds 80 deg, the path stops or reverses
+        where the nose must follow it, or the acceleration is too large.
     """
 
     time: Array
@@ -85,7 +85,7 @@ class SplineMotion(EarthMotion):
     def from_trajectory(
         cls, trajectory: pd.DataFrame, ellipsoid: Ellipsoid = WGS84
     ) -> SplineMotion:
-        """Make a motion through the places and attitudes of a Trajectory table.
+        """Make a motion through the positions and attitudes of a Trajectory table.
 
         Parameters
         ----------
@@ -118,7 +118,7 @@ class SplineMotion(EarthMotion):
 
     @property
     def origin(self) -> Origin:  # type: ignore[override]
-        """The first place."""
+        """The first position."""
         lat, lon, alt = (float(x) for x in self.place[0])
         return Origin(lat, lon, alt)
 
@@ -128,7 +128,7 @@ class SplineMotion(EarthMotion):
         return [float(t) for t in self._course.knots]
 
     def kinematics(self, time: Array) -> Kinematics:
-        """State at instants; as `EarthMotion.kinematics`."""
+        """State at given instants; as `EarthMotion.kinematics`."""
         from strapdown._kernels.earth_motion import velocities
 
         moved, first, second = self._course(time)
@@ -160,7 +160,7 @@ class SplineMotion(EarthMotion):
         return quintic(self.time, angles)
 
     def _look(self) -> None:
-        """See that what the spline does between the places can be followed."""
+        """Check that the spline between the positions is a feasible motion."""
         from strapdown._kernels.earth_motion import velocities
 
         part = np.linspace(0.0, 1.0, _LOOKS, endpoint=False)
@@ -255,13 +255,13 @@ def _check_pitch(pitch: Array, time: Array) -> None:
 
 
 def _unwrapped(angles: Array) -> Array:
-    """Angles in deg, each next to the one before it; what needs no turn is left to the last bit."""
+    """Unwrap angles in deg; angles that need no turn are bit-identical."""
     steps = np.diff(angles)
     turns = np.cumsum(np.rint(steps / 360.0))
     return np.asarray(np.r_[angles[:1], angles[1:] - 360.0 * turns])
 
 
-# Splines of the fifth degree with their derivatives.
+# Quintic splines with their derivatives.
 
 
 _DEGREE = 5  # continuous to the fourth derivative
@@ -285,19 +285,19 @@ class Spline:
 
 
 def quintic(time: ArrayLike, values: ArrayLike) -> Spline:
-    """Spline of the fifth degree through values, whose third and fourth derivatives end at zero.
+    """Quintic spline through values, with zero third and fourth derivatives at the ends.
 
     Parameters
     ----------
     time : array_like, (n,), s
-        Two or more, rising.
+        Two or more, increasing.
     values : array_like, (n, m)
 
     Returns
     -------
     Spline
-        With continuous fourth derivative: of all curves through the values the one of least mean
-        square third derivative. Two values give a straight line.
+        With continuous fourth derivative: the curve through the values with the least mean square
+        third derivative. Two values give a straight line.
     """
     from scipy.interpolate import make_interp_spline
 
@@ -311,12 +311,12 @@ def quintic(time: ArrayLike, values: ArrayLike) -> Spline:
     ends = [(3, zero), (4, zero)]
     spline = make_interp_spline(t, rows, k=_DEGREE, bc_type=(ends, ends))  # type: ignore[arg-type]
     knots = np.unique(spline.t)
-    # Taylor coefficients at the left of each piece, highest power first.
+    # Taylor coefficients at the left end of each segment, highest power first.
     powers = [spline(knots[:-1], nu=k) / math.factorial(k) for k in range(_DEGREE, -1, -1)]
     return Spline(knots, np.ascontiguousarray(np.stack(powers, axis=1)))
 
 
-# A path through waypoints, in time or at a speed.
+# A path through waypoints, at given times or speeds.
 
 
 def through_waypoints(
@@ -327,18 +327,18 @@ def through_waypoints(
     most_acceleration: float = 30.0,
     ellipsoid: Ellipsoid = WGS84,
 ) -> SplineMotion:
-    """A vehicle without roll, nose along its path.
+    """Motion through waypoints without roll, nose along the path.
 
     Parameters
     ----------
     places : sequence of (lat_deg, lon_deg, alt)
-        deg, deg, m; two or more.
+        Waypoints in deg, deg, m; two or more.
     times : sequence of float, s
-        From zero, one a place.
+        From zero, one per waypoint.
     speeds : sequence of float, m/s
-        Instead of times: the mean speed along the straight line from each place to the next.
+        Alternative to times: mean speed along the straight line from each waypoint to the next.
     most_acceleration : float, m/s²
-        Of the spline through the places.
+        Largest acceleration allowed on the spline.
     ellipsoid : Ellipsoid
 
     Returns
@@ -348,8 +348,8 @@ def through_waypoints(
     Raises
     ------
     ConfigError
-        Neither or both of times and speeds are given, or not as many as there are places or legs,
-        a place is repeated, or as `SplineMotion`.
+        Neither or both of times and speeds are given, their number does not match the waypoints or
+        legs, a waypoint is repeated, or as `SplineMotion`.
     """
     rows = np.array(places, dtype=np.float64).reshape(-1, 3)
     if (times is None) == (speeds is None):
@@ -382,7 +382,7 @@ def _times(places: Array, speeds: Sequence[float], ellipsoid: Ellipsoid) -> Arra
     for (lat, lon, alt), (to_lat, to_lon, to_alt), speed in zip(
         places[:-1], places[1:], speeds, strict=True
     ):
-        # The straight line on the ground at the middle; it only shares out time.
+        # The straight line on the ground at mid-leg; it only determines the times.
         middle = math.radians(0.5 * (lat + to_lat))
         meridian, transverse = radii(
             math.sin(middle), ellipsoid.semi_major_axis, ellipsoid.eccentricity_squared
@@ -399,19 +399,19 @@ def _times(places: Array, speeds: Sequence[float], ellipsoid: Ellipsoid) -> Arra
 
 
 def along_velocity(velocity: Array, acceleration: Array) -> tuple[Array, Array]:
-    """3-2-1 angles of a body without roll, nose along the velocity, and their rates.
+    """3-2-1 angles, and their rates, of a body without roll and with its nose along the velocity.
 
     Parameters
     ----------
     velocity : ndarray, (n, 3), m/s
-        North, east, down; its horizontal part is not zero.
+        North, east, down; the horizontal component must not be zero.
     acceleration : ndarray, (n, 3), m/s²
-        Derivatives of its components.
+        Derivatives of the velocity components.
 
     Returns
     -------
     angles, rates : ndarray, (n, 3), deg and deg/s
-        Roll, pitch (up where it climbs), heading within ±180.
+        Roll, pitch (positive in a climb), heading within ±180.
     """
     north, east, down = velocity.T
     d_north, d_east, d_down = acceleration.T
@@ -428,10 +428,10 @@ def along_velocity(velocity: Array, acceleration: Array) -> tuple[Array, Array]:
     return np.degrees(angles).T, np.degrees(rates).T
 
 
-# A vehicle whose velocity is a mean and a sine in each of north, east and down.
+# Velocity as a mean plus a sine in each of north, east and down.
 
 Triple = tuple[float, float, float]
-# Part of the duration: what a few hundred megabytes hold of an integral's panels.
+# Shortest period as a fraction of the duration: limits the integral to a few hundred megabytes.
 _LEAST_PERIOD = 1e-5
 
 
@@ -439,9 +439,9 @@ _LEAST_PERIOD = 1e-5
 class SineVelocityMotion(EarthMotion):
     """``v = mean + amplitude sin(2 pi t/period + phase)``, without roll, nose along the velocity.
 
-    The motion of ``pyins.sim.generate_sine_velocity_motion``, in closed form: velocity, attitude
-    and their derivatives; the place is their integral to rounding. Pitch is that of the path, nose
-    up where it climbs.
+    The motion of ``pyins.sim.generate_sine_velocity_motion``: velocity, attitude and their
+    derivatives are in closed form; position is integrated to rounding. Pitch equals the climb angle
+    of the path.
 
     Attributes
     ----------
@@ -452,14 +452,14 @@ class SineVelocityMotion(EarthMotion):
     amplitude : tuple of float, m/s
     period : float, s
     phase_deg : tuple of float, deg
-        The default makes an ellipse of latitude and longitude where the mean is zero.
+        The default gives an ellipse of latitude and longitude where the mean is zero.
     ellipsoid : Ellipsoid
 
     Raises
     ------
     ConfigError
-        The duration is not positive, the period is under 1e-5 of it, or the vehicle comes to a
-        stop, where its path has no direction.
+        The duration is not positive, the period is below 1e-5 of the duration, or the vehicle
+        stops, where its path has no direction.
     """
 
     duration: float
@@ -497,7 +497,7 @@ class SineVelocityMotion(EarthMotion):
         return [*(0.5 * self.period * k for k in range(count)), self.duration]
 
     def kinematics(self, time: Array) -> Kinematics:
-        """State at instants; as `EarthMotion.kinematics`."""
+        """State at given instants; as `EarthMotion.kinematics`."""
         v = self._velocity(time)
         omega = 2.0 * math.pi / self.period
         dv = omega * np.asarray(self.amplitude) * np.cos(self._phase(time))
@@ -506,7 +506,8 @@ class SineVelocityMotion(EarthMotion):
         return Kinematics(self._moved(time), v, dv, q_nb, euler_body_rate(turned, turning), turned)
 
     def _phase(self, time: Array) -> Array:
-        # Whole periods are taken away without rounding, so that late phases are as good as early.
+        # Whole periods are removed without rounding, so that late phases are as precise as early
+        # ones.
         part = np.fmod(time, self.period) / self.period
         return np.asarray(2.0 * math.pi * part[:, None] + np.radians(self.phase_deg))
 

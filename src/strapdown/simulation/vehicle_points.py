@@ -1,4 +1,4 @@
-"""How the points of a vehicle move, and what sensors at them feel."""
+"""Kinematics and specific force at points of a moving vehicle."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class PointKinematics:
-    """A point of a vehicle at n instants, in the axes of one place.
+    """A vehicle point at n instants, in fixed local-level axes.
 
-    The axes are north, east, down where the vehicle's origin is at the epoch, and stay there.
+    The axes are north, east, down at the vehicle's origin at the epoch, fixed to the Earth.
 
     Attributes
     ----------
     position : ndarray, (n, 3), m
-        From that place.
+        Relative to the vehicle's origin at the epoch.
     velocity : ndarray, (n, 3), m/s
         Relative to the Earth: the derivative of `position`.
     acceleration : ndarray, (n, 3), m/s²
         The derivative of `velocity`.
     q_nv : ndarray, (n, 4)
-        Turns vectors from vehicle axes into these axes.
+        Rotates vectors from vehicle axes into these axes.
     """
 
     position: Array
@@ -42,13 +42,13 @@ class PointKinematics:
 
 @dataclass(frozen=True)
 class Arm:
-    """From the vehicle's origin to a point, in vehicle axes, (n, 3) each.
+    """Lever arm from the vehicle's origin to a point, in vehicle axes, (n, 3) each.
 
     Attributes
     ----------
     place : ndarray, m
     velocity, acceleration : ndarray, m/s and m/s²
-        Derivatives of its components by time: zero for a point of the rigid vehicle.
+        Time derivatives of its components; zero for a point of the rigid vehicle.
     """
 
     place: Array
@@ -58,19 +58,19 @@ class Arm:
 
 @dataclass(frozen=True)
 class MovingPoint:
-    """Point at the end of an arm at n instants; vectors in vehicle axes, but for `origin`.
+    """Point at the end of a lever arm at n instants; vectors in vehicle axes, except `origin`.
 
     Attributes
     ----------
     origin : ndarray, (n, 3)
         Latitude and longitude in deg and height in m of the vehicle's origin.
     q_nv : ndarray, (n, 4)
-        From vehicle axes to the local level of the origin.
+        From vehicle axes to local level at the origin.
     arm : ndarray, (n, 3), m
     velocity, acceleration : ndarray, (n, 3), m/s and m/s²
-        Relative to the Earth, and its derivative in axes of the Earth.
+        Velocity relative to the Earth, and its derivative in Earth axes.
     added_force : ndarray, (n, 3), m/s²
-        What the specific force is more than at the origin.
+        Specific force at the point minus that at the origin.
     """
 
     origin: Array
@@ -82,12 +82,12 @@ class MovingPoint:
 
 
 def moving_point(motion: EarthMotion, arm: Arm, time: Array) -> MovingPoint:
-    """Follow a point at the end of an arm.
+    """Kinematics of a point at the end of a lever arm.
 
     Parameters
     ----------
     motion : EarthMotion
-        Of the vehicle's origin; it must know its angular acceleration.
+        Motion of the vehicle's origin; must provide angular acceleration.
     arm : Arm
     time : ndarray, (n,), s
 
@@ -102,11 +102,11 @@ def moving_point(motion: EarthMotion, arm: Arm, time: Array) -> MovingPoint:
 
     Notes
     -----
-    With the arm r, the body rate w and its derivative relative to inertial space, and dots for
-    derivatives of components in vehicle axes, the specific force is more by
-    ``r'' + 2 w x r' + w' x r + w x (w x r) + G(O) - G(S)``, exactly. G is gravitation: gravity
-    less the centrifugal acceleration, ``G(O) - G(S) = g(O) - g(S) - w_ie x (w_ie x r)``. That
-    difference is up to 3e-6 m/s² for each metre.
+    With the arm r, the body rate w and its derivative relative to inertial space, and primes for
+    derivatives of components in vehicle axes, the specific force increases by ``r'' + 2 w x r' + w'
+    x r + w x (w x r) + G(O) - G(S)``, exactly. G is gravitation, gravity minus the centrifugal
+    acceleration: ``G(O) - G(S) = g(O) - g(S) - w_ie x (w_ie x r)``. That difference is up to 3e-6
+    m/s² per meter.
     """
     k = motion.kinematics(time)
     place = motion.origin.place(k.moved)
@@ -119,7 +119,7 @@ def moving_point(motion: EarthMotion, arm: Arm, time: Array) -> MovingPoint:
     spin = rotation.rotate(to_vehicle, earth.earth_rate(place[:, 0], ellipsoid=motion.ellipsoid))
     rate, swing = motion.rate(time), motion.angular_acceleration(time)
     relative = rate - spin
-    # The Earth's rate stands still in inertial space, and so turns backward in the vehicle.
+    # The Earth's rate is constant in inertial space, so in vehicle axes it rotates backward.
     relative_swing = swing + np.cross(rate, spin)
     fall = _gravity_change(motion, place, rotation.rotate(k.q_nb, r))
     whole = k.acceleration + np.cross(level_turn, k.velocity)
@@ -138,29 +138,29 @@ def point_kinematics(
 ) -> PointKinematics:
     """Exact position, velocity and acceleration of a point of a rigid vehicle.
 
-    The change of velocity from one instant to another, free of gravity, is the difference of two
-    rows of `velocity`.
+    The gravity-free velocity change between two instants is the difference of two rows of
+    `velocity`.
 
     Parameters
     ----------
     motion : EarthMotion
-        Of the vehicle's origin.
+        Motion of the vehicle's origin.
     position : array_like, (3,), m
-        Of the point, in vehicle axes (forward, right, down), from the vehicle's origin.
+        Position of the point in vehicle axes (forward, right, down), from the vehicle's origin.
     time : array_like, (n,), s
     epoch : float, s
-        When the vehicle's origin is where the axes are.
+        Instant at which the local-level axes are fixed at the vehicle's origin.
 
     Returns
     -------
     PointKinematics
-        Positions right to 5e-9 m, two conversions of Earth-centred coordinates; the rest to
+        Positions accurate to 5e-9 m, two conversions of Earth-centered coordinates; the rest to
         rounding.
 
     Raises
     ------
     ConfigError
-        The position is not three finite numbers, the epoch is outside of the motion, or as
+        The position is not three finite numbers, the epoch is outside the motion, or as
         `EarthMotion.angular_acceleration`.
     """
     t = np.ascontiguousarray(np.asarray(time, dtype=np.float64))
@@ -181,8 +181,8 @@ def point_path(
     -------
     DataFrame
         Index ``time``, s; columns ``north east down``, m, ``VN VE VD``, m/s, and
-        ``roll pitch heading``, deg, of the vehicle: all in the axes of the place where the
-        vehicle's origin is at the epoch. Axes of a place 100 m away are turned by 16 µrad.
+        ``roll pitch heading``, deg, of the vehicle, all in local-level axes at the vehicle's origin
+        at the epoch. Local level 100 m away is rotated by 16 µrad.
 
     Raises
     ------
@@ -207,7 +207,7 @@ def rigid_arm(position: ArrayLike, count: int) -> Arm:
 
 
 def in_axes_of(motion: EarthMotion, point: MovingPoint, epoch: float) -> PointKinematics:
-    """Turn what is in vehicle axes into those of the place of the origin at an epoch."""
+    """Transform a point from vehicle axes to local-level axes at the origin at an epoch."""
     if not 0.0 <= epoch <= motion.duration:
         raise ConfigError(
             "simulation.outside-motion", quantity="epoch", epoch=epoch, duration=motion.duration
@@ -234,7 +234,7 @@ def _degrees(motion: EarthMotion, time: Array) -> Array:
 
 
 def places_beside(motion: EarthMotion, place: Array, offset: Array) -> Array:
-    """Places (deg, deg, m) at offsets north, east, down in m from others, (n, 3)."""
+    """Geodetic positions (deg, deg, m) at offsets north, east, down in m from others, (n, 3)."""
     to_earth = rotation.conjugate(frames.q_ne(place[:, 0], place[:, 1]))
     at = frames.ecef_from_geodetic(place, ellipsoid=motion.ellipsoid)
     return frames.geodetic_from_ecef(
@@ -243,7 +243,7 @@ def places_beside(motion: EarthMotion, place: Array, offset: Array) -> Array:
 
 
 def level_change(here: Array, there: Array) -> Array:
-    """Quaternion from the local level of some places to that of others, (n, 4)."""
+    """Quaternion from local level at some positions to local level at others, (n, 4)."""
     return rotation.compose(
         frames.q_ne(there[:, 0], there[:, 1]),
         rotation.conjugate(frames.q_ne(here[:, 0], here[:, 1])),
@@ -251,7 +251,7 @@ def level_change(here: Array, there: Array) -> Array:
 
 
 def _gravity_change(motion: EarthMotion, place: Array, offset: Array) -> Array:
-    """Gravity at an offset less that at a place, in the axes of the place."""
+    """Gravity at an offset minus gravity at a position, in local-level axes there."""
     beside = places_beside(motion, place, offset)
     here = earth.gravity(place[:, 0], place[:, 2], ellipsoid=motion.ellipsoid)
     there = earth.gravity(beside[:, 0], beside[:, 2], ellipsoid=motion.ellipsoid)

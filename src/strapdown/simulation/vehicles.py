@@ -1,4 +1,4 @@
-"""Vehicles that do a list of manoeuvres: car, aircraft, ship."""
+"""Vehicles that follow a list of maneuvers: car, aircraft, ship."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from strapdown.simulation.path_motion import (
     lay_course,
 )
 
-#: What each vehicle may do. A car's grip and a sporting aircraft's wing are just above 1 g and
-#: 4 g; a large ship does a tenth of a car.
+#: Performance limits of each vehicle. A car's grip and an aerobatic aircraft's wing give just above
+#: 1 g and 4 g; a large ship reaches a tenth of a car.
 LIMITS: dict[str, Limits] = {
     "car": Limits(acceleration=12.0, lateral=12.0, climb_deg=20.0),
     "aircraft": Limits(acceleration=40.0, lateral=40.0, bank_deg=75.0, climb_deg=60.0),
@@ -46,7 +46,7 @@ def car(
     limits: Limits = LIMITS["car"],
     ellipsoid: Ellipsoid = WGS84,
 ) -> PathMotion:
-    """A car: level, nose along its path; on springs, if it is told so.
+    """A car: level, nose along its path; optionally on springs.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def aircraft(
     limits: Limits = LIMITS["aircraft"],
     ellipsoid: Ellipsoid = WGS84,
 ) -> PathMotion:
-    """An aircraft: banked in every turn, nose over its path by the angle of attack.
+    """An aircraft: banked in every turn, pitched above its path by the angle of attack.
 
     Parameters
     ----------
@@ -172,18 +172,18 @@ def _laid(
     )
 
 
-# What a vehicle can be told to do.
+# Maneuvers of a vehicle.
 
 
-# Largest over mean slope of a move with least jerk.
+# Ratio of largest to mean slope of a minimum-jerk move.
 _PEAK = 15.0 / 8.0
-# What a ramp covers is integrated with this many nodes.
+# Nodes for the integral over a ramp.
 _NODES = 32
 
 
 @dataclass(frozen=True)
 class Accelerate:
-    """Come to another speed with least jerk; it may fall too.
+    """Change to another speed, higher or lower, with minimum jerk.
 
     Attributes
     ----------
@@ -196,7 +196,7 @@ class Accelerate:
     duration: float
 
     def lay(self, course: Course) -> None:
-        """Add it to a course."""
+        """Append it to a course."""
         if not 0.0 <= self.to < math.inf:
             raise ConfigError(
                 "simulation.speed-negative",
@@ -223,10 +223,10 @@ class Accelerate:
 
 @dataclass(frozen=True)
 class Brake(Accelerate):
-    """Come down to another speed; as `Accelerate`, but it must be lower."""
+    """Decrease to another speed; as `Accelerate`, but it must be lower."""
 
     def lay(self, course: Course) -> None:
-        """Add it to a course."""
+        """Append it to a course."""
         if self.to >= course.speed_now:
             raise ConfigError(
                 "simulation.braking-not-slower",
@@ -239,7 +239,7 @@ class Brake(Accelerate):
 
 @dataclass(frozen=True)
 class Stop:
-    """Brake to a stop, and stand.
+    """Brake to a stop, and remain stationary.
 
     Attributes
     ----------
@@ -250,7 +250,7 @@ class Stop:
     stay: float = 0.0
 
     def lay(self, course: Course) -> None:
-        """Add it to a course."""
+        """Append it to a course."""
         Brake(0.0, self.braking).lay(course)
         if not 0.0 <= self.stay < math.inf:
             raise ConfigError(
@@ -263,7 +263,7 @@ class Stop:
 
 @dataclass(frozen=True)
 class Straight:
-    """Go on as it is, or stand, for a time.
+    """Continue unchanged, or remain stationary, for a time.
 
     Attributes
     ----------
@@ -273,14 +273,14 @@ class Straight:
     duration: float
 
     def lay(self, course: Course) -> None:
-        """Add it to a course."""
+        """Append it to a course."""
         check_length(self.duration)
         course.time += self.duration
 
 
 @dataclass(frozen=True)
 class Along:
-    """Go straight on for a distance.
+    """Continue straight for a distance.
 
     Attributes
     ----------
@@ -291,24 +291,24 @@ class Along:
     distance: float
 
     def lay(self, course: Course) -> None:
-        """Add it to a course."""
+        """Append it to a course."""
         check_length(self.distance, "distance")
         course.time += self.distance / course.moving_speed("simulation.distance-at-rest")
 
 
 @dataclass(frozen=True)
 class Turn:
-    """Turn on a radius.
+    """Turn with a given radius.
 
     Attributes
     ----------
     angle_deg : float, deg
-        Of the whole turn with its ramps, positive to the right.
+        Total heading change including the ramps, positive to the right.
     radius : float, m
-        Between the ramps, level.
+        Horizontal radius between the ramps.
     ramp : float, s
-        The turn rate comes and goes in this with least jerk; where the angle is too small for two
-        ramps at the full rate, in less.
+        Time in which the turn rate builds up and decays with minimum jerk; shorter where the angle
+        is too small for two full ramps.
     """
 
     angle_deg: float
@@ -316,7 +316,7 @@ class Turn:
     ramp: float = 1.0
 
     def lay(self, course: Course) -> None:
-        """Add it to a course."""
+        """Append it to a course."""
         check_length(self.radius, "radius")
         speed, most = course.level_speed("simulation.turn-at-rest"), course.limits.lateral
         lateral = speed * speed / self.radius
@@ -336,12 +336,12 @@ class Turn:
 
 @dataclass(frozen=True)
 class BankedTurn:
-    """Turn at a bank, so that it is felt straight down.
+    """Coordinated turn at a given bank angle.
 
     Attributes
     ----------
     angle_deg : float, deg
-        Of the whole turn with its ramps, positive to the right.
+        Total heading change including the ramps, positive to the right.
     bank_deg : float, deg
         Between the ramps; the turn rate is ``g tan(bank)/(v cos climb)``.
     ramp : float, s
@@ -353,7 +353,7 @@ class BankedTurn:
     ramp: float = 3.0
 
     def lay(self, course: Course) -> None:
-        """Add it to a course."""
+        """Append it to a course."""
         most = course.limits.bank_deg
         if not 0.0 < self.bank_deg <= most:
             raise ConfigError(
@@ -374,11 +374,12 @@ class Climb:
     Attributes
     ----------
     angle_deg : float, deg
-        Of the path over the horizon, down if negative.
+        Climb angle above the horizon, negative in a descent.
     height : float, m, optional
-        What is gained or lost until the path is level again; without it, on until `Level`.
+        Height change until the path is level again; if not given, the climb continues until
+        `Level`.
     ramp : float, s
-        In which the angle comes and goes.
+        Time in which the angle builds up and decays.
     """
 
     angle_deg: float
@@ -386,7 +387,7 @@ class Climb:
     ramp: float = 3.0
 
     def lay(self, course: Course) -> None:
-        """Add it to a course."""
+        """Append it to a course."""
         most = course.limits.climb_deg
         if not 0.0 < abs(self.angle_deg) <= most:
             raise ConfigError(
@@ -427,7 +428,7 @@ class Climb:
 
 @dataclass(frozen=True)
 class Level:
-    """Leave a climb.
+    """Level off from a climb.
 
     Attributes
     ----------
@@ -437,7 +438,7 @@ class Level:
     ramp: float = 3.0
 
     def lay(self, course: Course) -> None:
-        """Add it to a course."""
+        """Append it to a course."""
         check_length(self.ramp, "ramp")
         course.move(course.climb, course.time, self.ramp, 0.0)
         course.time += self.ramp
@@ -445,21 +446,21 @@ class Level:
 
 @dataclass(frozen=True)
 class LaneChange:
-    """Go over to a lane beside this one.
+    """Change to a parallel lane.
 
     Attributes
     ----------
     offset : float, m
         To the right.
     duration : float, s
-        The course leaves and comes back in it, each by two ramps of a quarter.
+        Total time; the course leaves and returns by two ramps of a quarter each.
     """
 
     offset: float
     duration: float
 
     def lay(self, course: Course) -> None:
-        """Add it to a course."""
+        """Append it to a course."""
         check_length(self.duration)
         speed, most = course.level_speed("simulation.lane-change-at-rest"), course.limits.lateral
         quarter = 0.25 * self.duration
@@ -473,7 +474,7 @@ class LaneChange:
         def reached(rate: float) -> float:
             return float(speed * (weight @ np.sin(rate * turned)))
 
-        # The course never turns by more than 60 deg, below which the offset grows with the rate.
+        # The course changes by at most 60 deg, for which the offset increases with the rate.
         steepest = math.radians(60.0) / float(turned.max())
         rate = _solve(reached, abs(self.offset), steepest)
         if rate is None or speed * math.radians(rate) > most:

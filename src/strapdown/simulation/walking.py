@@ -1,9 +1,9 @@
-"""A unit on a shoe: stances at which it does not move to the last bit, and swings between them.
+"""Foot-mounted pedestrian motion: stance phases at exact rest, and swing phases between them.
 
-Each stride lifts the shoe off heel first, carries it over and sets it down heel first, with a blow;
-everything is a sum of moves of least jerk, so that velocity, acceleration and rate are exact and in
-stances exactly zero. What a leg does is simplified: the unit stays in the plane of the stride, and
-the shoe does not roll over its sole while it stands.
+Each stride lifts the shoe heel first, carries it forward and sets it down heel first, with a blow.
+All moves are minimum-jerk, so velocity, acceleration and rate are exact, and exactly zero in
+stance. Simplifications: the unit stays in the plane of the stride, and the shoe does not roll over
+its sole in stance.
 """
 
 from __future__ import annotations
@@ -31,21 +31,21 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Gait:
-    """How a foot goes; largest values of least-jerk moves are 15/8 of the mean rate.
+    """Parameters of a gait; peaks of minimum-jerk moves are 15/8 of the mean rate.
 
     Attributes
     ----------
     stride : float, m
-        From a stance to the next of the same foot.
+        Distance between successive stances of the same foot.
     swing, stance : float, s
     lift : float, m
-        Of the unit over the ground.
+        Height of the unit above the ground in the swing.
     heel_off_deg, toe_up_deg : float, deg
-        Pitch downward when the heel is off, and upward before it strikes.
+        Nose-down pitch at heel-off, and nose-up pitch before heel strike.
     strike : float, m
-        Height from which the shoe falls onto its heel at the end,
+        Height from which the shoe falls onto its heel at the end of the swing.
     strike_time : float, s
-        within this time: about ``5.8 strike / strike_time²`` of acceleration.
+        Duration of that fall, with an acceleration of about ``5.8 strike / strike_time²``.
     """
 
     stride: float
@@ -69,7 +69,7 @@ class Gait:
             )
 
 
-#: Peaks of a walk: 460 deg/s and 7 g, of the blow; of a run: 970 deg/s and 11 g.
+#: Peaks: walking 460 deg/s and 7 g, from the blow; running 970 deg/s and 11 g.
 GAITS: dict[str, Gait] = {
     "walk": Gait(1.35, 0.55, 0.57, 0.08, 45.0, 22.0, 0.004, 0.020),
     "run": Gait(2.20, 0.45, 0.22, 0.20, 70.0, 25.0, 0.007, 0.020),
@@ -85,11 +85,12 @@ class Stride:
     ----------
     gait : Gait
     turn_deg : float, deg
-        Of the foot, to the right, during the swing; it goes where it then points.
+        Heading change of the foot in the swing, positive to the right; it moves in the new
+        direction.
     climb : float, m
-        Up a stair.
+        Height gained on a stair.
     size : float
-        Of the length of the gait's stride; zero: a turn on the spot.
+        Fraction of the gait's stride length; zero is a turn on the spot.
     """
 
     gait: Gait
@@ -100,7 +101,7 @@ class Stride:
 
 @dataclass(frozen=True)
 class WalkingMotion(EarthMotion):
-    """Strides one after the other, from a stance to a stance.
+    """Successive strides, from stance to stance.
 
     Attributes
     ----------
@@ -108,15 +109,15 @@ class WalkingMotion(EarthMotion):
     origin : Origin
     heading_deg : float, deg
     stand : float, s
-        At the beginning, and at the end.
+        Stationary time at the start, and at the end.
     roll_deg, pitch_deg : float, deg
-        Of the unit on a shoe that is flat on the ground.
+        Attitude of the unit with the shoe flat on the ground.
     ellipsoid : Ellipsoid
 
     Raises
     ------
     ConfigError
-        There is no stride, or the unit would pitch by 80 deg or more.
+        No stride is given, or the unit would pitch by 80 deg or more.
     """
 
     strides: tuple[Stride, ...]
@@ -143,7 +144,7 @@ class WalkingMotion(EarthMotion):
 
     @cached_property
     def swings(self) -> tuple[tuple[float, float], ...]:
-        """Begin and end of each swing, s: between them the unit does not move."""
+        """Start and end of each swing, s; outside them the unit is stationary."""
         out, at = [], self.stand
         for stride in self.strides:
             out.append((at, at + stride.gait.swing))
@@ -152,26 +153,26 @@ class WalkingMotion(EarthMotion):
 
     @property
     def breaks(self) -> Sequence[float]:
-        """Where a move begins or ends, s."""
+        """Starts and ends of the moves, s."""
         tracks = (*self._tracks.place, *self._tracks.lift, self._tracks.pitch, self._tracks.heading)
         inner = {t for track in tracks for t in track.times if 0.0 < t < self.duration}
         return [0.0, *sorted(inner), self.duration]
 
     def stances(self, time: Array) -> NDArray[np.bool_]:
-        """Whether the unit does not move at instants, (n,) in s."""
+        """Whether the unit is stationary at instants (n,), s."""
         begins, ends = np.array(self.swings).T
         k = np.searchsorted(begins, time, side="left") - 1
         return np.asarray((k < 0) | (time >= ends[k]))
 
     @property
     def footfalls(self) -> Array:
-        """Middles of the stances, (n + 1,), s."""
+        """Mid-times of the stances, (n + 1,), s."""
         begins, ends = np.array(self.swings).T
         middles: Array = 0.5 * (np.append(0.0, ends) + np.append(begins, self.duration))
         return middles
 
     def kinematics(self, time: Array) -> Kinematics:
-        """State at instants; as `EarthMotion.kinematics`."""
+        """State at given instants; as `EarthMotion.kinematics`."""
         parts = [track.evaluate(time) for track in (self._tracks.pitch, self._tracks.heading)]
         still = np.zeros(len(time))
         angles = np.column_stack([still + self.roll_deg, parts[0][0], parts[1][0]])
@@ -277,7 +278,7 @@ def walk(
     pitch_deg: float = 0.0,
     ellipsoid: Ellipsoid = WGS84,
 ) -> WalkingMotion:
-    """Walk around blocks.
+    """Simulate a walk around blocks.
 
     Parameters
     ----------
@@ -285,11 +286,11 @@ def walk(
     strides : int
     origin : Origin
     corner_each : int
-        A corner after so many strides; none, if zero. It takes two strides.
+        Number of strides between corners; zero for none. A corner takes two strides.
     corner_deg : float, deg
-        To the right.
+        Heading change at a corner, to the right.
     stairs : sequence of int
-        Strides that climb two stairs, counted from zero, and come 0.6 m forward.
+        Strides that climb two stairs, counted from zero, and advance 0.6 m.
     climb : float, m
         Height of a stair.
     heading_deg, stand, roll_deg, pitch_deg, ellipsoid
