@@ -66,7 +66,7 @@ class DriveSums:
     until_end : ndarray, (k,), s
         From the fixes to the end of the record.
     turned : ndarray, (k, 3, 3)
-        From the body's axes at a fix to those at the end, held still in inertial space.
+        From the body axes at a fix to those at the end, in inertial space.
     gained : ndarray, (k, 3), m/s
         Integral of the specific force from a fix to the end, in the axes at the end.
     rate : ndarray, (k, 3), rad/s
@@ -74,16 +74,16 @@ class DriveSums:
     stretch : ndarray, (s,), s
         Lengths of the stretches.
     by_gyro : ndarray, (k, 3, 21 + 3 s)
-        What errors of the gyros add to that of the attitude at a fix, in the axes at the end, rad:
-        a bias of each axis, the nine elements (i, j) of an error of axis i in proportion to what
-        axis j has above its mean rate, nine in proportion to the specific force above its mean,
-        and a bias of each axis in each stretch alone. Signs: bias is reading less truth, what is
-        added is truth less computed.
+        Attitude error at a fix by errors of the gyros, in the axes at the end, rad:
+        a bias of each axis, the nine elements (i, j) of an error of axis i in proportion to the
+        rate of axis j above its mean, nine in proportion to the specific force above its mean,
+        and a bias of each axis in each stretch alone. Signs: bias is reading − truth, the
+        attitude error is true − computed.
     by_turn : ndarray, (k, 3, 21 + 3 s)
-        What they add to the velocity at a fix, in the axes at the end, m/s.
+        Velocity error at a fix by the same errors, in the axes at the end, m/s.
     by_accel : ndarray, (k, 3, 12 + 3 s)
-        What errors of the accelerometers add to the velocity: likewise, nine in proportion to the
-        specific force.
+        Velocity error at a fix by errors of the accelerometers: likewise, nine in proportion to
+        the specific force.
     """
 
     until_end: Array
@@ -202,7 +202,7 @@ def _partials(
 
 
 def _from_end(nodes: Array) -> Array:
-    """Sums of nodes from the beginning of each to the end, and nothing at the end."""
+    """Sums of nodes from the beginning of each to the end, zero at the end."""
     nothing = np.zeros((1, *nodes.shape[1:]))
     return np.concatenate([np.cumsum(nodes[::-1], axis=0)[::-1], nothing])
 
@@ -269,7 +269,7 @@ class CourseFixes:
     source: str | None
 
     def only(self, rows: NDArray[np.bool_]) -> CourseFixes:
-        """Some of them."""
+        """Select fixes."""
         return CourseFixes(
             self.time[rows],
             self.velocity[rows],
@@ -351,12 +351,12 @@ def course_fixes(
     return CourseFixes(time, velocity, sd, fast, rows + 1, source)
 
 
-# What the gyros read while the fixes of a drive say that the vehicle stood.
+# Gyro means while the fixes of a drive show the vehicle stationary.
 
 
 #: A velocity within so many standard deviations is none, nor one below what no one drives at.
 CLEAR, CREEP = 4.0, 0.1
-#: A shorter rest, s, tells less than the fixes of the drive do.
+#: A shorter rest, s, determines the bias less well than the fixes of the drive.
 LEAST = 1.0
 
 
@@ -367,10 +367,10 @@ class RestRate:
     Attributes
     ----------
     time : float, s
-        Its middle.
+        Middle of the rest.
     rate, sd : ndarray, (3,), rad/s
-        The mean, and how well it tells the bias at the end of the record: what scatters within the
-        rest, and what the bias drifts since.
+        The mean, and its standard deviation as a measure of the bias at the end of the record:
+        scatter within the rest, and bias drift since.
     """
 
     time: float
@@ -383,7 +383,7 @@ def rest_rates(
 ) -> tuple[RestRate, ...]:
     """Find the rests of a record in which the receiver stood, too.
 
-    A gyro cannot tell a parked vehicle from one on a straight road; the fixes do.
+    A gyro cannot distinguish a stationary vehicle from one on a straight road; the fixes can.
 
     Parameters
     ----------
@@ -421,7 +421,7 @@ def rest_rates(
 def _while_slow(
     imu: pd.DataFrame, rest: RestStretch, time: Array, slow: NDArray[np.bool_]
 ) -> RestStretch | None:
-    """The longest part of a rest between fixes that stand: gyros rest on a straight road, too."""
+    """The longest part of a rest between stationary fixes: gyros rest on a straight road, too."""
     inside = np.flatnonzero((time >= rest.start) & (time <= rest.end))
     runs = np.split(inside, np.flatnonzero(np.diff(slow[inside].astype(np.int64))) + 1)
     runs = [run for run in runs if len(run) > 1 and slow[run[0]]]
@@ -433,7 +433,7 @@ def _while_slow(
     return rest_between(imu, start, end) if end - start >= LEAST else None
 
 
-# What the least squares of a drive look for, in the order of their columns.
+# Unknowns of the least squares of a drive, in the order of their columns.
 
 
 #: Stretches of a record with a noise of their own: what white noise adds is known at their ends.
@@ -464,5 +464,5 @@ COUNT: Final = YAW + 3
 OF_GYROS = np.r_[COURSE_UNKNOWNS_GYRO, GYRO_MATRIX, GYRO_BY_FORCE, GYRO_NOISE]
 OF_ACCELS = np.r_[COURSE_UNKNOWNS_ACCEL, ACCEL_MATRIX, ACCEL_NOISE]
 OF_SENSORS = slice(COURSE_UNKNOWNS_GYRO.start, ACCEL_NOISE.stop)
-#: What is known beyond the record: all but its own noise, and what is of the vehicle and the fixes.
+#: Known beyond the record: all but its own noise and the unknowns of the vehicle and the fixes.
 HANDED = np.r_[:ASKED, GYRO_MATRIX, GYRO_BY_FORCE, ACCEL_MATRIX]

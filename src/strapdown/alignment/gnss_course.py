@@ -69,7 +69,7 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-#: What the level may err by, rad: beyond it errors of attitude are no longer small.
+#: Largest allowed tilt error, rad: beyond it attitude errors are no longer small.
 LARGEST_TILT_SD = 0.35
 #: Part of a sideslip that changes from second to second, beside what stays.
 SLIP_SHARE = 0.5
@@ -93,8 +93,8 @@ class GnssCourse(CoarseAlignment):
     reverse : bool
         It drives backward.
     axle_sd : float, m
-        How far the unit may be ahead of the axle that is not steered, or behind it: what is off it
-        goes aside while the vehicle turns.
+        Distance of the unit ahead of or behind the unsteered axle: a unit off the axle moves
+        sideways while the vehicle turns.
 
     Raises
     ------
@@ -151,8 +151,9 @@ class GnssCourse(CoarseAlignment):
         Raises
         ------
         DataError
-            There is no Gnss table, no two fixes with a velocity within the record, the vehicle
-            is too slow, or what is known of the accelerations leaves no level.
+            There is no Gnss table, there are fewer than two fixes with a velocity within the
+            record, the vehicle is too slow, or the uncertainty of the accelerometers is too large
+            for a level.
         """
         findings = check_record(imu)
         slowest, widest = self.least_speed, math.radians(self.largest_sd_deg)
@@ -199,7 +200,7 @@ class GnssCourse(CoarseAlignment):
 SIGN = np.where(OF_SENSORS.start > HANDED, 1.0, -1.0)
 # Nothing is known of a velocity, m/s, or of an attitude, rad.
 UNKNOWN = (100.0, 3.0)
-# The scatter of the fixes is judged by so many velocities more than what is asked for takes.
+# The scatter of the fixes is judged from so many velocities beyond the number of unknowns.
 LEAST_FREE = 12.0
 # Weights and scale are found anew so many times with one linearization.
 SWEEPS = 3
@@ -213,7 +214,7 @@ LEAST_SLIP, LEAST_RATE_SD = 1e-6, 1e-10
 
 @dataclass(frozen=True)
 class CourseModel:
-    """What is known of a vehicle beside its fixes.
+    """Prior uncertainty of a vehicle's motion and of its fixes.
 
     Attributes
     ----------
@@ -222,7 +223,7 @@ class CourseModel:
     yaw : float, rad
         Heading of the unit's forward axis less the course.
     yaw_sd, slip_sd : float, rad
-        What of it stays over a drive, and what changes from second to second.
+        The part that stays over a drive, and the part that changes from second to second.
     axle_sd : float, m
         How far the unit may be ahead of the axle that goes where it points, or behind it.
     antenna : Antenna
@@ -238,7 +239,7 @@ class CourseModel:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Where the least squares stand.
+    """Current estimates of the least squares.
 
     Attributes
     ----------
@@ -276,7 +277,7 @@ class Found:
 
     @property
     def by_input(self) -> Array:
-        """Errors in proportion to what is sensed, (27,), as `Alignment.by_input`."""
+        """Errors in proportion to the input, (27,), as `Alignment.by_input`."""
         return np.asarray(self.errors[HANDED[ASKED:] - OF_SENSORS.start])
 
 
@@ -307,7 +308,7 @@ class CourseFit:
     model: CourseModel
 
     def step(self, found: Found, influence: Influence) -> Found:
-        """Solve once, about what was found before, with weights by its residuals.
+        """Solve once, about the last estimates, with weights by the residuals.
 
         Parameters
         ----------
@@ -484,8 +485,8 @@ def _solve(
 ) -> tuple[Array, Array, float]:
     """Least squares of gaps, rows and weights: unknowns, their covariance, how many are spent.
 
-    In units of their standard deviations the unknowns are known to one before; of errors of the
-    sensors what was taken off already counts.
+    In units of their standard deviations the unknowns have a prior of unit variance; for sensor
+    errors it applies to the total, including the part already subtracted.
     """
     normal = np.zeros((len(sd), len(sd)))
     right = np.zeros(len(sd))
@@ -509,21 +510,21 @@ def _level_rate(velocity: Array, site: Site) -> Array:
     return np.asarray(site.earth_rate + moving)
 
 
-# From nothing known to the attitude of a drive: over a short end of it, and then over more.
+# Initial attitude of a drive: over a short end of the record first, then over more.
 
 Indices = NDArray[np.int64]
 
-# A bias turns the attitude by so much over the part that is solved, rad, one standard deviation:
-# what is left to second order is a hundredth of it.
+# Attitude error by a bias over the part that is solved, rad, one standard deviation: the second
+# order is a hundredth.
 LINEAR = 0.2
 # Fixes, and their length in s, that are solved at first, and how the length grows at least.
 LEAST_FIXES, LEAST_LENGTH, GROWTH = 4, 1.0, 1.5
-# Steps of Gauss and Newton over each part: it ends when one moves nothing by more than a part of
-# its standard deviation.
+# Gauss-Newton steps over each part: iteration ends when the largest step is below a part of its
+# standard deviation.
 STEPS, SMALL = 8, 0.02
 # Errors that are of a stretch of one part, and of no other.
 NOISE = np.r_[GYRO_NOISE, ACCEL_NOISE] - OF_SENSORS.start
-# A velocity stands out by so many of its standard deviations, or of those that are usual.
+# A velocity is an outlier beyond so many of its standard deviations, or of the usual ones.
 CLEAR = 6.0
 # So many courses point where the vehicle drives.
 MOST = 0.5
@@ -621,7 +622,7 @@ class CourseSearch:
         return part, CourseFit(part, means, fixes, self.rests, self.site, self.sensors, self.model)
 
     def _guess(self, imu: pd.DataFrame, fixes: CourseFixes, bias: Array) -> Found:
-        """Level by the mean force less what the velocities gain, heading by the middle course."""
+        """Level by mean force minus acceleration from the velocities, heading by median course."""
         sums = drive_sums(imu, fixes.time, bias[:6], bias)
         check_forward(imu, fixes, sums, self.model.reverse)
         first, last = _ends(fixes)
@@ -662,7 +663,7 @@ def left_out(fixes: CourseFixes, found: Found) -> tuple[Finding, ...]:
 
 
 def _converged(fit: CourseFit, found: Found, influence: Influence) -> Found:
-    """Step until nothing moves."""
+    """Iterate to convergence."""
     for _ in range(STEPS):
         before, found = found, fit.step(found, influence)
         sd = np.sqrt(np.diagonal(found.covariance)[:ASKED])
@@ -681,13 +682,13 @@ def _ends(fixes: CourseFixes) -> tuple[Indices, Indices]:
 
 
 def _smooth(fixes: CourseFixes) -> Array:
-    """Of each velocity and its neighbours the middle one: without what stands out."""
+    """Median of each velocity and its neighbors: without outliers."""
     k = np.arange(len(fixes.time))[:, None] + np.arange(-2, 3)
     return np.asarray(np.median(fixes.velocity[np.clip(k, 0, len(k) - 1)], axis=1))
 
 
 def _near_neighbours(fixes: CourseFixes) -> Array:
-    """One for a velocity that is near those about it, zero for one that stands out at first sight.
+    """One for a velocity close to its neighbors, zero for an evident outlier.
 
     Whatever it is, its residual decides later.
     """
@@ -698,14 +699,14 @@ def _near_neighbours(fixes: CourseFixes) -> Array:
 
 
 def _middle_turn(off_deg: Array) -> float:
-    """Middle of angles, about the one that is nearest to all others; deg."""
+    """Median of angles, about the angle nearest to all others; deg."""
     apart = rotation.within_half_turn(off_deg[:, None] - off_deg)
     nearest = off_deg[int(np.argmin(np.abs(apart).sum(axis=1)))]
     return float(nearest + np.median(rotation.within_half_turn(off_deg - nearest)))
 
 
 def _attitude(force_b: Array, force_n: Array, heading: float) -> Array:
-    """``C_nb`` of a heading (rad) that lays the one force along the other."""
+    """``C_nb`` of a heading (rad) that maps the one force onto the other."""
     c, s = math.cos(heading), math.sin(heading)
     size = float(np.linalg.norm(force_b) / np.linalg.norm(force_n))
     x, y, z = size * np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) @ force_n
@@ -718,7 +719,7 @@ def _attitude(force_b: Array, force_n: Array, heading: float) -> Array:
 # Whether a vehicle drives the way its forward axis points.
 
 
-#: A slope so many standard deviations from zero is no chance.
+#: A slope of more standard deviations is significant.
 FORWARD_SIGN_CLEAR = 5.0
 LEAST_STEPS = 6
 
@@ -734,13 +735,13 @@ def check_forward(imu: pd.DataFrame, fixes: CourseFixes, sums: DriveSums, revers
     sums : DriveSums
         At the fixes.
     reverse : bool
-        What was taken.
+        Whether the drive was taken for a reverse one.
 
     Raises
     ------
     DataError
-        The force falls while the vehicle gains speed. Without six steps from fix to fix, or
-        without changes of speed, nothing can be said.
+        The force falls while the vehicle gains speed. Fewer than six steps from fix to fix, or
+        no changes of speed, allow no check.
     """
     fast = fixes.fast
     if fast.sum() <= LEAST_STEPS:

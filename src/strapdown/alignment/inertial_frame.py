@@ -1,4 +1,4 @@
-"""Alignment in the inertial frame: for a body that rocks and sways about a place."""
+"""Alignment in the inertial frame: for a body that rocks and sways about a position."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ def _mean_force(sums: InertialSums) -> Array:
 def _own_covariance(
     sums: InertialSums, fit: InertialFit, sensors: ImuUncertainty, level: Array | None = None
 ) -> Array:
-    """What the sensors alone make: of attitude at the start, latitude and gravity (5, 5).
+    """Covariance by the sensors alone: of attitude at the start, latitude and gravity (5, 5).
 
     With `level`, which turns the local level at the start into that at the end, of the attitude
     at the end (3, 3).
@@ -205,15 +205,15 @@ def _left_over(noise: ResidualNoise, sd: float, length: float, source: str | Non
     )
 
 
-# The attitude that lays the specific force of a record on the gravity of its place.
+# Attitude that aligns the specific force of a record with gravity at its position.
 #
-# In the axes of the body at the first instant, held still in inertial space, the second integral of
-# the specific force is ``S(t) = s0 + v0 t + C_bn W(t) + e(t)``, and in those of the local level at
-# that instant, held still likewise, that of minus gravity is known:
-# ``W(t) = -∫∫ exp([ω t x]) g``. Both are expanded in Legendre polynomials of the time; what is of
-# degree zero and one is place and velocity, which nobody asks for. The others make Wahba's problem.
+# In the body axes of the first instant, fixed in inertial space, the second integral of the
+# specific force is ``S(t) = s0 + v0 t + C_bn W(t) + e(t)``. In the local-level axes of that
+# instant, fixed likewise, the second integral of minus gravity is known:
+# ``W(t) = -∫∫ exp([ω t x]) g``. Both are expanded in Legendre polynomials of time; degrees zero
+# and one are position and velocity, which are not needed. The others form Wahba's problem.
 #
-# A body that rocks and sways stays near its place, so that ``e`` is bounded by its excursion and
+# A body that rocks and sways stays near its position, so that ``e`` is bounded by its excursion and
 # does not grow, while ``W`` grows as ``g t²/2``: for the mean force the fit is a weight
 # ``30 t² (T - t)²/T⁵`` that vanishes at both ends with its slope. On white noise of the
 # accelerometers it costs a fifth of the standard deviation against the plain mean.
@@ -228,7 +228,7 @@ _STEP = 1e-4  # rad of latitude, for a derivative that is a sine
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """What an error in a node does to the answer, (m, 5, 3) each.
+    """Sensitivity of the estimates to an error in a node, (m, 5, 3) each.
 
     The answer is: error of the attitude at the first instant (3, north-east-down, rad), that of
     the latitude (rad) and of the size of gravity (relative). An error is a vector in the body's
@@ -251,7 +251,7 @@ class Response:
 
 @dataclass(frozen=True, eq=False)
 class InertialFit:
-    """The attitude at the first instant, and what is left over.
+    """The attitude at the first instant, and the residuals.
 
     Attributes
     ----------
@@ -275,7 +275,7 @@ class InertialFit:
 
     @property
     def residual(self) -> Array:
-        """Measured less known, (DEGREES, 3), m; degrees 0 and 1 mean nothing."""
+        """Measured minus known, (DEGREES, 3), m; degrees 0 and 1 are not used."""
         return self.measured - self.known
 
 
@@ -321,7 +321,7 @@ def fit_inertially(sums: InertialSums, site: Site) -> InertialFit:
     Notes
     -----
     Wahba's problem by the singular value decomposition (Markley, J. Astronaut. Sci. 36 (1988)
-    245): north, east and down are told by ``g`` and by ``ω x g``, which the second and third
+    245): north, east and down are determined by ``g`` and by ``ω x g``, which the second and third
     powers of the time carry.
     """
     gravity, rate = site.gravity, site.earth_rate
@@ -342,7 +342,7 @@ def fit_inertially(sums: InertialSums, site: Site) -> InertialFit:
     cross = np.array([rotation.cross_matrix(x) for x in known])
     design = np.concatenate([-cross, by_latitude[:, :, None], known[:, :, None]], axis=2)
     normal = np.einsum("d,dik,dil->kl", weights, design, design)
-    # The estimate turns so as to undo an error: C d + phi x W = 0. Latitude and gravity tell it.
+    # The estimate rotates to cancel an error: C d + phi x W = 0, coupled to latitude and gravity.
     gain3 = -np.linalg.solve(normal[:3, :3], _rows(design[:, :, :3], weights))
     gain5 = _solve(normal, _rows(design, weights))
     gain = np.concatenate([gain3, gain5[3:]]).reshape(5, DEGREES, 3)
@@ -370,7 +370,7 @@ def _rows(design: Array, weights: Array) -> Array:
 
 
 def _solve(normal: Array, rows: Array) -> Array:
-    """Solve where a direction may be unseen, as the latitude at the equator: it gets nothing."""
+    """Solve where a direction may be unobservable (latitude at the equator): it is set to zero."""
     scale = np.sqrt(np.diagonal(normal))
     scale = np.where(scale > 0.0, scale, 1.0)
     inner = np.linalg.pinv(normal / np.outer(scale, scale), rcond=1e-12)
@@ -387,7 +387,7 @@ def functionals(sums: InertialSums) -> tuple[Array, Array]:
     Returns
     -------
     place, push : ndarray, (DEGREES, m)
-        Exact for what is constant within a node: by integrals of the polynomials from the end.
+        Exact for a constant within a node: by integrals of the polynomials from the end.
     """
     from numpy.polynomial import legendre
 
@@ -453,7 +453,7 @@ def heading_rate(
     means = np.array([part.mean() for part in np.array_split(left, BLOCKS)])
     scatter = 12.0 * means.var(ddof=2) / (BLOCKS * sums.length**2)
     gyro = sensors.gyro
-    # A line through a walk is known to 6/5 of what its end tells.
+    # The slope of a line through a random walk has 6/5 of the variance of its end point.
     noise = 1.2 * np.square(gyro.axis("noise_density")) / sums.length
     own = np.square(gyro.axis("bias")) + mean_of_drift(sensors.gyro_drift, sums.length) + noise
     across = np.square(gyro.axis("misalignment")) + np.square(gyro.axis("scale"))
@@ -479,7 +479,7 @@ def turn_findings(
     vertical = -float(site.earth_rate[2])
     size = float(np.sqrt(site.earth_rate @ site.earth_rate))
     mirrored = abs(rate + 2.0 * -vertical) < abs(rate) / 10.0
-    # Against the level of a latitude, a body that stands turns by what that has too much.
+    # Relative to the level of a latitude, a stationary body turns by the excess of that rate.
     sine = (vertical - rate) / size
     measured = float(np.degrees(np.arcsin(np.clip(sine, -1.0, 1.0))))
     if mirrored:
@@ -501,7 +501,7 @@ def turn_findings(
     )
 
 
-# Slow noise in a record that its sensors do not explain, from what an inertial fit leaves over.
+# Slow noise that the sensors do not explain, from the residuals of an inertial fit.
 #
 # The fit lives on the Legendre degrees 2 and 3 of the second integral of the specific force. The
 # degrees above hold noise alone: from 4 to 20, two horizontal axes each, their energies tell how

@@ -73,13 +73,13 @@ def level(accel_mean: ArrayLike) -> tuple[float, float]:
 # Roll and pitch alone: the heading stays open.
 
 
-#: Standard deviation of a heading of which nothing is known: uniform over a turn, rad.
+#: Standard deviation of an unknown heading: uniform over a turn, rad.
 UNKNOWN_HEADING = math.pi / math.sqrt(3.0)
 
 
 @dataclass(frozen=True)
 class Levelling(CoarseAlignment):
-    """Mean specific force at rest is up; of the heading nothing is known."""
+    """Mean specific force at rest is up; the heading is unknown."""
 
     name: ClassVar[str] = "levelling"
     summary: ClassVar[str] = "roll and pitch from the mean specific force at rest; no heading"
@@ -92,7 +92,7 @@ class Levelling(CoarseAlignment):
         sensors: ImuUncertainty,
         gnss: pd.DataFrame | None = None,
     ) -> Alignment:
-        """As `CoarseAlignment.align`; heading 0 stands for any.
+        """As `CoarseAlignment.align`; heading 0 is a placeholder.
 
         Raises
         ------
@@ -166,7 +166,7 @@ class KnownHeading(CoarseAlignment):
         return replace(found, heading_given=True)
 
 
-# Roll and pitch of a body at rest with what is known of them, for a heading that is stated.
+# Roll and pitch of a stationary body with their uncertainty, for a stated heading.
 
 
 Array = NDArray[np.float64]
@@ -197,8 +197,8 @@ def level_at_rest(
     Returns
     -------
     Alignment
-        At the last sample. Where the force scatters more than by noise, that scatter and the
-        angles by which the body swings are in the covariance, and a finding says so.
+        At the last sample. Scatter of the force beyond noise, and the angles by which the body
+        swings, are included in the covariance, with a finding.
 
     Notes
     -----

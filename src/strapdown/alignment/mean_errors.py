@@ -137,7 +137,7 @@ def block_means(imu: pd.DataFrame, blocks: int) -> BlockMeans:
     Returns
     -------
     BlockMeans
-        Each sample counts for the time that it stands for.
+        Each sample is weighted by its time interval.
     """
     time = imu.index.to_numpy(dtype=np.float64)
     values = imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64)
@@ -155,7 +155,7 @@ def block_means(imu: pd.DataFrame, blocks: int) -> BlockMeans:
 def _stands_for(time: Array, mean: bool) -> Array:
     steps = np.diff(time)
     if mean:
-        # The first mean belongs to an interval before the record, whose length it does not tell.
+        # The first mean belongs to an interval before the record, of unknown length.
         return np.asarray(np.r_[0.0, steps])
     return np.asarray(0.5 * (np.r_[steps, 0.0] + np.r_[0.0, steps]))
 
@@ -222,7 +222,7 @@ def excursion(imu: pd.DataFrame, density: Triad) -> Array:
     ----------
     imu : DataFrame
     density : triad, rad/s/√Hz
-        What the noise of the gyros would make of it is taken off.
+        The effect of the gyro noise is subtracted.
 
     Returns
     -------
@@ -241,7 +241,7 @@ def excursion(imu: pd.DataFrame, density: Triad) -> Array:
     return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T)
 
 
-# What the errors of the sensors do to an answer that is linear in them.
+# Effect of sensor errors on an estimate that is linear in them.
 
 
 def sensor_noise(sums: InertialSums, turn: Array, push: Array, sensors: ImuUncertainty) -> Array:
@@ -259,8 +259,8 @@ def sensor_covariance(
     ----------
     sums : InertialSums
     turn, push : ndarray, (m, k, 3)
-        What an error of the angle, and one of the velocity gained, within a node do to it; the
-        error in the body's axes at the first instant.
+        Sensitivities of the estimate to an error of the angle and of the velocity gained within
+        a node; the error in the body axes at the first instant.
     sensors : ImuUncertainty
         Biases, their drift, scale, misalignment and g-sensitivity; nonlinearity and the
         rectification of vibration are not in it.

@@ -95,7 +95,7 @@ def durations_of(imu: pd.DataFrame, count: int = 10) -> Array:
     Returns
     -------
     ndarray, (count,), s
-        From 5 s, or a hundredth of the record where that is more, to all of it.
+        From 5 s, or a hundredth of the record if longer, to the whole record.
 
     Raises
     ------
@@ -133,19 +133,19 @@ def readiness(
     method : str
         Its name.
     align : callable
-        Makes an alignment of an Imu table: coarse, fine, or the one after the other.
+        Returns an alignment of an Imu table: coarse, fine, or both in sequence.
     imu : DataFrame
         Imu table.
     durations : sequence of float, s, optional
-        Rising, within the record; ten of `durations_of` where left out.
+        Rising, within the record; ten of `durations_of` if not given.
     reference : DataFrame, optional
-        Attitude table with the truth, or something better: the row nearest to the time of an
-        alignment counts.
+        Attitude table of the truth, or of a better instrument: the row nearest to the time of
+        an alignment is compared.
 
     Returns
     -------
     Readiness
-        A stretch that is refused has a row that says why.
+        A duration that is refused has a row with the reason.
 
     Raises
     ------
@@ -211,12 +211,12 @@ def _row(
     return [*numbers, len(found.findings), None]
 
 
-# What a rest cannot tell, and which turn of the body would tell it.
+# Unobservable errors of a stationary body, and rotations of the body that make them observable.
 
 
 # A turn by hand or by a vehicle, and the length of a step of the forecast.
 TURN_TIME, STEP = 20.0, 0.1  # s
-#: What a body can be asked to do: a rotation vector in its own axes, deg.
+#: Possible rotations of the body: a rotation vector in its own axes, deg.
 TURNS: dict[str, tuple[float, float, float]] = {
     "turn it by 90° about the vertical": (0.0, 0.0, 90.0),
     "turn it by 180° about the vertical": (0.0, 0.0, 180.0),
@@ -252,8 +252,8 @@ def null_space(lat_deg: float, q_nb: Array, gravity: float, earth_rate: float) -
     """Return the errors that leave no trace in any observation of a rest.
 
     Any constant rotation psi of the computed attitude, with ``C_nb b_a = f x psi`` and
-    ``C_nb b_g = omega_ie x psi``: velocity and attitude relative to the Earth then stay at rest. So
-    a horizontal bias cannot be told from a tilt, nor an east drift from the heading.
+    ``C_nb b_g = omega_ie x psi``, leaves velocity and attitude relative to the Earth constant. So
+    a horizontal bias cannot be separated from a tilt, nor an east drift from the heading.
 
     Parameters
     ----------
@@ -284,12 +284,12 @@ def null_space(lat_deg: float, q_nb: Array, gravity: float, earth_rate: float) -
 def manoeuvres_after(
     result: FineResult, site: Site, rest: float | None = None
 ) -> tuple[Manoeuvre, ...]:
-    """Forecast what a turn of the body and a further rest would make known.
+    """Predict what a rotation of the body and a further rest make observable.
 
-    The filter's covariance goes on over the increments that error-free sensors would give, with the
+    The filter's covariance is propagated over the increments of error-free sensors, with the
     observations of the same rest; nothing else of the result is used. Scale factors and
-    misalignments are a part of the biases here, and stay so; as a turn out of the level changes
-    what they do, the forecast of such a turn is the best that could come of it.
+    misalignments are treated as constant parts of the biases; a rotation out of the level changes
+    their effect, so that the prediction for such a rotation is the best case.
 
     Parameters
     ----------
@@ -301,7 +301,7 @@ def manoeuvres_after(
     Returns
     -------
     tuple of Manoeuvre
-        The best heading first; to stay as it stands is among them.
+        The most accurate heading first; includes no rotation.
     """
     history = result.history
     length = float(history.index[-1] - history.index[0]) if rest is None else rest
@@ -362,7 +362,7 @@ def _forecast(result: FineResult, site: Site, name: str, turn: Array, rest: floa
 
 
 def _resting(site: Site, q_nb: Array) -> Array:
-    """Motion increments of one step of a body that stands, (10,)."""
+    """Motion increments of one step of a stationary body, (10,)."""
     C = rotation.dcm_from_quaternion(q_nb)
     rate, force = C.T @ site.earth_rate, -(C.T @ site.gravity)
     return np.concatenate([[STEP], rate * STEP, force * STEP, 0.5 * force * STEP**2])
@@ -402,15 +402,15 @@ def carry(
         Imu table with specific force that holds both instants; the samples nearest to them
         count.
     alignment : Alignment
-        A gyro bias that it tells is taken off.
+        Its gyro bias, if any, is subtracted.
     to : float, s
     site : Site
-        The local level turns with the Earth here; a vehicle that goes at 10 m/s turns it by
-        another 0.3 deg/h, which is not in it.
+        The local level rotates with the Earth; motion at 10 m/s rotates it by another
+        0.3 deg/h, which is neglected.
     sensors : ImuUncertainty, optional
-        What the gyros add to the covariance; without it nothing. It is taken as independent of
-        what is in the covariance already: of `InertialFrame`, which has used the same gyros,
-        ask for the attitude at the start or the end directly.
+        Gyro errors to be added to the covariance; none if not given. They are taken as
+        independent of the covariance so far: of `InertialFrame`, which has used the same gyros,
+        request the attitude at the start or the end directly.
 
     Returns
     -------
@@ -459,9 +459,9 @@ def carried_attitude(alignment: Alignment, imu: pd.DataFrame, site: Site) -> pd.
     Parameters
     ----------
     alignment : Alignment
-        At an instant of the record; its gyro bias, where it has one, is taken off.
+        At an instant of the record; its gyro bias, if any, is subtracted.
     imu : DataFrame
-        Imu table of a body that stays at its place.
+        Imu table of a body that stays at its position.
     site : Site
 
     Returns

@@ -44,12 +44,12 @@ __all__ = ["TwoVector", "triad_attitude"]
 
 @dataclass(frozen=True)
 class TwoVector(CoarseAlignment):
-    """Mean specific force is up, and the mean rate is the Earth's: for a body that stands still.
+    """Mean specific force is up, the mean rate is the Earth's: for a stationary body.
 
     Attributes
     ----------
     blocks : int
-        Equal parts of the record, 2 to 1000, whose scatter tells what disturbs the means.
+        Equal parts of the record, 2 to 1000, whose scatter measures the disturbance of the means.
 
     Raises
     ------

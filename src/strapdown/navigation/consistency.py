@@ -1,4 +1,4 @@
-"""Whether innovations are what a filter expected of them: how large, without mean, white."""
+"""Consistency tests of filter innovations: scale, bias and whiteness."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ Array = NDArray[np.float64]
 #: Beyond so many standard deviations, of those that are usual in the run, an innovation is a gross
 #: error: one in two million normal ones is.
 GROSS = 5.0
-#: Fewer epochs than these tell of nothing.
+#: Fewer epochs than these allow no test.
 FEWEST = 10
 #: Lags of the test of whiteness, where there are so many epochs for each: with fewer the tail of
 #: its distribution is longer than that of chi-square.
@@ -50,36 +50,36 @@ SHARE = 0.95
 
 @dataclass(frozen=True, eq=False)
 class ComponentConsistency:
-    """Normalised innovations of one component, gross errors left out but where it is said.
+    """Normalized innovations of one component; gross errors left out unless stated.
 
     Attributes
     ----------
     label : str
         With its unit.
     count, gross : int
-        Epochs; those among them with gross errors, which are in nothing that follows.
+        Epochs; those among them with gross errors, which the following figures leave out.
     inside : float
         Share within 1.96 standard deviations.
     scale : float
-        Root of their mean square: 1 where what was expected is right.
+        Root of their mean square; 1 for a consistent filter.
     scale_bounds : tuple of float
-        Within which it is in 95 % of all runs with as many epochs (chi-square).
+        95 % bounds of the scale for this number of epochs (chi-square).
     bias : float
         Their mean, in standard deviations.
     bias_bound : float
-        Which it is below in 95 % of them: ``1.96 / √n``.
+        95 % bound of the magnitude of the bias: ``1.96 / √n``.
     bias_in_unit : float
         Mean of the innovations themselves.
     autocorrelation : ndarray, (lags,)
         Of lags 1, 2, ... epochs, about their mean.
     autocorrelation_bound : float
-        Of each alone, in 95 % of them: ``1.96 / √n``.
+        95 % bound of each lag alone: ``1.96 / √n``.
     whiteness_p : float
-        Probability of as large a sum of their squares, were they white (`whiteness`).
+        Probability of as large a sum of their squares for white innovations (`whiteness`).
     lag_p : float
         Probability of as large an autocorrelation of lag 1, ``ρ √n`` as a normal number.
     scale_p, bias_p : float
-        Probability of as extreme a scale or bias, were all as expected.
+        Probability of as extreme a scale or bias for a consistent filter.
     """
 
     label: str
@@ -101,7 +101,7 @@ class ComponentConsistency:
 
 @dataclass(frozen=True, eq=False)
 class ObservationConsistency:
-    """What the innovations of one observation say of the filter.
+    """Consistency of the innovations of one observation.
 
     Attributes
     ----------
@@ -116,14 +116,14 @@ class ObservationConsistency:
         ``nis`` over the components (1 is expected), ``lower``, ``upper``, its 95 % bounds; without
         gross errors.
     inside : float
-        Share of the epochs whose NIS is inside of its two bounds.
+        Share of the epochs whose NIS is inside its two bounds.
     components : tuple of ComponentConsistency
     alarms : tuple of Alarm
-        Where it was no longer as expected (`InnovationMonitor`).
+        Detected changes within the run (`InnovationMonitor`).
     verdicts : tuple of Verdict
-        What is wrong, the most telling first; empty where nothing is.
+        Inconsistencies, the most significant first; empty for a consistent observation.
     false_alarm : float
-        Probability that there is any verdict but of gross errors where all is as expected.
+        Probability of any verdict, other than on gross errors, for a consistent filter.
     """
 
     name: str
@@ -137,18 +137,18 @@ class ObservationConsistency:
 
     @property
     def consistent(self) -> bool:
-        """Whether no verdict says otherwise; gross errors alone are none of the filter's."""
+        """Whether no verdict but on gross errors is left; those are not the filter's fault."""
         return all(one.kind == "gross" for one in self.verdicts)
 
 
 def consistency_of(
     name: str, innovations: pd.DataFrame, *, window: int = 30, false_alarm: float = 0.01
 ) -> ObservationConsistency:
-    """Hold the innovations of an observation against what was expected of them.
+    """Test the innovations of an observation against their predicted covariance.
 
-    Components of one epoch are taken one after the other, each less what those before it told, so
-    that normalised they are independent numbers of mean 0 and variance 1 if the model is right.
-    They are so for Kalman's update; for a robust one as far as gross errors are rare.
+    Components of one epoch are decorrelated one after the other, so that, normalized, they are
+    independent with mean 0 and variance 1 if the model is right. This holds for the Kalman update;
+    for a robust update it holds as far as gross errors are rare.
 
     Parameters
     ----------
@@ -158,9 +158,9 @@ def consistency_of(
     window : int
         Epochs of a window.
     false_alarm : float
-        Probability of any verdict where all is as expected, but for gross errors. It is
-        divided evenly among the tests: scale, bias, lag 1, whiteness and a change within the run,
-        of each component.
+        Probability of any verdict, other than on gross errors, for a consistent filter. It is
+        divided evenly among the tests of each component: scale, bias, lag 1, whiteness and a
+        change within the run.
 
     Returns
     -------
@@ -346,7 +346,7 @@ def _windows(time: Array, u: Array, window: int) -> pd.DataFrame:
 
 #: Kinds that hold of the whole run.
 THROUGHOUT = ("understated", "bias", "correlated")
-#: From these on what is no chance matters, too: a scatter, a mean in standard deviations, a
+#: Significant deviations count from these sizes on: a scatter, a mean in standard deviations, a
 #: correlation.
 SCATTERS, LEANS, REMEMBERS = 1.5, 0.5, 0.3
 #: Of errors that are stated to last, what they do beside independent ones of the stated size.
@@ -355,7 +355,7 @@ LASTS = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Inconsistency:
-    """An observation that is not what a filter expected of it, in a way that matters.
+    """A significant and relevant inconsistency of one observation with the filter's model.
 
     Attributes
     ----------
@@ -372,7 +372,7 @@ class Inconsistency:
     epochs : ndarray, (k,), s
         Of gross errors, those; else none.
     factor : float
-        By how much larger standard deviations would make it as expected; 1 where that is no remedy.
+        Factor on the standard deviations that makes it consistent; 1 where none does.
     what, meaning : str
         In words.
     """
@@ -399,12 +399,12 @@ def inconsistencies(
     innovations: Mapping[str, pd.DataFrame],
     lasting: Collection[str] = (),
 ) -> tuple[Inconsistency, ...]:
-    """Return what is inconsistent in a run, the first in time first.
+    """Return the inconsistencies of a run in order of time.
 
-    What is no chance, and yet too little to matter, is left out: a scatter below 1.5 times what
-    was expected, a mean below half a standard deviation, a correlation below 0.3, and one of what
-    scatters so little that it does no more than independent errors of the stated size. So is
-    an observation that is better than was stated.
+    Significant but small deviations are left out: a scatter below 1.5 times the predicted one, a
+    mean below half a standard deviation, a correlation below 0.3, and a correlation of innovations
+    that scatter so little that it does no more harm than independent errors of the stated size. An
+    observation that is better than stated is left out, too.
 
     Parameters
     ----------

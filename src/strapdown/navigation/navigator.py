@@ -1,4 +1,4 @@
-"""An error-state filter around a mechanization, observing at any instant what its aids tell."""
+"""Error-state navigation filter around a mechanization, with measurements at any instant."""
 
 from __future__ import annotations
 
@@ -58,10 +58,10 @@ Array = NDArray[np.float64]
 class Navigator:
     """Navigate by motion increments and by what aids observe.
 
-    The mechanization goes from sample to sample; where an epoch is within a step, the step is cut
-    there. The covariance follows at the filter's own `step` and at every epoch. A log may be given
-    in pieces of any length, and each aid's table at once or bit by bit, as long as an epoch is told
-    before the samples that follow it: the numbers are the same to the last bit.
+    The mechanization goes from sample to sample; a step that contains an epoch is split there.
+    The covariance is propagated at the filter's own `step` and at every epoch. A log may be given
+    in chunks of any length, and each aid's table whole or in parts, as long as an epoch is given
+    before the samples that follow it: the result is the same to the last bit.
 
     Attributes
     ----------
@@ -72,10 +72,10 @@ class Navigator:
     mark_interval : float, s
         Longest time between two marks of the covariance.
     damping : Damping
-        Whether what is estimated is fed back.
+        Whether the estimated errors are fed back (closed-loop correction).
     smoother : Smoother, optional
-        With one, its pieces have what the run is smoothed by, too; the filter's numbers are the
-        same to the last bit.
+        If given, the chunks hold the smoother history, too; the filter's result is the same to
+        the last bit.
 
     Raises
     ------
@@ -101,7 +101,7 @@ class Navigator:
 
     @cached_property
     def lone_receiver(self) -> Gnss | None:
-        """The only aid, where it is a receiver whose errors are noise, believed as it says."""
+        """The only aid, if it is a receiver with white errors, used with its stated accuracy."""
         if len(self.aids) != 1 or type(self.aids[0]) is not Gnss:
             return None
         aid = self.aids[0]
@@ -195,10 +195,10 @@ class Navigator:
         Raises
         ------
         DivergenceError
-            The state has left what the mechanization can do; the sample is named.
+            The state is outside the validity of the mechanization; the sample is named.
         """
         going = EpochLoop(self, state)
-        # What is writeable is one type for compiled code, and what is not another.
+        # Compiled code has one type for writable and another for read-only arrays.
         stamps = np.require(time, np.float64, ["C", "W"])
         going.over(stamps, np.require(rows, np.float64, ["C", "W"]))
         return going.state(), going.piece()
@@ -244,7 +244,7 @@ def with_states(filter_: ErrorFilter, aids: tuple[Measurement, ...]) -> ErrorFil
     return replace(filter_, model=model)
 
 
-# What a navigator remembers.
+# State of a navigator between chunks.
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,19 +256,19 @@ class NavigatorState:
     engine : EngineState
         Of mechanization, estimates and covariance.
     queues : mapping of str to Epochs
-        Of each aid, the epochs that are still to come.
+        Of each aid, the epochs that have not been processed yet.
     memories : mapping of str to object
-        Of each aid that watches the sensors.
+        Of each aid that is derived from the inertial sensors.
     marked : float, s
         Time of the last mark.
     observed : float, s
-        When something was observed last; the start, before that.
+        Time of the last observation; the start, before the first.
     scales : mapping of str to tuple of ScaleState
-        By name of an observation whose rule learns: what it has learnt of each component.
+        By name of an observation with an adaptive rule: the scale learned of each component.
     steady : ndarray, (7,)
-        Fading means of rate and force (`_kernels.steady_motion`), where an aid wants them.
+        Fading means of rate and specific force (`_kernels.steady_motion`) for aids that use them.
     tilted : bool
-        Whether the tilt is, since the start, known so badly that its second order counts.
+        Whether the tilt has been so uncertain since the start that its second order counts.
     """
 
     engine: EngineState
@@ -292,8 +292,8 @@ class NavigatorState:
 #: Over which shaking is taken out of rates and forces, s: beyond a tenth of a second it is not seen
 #: by receivers, and a vehicle does not change its acceleration by much in it.
 STEADY_TIME = 0.2
-#: Where nothing was observed for so many intervals of marks, there is a mark before the next
-#: observation, too; its stamp is so much earlier, s.
+#: After so many intervals of marks without an observation, a mark is added before the next
+#: observation; its time stamp is so much earlier, s.
 ALONE = 1.5
 JUST_BEFORE = 1e-6
 #: A variance is negative by rounding alone within this part of those of its kind.
@@ -365,7 +365,7 @@ class EpochLoop:
     def _cuts(self, time: Array) -> bool:
         """Whether an epoch is within a step, which is then cut there."""
         for queue in self.queues.values():
-            # Mostly nothing is due: a sample alone must not pay for what it does not meet.
+            # Mostly no epoch is due: processing a single sample must not cost more for that.
             if not queue.time.size or queue.time[0] >= time[-1] - SAME_INSTANT:
                 continue
             due = queue.time[: queue.time.searchsorted(time[-1] - SAME_INSTANT)]
@@ -420,7 +420,7 @@ class EpochLoop:
         return Epochs(queue.time[:count], queue.values[:count])
 
     def _fixed(self, aid: Gnss, fixes: Epochs, fixed: Fixed) -> None:
-        """Note what came of fixes."""
+        """Record the results of position fixes."""
         count = len(fixed.told)
         codes, times = fixes.values[:count, 0].tolist(), fixed.time.tolist()
         names = {code: aid.names(code) for code in set(codes)}
@@ -450,7 +450,7 @@ class EpochLoop:
         )
 
     def piece(self) -> NavigationChunk:
-        """What came of it."""
+        """Result of the chunk."""
         return NavigationChunk(
             self.time,
             self.history,
@@ -534,7 +534,7 @@ class EpochLoop:
     def _told(
         self, rules: list[UpdateRule | None], observations: list[Observation]
     ) -> list[Innovations]:
-        """Take observations; what their rules learn of them is kept."""
+        """Process observations; keep what their adaptive rules learn."""
         asked: list[Rules] = []
         for rule, one in zip(rules, observations, strict=True):
             if isinstance(rule, AdaptiveRule):
@@ -551,7 +551,7 @@ class EpochLoop:
         return innovations
 
     def _unlearn(self, met: FilterState) -> None:
-        """Know less of what was learnt about a large tilt, where it was corrected."""
+        """Inflate the covariance after the correction of a large tilt (second-order tilt)."""
         if not self.tilted or not self.navigator.damping.feeds_back:
             return
         filter_, engine = self.navigator.filter, self.engine
@@ -576,7 +576,7 @@ class EpochLoop:
         self._add_mark(mark)
 
     def _sd(self, time: float, P: Array) -> Array:
-        """Standard deviations of the sensors' errors; refuses what is no covariance."""
+        """Standard deviations of the sensor errors; refuses an invalid covariance."""
         variances, model = np.diagonal(P), self.navigator.filter.model
         kinds = np.concatenate(
             [np.repeat(variances[:9].reshape(3, 3).max(axis=1), 3), np.square(model.stacked.sd)]
