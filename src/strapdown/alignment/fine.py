@@ -261,8 +261,8 @@ class FineAlignment:
         last = alignment_of(filter_, state)
         end = filter_.mechanization.nav_state(state.mechanization, state.time)
         back = self._backward(replace(end, v_n=np.zeros(3)), clean)
-        # The gyro drifts turn the body by as much as the attitude error misplaces the Earth rate: a rest
-        # cannot separate them. The backward propagation adds the noise of the gyros.
+        # The gyro drifts turn the body by as much as the attitude error misplaces the Earth rate: a
+        # rest cannot separate them. The backward propagation adds the noise of the gyros.
         C = rotation.dcm_from_quaternion(back.q_nb)
         noise = C * np.square(filter_.model.gyro_noise) @ C.T * abs(last.time - back.time)
         covariance = np.asarray(last.covariance + noise)

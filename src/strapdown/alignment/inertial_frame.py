@@ -503,12 +503,12 @@ def turn_findings(
 
 # Slow noise that the sensors do not explain, from the residuals of an inertial fit.
 #
-# The fit lives on the Legendre degrees 2 and 3 of the second integral of the specific force. The
-# degrees above hold noise alone: from 4 to 20, two horizontal axes each, their energies tell how
-# much there is and how it falls with the frequency, and so what it is at degrees 2 and 3.
+# The fit uses the Legendre degrees 2 and 3 of the second integral of the specific force. The
+# degrees above hold noise alone: from 4 to 20, two horizontal axes each, their energies give the
+# level of the noise and its slope with frequency, and so its level at degrees 2 and 3.
 
 
-#: White in the place, in the velocity, in the force, and in the force's derivative.
+#: White in position, in velocity, in specific force, and in its derivative.
 KINDS = ("place", "velocity", "force", "walk")
 _ROUNDS = 300
 
@@ -536,7 +536,7 @@ class ResidualNoise:
     sway: float
 
     def covariance(self, sums: InertialSums, push: Array, place: Array) -> Array:
-        """Covariance of an answer to errors of velocity gain and place; as `Response`.
+        """Covariance of an estimate to errors of velocity gain and position; as `Response`.
 
         Parameters
         ----------
@@ -579,8 +579,8 @@ def residual_noise(sums: InertialSums, fit: InertialFit, sensors: ImuUncertainty
 
     Notes
     -----
-    The energies of a degree are exponentially distributed about the sum of what each kind of
-    noise makes of it; densities of the greatest likelihood are found by steps that keep them
+    The energies of a degree are exponentially distributed about the sum of the contributions of
+    each kind of noise; maximum-likelihood densities are found by steps that keep them
     positive and never lose likelihood (Févotte and Idier 2011, doi:10.1162/NECO_a_00168, the
     Itakura-Saito divergence with exponent 1/2).
     """

@@ -287,7 +287,7 @@ def manoeuvres_after(
     """Predict what a rotation of the body and a further rest make observable.
 
     The filter's covariance is propagated over the increments of error-free sensors, with the
-    observations of the same rest; nothing else of the result is used. Scale factors and
+    observations of the same rest; no other part of the result is used. Scale factors and
     misalignments are treated as constant parts of the biases; a rotation out of the level changes
     their effect, so that the prediction for such a rotation is the best case.
 

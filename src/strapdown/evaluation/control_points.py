@@ -1,7 +1,8 @@
-"""A path beside control points, after the one origin and heading that fit best.
+"""Compare a path with control points after the best-fitting shift and rotation.
 
-Who reckons from a start of his own finds a path up to a shift and a turn: no scale, no bend. So
-much is taken off, and what is left is the error. Of N points it takes three numbers of 2N.
+Dead reckoning from an arbitrary start finds a path up to a shift and a rotation, but with its
+scale and bends. The fit removes the shift and rotation; the residual is the error. It spends
+three of the 2N numbers of N points.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ __all__ = ["ControlPointScore", "rigid_fit", "score_control_points"]
 
 Array = NDArray[np.float64]
 
-#: From point to point so far at least, m: what is nearer has no direction.
+#: Least distance from point to point, m: closer points define no direction.
 NO_WAY = 1e-6
 
 
@@ -129,7 +130,7 @@ def score_control_points(
     Raises
     ------
     DataError
-        Fewer than two are within its time, or all are at one place.
+        Fewer than two are within its time, or all are at one position.
     """
     time, own = index_of(points), index_of(trajectory)
     within = (time >= own[0]) & (time <= own[-1])

@@ -96,7 +96,7 @@ def largest_differences(runs: tuple[AttitudeRun, ...]) -> pd.DataFrame:
     return table
 
 
-# What is known of the attitude at the samples of a log.
+# Known attitude at the samples of a log.
 
 Mask = NDArray[np.bool_]
 
@@ -119,11 +119,11 @@ class Known:
     counts: Mask
 
     def at(self, samples: NDArray[np.int64]) -> Known:
-        """Return what is known at some of the samples."""
+        """Return the known attitude at some of the samples."""
         return Known(self.q_nb[samples], self.counts[samples])
 
     def errors(self, q_nb: Array) -> Errors | None:
-        """Compare an attitude at every sample with what is known there.
+        """Compare an attitude at every sample with the known one.
 
         Parameters
         ----------
@@ -132,7 +132,7 @@ class Known:
         Returns
         -------
         tuple of float, or None
-            Final, RMS and largest rotation angle in deg; None where nothing is known.
+            Final, RMS and largest rotation angle in deg; None where the truth is unknown.
         """
         if self.counts.all():
             return angles_to_errors(unit_rotation_angle(q_nb, self.q_nb))
@@ -162,8 +162,8 @@ def known_at(truth: pd.DataFrame, scored: Mask, stamps: Array) -> Known:
     Returns
     -------
     Known
-        A sample counts where a counting row of the truth stands at its stamp, or one on each
-        side of it no further apart than three of the truth's usual steps.
+        A sample counts if a counting row of the truth has its time stamp, or if counting rows
+        on both sides are no further apart than three of the truth's usual steps.
     """
     rows = truth[scored]
     if rows.empty:

@@ -1,8 +1,8 @@
 """Fixes withheld from a navigator, and how far it then is from them.
 
-A reference is not needed where a receiver is good: some seconds of its fixes are kept back, and the
-navigator, which goes on without them, is scored against them. What it says of its own error is
-scored at the same fixes.
+A good receiver replaces a reference: some seconds of its fixes are withheld, and the navigator,
+which continues without them, is scored against them. Its stated error is tested on the same
+fixes.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Withholding:
     """The rule of an aid whose observations are looked at and not used."""
 
     def step(self, nu: float, s: float, r: float) -> Step:
-        """Return a step that changes nothing."""
+        """Return a step of zero corrections."""
         return Step(0.0, 1.0, r, 0.0)
 
 
@@ -59,9 +59,9 @@ class WithheldScore:
     time : ndarray, (n,), s
         Of the fixes that were withheld, on the clock of the inertial sensors.
     error : ndarray, (n, 3), m
-        Computed place of the antenna less the fix, north, east, down.
+        Computed position of the antenna minus the fix, north, east, down.
     variance : ndarray, (n, 3), m²
-        Expected of it, the noise of the fix with it.
+        Predicted variance of the error, including the noise of the fix.
     covariance : ndarray, (n, 2, 2), m²
         Of its horizontal part, the noise of the fix with it.
     """
@@ -122,7 +122,7 @@ def spans_to_withhold(begin: float, end: float, length: float, places: int = 5) 
     Raises
     ------
     ConfigError
-        There is no room for one.
+        The record is too short for one span.
     """
     room = end - begin - length
     if room < 0.0 or places < 1 or not length > 0.0:
@@ -198,14 +198,14 @@ def score_withheld(
     ----------
     navigator : Navigator
     state : NavigatorState
-        At the start; the tables of the other aids have been told.
+        At the start; the tables of the other aids have been given.
     time : ndarray, (n,), s
     rows : ndarray, (n, 10)
         As `Navigator.advance`, from the state on.
     name : str
         Of the aid; its observation ``NAME.position`` is scored.
     table : DataFrame
-        Of the aid, not told yet.
+        Of the aid, not given yet.
     spans : sequence of Span
         On the clock of the inertial sensors.
 
@@ -217,7 +217,7 @@ def score_withheld(
     Raises
     ------
     ConfigError
-        There is no such aid, or a span has no fixes or is not within the record.
+        The aid does not exist, or a span has no fixes or is not within the record.
     """
     blind = blinded(navigator, name)
     state = navigator.tell(state, name, table)
@@ -274,7 +274,7 @@ def scores_table(scores: Sequence[WithheldScore]) -> pd.DataFrame:
 
 
 def blinded(navigator: Navigator, name: str) -> Navigator:
-    """Return a navigator that looks at what an aid observes, and does not use it.
+    """Return a navigator that computes an aid's innovations without using them.
 
     Parameters
     ----------
@@ -285,7 +285,7 @@ def blinded(navigator: Navigator, name: str) -> Navigator:
     Raises
     ------
     ConfigError
-        There is no such aid with a table.
+        No such aid with a table exists.
     """
     aid = navigator.by_name.get(name)
     if not isinstance(aid, TabulatedMeasurement):
@@ -309,7 +309,7 @@ def _score(
 
 
 def score_of(pieces: Sequence[NavigationChunk], name: str, span: Span) -> WithheldScore:
-    """Score what a navigator gave over a span, in which an aid was looked at and not used.
+    """Score a navigator over a span in which an aid's innovations were computed but not used.
 
     Parameters
     ----------
@@ -337,7 +337,7 @@ def score_of(pieces: Sequence[NavigationChunk], name: str, span: Span) -> Withhe
 
 
 def seen_of(pieces: Sequence[NavigationChunk], name: str, span: Span) -> list[InnovationRecord]:
-    """Return what was seen of the fixes of a span.
+    """Return the innovations of the fixes of a span.
 
     Parameters
     ----------
@@ -350,7 +350,7 @@ def seen_of(pieces: Sequence[NavigationChunk], name: str, span: Span) -> list[In
     Raises
     ------
     ConfigError
-        There is nothing.
+        The span has no innovations.
     """
     seen = [one for piece in pieces for one in piece.seen if one.name == f"{name}.position"]
     if not seen:
@@ -361,10 +361,10 @@ def seen_of(pieces: Sequence[NavigationChunk], name: str, span: Span) -> list[In
 
 
 def _beyond_place(s: Array, P: Array) -> Array:
-    """Return the variance that is expected of a fix beyond that of the place, (n, 2, 2).
+    """Return the predicted variance of a fix beyond that of the position, (n, 2, 2).
 
-    What is expected along north and east is P, what the arm adds, and the fix's own noise: the
-    part beyond P is independent from axis to axis but for the arm's share.
+    The predicted variance along north and east is P, the part of the lever arm, and the fix's own
+    noise: the part beyond P is independent from axis to axis except for the lever arm.
     """
     beyond = np.maximum(s[:, :2] - np.diagonal(P, axis1=1, axis2=2), 0.0)
     return np.asarray(np.eye(2) * beyond[:, None, :])
@@ -373,8 +373,8 @@ def _beyond_place(s: Array, P: Array) -> Array:
 # Fixes withheld from a navigator, and how far its smoother then is from them.
 
 
-#: A smoother is given so many lengths of the stretch after it, and no less than so many seconds:
-#: what comes later tells nothing of the stretch that this does not.
+#: A smoother gets so many lengths of the stretch after it, and at least so many seconds: later
+#: fixes add no information on the stretch.
 AFTER, LEAST_AFTER = 2.0, 60.0
 
 
@@ -398,7 +398,7 @@ def score_withheld_smoothed(
     navigator : Navigator
         With a smoother.
     state : NavigatorState
-        At the start, told of the fixes.
+        At the start, with the fixes.
     time : ndarray, (n,), s
     rows : ndarray, (n, 10)
         As `Navigator.advance`, from the state on.
@@ -414,7 +414,7 @@ def score_withheld_smoothed(
     Raises
     ------
     ConfigError
-        There is no such aid, or a span has no fixes.
+        The aid does not exist, or a span has no fixes.
     """
     blind = blinded(navigator, name)
     found, at = [], 0
@@ -436,10 +436,10 @@ def score_of_smoothed(
     name: str,
     span: Span,
 ) -> WithheldScore:
-    """Score what a smoother makes of a span by what came before and after it.
+    """Score the smoothed solution over a span.
 
-    The place of the antenna is that of the smoothed state with the smoothed arm and the smoothed
-    offset of its clock, where these are estimated, and so is its covariance.
+    The antenna position and its covariance follow from the smoothed state with the smoothed lever
+    arm and the smoothed clock offset, where these are estimated.
 
     Parameters
     ----------
@@ -468,7 +468,7 @@ def score_of_smoothed(
     for piece in (*pieces, *later):
         smoothing.take(piece)
     time = np.array([one.time for one in seen])
-    # Looked at by a rule of its own, it is no lone receiver of a compiled loop.
+    # With a rule of its own it does not take the compiled loop of a single receiver.
     observations = [one.observation for one in seen if one.observation is not None]
     error, covariance = smoothing.seen(time, observations)
     variance = np.einsum("kii->ki", covariance)

@@ -1,10 +1,10 @@
 """Whether a heading can be trusted, second by second: a traffic light.
 
-Green is a promise: the heading is within the limit that was asked for. It is given where two
-reckonings say so that do not share what was assumed at the start: the run by its own bound, and a
-witness by its own. That is a reckoning by fixes that began with no heading at all
-(`systems.sins.heading_witness`), what the gyros found of north at rest and carried on
-(`systems.sins.carried_heading`), or two sources that share nothing
+Green is a promise: the heading error is within the requested limit. It requires two solutions that
+do not share the assumptions made at the start: the run by its own bound, and an independent heading
+check by its own. The check is a solution by fixes that began without a heading
+(`systems.sins.heading_witness`), gyrocompassing at rest carried on by the gyros
+(`systems.sins.carried_heading`), or two independent sources of heading
 (`systems.sins.heading_sources`).
 """
 
@@ -56,25 +56,25 @@ WITNESSES: dict[str, str] = {
     "gyrocompass": "north as the gyros found it at rest",
     "sources": "two sources of a heading that share nothing",
 }
-#: Two-sided quantile of 99 of 100 normal numbers: beyond it nothing is by chance, and within it a
-#: witness bounds an error.
+#: Two-sided 99 % quantile of the normal distribution: a larger difference is significant, and
+#: so many standard deviations bound the error of an independent check.
 SURE = 2.5758293035489004
-#: Scatter of innovations over the last seconds, by what was expected: beyond the first nothing is
-#: green, beyond the second everything is red.
+#: Scatter of the innovations over the last seconds, relative to the predicted one: beyond the first
+#: limit the status is not green, beyond the second it is red.
 FAR_OFF, REFUTED = 2.0, 3.0
-#: What a witness told holds for so long, s; the run's own growth since counts so many times.
+#: Validity of the result of a check, s; the run's own growth since then is weighted so many times.
 CARRIED, GROWS = 60.0, 2.0
-#: Over which it is judged, s, and fewest components that tell.
+#: Window of the scatter, s, and fewest components in it.
 RECENT, FEWEST = 30.0, 8
-#: Labels of components that tell nothing of a heading.
+#: Labels of components without information on the heading.
 VERTICAL = ("down", "VD", "height")
-#: One innovation counts no more than so many of its standard deviations, and so many if it was
-#: rejected: half of them are as much as what refutes a run.
+#: Limit of one normalized innovation, and its value if it was rejected: half the innovations at
+#: that value are as much as refutes a run.
 CLIP, REJECTED = 4.0, 3.0
 
 
 class Heard(Protocol):
-    """What a witness said: see `systems.sins.heading_witness.Evidence`.
+    """Result of an independent heading check: see `systems.sins.heading_witness.Evidence`.
 
     Its `kind` is one of `WITNESSES`.
     """
@@ -118,10 +118,11 @@ class HeadingIntegrity:
     table : DataFrame
         By time in s, the seconds of the run: ``light`` (0 green, 1 amber, 2 red), ``reason`` (a key
         of `REASONS`), ``bound`` (1.96 standard deviations of the run, deg), ``difference`` (run
-        less witness, deg), ``witness_sd`` (deg), ``witnessed`` (`SURE` standard deviations of the
-        witness and the difference, deg), ``carried`` (that, or an earlier one with what was added
-        since, deg: what green goes by), ``witness_since`` (s), ``witness`` (a key of `WITNESSES`,
-        or empty), ``scatter`` (of the innovations, by what was expected).
+        minus check, deg), ``witness_sd`` (standard deviation of the check, deg), ``witnessed``
+        (`SURE` standard deviations of the check plus the difference, deg), ``carried`` (that, or an
+        earlier one plus the growth since, deg: the value that decides on green), ``witness_since``
+        (s), ``witness`` (a key of `WITNESSES`, or empty), ``scatter`` (of the innovations, relative
+        to the predicted one).
     green, red : float, deg
         Limits.
     """
@@ -164,7 +165,7 @@ def heading_light(
     ----------
     record : NavigationRecord
     evidence : sequence of Heard
-        What witnesses said; none where nothing can tell a heading by itself.
+        Results of the independent checks; empty without a check.
     scatter : ndarray, (n,), optional
         Of `recent_scatter` at the seconds of the run.
     green, red : float, deg
@@ -254,8 +255,8 @@ def recent_scatter(record: NavigationRecord) -> Array:
     Returns
     -------
     ndarray, (n,)
-        Of the worst observation: root mean square of the normalised innovations of the last half
-        minute, each no more than four; 1 is expected, and stands where nothing was observed.
+        Of the worst observation: root mean square of the normalized innovations of the last half
+        minute, each limited to four; 1 is expected, and is the value without observations.
     """
     seconds = seconds_of(record)
     worst = np.ones(len(seconds))
@@ -270,7 +271,7 @@ def recent_scatter(record: NavigationRecord) -> Array:
             u = np.where(s > 0.0, nu / np.sqrt(s), np.nan)
         weight = table[[f"weight {str(c)[3:]}" for c in labels]].to_numpy(dtype=np.float64)
         told = np.isfinite(u)
-        # What was rejected did no harm, unless it is much.
+        # Rejected measurements did no harm, unless there are many.
         lost = told & (weight <= 0.0)
         u = np.where(lost, REJECTED, np.clip(u, -CLIP, CLIP))
         square = np.where(told, np.where(told, u, 0.0) ** 2, 0.0)
@@ -292,7 +293,7 @@ def doubted(record: NavigationRecord, evidence: Sequence[Heard], upto: float, gr
     ----------
     record : NavigationRecord
     evidence : sequence of Heard
-        What witnesses said.
+        Results of the independent checks.
     upto : float, s
     green : float, deg
         As of `heading_light`.
@@ -320,7 +321,7 @@ def _own_sd(record: NavigationRecord, seconds: Array) -> Array:
 def _best(
     seconds: Array, evidence: Sequence[Heard]
 ) -> tuple[Array, Array, Array, NDArray[np.object_]]:
-    """Difference, deviation, begin and kind of the witness that bounds each second best."""
+    """Difference, standard deviation, start and kind of the tightest check of each second."""
     difference, sd, since = (np.full(len(seconds), np.nan) for _ in range(3))
     who = np.full(len(seconds), "", dtype=object)
     least = np.full(len(seconds), np.inf)
@@ -337,7 +338,7 @@ def _best(
 
 
 def _carried(seconds: Array, witnessed: Array, own: Array, apart: NDArray[np.bool_]) -> Array:
-    """What witnesses bound now, or did a while ago with what was added since."""
+    """Bound by the checks now, or by an earlier check plus the growth since."""
     out = np.where(np.isfinite(witnessed), witnessed, np.inf)
     grown = np.maximum(np.diff(own**2, prepend=own[:1] ** 2), 0.0)
     told, added, since = math.inf, 0.0, -math.inf
@@ -357,7 +358,7 @@ def _carried(seconds: Array, witnessed: Array, own: Array, apart: NDArray[np.boo
 def _contradicted(
     seconds: Array, evidence: Sequence[Heard], own: Array, green: float
 ) -> NDArray[np.bool_]:
-    """Seconds at which any witness that knows its heading contradicts the run."""
+    """Seconds at which any check with a known heading contradicts the run."""
     out = np.zeros(len(seconds), dtype=np.bool_)
     for one in evidence:
         at = np.searchsorted(seconds, one.time - 1e-6)

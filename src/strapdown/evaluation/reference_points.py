@@ -87,7 +87,7 @@ def parse_reference(text: str, start: float, end: float) -> dict[str, object]:
     text : str
         As in the module's text; ``same-as``, colons and equals signs are understood, too.
     start, end : float, s
-        What these words stand for, and the span in which instants must lie.
+        Times that these words mean, and the span in which instants must lie.
 
     Returns
     -------
@@ -147,7 +147,7 @@ def instant(word: str, start: float, end: float, text: str) -> float:
     word : str
         ``start``, ``end``, or seconds.
     start, end : float, s
-        What the words stand for, and the span in which it must lie.
+        Times that the words mean, and the span in which it must lie.
     text : str
         The sentence, for messages.
 
@@ -371,7 +371,7 @@ def references_from_words(words: list[str], start: float, end: float) -> pd.Data
     return references_table([parse_reference(text, start, end) for text in words])
 
 
-# Rests as reference points: where a sensor lies still, gravity tells roll and pitch.
+# Rests as reference points: while a sensor is stationary, gravity gives roll and pitch.
 
 
 Array = NDArray[np.float64]
@@ -407,16 +407,16 @@ def tilt_sd_deg(
     Returns
     -------
     float
-        Root mean square of the angle by which the direction is off, in deg: two axes square to
-        gravity, each off by ``sqrt(bias² + noise²)/g`` rad. The bias is the larger of what is
-        assumed and of how far the length of the specific force is from gravity: the log may
-        refute an assumption, and it cannot confirm one, since what is square to gravity does
-        not change the length.
+        Root mean square of the angle between computed and true direction, in deg: two axes
+        perpendicular to gravity, each in error by ``sqrt(bias² + noise²)/g`` rad. The bias is the
+        larger of the assumed one and of the deviation of the specific force from gravity: the
+        log may refute an assumption, but cannot confirm it, since an error perpendicular to
+        gravity does not change the length.
 
     Raises
     ------
     DataError
-        The rest has no acceleration, or what it has is no gravity (20 %).
+        The rest has no acceleration, or its specific force differs from gravity by 20 %.
     """
     force, noise = _force(rest)
     g = STANDARD_GRAVITY if gravity is None else gravity
@@ -488,8 +488,8 @@ def same_pose_candidates(rests: Sequence[RestStretch]) -> tuple[SamePose, ...]:
     tuple of SamePose
         For each rest the earliest one whose direction of gravity agrees with it, within three
         standard deviations of the noise of both (the biases of the accelerometers are the same
-        in both and cancel) or 0.1 deg, whichever is more. They are offered and never used:
-        gravity does not tell heading, and only who moved the sensor knows that.
+        in both and cancel) or 0.1 deg, whichever is more. They are proposed, never used:
+        gravity does not determine heading; only the operator knows whether the pose is the same.
     """
     found: list[SamePose] = []
     lying = [r for r in rests if r.accel_mean is not None]
@@ -543,5 +543,5 @@ def _apart(a: RestStretch, b: RestStretch) -> tuple[float, float]:
 def _across(force: Array, noise: Array) -> float:
     """Variance of the direction of a force, both axes square to it together, rad²."""
     up = force / np.sqrt(force @ force)
-    # What of the noise is square to the force: |n|² less the part along it.
+    # Noise perpendicular to the force: |n|² minus the part along it.
     return float(((noise**2).sum() - ((up * noise) ** 2).sum()) / (force @ force))

@@ -44,7 +44,7 @@ LEAST_BLOCKS = 40
 WINDOW = 20.0  # s
 # Crystals are good to 100 ppm, and stamps of a phone or a host to some hundreds.
 MAX_DRIFT = 2e-3
-# The second axis of the motion must stand above the noise by this much in power, and fix the
+# The second axis of the motion must exceed the noise by this ratio in power, and determine the
 # mounting about the first to this.
 ABOVE_NOISE = 10.0
 MAX_MOUNTING_SD = 2.0  # deg
@@ -218,7 +218,7 @@ class _Fit:
         return _State(offset, drift, turn, mean_1 - scale * turn @ mean_2, scale)
 
     def _residuals(self, state: _State) -> tuple[Array, Array]:
-        """What is left, (n, 3), and what each figure changes of the model, (n, 3, 9)."""
+        """Residuals, (n, 3), and their derivatives by each parameter, (n, 3, 9)."""
         rate, slope = self.second(state.offset, state.drift)
         turned = rate @ state.turn.T
         left = self.rate - (state.scale * turned + state.bias)
@@ -314,7 +314,7 @@ def _result(
     mounting = rotation.quaternion_from_dcm(state.turn)
     mounting_sd = np.degrees(sd[TURN])
     if axis is not None:
-        # About an axis of the sensor that has a part of the single axis nothing is known.
+        # About an axis of the sensor that is partly along the single axis the result is undetermined.
         mounting_sd = np.where(np.abs(axis) > 1e-3, np.inf, mounting_sd)
     return SecondLog(
         start=float(fit.time[0]),
@@ -348,14 +348,14 @@ def _triple(values: ArrayLike) -> tuple[float, float, float]:
 # Two logs of one motion: their rates on even grids, and the coarse offset of their clocks.
 
 
-# A Gaussian of two cells leaves 3e-9 of what is at the end of the band, so that interpolating
+# A Gaussian of two cells attenuates to 3e-9 at the end of the band, so that interpolating
 # between cells changes neither the signal nor the power of its noise.
 SMOOTH_CELLS = 2.0
 # What both logs must share for an offset to be looked at.
 LEAST_OVERLAP = 5.0  # s
 COARSE_STEP = 0.02  # s
 PEAKS = 8
-# A pause of rates below this says nothing about time.
+# A pause of rates below this has no timing information.
 LEAST_RATE = 0.02  # rad/s, root mean square
 LEAST_CORRELATION = 0.7
 
@@ -437,7 +437,7 @@ def even_rates(imu: pd.DataFrame, step: float) -> EvenRates:
     if imu.attrs["sampling"] == "instantaneous" and even:
         angle = CubicSpline(time - origin, rate).antiderivative()(edges)
     else:
-        # A spline overshoots where stamps are uneven; what was integrated stays in any case.
+        # A spline overshoots at uneven time stamps; the integral is kept in any case.
         theta = increments_from_imu(imu)[THETA].to_numpy()
         turned = np.vstack([np.zeros(3), np.cumsum(theta, axis=0)])
         if even:
@@ -450,7 +450,7 @@ def even_rates(imu: pd.DataFrame, step: float) -> EvenRates:
     reach = 5.0 * SMOOTH_CELLS * step
     for gap in find_gaps(time):
         known &= ~((middle > gap.start - origin - reach) & (middle < gap.end - origin + reach))
-    # At the ends the filter mirrors what it does not have.
+    # At the ends the filter mirrors the signal.
     known[: int(4 * SMOOTH_CELLS)] = known[-int(4 * SMOOTH_CELLS) :] = False
     return EvenRates(float(origin + 0.5 * step), step, smooth, known)
 
@@ -493,7 +493,7 @@ def coarse_offset(first: pd.DataFrame, second: pd.DataFrame) -> CoarseOffset:
     Raises
     ------
     DataError
-        There is too little motion, nothing in common, or two offsets do about as well.
+        There is too little motion, no overlap, or two offsets fit about equally well.
     """
     usual = max(float(np.median(np.diff(t.index.to_numpy()))) for t in (first, second))
     step = max(COARSE_STEP, usual)
@@ -516,7 +516,7 @@ def coarse_offset(first: pd.DataFrame, second: pd.DataFrame) -> CoarseOffset:
         )
     weighed = [(_vector_share(a, b, lag), lag) for lag in lags[top_peaks(score, PEAKS)].astype(int)]
     best, at = max(weighed, default=(0.0, 0))
-    # What is within half a second is the same peak.
+    # Offsets within half a second belong to the same peak.
     apart = int(np.ceil(0.5 / step))
     rest = [share for share, lag in weighed if abs(lag - at) > apart]
     found = CoarseOffset(b.start - a.start - at * step, best, max(rest, default=0.0))
@@ -602,7 +602,7 @@ def truth_from_second_log(
     gyro_bias: ArrayLike = (0.0, 0.0, 0.0),
     q_start: ArrayLike = (1.0, 0.0, 0.0, 0.0),
 ) -> pd.DataFrame:
-    """Attitude of the first sensor's axes at its stamps, as the second log tells it.
+    """Attitude of the first sensor's axes at its stamps, by the second log.
 
     Parameters
     ----------
@@ -614,7 +614,7 @@ def truth_from_second_log(
         Attitude table of the second sensor on its own clock. If it has one, it is taken; if
         not, the second log's rates are integrated, sample by sample as they are.
     gyro_bias : array_like, (3,), rad/s
-        Bias of the second gyro in its own axes, taken off before: what is left of it turns
+        Bias of the second gyro in its own axes, subtracted beforehand: its residual turns
         the truth by so much in every second. From a rest, or from its calibration.
     q_start : array_like, (4,)
         Attitude of the first sensor at its first stamp that both cover: a gyro tells attitude
@@ -628,8 +628,8 @@ def truth_from_second_log(
     Raises
     ------
     DataError
-        The body turned about one axis only, so that the mounting is not known; or nothing is
-        covered by both.
+        The body turned about one axis only, so that the mounting is unknown; or the logs do
+        not overlap.
 
     Notes
     -----

@@ -57,7 +57,7 @@ def trajectory_differences(
     estimate, reference : DataFrame
         Trajectory tables of one clock.
     ellipsoid : Ellipsoid
-        To which the places of both refer.
+        Ellipsoid of the positions of both.
 
     Returns
     -------
@@ -66,19 +66,19 @@ def trajectory_differences(
 
         ``north east down``, m
             The straight line from the reference, along north, east and down midway between both
-            places: places of one height differ in no height, however far apart they are, and the
-            length is the distance. Over the ground it is ``d³/24R²`` farther, 1 m at 100 km.
+            positions: positions of equal height have no height difference, however far apart, and
+            the length is the distance. Over the ground it is ``d³/24R²`` farther, 1 m at 100 km.
         ``VN VE VD``, m/s
-            Each velocity along the local level of its own place.
+            Each velocity along the local level of its own position.
         ``roll pitch heading``, deg
             Differences of the angles, within -180 to 180. Near a pitch of 90 deg roll and
-            heading say little one by one.
+            heading are meaningful in combination only.
         ``phi_N phi_E phi_D``, deg
-            Rotation vector of ``C_est C_ref^T`` about north, east and down: the turn that brings
-            the reference's attitude into the estimate's, ``C_est = exp([phi x]) C_ref``, so that
+            Rotation vector of ``C_est C_ref^T`` about north, east and down: the rotation from
+            the reference's attitude to the estimate's, ``C_est = exp([phi x]) C_ref``, so that
             for a level body ``phi_D`` is the error of heading. Free of singularities; its
             length is the angle between the attitudes. Both are relative to the local
-            level of their own place, as a mechanization has them.
+            level of their own position, as in a mechanization.
 
         ``attrs``: ``source``, ``reference``; ``interpolated``, the number of instants at which
         the reference had no row and was interpolated (`trajectory_at`); ``findings``, a tuple
@@ -168,7 +168,7 @@ def _far_apart(
     ]
     for a, b, code in tried:
         latitude, longitude = np.abs([a[:2], b[:2]]).max(axis=0)
-        # A hundredth is no accident.
+        # A hundredth of the rows is too many for an accident.
         if latitude <= 90.0 and longitude <= 360.0 and distance(a, b) < 0.01 * apart:
             raise DataError(
                 code,
@@ -229,12 +229,12 @@ def _interpolated(time: Array, reference: pd.DataFrame, ellipsoid: Ellipsoid) ->
 
 # A trajectory at instants between its rows, and what interpolation costs.
 #
-# Everything is interpolated along the axes of the Earth, so that neither the date line nor a pole
-# is a special place.
+# Everything is interpolated along the axes of the Earth, so that the date line and the poles need
+# no special case.
 
 
-# Stamps of one beat that were summed up and not multiplied differ by this share of a step at most;
-# interpolating so near to a row costs nothing.
+# Time stamps of one rate that were summed and not multiplied differ by this share of a step at
+# most; interpolating so close to a row has no cost.
 SAME_BEAT = 1e-6
 
 
@@ -338,7 +338,7 @@ def trajectory_at(
     time : array_like, (n,), s
         Increasing, and within the span of the table, but for a millionth of a step.
     ellipsoid : Ellipsoid
-        To which its places refer.
+        Ellipsoid of its positions.
 
     Returns
     -------
@@ -410,9 +410,9 @@ def interpolation_cost(
     InterpolationCost or None
         None for fewer than three rows. The misfit at a row that lies at the share `s` of the
         double step `H` goes with ``s² (1-s)² H⁴`` for position, and with ``s (1-s) H²`` for
-        velocity and attitude; from it follows what the longer of the two steps costs in its
-        middle. The largest of all rows is given. Noise of the rows is no cost of interpolation
-        and enters undiminished, so that for a noisy trajectory this is too much.
+        velocity and attitude; the error in the middle of the longer of the two steps follows
+        from it. The largest of all rows is given. Noise of the rows is not an interpolation
+        error but enters undiminished, so that the figure is too large for a noisy trajectory.
     """
     if len(trajectory) < 3:
         return None
@@ -444,7 +444,7 @@ class QuantityError:
     Attributes
     ----------
     quantity : str
-        A column, or what is made of several: ``horizontal`` and ``position`` (the lengths in two
+        A column, or a combination: ``horizontal`` and ``position`` (the lengths in two
         and three dimensions), ``horizontal velocity``, ``velocity``, ``rotation`` (the angle
         between the attitudes).
     unit : str
@@ -473,12 +473,12 @@ class DifferenceSummary:
     Attributes
     ----------
     source, reference : str or None
-        What was compared with what.
+        The compared trajectories.
     samples : int
     start, end : float, s
     errors : tuple of QuantityError
     findings : tuple of Finding
-        What a person should know about the comparison.
+        Findings about the comparison.
     """
 
     source: str | None
@@ -513,7 +513,7 @@ class DifferenceSummary:
 
     @property
     def title(self) -> str:
-        """What was compared, over what."""
+        """The compared trajectories and the time span."""
         named = f"{self.source or 'estimate'} minus {self.reference or 'reference'}"
         span = f"{self.start:.9g} to {self.end:.9g} s, {self.samples} instants"
         return f"{named}, {span}"
