@@ -1,4 +1,4 @@
-"""What every form of a covariance is: begun of P, predicted, updated, read as P."""
+"""Interface of every covariance form: begin from P, predict, update, return P."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Innovations:
-    """What an epoch's observations were beside what was expected, one after the other.
+    """Innovations of an epoch's observations, processed one after the other.
 
     Attributes
     ----------
     nu : ndarray, (l,)
         Observation less its prediction, after the observations before it, in its unit.
     s : ndarray, (l,)
-        Variance that was expected of it: ``h P h' + R``.
+        Predicted variance of each: ``h P h' + R``.
     weight : ndarray, (l,)
-        What the update rule gave it, from 0 (not used) to 1.
+        Weight by the update rule, from 0 (not used) to 1.
     """
 
     nu: Array
@@ -102,8 +102,8 @@ class CovarianceForm(ABC):
         R : ndarray, (l,)
             Variances of observations that are independent of each other.
         rule : UpdateRule, or a sequence of them, optional
-            How much of an observation is believed, one rule for all or one for each; all of
-            each, if not given.
+            Weighting of the observations, one rule for all or one for each; full weight if not
+            given.
 
         Returns
         -------
@@ -169,8 +169,8 @@ class Step(NamedTuple):
     r : float
         In the unit of the observation, squared.
     weight : float
-        For the record: 1 where the observation is believed, 0 where it is not used. With a weight
-        of 0 nothing is changed.
+        For the record: 1 for full weight, 0 for a rejected observation, which leaves the state
+        unchanged.
     """
 
     moved: float
@@ -180,7 +180,7 @@ class Step(NamedTuple):
 
 
 class UpdateRule(Protocol):
-    """Says what one observation does."""
+    """Determines the effect of one observation on the filter."""
 
     def step(self, nu: float, s: float, r: float) -> Step:
         """Return the step of one observation.
@@ -205,7 +205,7 @@ class FullUpdate:
         return Step(nu, 1.0, r, 1.0)
 
 
-# What a filter is told, beside what it computed.
+# Observations of a filter.
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,7 +234,7 @@ class Observation:
     labels: tuple[str, ...]
 
 
-# What is asked of the matrices that a covariance form is given.
+# Checks of the matrices that a covariance form is given.
 
 
 #: How far correlations may be from symmetric, and below zero as eigenvalues, in n roundings.
@@ -314,7 +314,7 @@ def check_prediction(state: Array, Phi: Array, Q: Array) -> None:
 
 
 def bad_prediction(row: int, Phi: Array, Q: Array) -> DataError:
-    """Return what to raise where a predicted variance is no variance."""
+    """Return the error to raise for an invalid predicted variance."""
     for name, given in (("Phi", Phi), ("Q", Q)):
         if not np.isfinite(given).all():
             i, j = np.argwhere(~np.isfinite(given))[0]
@@ -366,14 +366,14 @@ def take_by_rule(
     rule: UpdateRule | Sequence[UpdateRule],
     work: Array,
 ) -> Innovations:
-    """Change the parts of a covariance and x, in place, by every observation.
+    """Update the factors of a covariance and x, in place, by every observation.
 
     Parameters
     ----------
     expect, take : kernels
         The two halves of a scalar step; between them the rule is asked.
     parts : (ndarray, ndarray)
-        What the kernels keep a covariance in.
+        Arrays in which the kernels keep a covariance.
     x : ndarray, (n,)
     observations : (z, H, R)
     rule : UpdateRule, or a sequence of them
@@ -423,8 +423,8 @@ def _kernels() -> ModuleType:
 class Plain(CovarianceForm):
     """``P <- (1 - K h) P``, kept to show where it fails.
 
-    A difference of two matrices that may be equal to rounding: with observations much better
-    than what is known before, variances become negative.
+    A difference of two matrices that may be equal to rounding: variances become negative with
+    observations much more accurate than the prediction.
     """
 
     name: ClassVar[str] = "plain"
@@ -669,7 +669,7 @@ class Chernodarov(BiermanThornton):
         return out, x, innovations
 
 
-# The one table of covariance forms.
+# Covariance forms by name.
 
 
 COVARIANCES: dict[str, type[CovarianceForm]] = {

@@ -43,9 +43,9 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-# Part by which noise is larger than what is known of it, so that what is left is no less than zero:
-# of a noise of less than full rank, as that of a quaternion's four numbers, the rounding of the
-# whole, 2e-16, must be nothing beside this part of it (`_kernels.factors.INDEFINITE`).
+# Relative excess of a noise over its known part, so that the difference stays positive
+# semidefinite: for a noise of deficient rank, as that of a quaternion's four numbers, rounding of
+# the whole, 2e-16, must be negligible beside it (`_kernels.factors.INDEFINITE`).
 ROUNDING = 1e-5
 # Place of the rotation among the physical errors.
 ROTATION = slice(6, 9)
@@ -53,7 +53,7 @@ ROTATION = slice(6, 9)
 
 @dataclass(frozen=True)
 class ErrorFilter:
-    """Closed loop: what is estimated is taken off the mechanization and off the sensors at once.
+    """Closed loop: estimates are subtracted at once from the mechanization and the sensors.
 
     Errors are computed less true, and so those of the sensors are what their readings are still
     too large by after the estimates have been taken off: true error less estimate. In the
@@ -67,18 +67,18 @@ class ErrorFilter:
     model : ErrorModel
     form : CovarianceForm
     rule : UpdateRule, optional
-        How far an observation is believed; without one, all of it.
+        Weighting of observations; full weight if not given.
     step : float, s
         Longest time over which errors grow by means of attitude and force.
     rests : bool
-        Whether the body is known to stay where it is, so that errors grow by gravity and the
-        attitude, and not by what the sensors read: their noise, and what sways, would be taken for
-        a motion that tells one error from another, although they are what is observed. Errors
-        of the biases then keep their direction in level axes, and not in the body's, where an
-        attitude is corrected: what a rest cannot tell keeps its direction, while otherwise each
-        correction of a heading by degrees makes something of it known (Huang, Mourikis and
-        Roumeliotis, Int. J. Robotics Research 29 (2010) 502, of such filters). The standard
-        deviations of the axes that a correction mixes should be alike.
+        Whether the body is known to be stationary, so that errors grow by gravity and the
+        attitude, not by the sensor readings: sensor noise and sway would act as a motion that
+        separates errors, although they are what is observed. Errors of the biases then keep
+        their direction in level axes, not in body axes, when an attitude is corrected:
+        unobservable directions stay so, while otherwise each correction of a heading by degrees
+        adds false information on it (Huang, Mourikis and Roumeliotis, Int. J. Robotics Research
+        29 (2010) 502, on such filters). The standard deviations of the axes that a correction
+        mixes should be alike.
     """
 
     mechanization: Mechanization
@@ -129,7 +129,7 @@ class ErrorFilter:
         return out
 
     def errors_of_sensors(self, state: FilterState) -> Array:
-        """Return what the estimates say of the readings, (2, 7, 3): gyros, accelerometers.
+        """Return the estimated errors of the readings, (2, 7, 3): gyros, accelerometers.
 
         A constant part, and parts per rate x, y, z and per force x, y, z.
         """
@@ -157,7 +157,7 @@ class ErrorFilter:
         Raises
         ------
         DivergenceError
-            The state left what the mechanization can do; the sample is named.
+            The state is outside the validity of the mechanization; the sample is named.
         """
         made, why = self.mechanization.advance_rows(
             mechanization, rows, np.empty(0), self.earth, history
@@ -232,11 +232,11 @@ class ErrorFilter:
         rows: Array,
         observe: Callable[[Segment], Observation],
     ) -> tuple[FilterState, Segment, Innovations]:
-        """Go on over motion increments that are themselves observed, and take off what that tells.
+        """Predict over motion increments that are themselves observed, and correct by them.
 
-        The noise of such an observation is in the state, too: that of gyros whose turn is compared
-        with the Earth's turns the attitude as well. It is met by taking the observation before the
-        prediction, from which then comes off what is known of the noise: with the noise v of the
+        The noise of such an observation is in the state, too: the noise of gyros whose rotation is
+        compared with the Earth's also rotates the attitude. So the observation is processed before
+        the prediction, from which the known part of the noise is subtracted: with the noise v of the
         observation, ``M = cov(w, v)`` and ``S = M R^-1``, the transition is ``Phi - S H`` and the
         covariance of the noise ``Q - S M'`` (Simon, Optimal State Estimation, 2006, sec. 7.1).
 
@@ -280,7 +280,7 @@ class ErrorFilter:
         observations: Sequence[Observation],
         rules: Sequence[Rules] | None = None,
     ) -> tuple[FilterState, Array, list[Innovations]]:
-        """Take the observations of an epoch, and take off what they tell of the errors.
+        """Update with the observations of an epoch, and correct the state (closed loop).
 
         Parameters
         ----------
@@ -288,8 +288,8 @@ class ErrorFilter:
         observations : sequence of Observation
             Of this state, independent of each other.
         rules : sequence of UpdateRule, of a sequence of them, or of None, optional
-            How far each is believed, all of its components alike or each by its own rule; the
-            filter's own for all, if not given.
+            Weighting of each, one rule for all of its components or one for each; the filter's
+            own for all, if not given.
 
         Returns
         -------
@@ -311,7 +311,7 @@ class ErrorFilter:
         observations: Sequence[Observation],
         rules: Sequence[Rules] | None = None,
     ) -> tuple[FilterState, Array, list[Innovations]]:
-        """Take the observations of an epoch, and take nothing off.
+        """Update with the observations of an epoch without correcting the state.
 
         Parameters
         ----------
@@ -380,8 +380,8 @@ class ErrorFilter:
         row = used.history_row(corrected)
         covariance = state.covariance
         if not self.model.states_are_physical:
-            # States that are components of what has just been corrected are meant of it from now
-            # on: the norm of a quaternion is along the new one.
+            # States defined by the corrected quantity refer to the new one from now on: the norm error of
+            # a quaternion is along the new quaternion.
             carried = self.model.from_physical(used, state.time, row) @ to_physical
             covariance = self.form.predict(covariance, carried, np.zeros_like(covariance))
         if self.rests:
@@ -406,7 +406,7 @@ def symmetric(P: Array) -> Array:
     return 0.5 * (P + P.T)
 
 
-# What a filter remembers from one step to the next.
+# State of a filter between steps.
 
 
 @dataclass(frozen=True, eq=False)
@@ -433,17 +433,17 @@ class FilterState:
     covariance: Array
 
 
-# Observations of one epoch as one update: whose rule each component has, and what each told.
+# Observations of one epoch as one update: the rule and the innovation of each component.
 
 
-#: What an observation is believed by: one rule, one for each of its components, or none.
+#: Weighting of an observation: one rule, one for each of its components, or none.
 Rules = UpdateRule | Sequence[UpdateRule] | None
 
 
 def rules_of_components(
     rules: Sequence[Rules], observations: Sequence[Observation]
 ) -> list[UpdateRule] | None:
-    """Return one rule for each component; none at all where nothing has one.
+    """Return one rule for each component, or None if no component has one.
 
     Parameters
     ----------
@@ -460,7 +460,7 @@ def rules_of_components(
 
 
 def split_innovations(seen: Innovations, observations: Sequence[Observation]) -> list[Innovations]:
-    """Return of each observation what all of them told together.
+    """Split the innovations of a joint update by observation.
 
     Parameters
     ----------
@@ -538,15 +538,15 @@ def _gravity(mechanization: Mechanization, level: Array) -> float:
     return float(np.linalg.norm(found))
 
 
-# What a tilt that is corrected leaves unknown of the vertical force, which is of second order.
+# Second-order uncertainty of the vertical force after the correction of a tilt.
 
 
-# Root of the summed variances of both tilts, rad, below which all this is no more than
-# 1 mm/s², as an accelerometer of the cheapest class drifts.
+# Root of the summed variances of both tilts, rad, below which the effect is at most 1 mm/s², the
+# drift of an accelerometer of the cheapest class.
 LARGE = math.radians(0.8)
 # Places of both tilts among the physical errors.
 TILTS = slice(6, 8)
-# Blocks of states that read as a bias of the accelerometers, the one that is asked first.
+# Blocks of states that act as a bias of the accelerometers, in order of preference.
 LARGE_TILT_BIASES = ("accel_bias", "accel_drift")
 
 
@@ -570,14 +570,14 @@ def unlearnt_force(
 ) -> Array | None:
     """Return the variance by which less is known of the accelerometers after a correction of tilt.
 
-    While a vehicle goes straight on, fixes tell the sum of a tilt and of the accelerometers' bias
-    that hides it, and of the vertical bias all, about the attitude that was computed then. Once the
-    tilt is told by something else, a turn mostly, and corrected by x and y, gravity along the body
-    is another by ``g (x² + y²)/2``, of which a linear filter knows nothing. Its variance is
-    ``g² tr(T²)/2`` with the covariance T of the tilts that are tied to the bias; of an update it is
-    that before less that after, so that it does not count by how many updates a tilt was told.
+    While a vehicle goes straight on, fixes determine the sum of a tilt and of the accelerometer
+    bias that hides it, and the whole vertical bias, about the computed attitude. Once the tilt is
+    observed otherwise, mostly by a turn, and corrected by x and y, gravity along the body changes
+    by ``g (x² + y²)/2``, which a linear filter neglects. Its variance is ``g² tr(T²)/2`` with the
+    covariance T of the tilts that are tied to the bias; an update inflates by the decrease of this
+    variance, so that the sum does not depend on the number of updates.
 
-    Its mean is left out: taken off, it changed nothing of how far bounds held in 60 drives.
+    Its mean is neglected: subtracting it did not change how far bounds held in 60 drives.
 
     Parameters
     ----------
@@ -590,8 +590,8 @@ def unlearnt_force(
     Returns
     -------
     ndarray, (n, n), or None
-        For the states of the model. None where the tilt is not large, nothing of it is tied, or
-        the model has no bias of the accelerometers.
+        For the states of the model. None where the tilt is not large, no part is tied to a
+        bias, or the model has no bias of the accelerometers.
 
     Notes
     -----

@@ -1,4 +1,4 @@
-"""What every error model is: states, how they go on over a segment, and what they mean."""
+"""Interface of every error model: states, propagation over a segment, physical meaning."""
 
 from __future__ import annotations
 
@@ -52,9 +52,9 @@ class Segment:
 class ErrorModel(ABC):
     """How the errors of a mechanization and of its sensors go on; it holds no state of its own.
 
-    Errors are what is computed or measured less the truth. Whatever its own states are, a model
-    tells the same physical errors: of the state of navigation the nine of
-    `mechanization.state_error.state_error`, in level axes of the mechanization, and then those of
+    Error = computed or measured − truth. Whatever its own states are, a model gives the same
+    physical errors: first the nine of the navigation state as in
+    `mechanization.state_error.state_error`, in level axes of the mechanization, then those of
     the sensors, in the order of `sensors`.
 
     Attributes
@@ -126,10 +126,10 @@ class ErrorModel(ABC):
 
     @abstractmethod
     def from_physical(self, mechanization: Mechanization, time: float, row: Array) -> Array:
-        """Return E of ``x = E physical``, (n, `physical_size`): ``T E = 1`` on what x can tell.
+        """Return E of ``x = E physical``, (n, `physical_size`): ``T E = 1`` on the states' range.
 
-        What the model does not hold, such as a height that is kept, is lost; what is nothing
-        physical, such as the norm of a quaternion, is zero.
+        Errors without a state in the model, such as that of a held height, are lost; states without
+        physical meaning, such as the norm of a quaternion, are zero.
         """
 
 
@@ -238,19 +238,19 @@ STATES = states.STATES
 
 @dataclass(frozen=True)
 class QuaternionModel(ErrorModel):
-    """Errors of what a wander-azimuth mechanization reckons, component by component.
+    """Errors of a wander-azimuth mechanization, component by component.
 
     The states of Chernodarov (2009), (3): the errors of the three components of velocity in the
     axes xi, eta, zeta, of the four of the quaternion body to inertial, and of the four of the
     quaternion level to Earth; with gyro and accelerometer biases 17. ``A = dF/dY`` of (1), (2),
-    (4), with the standard skew-symmetric matrix in (1), whose print is not. There is no state of
-    the height: with a height that is held the vertical velocity has no error; with a free one it
-    has, and what gravity gives away with height is left out.
+    (4), with the standard skew-symmetric matrix in (1), where the printed one is not. The height
+    has no state: with a height that is held the vertical velocity has no error; with a free one it
+    has, and the change of gravity with height is neglected.
 
-    Three directions are nothing physical: the norms of the two quaternions, and a turn of the level
-    axes about zeta together with the velocity's components. `from_physical` gives them zero, and
-    they stay zero: norms are kept by the equations, and at the end of every segment the level axes
-    of the truth are taken to be those without a turn about zeta.
+    Three directions have no physical meaning: the norms of the two quaternions, and a turn of the
+    level axes about zeta together with the velocity's components. `from_physical` gives them zero,
+    and they stay zero: norms are kept by the equations, and at the end of every segment the level
+    axes of the truth are taken to be those without a turn about zeta.
 
     Inertial axes are those of the Earth at time zero. To first order in the errors; over a step of
     attitude and force by their means. Regular at the poles.
@@ -371,7 +371,7 @@ class QuaternionModel(ErrorModel):
         return out
 
     def null_directions(self, mechanization: Mechanization, time: float, row: Array) -> Array:
-        """Return what is nothing physical.
+        """Return the directions without physical meaning.
 
         Parameters
         ----------
@@ -420,7 +420,7 @@ def _checked(mechanization: Mechanization) -> Mechanization:
     return mechanization
 
 
-# The one table of error models.
+# Error models by name.
 
 
 ERROR_MODELS: dict[str, type[ErrorModel]] = {

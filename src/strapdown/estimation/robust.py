@@ -17,7 +17,7 @@ from strapdown.estimation.covariance import Innovations, Step
 __all__ = ["AdaptiveRule", "Scales"]
 
 
-# What every influence function is: how much a residual counts, the larger it is.
+# Interface of every influence function: the influence of a residual by its size.
 
 
 @dataclass(frozen=True)
@@ -121,8 +121,8 @@ class LeastSquares(Influence):
 class Huber(Influence):
     """``psi(u) = u`` up to k, and k beyond.
 
-    Convex: there is one minimiser, and nothing is ever rejected outright, so that an estimate that
-    is wrong is always pulled back. A gross error goes on pulling with k standard deviations.
+    Convex: the minimizer is unique, and no observation is rejected outright, so that a wrong
+    estimate is always pulled back. A gross error keeps the influence of k standard deviations.
 
     Attributes
     ----------
@@ -155,7 +155,7 @@ class Huber(Influence):
         return 0.5 * u * u if u <= self.k else self.k * (u - 0.5 * self.k)
 
     def psi(self, u: float) -> float:
-        """The residual, at most k of it."""
+        """The residual, limited to k."""
         return u if abs(u) <= self.k else math.copysign(self.k, u)
 
     def psi_prime(self, u: float) -> float:
@@ -213,7 +213,7 @@ def check_scale(scale: float) -> None:
         raise ConfigError("estimation.scale-update", quantity="scale", scale=scale)
 
 
-# Hampel's influence function: in three parts, and nothing beyond c.
+# Hampel's influence function: in three parts, zero beyond c.
 
 
 @dataclass(frozen=True)
@@ -262,7 +262,7 @@ class Hampel(Influence):
         return a * (b - 0.5 * a) + 0.5 * a * ((c - b) - left * left / (c - b))
 
     def psi(self, u: float) -> float:
-        """The residual, then a, then less, then nothing."""
+        """The residual, then a, then decreasing, then zero."""
         size = abs(u)
         if size <= self.a:
             return u
@@ -278,14 +278,14 @@ class Hampel(Influence):
         return -self.a / (self.c - self.b) if self.b < size <= self.c else 0.0
 
 
-# Tukey's biweight: a smooth influence function that comes down to nothing at c.
+# Tukey's biweight: a smooth influence function that falls to zero at c.
 
 
 @dataclass(frozen=True)
 class Tukey(Influence):
-    """``psi(u) = u (1 - (u / c)^2)^2`` up to c, nothing beyond.
+    """``psi(u) = u (1 - (u / c)^2)^2`` up to c, zero beyond.
 
-    There is no linear range: even a good observation counts a little less than in full.
+    Without a linear range: even a good observation has slightly less than full weight.
 
     Attributes
     ----------
@@ -335,12 +335,12 @@ class Tukey(Influence):
         return (1.0 - t) ** 2 if t < 1.0 else 0.0
 
 
-# IGG-III: in full, then less and less, then nothing; used for positions from satellites.
+# IGG-III: full weight, then decreasing, then zero; used for GNSS positions.
 
 
 @dataclass(frozen=True)
 class Igg3(Influence):
-    """Weight 1 up to k0, ``(k0 / u) ((k1 - u) / (k1 - k0))^2`` up to k1, nothing beyond.
+    """Weight 1 up to k0, ``(k0 / u) ((k1 - u) / (k1 - k0))^2`` up to k1, zero beyond.
 
     Attributes
     ----------
@@ -379,7 +379,7 @@ class Igg3(Influence):
         return 0.5 * self.k0 * self.k0 + self.k0 * width / 3.0 * (1.0 - left**3)
 
     def psi(self, u: float) -> float:
-        """The residual, then ``k0 ((k1 - u) / (k1 - k0))^2``, then nothing."""
+        """The residual, then ``k0 ((k1 - u) / (k1 - k0))^2``, then zero."""
         size = abs(u)
         if size <= self.k0:
             return u
@@ -394,7 +394,7 @@ class Igg3(Influence):
         return -2.0 * self.k0 * max(0.0, self.k1 - size) / (self.k1 - self.k0) ** 2
 
 
-# The one table of influence functions.
+# Influence functions by name.
 
 
 INFLUENCES: dict[str, type[Influence]] = {
@@ -417,9 +417,9 @@ def post_fit(influence: Influence, b: float, kappa: float) -> float:
     """Return the residual after the fit, in standard deviations of the observation.
 
     Along ``P h'`` the loss ``(x - m)' P^-1 (x - m) / 2 + rho`` is, as a function of the residual
-    beta that it leaves, ``(b - beta)^2 / (2 kappa) + rho(beta)``. It is stationary where
-    ``F(beta) = beta + kappa psi(beta) = b``; a minimum is where F rises. With a psi that comes
-    down again there are several of them, and the lowest is taken.
+    beta after the fit, ``(b - beta)^2 / (2 kappa) + rho(beta)``. It is stationary where
+    ``F(beta) = beta + kappa psi(beta) = b``; a minimum is where F rises. A redescending psi has
+    several minima; the lowest is taken.
 
     Between two knots F is convex or concave, and has one rising root at most. Newton's method
     finds it from the left of a concave piece and from the right of a convex one: the tangent then
@@ -485,17 +485,18 @@ def _rising_root(
     return u
 
 
-# The robust update as Chernodarov prints it: one Newton step, kept to show what it does.
+# The robust update as Chernodarov prints it: one Newton step, kept for comparison.
 
 
 @dataclass(frozen=True)
 class PaperUpdate:
     """One Newton step on ``(x - m)' P^-1 (x - m) / 2 + rho(nu / alpha)`` from the prediction.
 
-    It looks at the residual before the fit. Where the prediction is much less certain than the
-    observation that residual is large although nothing is wrong: Huber's psi' is then 0,
-    the step goes far past the minimum and takes nothing off the covariance. Where psi comes
-    down, psi' < 0 adds to it, or makes it negative. For comparison only; `RobustUpdate` is safe.
+    Uses the residual before the fit. Where the prediction is much less certain than the
+    observation that residual is large although nothing is wrong: Huber's psi' is then 0, the
+    step goes far past the minimum, and the covariance is not reduced. Where psi redescends,
+    psi' < 0 increases the covariance, or makes it negative. For comparison only; `RobustUpdate`
+    is safe.
 
     Attributes
     ----------
@@ -532,14 +533,14 @@ HUBER = Huber()
 
 
 class ScaleState(NamedTuple):
-    """What has been learnt of one kind of observation: numbers to keep with the filter.
+    """Learned scale of one kind of observation: numbers to keep with the filter.
 
     Attributes
     ----------
     log_square : float
         Logarithm of the square of the factor.
     information : float
-        Number of observations that it rests on, as far as they told of it.
+        Effective number of observations behind it.
     rejected : int
         How many of the last observations, one after the other, were given no weight.
     """
@@ -558,18 +559,18 @@ class ScaleState(NamedTuple):
 class AdaptiveScale:
     """How the factor of a stated standard deviation follows the innovations.
 
-    An innovation nu has the variance ``s + c^2 r``. The factor c is moved until the clipped
+    An innovation nu has the variance ``s + c^2 r``. The factor c is adjusted until the clipped
     squares ``min(nu^2 / (s + c^2 r), clip^2)`` have the mean that they have with normal errors
-    (Huber's second proposal, as a recursion with fading memory): a gross error counts no
-    more than clip standard deviations. Each counts by the share of its variance that is the
-    observation's own: after an outage, where ``s >> r``, next to nothing is learnt, or forgotten.
+    (Huber's second proposal, as a recursion with fading memory): a gross error counts at most as
+    clip standard deviations. Each observation is weighted by the share of its own variance: after
+    an outage, where ``s >> r``, almost nothing is learned or forgotten.
 
-    An estimate that is wrong by more than it says would make a function that comes down to nothing
-    reject every observation after it: after an outage in which the error grew to three of its
-    standard deviations, Tukey's does, one by one, though together they leave no doubt. After
-    `patience` rejections in a row `rule` therefore gives Huber's function, which rejects nothing.
+    An estimate with an error far beyond its covariance would make a redescending function reject
+    every later observation: after an outage in which the error grew to three of its standard
+    deviations, Tukey's does, one by one, though together they leave no doubt. After `patience`
+    rejections in a row `rule` therefore gives Huber's function, which never rejects.
 
-    The object has no state: what is learnt is a `ScaleState` that its user keeps.
+    The object is stateless: its user keeps the learned `ScaleState`.
 
     Attributes
     ----------
@@ -634,7 +635,7 @@ class AdaptiveScale:
     def after(
         self, state: ScaleState, nu: float, s: float, r: float, weight: float = 1.0
     ) -> ScaleState:
-        """Return what is known after an observation.
+        """Return the scale state after an observation.
 
         Parameters
         ----------
@@ -647,7 +648,7 @@ class AdaptiveScale:
         r : float
             Variance of the observation as stated, without the factor.
         weight : float
-            What the rule gave it; 0 is a rejection.
+            Weight by the rule; 0 is a rejection.
 
         Returns
         -------
@@ -671,7 +672,7 @@ class AdaptiveScale:
 # A robust rule that learns the scale of each component of an observation.
 
 
-#: What has been learnt of each component of an observation.
+#: Learned scale of each component of an observation.
 Scales = tuple[ScaleState, ...]
 
 
@@ -700,7 +701,7 @@ class AdaptiveRule:
         return RobustUpdate(self.influence).step(nu, s, r)
 
     def begin(self, size: int) -> Scales:
-        """Return what is known of so many components at the start."""
+        """Return the initial scale state of so many components."""
         return (self.scale.begin(),) * size
 
     def rules(self, scales: Scales) -> list[RobustUpdate]:
@@ -708,14 +709,14 @@ class AdaptiveRule:
         return [self.scale.rule(one, self.influence) for one in scales]
 
     def after(self, scales: Scales, seen: Innovations, R: NDArray[np.float64]) -> Scales:
-        """Return what is known after an observation.
+        """Return the scale state after an observation.
 
         Parameters
         ----------
         scales : tuple of ScaleState
             Before it.
         seen : Innovations
-            What came of it.
+            Innovations of the observation.
         R : ndarray, (l,)
             Its stated variances.
 
@@ -736,7 +737,7 @@ class AdaptiveRule:
         )
 
 
-# The one table of update rules.
+# Update rules by name.
 
 
 UPDATE_RULES: dict[str, type[RobustUpdate] | type[PaperUpdate] | type[AdaptiveRule]] = {

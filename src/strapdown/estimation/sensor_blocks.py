@@ -1,9 +1,10 @@
 """The errors of sensors that a filter may have as states, each made of its standard deviations.
 
-`ERRORS_OF_SENSORS` lists them. What acts within the sensors is coupled to rate and force as in
-`sensors.error_chain`, to first order: the errors are reading less truth, and the rates and forces
-that they multiply are the measured ones. What only measurements see (`lever_arm`, `time_offset`,
-`mounting`) is coupled to nothing here: the model of a measurement looks for its place by its name.
+`ERRORS_OF_SENSORS` lists them. Errors within the sensors are coupled to rate and force as in
+`sensors.error_chain`, to first order: the errors are reading − truth, and the rates and forces
+that they multiply are the measured ones. Errors that only measurements see (`lever_arm`,
+`time_offset`, `mounting`) are not coupled here: the model of a measurement finds their position in
+the state vector by name.
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ ALL_TERMS = tuple(i + j for i in XYZ for j in XYZ)
 
 
 def gyro_bias(sd: TriadLike) -> SensorStates:
-    """Return what the gyros read at rest, constant: three states.
+    """Return the constant bias of the gyros: three states.
 
     Parameters
     ----------
@@ -81,12 +82,12 @@ def gyro_bias(sd: TriadLike) -> SensorStates:
 
 
 def accel_bias(sd: TriadLike) -> SensorStates:
-    """Return what the accelerometers read without force, constant; `sd` in m/s²."""
+    """Return the constant bias of the accelerometers; `sd` in m/s²."""
     return _bias("accel_bias", "m/s²", sd)
 
 
 def gyro_drift(sd: TriadLike, correlation_time: float) -> SensorStates:
-    """Return what of a bias of gyros changes within a record: stationary Gauss-Markov.
+    """Return the varying part of the gyro bias within a record: stationary Gauss-Markov.
 
     Parameters
     ----------
@@ -101,7 +102,7 @@ def gyro_drift(sd: TriadLike, correlation_time: float) -> SensorStates:
 
 
 def accel_drift(sd: TriadLike, correlation_time: float) -> SensorStates:
-    """Return what of a bias of accelerometers changes within a record; `sd` in m/s²."""
+    """Return the varying part of the accelerometer bias within a record; `sd` in m/s²."""
     return gauss_markov(_bias("accel_drift", "m/s²", sd), correlation_time)
 
 
@@ -134,7 +135,7 @@ def gyro_misalignment(sd: TriadLike, terms: Sequence[str] = CROSS_TERMS) -> Sens
     Raises
     ------
     ConfigError
-        A standard deviation is negative or not finite, or there is no such term.
+        A standard deviation is negative or not finite, or the term does not exist.
     """
     return _by_terms("gyro_misalignment", "rad", sd, _known(terms), RATE)
 
@@ -160,7 +161,7 @@ def g_sensitivity(sd: TriadLike) -> SensorStates:
 
 
 def lever_arm(sd: TriadLike) -> SensorStates:
-    """Return the assumed place of an antenna in body axes less the true one; `sd` in m."""
+    """Return the error of an antenna's lever arm, body axes, assumed − true; `sd` in m."""
     return unseen("lever_arm", XYZ, "m", _numbers(sd, "lever_arm"))
 
 
@@ -250,7 +251,7 @@ def gauss_markov(states: SensorStates, correlation_time: float) -> SensorStates:
     Raises
     ------
     ConfigError
-        The time is no number of seconds above zero.
+        The time is not a positive number of seconds.
     """
     if not is_number(correlation_time) or not 0.0 < correlation_time < math.inf:
         raise ConfigError(
@@ -335,14 +336,14 @@ def _as_many(given: Any, k: int, name: str) -> Array:
     return np.array([float(x) for x in numbers])
 
 
-# What the sensors of a body at rest may be off by, as states of a filter.
+# Sensor errors of a stationary body as states of a filter.
 
 
 def resting_sd(sensors: ImuUncertainty, rate: ArrayLike, force: ArrayLike) -> tuple[Array, Array]:
     """Return what gyros and accelerometers may read too much while rate and force stay the same.
 
-    Scale factors, misalignments and g-sensitivities are then a part of the bias: no rest can tell
-    them from it.
+    Scale factors, misalignments and g-sensitivities are then a part of the bias: a rest cannot
+    separate them.
 
     Parameters
     ----------
@@ -367,7 +368,7 @@ def resting_sd(sensors: ImuUncertainty, rate: ArrayLike, force: ArrayLike) -> tu
 def resting_states(
     sensors: ImuUncertainty, rate: ArrayLike, force: ArrayLike
 ) -> tuple[SensorStates, SensorStates]:
-    """Return the biases of a body that stays as it stands, as states.
+    """Return the biases of a stationary body as states.
 
     Parameters
     ----------
@@ -402,8 +403,8 @@ def _walk(drift: BiasDrift) -> tuple[float, float, float]:
 # Errors of sensors as states by their names, with the sizes that a data sheet states.
 
 
-#: By name of the block: triad, attribute of its uncertainty, what makes the block of it, and the
-#: key of [sensors.gyro] or [sensors.accel] that states it.
+#: By name of the block: triad, attribute of its uncertainty, factory of the block, and the key of
+#: [sensors.gyro] or [sensors.accel] that states it.
 STATED_STATES: dict[str, tuple[str, str, Callable[..., SensorStates], str]] = {
     "gyro_bias": ("gyro", "bias", gyro_bias, "bias_sd_deg_per_h"),
     "accel_bias": ("accel", "bias", accel_bias, "bias_sd_ug"),
@@ -417,7 +418,7 @@ STATED_STATES: dict[str, tuple[str, str, Callable[..., SensorStates], str]] = {
 }
 
 
-#: Errors that go with rate and force: nothing at rest, and most of all on the move.
+#: Errors in proportion to rate and force: negligible at rest, largest in motion.
 MOVING = ("gyro_scale", "accel_scale", "gyro_misalignment", "accel_misalignment")
 
 
@@ -443,7 +444,7 @@ def stated_states(
     Raises
     ------
     ConfigError
-        There is no such block, one is named twice, or nothing states its size.
+        A block does not exist, one is named twice, or its size is not stated.
     """
     if names is None:
         known = [n for n in MOVING if any(_size(n, sensors))]
@@ -589,7 +590,7 @@ def _both(a: Triad, b: Triad) -> Triad:
 
 @dataclass(frozen=True)
 class StateProcess:
-    """What is stated of a block of states; what is not stays as it was.
+    """Stated process of a block of states; values not stated stay unchanged.
 
     Attributes
     ----------
@@ -617,7 +618,7 @@ class StateProcess:
             )
 
     def of(self, name: str, block: SensorStates | None) -> SensorStates:
-        """Return a block with what is stated.
+        """Return a block with the stated values.
 
         Parameters
         ----------
@@ -668,7 +669,7 @@ class StateProcess:
 def with_processes(
     states: tuple[SensorStates, ...], processes: Mapping[str, StateProcess]
 ) -> tuple[SensorStates, ...]:
-    """Return states with what is stated of some of them; those that are not there come last.
+    """Return states with the stated values of some; additional ones come last.
 
     Parameters
     ----------

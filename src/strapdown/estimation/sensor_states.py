@@ -1,4 +1,4 @@
-"""Errors of the sensors as states: what each does to rate and force, and how it changes."""
+"""Sensor errors as filter states: coupling to rate and force, and their process models."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Stacked(NamedTuple):
     ----------
     gyro, accel : ndarray, (7, 3, k)
     gyro_terms, accel_terms : ndarray, (l, 4)
-        What of them is not zero: first, second and third index, and value.
+        Non-zero elements: first, second and third index, and value.
     decay : ndarray, (k,), 1/s
     drive : ndarray, (k,)
     sd : ndarray, (k,)
@@ -107,7 +107,7 @@ def _terms(coupling: Array) -> Array:
     return np.column_stack([places.astype(np.float64), values]).reshape(-1, 4)
 
 
-# Names, units and places of the states of a filter.
+# Names, units and positions of the states of a filter.
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ class StateBlock:
     labels : tuple of str
         One a state: ``("x", "y", "z")``.
     unit : str
-        ``rad/s``; of all of them.
+        Unit of all states of the block, e.g. ``rad/s``.
     """
 
     name: str
@@ -134,7 +134,7 @@ class StateBlock:
 
 @dataclass(frozen=True)
 class StateLayout:
-    """Where each block stands in a state vector.
+    """Position of each block in a state vector.
 
     Attributes
     ----------

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 __all__ = ["SignalEpochs", "SignalFilter", "SignalState"]
 
-# What is left of a change that many time constants of the smoother away.
+# Remainder of a change after so many time constants of the smoother.
 FORGOTTEN = 1e-4
 # Integral of 1/(1 + x^4)² from zero to infinity.
 MEAN_SQUARE_GAIN = 3.0 * math.pi / (8.0 * math.sqrt(2.0))
@@ -24,7 +24,7 @@ MEAN_SQUARE_GAIN = 3.0 * math.pi / (8.0 * math.sqrt(2.0))
 
 @dataclass(frozen=True, eq=False)
 class SignalState:
-    """What is remembered of one channel between epochs.
+    """State of one channel between epochs.
 
     Attributes
     ----------
@@ -46,14 +46,14 @@ class SignalState:
 
 @dataclass(frozen=True, eq=False)
 class SignalEpochs:
-    """What came out.
+    """Filtered epochs.
 
     Attributes
     ----------
     level : ndarray, (m,)
         Of the epochs that are final.
     weight, expected : ndarray, (k, l)
-        Of every new sample: what the rule gave it, and what it should have been.
+        Of every new sample: weight by the rule, and the predicted value.
     """
 
     level: Array

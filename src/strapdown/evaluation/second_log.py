@@ -314,7 +314,7 @@ def _result(
     mounting = rotation.quaternion_from_dcm(state.turn)
     mounting_sd = np.degrees(sd[TURN])
     if axis is not None:
-        # About an axis of the sensor that is partly along the single axis the result is undetermined.
+        # About a sensor axis that is partly along the single axis the result is undetermined.
         mounting_sd = np.where(np.abs(axis) > 1e-3, np.inf, mounting_sd)
     return SecondLog(
         start=float(fit.time[0]),
@@ -617,8 +617,8 @@ def truth_from_second_log(
         Bias of the second gyro in its own axes, subtracted beforehand: its residual turns
         the truth by so much in every second. From a rest, or from its calibration.
     q_start : array_like, (4,)
-        Attitude of the first sensor at its first stamp that both cover: a gyro tells attitude
-        from there on only. Not used where there is an `attitude`.
+        Attitude of the first sensor at its first stamp that both cover: a gyro gives relative
+        attitude only. Not used if `attitude` is given.
 
     Returns
     -------

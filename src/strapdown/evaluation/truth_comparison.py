@@ -467,8 +467,8 @@ def smoother_consistency(
 
     Where the model is right, ``x_filter - x_smoother`` has the covariance ``P_filter -
     P_smoother`` (McReynolds, JOTA 1 (1967); Bryson and Ho, Applied Optimal Control, 1975, sec.
-    13.2), of each component a normal number, correlated over time: three standard deviations hold
-    99.7 % of them. A filter with a wrong model is contradicted by its own later observations.
+    13.2), normally distributed in each component and correlated over time: three standard
+    deviations hold 99.7 %. A filter with a wrong model is contradicted by its later observations.
 
     Parameters
     ----------
