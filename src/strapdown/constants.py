@@ -25,7 +25,7 @@ __all__ = [
 #: Conventional standard acceleration of gravity, m/s² (3rd CGPM, 1901, Resolution 2).
 STANDARD_GRAVITY = 9.80665
 
-#: Factors from rad/s to deg/h and from m/s² to µg, for what is shown to people.
+#: Factors from rad/s to deg/h and from m/s² to µg, for output.
 DEG_PER_HOUR = math.degrees(3600.0)
 MICRO_G = 1e6 / STANDARD_GRAVITY
 

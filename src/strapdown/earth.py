@@ -28,7 +28,7 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-# Inside of this normals to the ellipsoid begin to meet; outside, a number is no height.
+# Deeper, normals to the ellipsoid intersect; beyond the upper limit a number is not a height.
 _DEEPEST, _HIGHEST = -1e6, 1e9  # m
 # Where the continuation of gravity has lost its meaning.
 _HIGHEST_GRAVITY = 1e6  # m
@@ -111,7 +111,7 @@ def gravity(lat_deg: ArrayLike, alt: ArrayLike, *, ellipsoid: Ellipsoid = WGS84)
 
 
 def centrifugal(lat_deg: ArrayLike, alt: ArrayLike, *, ellipsoid: Ellipsoid = WGS84) -> Array:
-    """Centrifugal acceleration of a place that turns with the Earth.
+    """Centrifugal acceleration of a position that rotates with the Earth.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def earth_rate(lat_deg: ArrayLike, *, ellipsoid: Ellipsoid = WGS84) -> Array:
 def transport_rate(
     lat_deg: ArrayLike, alt: ArrayLike, v_n: ArrayLike, *, ellipsoid: Ellipsoid = WGS84
 ) -> Array:
-    """Rate of north-east-down relative to the Earth, as the place moves over the ellipsoid.
+    """Rate of north-east-down relative to the Earth by motion over the ellipsoid.
 
     Parameters
     ----------
@@ -300,7 +300,7 @@ def rows(**quantities: ArrayLike) -> tuple[list[Array], tuple[int, ...]]:
 
 
 def refuse(bad: NDArray[np.bool_], values: Array, name: str, code: str, **data: Any) -> None:
-    """Raise what is wrong with the first bad row, if there is one.
+    """Raise the error of the first bad row, if any.
 
     Parameters
     ----------

@@ -1,11 +1,11 @@
 """Geodetic, Earth-centred and local coordinates, and the axes of each.
 
-* A *place* is ``(..., 3)``: geodetic latitude and longitude in degrees, north and east positive,
-  and height over the ellipsoid in metres.
-* *ECEF* is Earth-centred, earth-fixed, ``(..., 3)`` in metres: x through latitude and longitude
+* A *position* (`place`) is ``(..., 3)``: geodetic latitude and longitude in degrees, north and east
+  positive, and height over the ellipsoid in meters.
+* *ECEF* is Earth-centered, Earth-fixed, ``(..., 3)`` in meters: x through latitude and longitude
   zero, z through the north pole.
-* *Local* coordinates are north, east, down, ``(..., 3)`` in metres, along the axes at an origin,
-  which is a place: straight lines, and not along the surface.
+* *Local* coordinates are north, east, down, ``(..., 3)`` in meters, along the axes at an origin,
+  which is a position: straight lines, and not along the surface.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-#: Distances from the centre of the Earth between which a point in ECEF is a place, m. Nearer,
-#: more than one normal to the ellipsoid goes through it.
+#: Valid distances of a point in ECEF from the center of the Earth, m. Nearer, more than one normal
+#: to the ellipsoid goes through it.
 NEAREST, FARTHEST = 5e4, 1e9
 
 
 def ecef_from_geodetic(place: ArrayLike, *, ellipsoid: Ellipsoid = WGS84) -> Array:
-    """Earth-centred coordinates of places.
+    """Earth-centered coordinates of positions.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def geodetic_from_ecef(position: ArrayLike, *, ellipsoid: Ellipsoid = WGS84) -> 
     """
     (x, y, z), leading = _columns(position, ("x", "y", "z"), "position")
     xyz = np.column_stack([x, y, z])
-    # Clipped, as a square that overflows is no distance.
+    # Clipped against overflow of the square.
     distance = np.linalg.norm(np.clip(xyz, -FARTHEST, FARTHEST), axis=1)
     refuse(
         (distance < NEAREST) | (distance >= FARTHEST),
@@ -167,7 +167,7 @@ def ecef_from_ned(ned: ArrayLike, origin: ArrayLike, *, ellipsoid: Ellipsoid = W
 def ned_from_geodetic(
     place: ArrayLike, origin: ArrayLike, *, ellipsoid: Ellipsoid = WGS84
 ) -> Array:
-    """Local coordinates of places.
+    """Local coordinates of positions.
 
     Parameters
     ----------
@@ -219,11 +219,11 @@ def geodetic_from_ned(ned: ArrayLike, origin: ArrayLike, *, ellipsoid: Ellipsoid
 def place_difference(
     place: ArrayLike, reference: ArrayLike, *, ellipsoid: Ellipsoid = WGS84
 ) -> Array:
-    """How far places are from others, in metres north, east and down.
+    """Displacement of positions from others, in meters north, east and down.
 
     The straight line from `reference` to `place`, along the axes halfway between the two. So it
-    changes its sign when they are exchanged, its length is the distance, two places of one height
-    have no difference down, and nothing happens at the date line or at a pole.
+    changes its sign when they are exchanged, its length is the distance, two positions of equal
+    height have a zero down component, and the date line and the poles need no special case.
 
     Parameters
     ----------
@@ -240,7 +240,7 @@ def place_difference(
     Raises
     ------
     DataError
-        As `ecef_from_geodetic`; or the places are on opposite sides of the Earth.
+        As `ecef_from_geodetic`; or the positions are on opposite sides of the Earth.
     """
     to = ecef_from_geodetic(place, ellipsoid=ellipsoid)
     start = ecef_from_geodetic(reference, ellipsoid=ellipsoid)

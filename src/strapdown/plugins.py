@@ -39,7 +39,7 @@ def plugin(kind: str, name: str, base: type) -> Any | None:
         A key of `GROUPS`.
     name : str
     base : type
-        What it must be: a subclass, or an instance.
+        Required type: a subclass, or an instance.
 
     Returns
     -------
@@ -113,8 +113,8 @@ def _loaded(point: EntryPoint, base: type) -> Any:
 class WithPlugins(Mapping[str, Any]):
     """A literal table, and behind it the plug-ins of its kind.
 
-    Its keys are those of the table: a plug-in is found by its name alone, so that nothing of
-    other distributions is imported until it is asked for.
+    Its keys are those of the table: a plug-in is found by its name alone, so that no module of
+    another distribution is imported until it is requested.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What every aid is: when it observes, what it computes, what it adds to the states."""
+"""Interface of every aid: its epochs, its observations, its additional states."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Epochs:
-    """When an aid observes, and what it was told then.
+    """Times and measured values of an aid.
 
     Attributes
     ----------
@@ -95,7 +95,7 @@ class Measurement(ABC):
 
     @abstractmethod
     def observe(self, view: View, values: Array) -> list[Observation]:
-        """Return what it observes at one of its epochs; nothing, where it tells nothing.
+        """Return the observation at one of its epochs, or None without one.
 
         Parameters
         ----------
@@ -108,14 +108,14 @@ class Measurement(ABC):
 
 @dataclass(frozen=True)
 class TabulatedMeasurement(Measurement):
-    """An aid with a table of what it measured."""
+    """An aid with a table of measurements."""
 
     #: Columns that its table must have.
     columns: ClassVar[tuple[str, ...]] = ()
 
     @abstractmethod
     def epochs(self, table: pd.DataFrame) -> Epochs:
-        """Return the epochs of a table, without the rows that say nothing.
+        """Return the epochs of a table, without rows that have no values.
 
         Parameters
         ----------
@@ -131,11 +131,11 @@ class TabulatedMeasurement(Measurement):
 
 @dataclass(frozen=True)
 class ImuDerivedMeasurement(Measurement):
-    """An aid that watches the inertial sensors, and observes where they tell it to."""
+    """An aid that derives its observations from the inertial sensors."""
 
     @abstractmethod
     def begin(self) -> Any:
-        """Return what it remembers before the first sample; never changed in place."""
+        """Return the state before the first sample; never changed in place."""
 
     @abstractmethod
     def watch(self, memory: Any, time: Array, rows: Array) -> tuple[Any, Epochs]:
@@ -153,7 +153,7 @@ class ImuDerivedMeasurement(Measurement):
         -------
         memory : object
         epochs : Epochs
-            Where it observes: at the ends of some of these steps; and what it saw up to there.
+            Times of observation, at the ends of some of these steps, with their values.
         """
 
 
@@ -162,7 +162,7 @@ def lasting(aids: Iterable[Measurement]) -> tuple[str, ...]:
     return tuple(one.name for one in aids if one.lasts)
 
 
-# Options of aids that are no numbers, or out of range.
+# Checks of the options of aids.
 
 
 def check_number(
@@ -173,7 +173,7 @@ def check_number(
     high: float = math.inf,
     above: bool = False,
 ) -> None:
-    """Refuse an option that is no number within limits.
+    """Refuse an option that is not a number within limits.
 
     Parameters
     ----------
@@ -248,13 +248,13 @@ def check_block(view: View, name: str) -> None:
     Raises
     ------
     ConfigError
-        It is not there; what is is named.
+        The block does not exist; the message lists the existing ones.
     """
     view.model.layout[name]
 
 
 def check_other_name(aid: Measurement, name: str) -> None:
-    """Refuse an option that is no name of another aid; nothing is one.
+    """Refuse an option that is not the name of another aid; empty is allowed.
 
     Parameters
     ----------
@@ -265,7 +265,7 @@ def check_other_name(aid: Measurement, name: str) -> None:
     Raises
     ------
     ConfigError
-        It is no text, or the aid's own name.
+        It is not a text, or it is the aid's own name.
     """
     value = getattr(aid, name)
     if not isinstance(value, str) or (value and value == aid.name):
@@ -274,7 +274,7 @@ def check_other_name(aid: Measurement, name: str) -> None:
         )
 
 
-# What an aid sees of a navigator at the instant of an epoch.
+# State of a navigator as an aid sees it at an epoch.
 
 
 #: Columns of the physical errors: displacement, velocity, rotation.
@@ -283,7 +283,7 @@ DISPLACEMENT, VELOCITY, ROTATION = slice(0, 3), slice(3, 6), slice(6, 9)
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """The computed state, and what the body does, at an epoch.
+    """Computed state, and motion of the body, at an epoch.
 
     Attributes
     ----------
@@ -391,7 +391,7 @@ class View:
         return out
 
     def estimate(self, name: str) -> Array:
-        """Estimate of a block: error of what was assumed, as its block is defined."""
+        """Estimate of a block: error of the assumed value, as its block is defined."""
         at = self.place(name)
         return self.sensors[at.start - PHYSICAL : at.stop - PHYSICAL]
 
@@ -412,8 +412,8 @@ def longer_by(interval: float, correlation_time: float) -> float:
     Returns
     -------
     float
-        ``(1 + rho) / (1 - rho)``, ``rho = exp(-interval / correlation_time)``: what the variance of
-        the mean of many is times their number.
+        ``(1 + rho) / (1 - rho)``, ``rho = exp(-interval / correlation_time)``: ratio of the
+        variance of the mean of many to that of independent ones.
     """
     if correlation_time == 0.0:
         return 1.0

@@ -36,11 +36,11 @@ HOUR = 3600.0
 class Barometer(TabulatedMeasurement):
     """Height of a barometer: that over the ellipsoid, a bias, and noise.
 
-    The bias is what the sea is over the ellipsoid and the weather is from the standard, or
-    whatever the heights are counted from; it is a state ``NAME.bias`` that walks with the weather,
-    or that is a Gauss-Markov process. Not modelled are the air of another temperature, which makes
-    heights over the start wrong by 0.4 percent a kelvin, and the wind of travel, which makes up to
-    0.5 m at 10 m/s and nine times that at 30 m/s.
+    The bias is the height of the sea above the ellipsoid plus the deviation of the weather from the
+    standard, or the offset of the heights' reference; it is a state ``NAME.bias``, a random walk
+    with the weather or a Gauss-Markov process. Not modeled: air of another temperature, an error of
+    0.4 percent a kelvin in heights over the start, and the wind of travel, up to 0.5 m at 10 m/s
+    and nine times that at 30 m/s.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class Barometer(TabulatedMeasurement):
         return Epochs(index_of(table)[told], values[told])
 
     def observe(self, view: View, values: Array) -> list[Observation]:
-        """Return the height less what was measured."""
+        """Return the innovation of the height: computed minus measured."""
         arm = view.C_lb @ np.asarray(self.lever_arm)
         # Up, in level axes.
         up = -view.C_ln[:, 2]

@@ -39,7 +39,7 @@ __all__ = ["Gnss", "Moving", "arm_of", "moving"]
 
 Array = NDArray[np.float64]
 
-#: What an epoch is of: the first of its values.
+#: Kind of an epoch: the first of its values.
 POSITION_CODE, VELOCITY_CODE, HORIZONTAL_CODE = 0.0, 1.0, 2.0
 PLACE = ("north, m", "east, m", "down, m")
 SPEED = ("VN, m/s", "VE, m/s", "VD, m/s")
@@ -54,15 +54,15 @@ def _in(unit: str, default: float = 0.0) -> float:
 
 @dataclass(frozen=True)
 class Gnss(TabulatedMeasurement):
-    """A satellite receiver: places of its antenna, velocities, or both.
+    """A GNSS receiver: positions of its antenna, velocities, or both.
 
-    A time offset that is a state is met by the antenna's place, velocity and acceleration at the
-    epoch: what is left out is a sixth of its jerk times the offset's third power. Where a state
-    finds more than 0.1 s, begin again with what was found as `time_offset`.
+    A time offset as a state is modeled by the antenna's position, velocity and acceleration at the
+    epoch; the neglected term is a sixth of its jerk times the offset's third power. If the
+    estimated state exceeds 0.1 s, start again with the estimate as `time_offset`.
 
-    The acceleration is that of `View.steady`. What an accelerometer reads at an instant is mostly
-    shaking that no receiver sees: taken for the acceleration, it would seem to tell at every
-    velocity that nothing is off.
+    The acceleration is that of `View.steady`. An accelerometer reading at an instant is mostly
+    vibration that a receiver does not see: as acceleration, it would make every velocity falsely
+    confirm a zero offset.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class Gnss(TabulatedMeasurement):
         How well it is known. Above zero it is estimated: states ``NAME.lever_arm``, assumed less
         true.
     time_offset : float, s
-        Stamps of the aid less the time of the inertial sensors: what is stamped t is of
+        Time stamps of the aid minus the time of the inertial sensors: a stamp t means
         ``t - time_offset``.
     time_offset_sd : float, s
         How well that is known. Above zero it is estimated: state ``NAME.time_offset``, assumed less
@@ -80,16 +80,16 @@ class Gnss(TabulatedMeasurement):
     time_offset_drift : float, s/√s
         By which that state walks.
     velocity_delay : float, s
-        The velocity is of an instant so much before that of the place of the same row: half of
-        the interval where it is a mean over the interval before.
+        Delay of the velocity against the position of the same row: half of the interval for a
+        mean over the preceding interval.
     use_position, use_velocity : bool
     position_sd_factor, velocity_sd_factor : float
         By which the stated standard deviations are multiplied.
     least_position_sd, least_velocity_sd : float, m and m/s
         No standard deviation is taken to be less.
     qualities : tuple of int
-        Of which fixes are used, as NMEA 0183 GGA has them; 6 is what a receiver guesses without
-        satellites.
+        Fix qualities to be used, as in NMEA 0183 GGA; 6 is dead reckoning by the receiver
+        without satellites.
 
     Raises
     ------
@@ -213,7 +213,7 @@ class Gnss(TabulatedMeasurement):
             if code == POSITION_CODE:
                 value = np.column_stack([np.radians(value[:, :2]), value[:, 2]])
             elif used:
-                # Speed and course are all that many a receiver tells.
+                # Many receivers output speed and course only.
                 level = good & measured[:, :2].all(axis=1) & ~measured[:, 2]
                 codes[level], told = HORIZONTAL_CODE, told | level
                 value, sd = np.where(measured, value, 0.0), np.where(measured, sd, np.inf)
@@ -226,7 +226,7 @@ class Gnss(TabulatedMeasurement):
         return Epochs(at[order], np.concatenate(rows)[order])
 
     def observe(self, view: View, values: Array) -> list[Observation]:
-        """Return a place or a velocity, north, east, down, less what was measured."""
+        """Return the innovation of a position or velocity, north, east, down: computed − measured."""
         arm = arm_of(view, self._arm, np.asarray(self.lever_arm))
         place, velocity, acceleration = moving(view, arm, self._arm)
         of_place = values[0] == POSITION_CODE
@@ -297,17 +297,17 @@ def _refuse_certain(
         )
 
 
-# How an antenna moves by what a navigator knows, and how that depends on the navigator's errors.
+# Motion of an antenna by the navigator's state, and its sensitivity to the navigator's errors.
 #
 # With the arm r of the antenna in level axes, ``W = C_lb w_ib - w_ie`` the rate of the body
 # relative to the Earth and f the specific force, relative to the Earth
 #
-#     place        p + r
+#     position     p + r
 #     velocity     v + W x r
 #     acceleration f + g - 2 w_ie x v + W x (W x r)
 #
-# Gravity g has the centrifugal part in it. The turn of the rate, ``W' x r``, is not known and not
-# in the acceleration, nor how g changes with the place.
+# Gravity g includes the centrifugal part. The angular acceleration term, ``W' x r``, is unknown and
+# neglected, as is the change of g with position.
 
 
 @dataclass(frozen=True, eq=False)
@@ -330,7 +330,7 @@ class Moving:
 
 
 def arm_of(view: View, name: str, assumed: Array) -> Array:
-    """Return an arm in body axes, (3,), m, less what a filter has found of its error."""
+    """Return an arm in body axes, (3,), m, minus the filter's estimate of its error."""
     return assumed - view.estimate(name) if view.has(name) else assumed
 
 
@@ -348,7 +348,7 @@ def moving(view: View, arm: Array, arm_name: str) -> tuple[Moving, Moving, Movin
     Returns
     -------
     place : Moving, m
-        The value is the arm: what it is beyond the place of the body. H has the place's error, too.
+        The value is the arm: antenna minus body position. H includes the position error, too.
     velocity : Moving, m/s
         Relative to the Earth.
     acceleration : Moving, m/s²

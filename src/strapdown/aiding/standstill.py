@@ -49,14 +49,14 @@ LEAST_SAMPLES = 3
 GAPS = 0.2
 # Part of a window, or of an interval, by which stamps are rounded.
 SLACK = 1e-3
-#: Columns of what is remembered: end and length of a step, rate, force.
+#: Columns of a window: end and length of a step, rate, force.
 TIME, DT, RATE, FORCE = 0, 1, slice(2, 5), slice(5, 8)
 #: Values of an epoch: number of samples, means of rate and force, variances of the rates.
 COUNT, MEAN_RATE, MEAN_FORCE, RATE_VARIANCE = 0, slice(1, 4), slice(4, 7), slice(7, 10)
 
 
 class Window(NamedTuple):
-    """What is remembered between pieces.
+    """State of a detector between chunks.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Window(NamedTuple):
     number : float
         Of the interval of the last sample; NaN before the first.
     rule : object
-        What the rule of the threshold remembers.
+        State of the threshold rule.
     """
 
     samples: Array
@@ -75,13 +75,13 @@ class Window(NamedTuple):
 
 @dataclass(frozen=True)
 class StandstillAid(ImuDerivedMeasurement):
-    """An aid that observes while a detector says that the body rests.
+    """An aid that observes while a detector finds the body stationary.
 
     The detector sees the samples of the `window` that ends at an epoch, and no later ones.
 
-    A vehicle that glides over a smooth road looks like one that rests. So nothing is observed
-    while the computed velocity is not near zero: above `largest_speed` by more than `gate` standard
-    deviations of what is computed along its direction.
+    A vehicle that glides over a smooth road looks like a stationary one. So there is no
+    observation while the computed velocity is not near zero: above `largest_speed` by more than
+    `gate` standard deviations of the computed velocity along its direction.
 
     Attributes
     ----------
@@ -91,13 +91,13 @@ class StandstillAid(ImuDerivedMeasurement):
     threshold : float
         The statistic of a rest is below it: one, if the noise is as stated.
     threshold_rule : str
-        One of `STANDSTILL_THRESHOLDS`: what becomes of it while it goes.
+        One of `STANDSTILL_THRESHOLDS`: adaptation of the threshold during a run.
     threshold_time : float, s
         For so long a rule remembers, or is patient.
     rate_sd_deg_per_s, force_sd : float, deg/s and m/s²
         Of the noise of one sample at rest, an idling engine included.
     gravity : float, m/s²
-        Of the place, for detectors that use it.
+        At the site, for detectors that use it.
     interval : float, s
         Between observations; zero: at every sample.
     largest_speed : float, m/s
@@ -146,7 +146,7 @@ class StandstillAid(ImuDerivedMeasurement):
             check_number(self, "largest_speed", low=0.0)
 
     def begin(self) -> Window:
-        """Return nothing seen."""
+        """Return an empty window."""
         rule = STANDSTILL_THRESHOLDS[self.threshold_rule]
         return Window(np.empty((0, 8)), math.nan, rule.begin(self.threshold, self.threshold_time))
 
@@ -176,7 +176,7 @@ class StandstillAid(ImuDerivedMeasurement):
         return after, Epochs(np.array(at), np.array(values).reshape(-1, 10))
 
     def near_rest(self, view: View) -> bool:
-        """Whether what is computed may be a rest."""
+        """Whether the computed velocity is compatible with rest."""
         speed = float(np.linalg.norm(view.velocity))
         if speed <= self.largest_speed or 0.0 < self.gate_time <= view.unobserved:
             return True
@@ -203,7 +203,7 @@ class StandstillAid(ImuDerivedMeasurement):
         return int(seen[: i + 1, TIME].searchsorted(begin, side="right"))
 
     def _look(self, seen: Array, i: int) -> tuple[float, Array] | None:
-        """Statistic of a window that is whole, and what it tells where it is of a rest."""
+        """Statistic of a complete window, and the observation if it is stationary."""
         first = self._first(seen, i)
         count = i + 1 - first
         within = np.ascontiguousarray(seen[first : i + 1])
@@ -218,12 +218,12 @@ class StandstillAid(ImuDerivedMeasurement):
         return statistic, np.concatenate(told)
 
 
-# The one table of detectors of a standstill: what each makes of a window of samples.
+# Standstill detectors by name: the statistic of a window of samples.
 #
 # Skog, Händel, Nilsson and Rantakokko, Zero-velocity detection - an algorithm evaluation, IEEE
-# Trans. Biomedical Engineering 57 (2010) 2657: a generalised likelihood ratio test of rest
-# against any motion, and what becomes of it where less is known of the signals. Theirs are sums
-# of squares T, to be below a threshold; here each is divided by the number of squares whose
+# Trans. Biomedical Engineering 57 (2010) 2657: a generalized likelihood ratio test of rest
+# against any motion, and its variants for less knowledge of the signals. Theirs are sums of
+# squares T, to be below a threshold; here each is divided by the number of squares whose
 # expectation is one at a quiet rest, and its root taken, so that it is one there and a threshold
 # is a number of standard deviations: ``gamma = n threshold²``, n as in
 # `StandstillDetector.squares`.
@@ -340,13 +340,12 @@ STANDSTILL_DETECTORS: dict[str, StandstillDetector] = {
 }
 
 
-# The one table of rules that say below which statistic a body stands.
+# Threshold rules by name: the statistic below which a body counts as stationary.
 #
-# A statistic (`standstill_detectors`) is in standard deviations of the noise that is stated of a
-# rest. What is stated fits a vehicle whose engine was measured. On a shoe, how still a stance is
-# depends on the gait, the sole and the ground; then a rule finds the threshold while it goes. Each
-# sees statistics one by one and none that is later, so that pieces of a record give the same as the
-# whole.
+# A statistic (`standstill_detectors`) is in standard deviations of the stated noise at rest. A
+# stated threshold fits a vehicle whose engine was measured. On a shoe, the motion in stance depends
+# on gait, sole and ground; there a rule adapts the threshold. Each rule sees statistics one by one,
+# never a later one, so that the chunks of a record give the same as the whole.
 
 
 # Of the histogram of the logarithm of a statistic: first edge, width of a bin, number of bins.
@@ -361,14 +360,14 @@ SEEN, ANEW = 2.0, 0.25
 
 
 class StandstillThreshold(ABC):
-    """A rule for a threshold; what it remembers is a value that is never changed in place."""
+    """A rule for a threshold; its state is a value that is never changed in place."""
 
     summary: ClassVar[str]
     source: ClassVar[str]
 
     @abstractmethod
     def begin(self, stated: float, scale: float) -> NamedTuple:
-        """Return what is remembered before the first statistic.
+        """Return the state before the first statistic.
 
         Parameters
         ----------
@@ -397,7 +396,7 @@ class StandstillThreshold(ABC):
 
 
 class Told(NamedTuple):
-    """What is stated, and nothing else."""
+    """The stated threshold, constant."""
 
     stated: float
 
@@ -409,11 +408,11 @@ class Stated(StandstillThreshold):
     source: ClassVar[str] = "Skog et al. (2010)"
 
     def begin(self, stated: float, scale: float) -> Told:
-        """Return what is stated."""
+        """Return the stated threshold."""
         return Told(stated)
 
     def next(self, memory: Told, time: float, statistic: float) -> tuple[Told, float]:  # type: ignore[override]
-        """Return what is stated."""
+        """Return the stated threshold."""
         return memory, memory.stated
 
 
@@ -488,7 +487,7 @@ class Patience(StandstillThreshold):
     source: ClassVar[str] = "Wahlström et al. (2019), exponential cost of a missed rest"
 
     def begin(self, stated: float, scale: float) -> Waiting:
-        """Return nothing seen."""
+        """Return empty statistics."""
         return Waiting(stated, scale, math.nan)
 
     def next(self, memory: Waiting, time: float, statistic: float) -> tuple[Waiting, float]:  # type: ignore[override]
@@ -511,10 +510,10 @@ def otsu(counts: Array) -> float | None:
     Returns
     -------
     float or None
-        The edge for which the variance between the classes is the most; the middle of such edges,
-        where bins between the classes are empty. None where there are no two classes: one has
-        less than a tenth, their means are less than a factor of five apart, or what is between
-        them is less than 0.65 of the variance.
+        The edge of the largest variance between the classes; the middle of such edges, if bins
+        between the classes are empty. None without two classes: one has less than a tenth, their
+        means are less than a factor of five apart, or the variance between them is less than 0.65
+        of the total.
 
     Notes
     -----
@@ -547,26 +546,26 @@ STANDSTILL_THRESHOLDS: dict[str, StandstillThreshold] = {
 }
 
 
-# A body that stands: its velocity is zero.
+# Zero velocity of a stationary body (ZUPT).
 
 
 @dataclass(frozen=True)
 class ZeroVelocity(StandstillAid):
-    """Zero velocity relative to the Earth, where a detector says so.
+    """Zero velocity relative to the Earth while a detector finds rest (ZUPT, zero-velocity update).
 
     Attributes
     ----------
     sd : float, m/s
-        Of the velocity of what is called a standstill, each component. What sways about a place
-        has a velocity whose mean soon is nothing, so that subsequent observations are no worse than
-        independent.
+        Of the velocity in a detected standstill, each component. The velocity of a body that
+        sways about a position soon has zero mean, so that subsequent observations are at least
+        as good as independent ones.
     pivot : float, m
         From the sensors to the point about which the body rolls while it is called still, as the
         sole of a shoe does over the ground: the mean rate of the window times this is a velocity,
         and its square adds to that of `sd`.
     correlation_time : float, s
-        For so long the velocity of what is called a standstill lasts: its variance is more by
-        `correlated.longer_by`. A shoe that rolls over its sole does so all through a stance.
+        Correlation time of the velocity in a detected standstill: its variance is increased by
+        `correlated.longer_by`. A shoe that rolls over its sole moves all through a stance.
     """
 
     sd: float = field(default=0.02, metadata={"unit": "m_per_s"})
@@ -604,12 +603,14 @@ class ZeroVelocity(StandstillAid):
 LABELS = ("VN, m/s", "VE, m/s", "VD, m/s")
 
 
-# A body that stands does not turn: what the gyros read is the Earth's rate and their errors.
+# Zero rate of a stationary body (ZARU): the gyros read the Earth's rate and their errors.
 
 
 @dataclass(frozen=True)
 class ZeroRate(StandstillAid):
-    """No turn relative to the Earth, where a detector says so: the mean rate over the window.
+    """Zero rate relative to the Earth while a detector finds rest (ZARU, zero angular rate update).
+
+    The observation is the mean rate over the window.
 
     Its variance is that of the samples in the window over their number, and `sd_deg_per_s` squared
     beside it; where windows overlap, as much more as each sample is used more than once.
@@ -617,7 +618,7 @@ class ZeroRate(StandstillAid):
     Attributes
     ----------
     sd_deg_per_s : float, deg/s
-        Of the mean rate of what is called a standstill, beyond the noise: a body that sways.
+        Of the mean rate in a detected standstill, beyond the noise: a body that sways.
     """
 
     sd_deg_per_s: float = 0.005
@@ -636,8 +637,8 @@ class ZeroRate(StandstillAid):
             return []
         earth = view.ellipsoid.rotation_rate * view.level[AXIS : AXIS + 3]
         C_bl = view.C_lb.T
-        # A scale factor is of the true rate, which at a rest is the Earth's: of what is read, that
-        # of an axis would be found to go with its bias.
+        # A scale factor acts on the true rate, at rest the Earth's: with the reading, that of an
+        # axis would be correlated with its bias.
         readings = np.concatenate([values[MEAN_RATE], values[MEAN_FORCE]])
         H = rate_columns(view, C_bl @ earth, view.without_errors(readings)[3:])
         z = values[MEAN_RATE] - H[:, PHYSICAL:] @ view.sensors - C_bl @ earth

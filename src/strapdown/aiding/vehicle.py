@@ -68,9 +68,9 @@ class NoSlip(ImuDerivedMeasurement):
     that of the errors times ``(1 + rho) / (1 - rho)``, ``rho = exp(-interval / correlation_time)``,
     so that a mean over many is as good as it is, whatever the `interval`.
 
-    Slip and dive are mostly no noise: tyres and springs yield by so much a g as long as load and
-    tyres are the same. With `compliance_sd_deg_per_g` that constant is estimated, and
-    `slip_deg_per_g` and `dive_deg_per_g` are of what is left.
+    Slip and dive are mostly systematic: tires and springs yield by a constant angle per g as long
+    as load and tires are the same. With `compliance_sd_deg_per_g` that constant is estimated, and
+    `slip_deg_per_g` and `dive_deg_per_g` refer to the remainder.
 
     At rest it holds as well as on the move, and backwards as well as forwards.
 
@@ -82,8 +82,8 @@ class NoSlip(ImuDerivedMeasurement):
     roll_deg, pitch_deg, yaw_deg : float, deg
         Of the inertial sensors in the vehicle (`VehicleAxes`).
     mounting_sd_deg : tuple of float, deg
-        Of pitch and of yaw: more than zero adds the states ``NAME.mounting``, which are seen while
-        the vehicle moves and GNSS tells where to.
+        Of pitch and of yaw: more than zero adds the states ``NAME.mounting``, which are
+        observable in motion with GNSS.
     lateral_sd, vertical_sd : float, m/s
         Of the velocities at an instant, straight on. A body that rises and falls by 15 mm at
         1.5 Hz on its springs has a vertical one of 0.1 m/s.
@@ -100,8 +100,7 @@ class NoSlip(ImuDerivedMeasurement):
     interval : float, s
         Between observations: they are at its multiples, or the first sample after.
     largest_rate_deg_per_s : float, deg/s
-        While the vehicle turns faster about its vertical, as it does when it skids, nothing is
-        observed.
+        No observation while the vehicle turns faster about its vertical, as it does in a skid.
     largest_heading_sd_deg : float, deg
         Nor while the heading is less known than so: a wrong one by so much has no linear errors.
     """
@@ -155,7 +154,7 @@ class NoSlip(ImuDerivedMeasurement):
         return (*mounting, unseen(block, labels, "rad/g", [math.radians(sds[x]) for x in labels]))
 
     def begin(self) -> Array:
-        """Return nothing seen."""
+        """Return an empty window."""
         return np.concatenate([[np.nan], np.zeros(MEMORY - 1)])
 
     def watch(self, memory: Array, time: Array, rows: Array) -> tuple[Array, Epochs]:
@@ -171,7 +170,7 @@ class NoSlip(ImuDerivedMeasurement):
         return self.correlation_time > 0.0
 
     def observe(self, view: View, values: Array) -> list[Observation]:
-        """Return the lateral and the vertical velocity, or nothing, as the limits say."""
+        """Return the lateral and the vertical velocity, if within the limits."""
         # About the third level axis, which is vertical.
         heading_sd = math.sqrt(view.covariance[HEADING, HEADING])
         if heading_sd > math.radians(self.largest_heading_sd_deg):
@@ -220,8 +219,8 @@ class Odometer(TabulatedMeasurement):
         From the inertial sensors to the wheel, or to the middle of the axle whose two wheels are
         averaged; body axes.
     roll_deg, pitch_deg, yaw_deg : float, deg
-        Of the inertial sensors in the vehicle (`VehicleAxes`). What is wrong with them is hardly
-        seen along the wheel.
+        Of the inertial sensors in the vehicle (`VehicleAxes`). Their error is hardly observable
+        along the wheel.
     mounting_of : str
         Name of another aid, as one of kind no_slip, whose estimated mounting is used.
     scale_sd : float
@@ -345,7 +344,7 @@ class BodyVelocity(TabulatedMeasurement):
         return Epochs(index_of(table)[told], values[told])
 
     def observe(self, view: View, values: Array) -> list[Observation]:
-        """Return the velocity along the axes that were measured, less what was measured."""
+        """Return the innovation of the velocity along the measured axes: computed − measured."""
         if self.mounting_of:
             check_block(view, f"{self.mounting_of}.mounting")
         velocity, H = point_velocity(view, self.lever_arm)
@@ -367,7 +366,7 @@ class BodyVelocity(TabulatedMeasurement):
 BODY_VELOCITY_LABELS = ("forward, m/s", "right, m/s", "down, m/s")
 
 
-# How the inertial sensors stand in a vehicle or an instrument: assumed, and what may be wrong.
+# Mounting of the inertial sensors in a vehicle or an instrument: assumed angles, and their error.
 
 
 ANGLES = ("roll", "pitch", "yaw")
@@ -395,7 +394,7 @@ class VehicleAxes:
     sd_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def states(self, name: str) -> tuple[SensorStates, ...]:
-        """Return the states, if any, of an aid: what is wrong with the angles, rad."""
+        """Return the mounting states of an aid, if any: errors of the angles, rad."""
         labels = [label for label, sd in zip(ANGLES, self.sd_deg, strict=True) if sd > 0.0]
         if not labels:
             return ()
@@ -403,8 +402,8 @@ class VehicleAxes:
         return (unseen(f"{name}.mounting", labels, "rad", sds),)
 
     def now(self, view: View, name: str) -> Array:
-        """Return ``C_vb``, (3, 3), without what is estimated of its errors."""
-        # What is estimated comes off the roll, then the pitch, then the yaw.
+        """Return ``C_vb``, (3, 3), with its estimated errors subtracted."""
+        # Estimates are subtracted from the roll, then the pitch, then the yaw.
         return self._back(view, name)[0] @ rotation.dcm_from_euler(self.angles_deg)
 
     def of_vehicle(self, view: View, name: str, velocity: Array, H: Array) -> tuple[Array, Array]:
@@ -445,17 +444,17 @@ class VehicleAxes:
         return back, axes, labels
 
 
-# How a point of the body moves, as it is computed, and what the errors do to it.
+# Computed motion of a point of the body, and its sensitivity to the errors.
 
 
 def rate_columns(view: View, rate: Array, force: Array) -> Array:
-    """Return what the errors of the gyros do to a rate that they measure.
+    """Return the sensitivity of a measured rate to the errors of the gyros.
 
     Parameters
     ----------
     view : View
     rate, force : ndarray, (3,), rad/s and m/s²
-        What is measured.
+        Measured values.
 
     Returns
     -------

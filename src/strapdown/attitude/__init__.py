@@ -1,4 +1,4 @@
-"""Attitude algorithms: one file each, and the one table of them."""
+"""Attitude algorithms: one file each, and the table of all."""
 
 from __future__ import annotations
 
@@ -183,13 +183,13 @@ def run_attitude(
     Returns
     -------
     AttitudeRun
-        Attitude at the start and at the end of each step, and what the algorithm says of
-        its own condition.
+        Attitude at the start and at the end of each step, and the diagnostics of the
+        algorithm.
 
     Raises
     ------
     DataError
-        `q_nb` is no rotation.
+        `q_nb` is not a rotation.
     DivergenceError
         The algorithm left the range of floating point.
     """

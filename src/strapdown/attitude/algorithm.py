@@ -1,4 +1,4 @@
-"""What every attitude algorithm is: a state, a way to advance it, and an attitude read from it."""
+"""Interface of every attitude algorithm: state, propagation, and attitude output."""
 
 from __future__ import annotations
 
@@ -79,11 +79,11 @@ class AttitudeAlgorithm(ABC):
     title : str
         The words for it in a report.
     equations : str
-        Where it stands in its source.
+        Equation numbers in its source.
     source : str
         That source.
     width : int
-        Numbers of the state that are the attitude, the first of it.
+        Number of elements of the state that are the attitude, the first ones.
     advance_kernel, update_kernel : callable
         The compiled loops over many steps and for one sample.
     """
@@ -115,7 +115,7 @@ class AttitudeAlgorithm(ABC):
         """Return the two options that the kernels take, as numbers; zero where there is none."""
 
     def diagnostics(self, state: Array, time: Array) -> dict[str, float]:
-        """Return what the algorithm knows of its own condition after a run.
+        """Return the algorithm's diagnostics after a run.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""What an algorithm costs on a processor: operations a step, and what it must remember."""
+"""Computational cost of an algorithm: operations per step, and memory."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def memory(algorithm: AttitudeAlgorithm) -> int:
 
 
 def count_cost(algorithm: AttitudeAlgorithm, dt: ArrayLike | None = None) -> Cost:
-    """Count what one sample costs an algorithm.
+    """Count the operations of one sample of an algorithm.
 
     Parameters
     ----------

@@ -18,13 +18,13 @@ class DirectionCosine(AttitudeAlgorithm):
     """The matrix, multiplied at each step by the exponential of the increment.
 
     Exact wherever the direction of the rate is constant within each step; on general motion
-    of order 2, because the increment alone says nothing of how the direction turned.
+    of order 2, because the increment alone has no information on the change of direction.
 
     Parameters
     ----------
     order : int
-        Highest power of the increment that is kept of the exponential, 1 to 20; 0 keeps all
-        of them, which is the closed form (12).
+        Highest power of the increment in the series of the exponential, 1 to 20; 0 for the
+        closed form (12).
     orthogonalise_every : int
         Steps between re-orthogonalisations, 0 for never. A truncated exponential is no
         rotation, and the loss accumulates; the closed form loses only rounding.
@@ -68,7 +68,7 @@ class DirectionCosine(AttitudeAlgorithm):
 
     @property
     def accuracy(self) -> Accuracy:
-        """Two, whatever the order of the series: what it stretches, it does not turn."""
+        """Two, whatever the order of the series: truncation scales the matrix without rotating it."""
         return Accuracy(increments=2, rates=2, coning=2)
 
     def kernel_options(self) -> tuple[float, float]:

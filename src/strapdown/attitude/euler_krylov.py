@@ -53,7 +53,7 @@ class EulerKrylov(AttitudeAlgorithm):
 
     @property
     def accuracy(self) -> Accuracy:
-        """One for the forward step; Runge-Kutta is limited by what is known of the rate."""
+        """One for the forward step; Runge-Kutta is limited by the knowledge of the rate."""
         if self.step == "forward":
             return Accuracy(increments=1, rates=1, coning=2)
         return Accuracy(increments=2, rates=4, coning=2)

@@ -42,5 +42,5 @@ class Naive(AttitudeAlgorithm):
         return Accuracy(increments=0, rates=0, coning=0)
 
     def kernel_options(self) -> tuple[float, float]:
-        """Return nothing: there are no options."""
+        """Return no options: there are none."""
         return 0.0, 0.0

@@ -21,8 +21,8 @@ class Quaternion(AttitudeAlgorithm):
     Parameters
     ----------
     order : int
-        Highest power of the increment that is kept of the series (21) and (22), 1 to 20;
-        0 keeps all of them, which is the limit: exact sine and cosine.
+        Highest power of the increment in the series (21) and (22), 1 to 20; 0 for the limit:
+        exact sine and cosine.
     normalise : bool
         Scale back to norm 1 after each step.
     """

@@ -18,11 +18,11 @@ _COEFFICIENTS = {"auto": kernel.AUTO, "miller": kernel.MILLER, "fit": kernel.FIT
 class RotationVector(AttitudeAlgorithm):
     """The quaternion, multiplied by that of the rotation vector of 1 to 4 increments.
 
-    Increments of one block are compared with each other: what their axis turned is put into
-    the rotation vector (Bortz 1971). Within a block, and at a ragged end, the attitude is
+    Increments of one block are compared with each other: the rotation of their axis is put into
+    the rotation vector (Bortz 1971). Within a block, and at an incomplete end, the attitude is
     that of the increments so far. A block ends when it is full or has turned by 1 rad, or
     before a step that is more than three times longer or shorter than its first, as beside a
-    gap or in a burst: there the increments tell nothing of each other.
+    gap or in a burst: there the increments are not comparable.
 
     Parameters
     ----------

@@ -236,9 +236,9 @@ class ErrorFilter:
 
         The noise of such an observation is in the state, too: the noise of gyros whose rotation is
         compared with the Earth's also rotates the attitude. So the observation is processed before
-        the prediction, from which the known part of the noise is subtracted: with the noise v of the
-        observation, ``M = cov(w, v)`` and ``S = M R^-1``, the transition is ``Phi - S H`` and the
-        covariance of the noise ``Q - S M'`` (Simon, Optimal State Estimation, 2006, sec. 7.1).
+        the prediction, from which the known part of the noise is subtracted: with the noise v of
+        the observation, ``M = cov(w, v)`` and ``S = M R^-1``, the transition is ``Phi - S H`` and
+        the covariance of the noise ``Q - S M'`` (Simon, Optimal State Estimation, 2006, sec. 7.1).
 
         Parameters
         ----------
@@ -380,8 +380,8 @@ class ErrorFilter:
         row = used.history_row(corrected)
         covariance = state.covariance
         if not self.model.states_are_physical:
-            # States defined by the corrected quantity refer to the new one from now on: the norm error of
-            # a quaternion is along the new quaternion.
+            # States defined by the corrected quantity refer to the new one from now on: the norm
+            # error of a quaternion is along the new quaternion.
             carried = self.model.from_physical(used, state.time, row) @ to_physical
             covariance = self.form.predict(covariance, carried, np.zeros_like(covariance))
         if self.rests:
@@ -544,7 +544,7 @@ def _gravity(mechanization: Mechanization, level: Array) -> float:
 # Root of the summed variances of both tilts, rad, below which the effect is at most 1 mm/s², the
 # drift of an accelerometer of the cheapest class.
 LARGE = math.radians(0.8)
-# Places of both tilts among the physical errors.
+# Positions of both tilts among the physical errors.
 TILTS = slice(6, 8)
 # Blocks of states that act as a bias of the accelerometers, in order of preference.
 LARGE_TILT_BIASES = ("accel_bias", "accel_drift")

@@ -146,7 +146,7 @@ def accel_misalignment(sd: TriadLike, terms: Sequence[str] = CROSS_TERMS) -> Sen
 
 
 def g_sensitivity(sd: TriadLike) -> SensorStates:
-    """Return what force does to gyros: nine states, ``xy`` of the gyro of x by the force along y.
+    """Return the g-sensitivity of gyros: nine states, ``xy`` of gyro x by the force along y.
 
     Parameters
     ----------

@@ -182,12 +182,11 @@ def heading_light(
 
     Notes
     -----
-    The error e of the run is its difference d from a witness, which is known, and the error of the
-    witness: ``|e| < |d| + 2.58 sd`` but for one of a hundred cases at most. That rests on nothing
-    that the run was told of its heading. Where a witness told it a while ago, what was added since
-    goes on top, for a minute at most: twice 2.58 times the root of all growth of the run's own
-    variance since then, of which no update takes anything off. The run is contradicted where d is
-    beyond 2.58 standard deviations of both, and beyond half of the limit.
+    The error e of the run is its known difference d from an independent check plus the error of the
+    check: ``|e| < |d| + 2.58 sd`` in 99 % of all cases. This bound does not depend on the heading
+    given to the run. For up to a minute after a check the growth since then is added: twice 2.58
+    times the root of the total growth of the run's own variance, not reduced by updates. The run is
+    contradicted where d is beyond 2.58 standard deviations of both, and beyond half of the limit.
     """
     if not 0.0 < green <= red:
         raise ConfigError(

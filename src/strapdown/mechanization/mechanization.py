@@ -1,4 +1,4 @@
-"""What every mechanization is: a state, a way to advance it, a trajectory read from it."""
+"""Interface of every mechanization: state, propagation, and trajectory output."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Mechanization(ABC):
     Attributes
     ----------
     ellipsoid : str
-        One of `ellipsoids.ELLIPSOIDS`; also of the places that go in and come out.
+        One of `ellipsoids.ELLIPSOIDS`; also of the input and output positions.
     height : {'free', 'held', 'damped'}
         The height follows from the sensors, whose errors it multiplies by e every 570 s; or is
         kept where it is, and the vertical velocity at zero; or a loop of the third order draws
@@ -51,11 +51,11 @@ class Mechanization(ABC):
     height_time_constant : float, s
         Of each of the three poles of that loop, 1 to 1000, however often references come.
     latitude_limit_deg : float, deg
-        Where north is no longer used: beyond it a run stops. A wander azimuth has no such limit.
+        North is not used beyond it: a run stops. A wander azimuth has no such limit.
     largest_speed : float, m/s
         Above it the state is taken to have diverged.
     height_limits : tuple of float, m
-        Outside of them, too.
+        A run stops outside of them, too.
 
     Raises
     ------
@@ -127,7 +127,7 @@ class Mechanization(ABC):
         return None
 
     def levels(self, history: Array) -> Array:
-        """Return what a filter needs to know of each row of a history.
+        """Return the quantities that a filter needs of each row of a history.
 
         Parameters
         ----------
@@ -197,7 +197,7 @@ class Mechanization(ABC):
         return after
 
     def nav_state(self, state: Array, time: float) -> NavState:
-        """Return the place, velocity and attitude of a state.
+        """Return the position, velocity and attitude of a state.
 
         Parameters
         ----------
@@ -351,7 +351,7 @@ class Mechanization(ABC):
         return float(row[LAT])
 
     def remarks(self, time: Array, history: Array) -> tuple[Finding, ...]:
-        """Return what a person should know of the states of a run."""
+        """Return findings about the states of a run."""
         return ()
 
     def _speed(self, row: Array) -> float:

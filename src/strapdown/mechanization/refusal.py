@@ -56,7 +56,7 @@ def refuse_step(
     Parameters
     ----------
     why : int
-        What the kernel's `verdict` said of it.
+        Code by the kernel's `verdict`.
     step : int
         Row of the increments, from 0.
     increments : DataFrame

@@ -38,7 +38,7 @@ LOST = 0.5
 
 @dataclass(frozen=True, eq=False)
 class NavigationRun:
-    """What a mechanization made of a log.
+    """Result of a mechanization run over a log.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class NavigationRun:
     history : ndarray, (n, `mechanization.row`)
         The states as the kernels have them: `Mechanization.advance`.
     findings : tuple of Finding
-        What a person should know of the increments, and of the states.
+        Findings about the increments and the states.
     source : str, optional
         Name of the log.
     """
@@ -93,7 +93,7 @@ def run_mechanization(
     backward : bool
         From the end of the log to its start.
     longest_step : float, s
-        A step longer than this is a hole over which nothing is known, and refused.
+        A longer step is a gap in the data, and refused.
 
     Returns
     -------
@@ -105,7 +105,7 @@ def run_mechanization(
         The table is not valid, a step is too long, there is a hole between two steps, or `start`
         is not at the time where the increments begin.
     ConfigError
-        `longest_step` is no time.
+        `longest_step` is not a valid time.
     DivergenceError
         As `Mechanization.advance`.
     """
@@ -198,7 +198,7 @@ def navigate_segments(
 
 
 def check_longest_step(longest: float) -> None:
-    """Refuse what is no length of time."""
+    """Refuse an invalid length of time."""
     if not is_number(longest) or not longest > 0.0:
         raise ConfigError(
             "mechanization.longest-step-none", quantity="longest_step", longest=longest
@@ -206,7 +206,7 @@ def check_longest_step(longest: float) -> None:
 
 
 def _check_segment(segment: pd.DataFrame, newest: Array) -> None:
-    """Refuse a piece that is no Imu table, or does not follow the one before."""
+    """Refuse a chunk that is not an Imu table, or does not follow the previous one."""
     source = source_of(segment)
     check_columns(segment, [*GYRO, *ACCEL], source)
     if len(segment) > 1:
@@ -229,7 +229,7 @@ def _check_start(start: NavState, begin: float, increments: pd.DataFrame) -> Non
 
 
 def _check_joints(increments: pd.DataFrame, dt: Array) -> None:
-    """Refuse time between two steps over which there is no increment."""
+    """Refuse a time interval between two steps without an increment."""
     ends = increments.index.to_numpy(dtype=np.float64)
     between = np.diff(ends) - dt[1:]
     if between.size and between.max() > LOST * dt.min():
@@ -269,7 +269,7 @@ def _refuse_holes(increments: pd.DataFrame, longest: float) -> None:
 
 def _wide_steps(increments: pd.DataFrame) -> tuple[Finding, ...]:
     dt = increments["dt"].to_numpy(dtype=np.float64)
-    # The usual step is no shorter than the shortest: with this most logs are done.
+    # The usual step is at least the shortest: this test suffices for most logs.
     if dt.max() <= 3.0 * dt.min():
         return ()
     usual = float(np.median(dt))

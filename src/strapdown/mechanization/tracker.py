@@ -19,7 +19,7 @@ from strapdown.mechanization.run import LONGEST_STEP, check_longest_step
 from strapdown.nav_state import NavState
 from strapdown.tables import SAMPLINGS
 
-# Looked up once: at a microsecond a call, finding a name is a part of it.
+# Looked up once: attribute lookup is a significant part of a call of a microsecond.
 _ndarray = np.ndarray
 
 
@@ -36,15 +36,15 @@ class NavTracker:
     mechanization : NorthEastDown or WanderAzimuth, optional
         North-east-down on WGS 84 with a free height, if not given.
     sampling : {'instantaneous', 'mean'}
-        What a sample is: the value at its stamp, or its mean over the interval that ends there.
+        Sample type: the value at its stamp, or its mean over the interval that ends there.
     longest_step : float, s
-        A longer step is a hole over which nothing is known, and refused; so is a first sample
-        that is farther than this from the time of `start`.
+        A longer step is a gap in the data, and refused; so is a first sample that is farther
+        than this from the time of `start`.
 
     Raises
     ------
     ConfigError
-        `sampling` is unknown, `longest_step` is no time, or the mechanization is another.
+        `sampling` is unknown, `longest_step` is not a valid time, or the mechanization differs.
     """
 
     __slots__ = ("_mechanization", "_record", "_update")

@@ -36,11 +36,11 @@ class WanderAzimuth(Mechanization):
     Gravity is normal gravity, which is the paper's gravitation and centrifugal term together.
 
     The error of a run is of the fourth order of the step (`_kernels.wander`), at a pole as
-    elsewhere. What comes out is north-east-down: within a distance d of a pole a displacement of x
-    across turns north, and with it longitude, heading and the components of the velocity, by
-    x / d; a centimetre, ten metres from the pole, by 0.06 deg. Ground track and attitude relative
-    to the Earth (`WanderAzimuth.earth_attitude`) are as good there as anywhere. At a pole, to
-    rounding, A is taken to be zero, and longitude tells where xi and eta point.
+    elsewhere. The output is north-east-down: within a distance d of a pole a displacement of x
+    across rotates north, and with it longitude, heading and the components of the velocity, by
+    x / d; 1 cm, ten meters from the pole, by 0.06 deg. Ground track and attitude relative to the
+    Earth (`WanderAzimuth.earth_attitude`) are as accurate there as anywhere. At a pole, to
+    rounding, A is set to zero, and longitude gives the direction of xi and eta.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ class WanderAzimuth(Mechanization):
         return wander_update
 
     def levels(self, history: Array) -> Array:
-        """Return what a filter needs to know of each row, as `Mechanization.levels`."""
+        """Return the quantities that a filter needs of each row, as `Mechanization.levels`."""
         out = np.empty((len(history), LEVEL))
         level.wander_levels(history, find_ellipsoid(self.ellipsoid).parameters(), out)
         return out
@@ -137,7 +137,7 @@ class WanderAzimuth(Mechanization):
         return after
 
     def nav_state(self, state: Array, time: float) -> NavState:
-        """Return the place, velocity and attitude of a state, as `Mechanization.nav_state`."""
+        """Return the position, velocity and attitude of a state, as `Mechanization.nav_state`."""
         place = np.empty((1, 10))
         level.wander_places(state[None, : kernel.ROW], place)
         lat, lon, alt = place[0, :3].tolist()

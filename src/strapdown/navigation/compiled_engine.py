@@ -62,14 +62,14 @@ def compiled(filter_: ErrorFilter) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Fixed:
-    """What came of m fixes.
+    """Results of m fixes.
 
     Attributes
     ----------
     time : ndarray, (m,), s
         When they were taken.
     told : ndarray, (m, 3, 3)
-        Innovation, its expected variance, and weight of each component.
+        Innovation, its predicted variance, and weight of each component.
     covariance : ndarray, (m, 9, 9)
     sensors, sensors_sd : ndarray, (m, k)
         As of a `Mark`, after each.
@@ -265,7 +265,7 @@ class CompiledEngine(Engine):
     def observe(
         self, observations: Sequence[Observation], rules: Sequence[Rules]
     ) -> list[Innovations]:
-        """Take what is observed now."""
+        """Update with the observations at the current instant."""
         met = self.filter
         self.filter, taken, seen = self.navigation.observe(met, observations, rules)
         self.nodes.updated(met, taken, self.filter)
@@ -288,10 +288,10 @@ class CompiledEngine(Engine):
 
     @classmethod
     def going_on(cls, filter_: ErrorFilter, state: EngineState) -> CompiledEngine:
-        """Return an engine at a state: the one that gave it, once, if nothing went on from there.
+        """Return an engine at a state: the one that produced it, if it was not used since.
 
-        What a sample costs is then not the making of an engine. Who goes on from the same state
-        again gets a new one, with the same numbers.
+        This saves the cost of making an engine per sample. Continuing a second time from the same
+        state gives a new engine, with the same result.
         """
         gave = state.__dict__.pop("_gave", None)
         if isinstance(gave, cls) and gave.navigation is filter_:
@@ -301,7 +301,7 @@ class CompiledEngine(Engine):
     def state(self) -> EngineState:
         """Return where it is now; the engine is not to be used any more but by `going_on`."""
         state = self._copied()
-        # Beside the fields of the state: it is no part of what it remembers.
+        # Beside the fields of the state: not part of its value.
         state.__dict__["_gave"] = self
         return state
 
@@ -318,7 +318,7 @@ class CompiledEngine(Engine):
         )
 
     def _after(self, why: int, time: Array, made: int) -> None:
-        """Take over what a loop left."""
+        """Copy the results of a loop."""
         if why == kernel.DIVERGED:
             raise diverged(float(time[made]))
         if why == kernel.BAD:

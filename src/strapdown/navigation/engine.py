@@ -1,4 +1,4 @@
-"""How a navigator goes on: what every way of it does, and the one for any modules."""
+"""Navigation engines: their interface, and the engine for any modules."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ LARGEST_GROUP = 1024
 
 @dataclass(frozen=True, eq=False)
 class EngineState:
-    """What an engine remembers.
+    """State of an engine.
 
     Attributes
     ----------
@@ -62,10 +62,10 @@ class EngineState:
     time : float, s
         Of the newest step.
     mechanization, row : ndarray
-        State and row of a history then, what was fed back taken off.
+        State and row of a history then, with the corrections applied.
     open_history, open_rows : ndarray
-        What followed the last instant of the covariance: rows of the history, the one at that
-        instant first, and increments without the errors that were fed back.
+        Since the last instant of the covariance: rows of the history, the one at that instant
+        first, and compensated increments.
     last : ndarray, (10,)
         The newest of these increments.
     """
@@ -84,7 +84,7 @@ def begun(filter_: ErrorFilter, state: FilterState, feeds_back: bool = True) -> 
     """Return the state of an engine at a state of a filter."""
     errors = np.zeros(filter_.model.layout.size)
     if not feeds_back:
-        # What an alignment found of the sensors is an error like those that are estimated.
+        # Sensor errors from an alignment are treated like estimated ones.
         E = filter_.model.from_physical(filter_.mechanization, state.time, state.row)
         errors = E @ np.concatenate([np.zeros(PHYSICAL), state.sensors])
         state = replace(state, sensors=np.zeros_like(state.sensors))
@@ -120,7 +120,7 @@ class Engine(ABC):
 
     @abstractmethod
     def over(self, time: Array, rows: Array, history: Array, note_at: float) -> int:
-        """Go over steps in which nothing is observed.
+        """Propagate over steps without observations.
 
         Parameters
         ----------
@@ -146,10 +146,10 @@ class Engine(ABC):
     def observe(
         self, observations: Sequence[Observation], rules: Sequence[Rules]
     ) -> list[Innovations]:
-        """Take what is observed now, after `close`; return what each told."""
+        """Update with the current observations, after `close`; return the innovations."""
 
     def known(self, observation: Observation) -> Observation:
-        """Return an observation of the state as it is estimated, what is kept beside taken off."""
+        """Return an observation of the estimated state, with open-loop estimates subtracted."""
         if not self.errors.any():
             return observation
         used = self.navigation
@@ -237,7 +237,7 @@ class GeneralEngine(Engine):
     def observe(
         self, observations: Sequence[Observation], rules: Sequence[Rules]
     ) -> list[Innovations]:
-        """Take what is observed now."""
+        """Update with the observations at the current instant."""
         used, met = self.navigation, self.filter
         if self.feeds_back:
             self.filter, taken, seen = used.observe(met, observations, rules)
@@ -263,7 +263,7 @@ class GeneralEngine(Engine):
         used = self.navigation.mechanization
         T = self.navigation.model.to_physical(used, self.filter.time, self.filter.row)
         error = (T @ self.errors)[:PHYSICAL]
-        # Since the last instant of the covariance the place has gone on with the velocity.
+        # Since the last instant of the covariance the position has moved with the velocity.
         error[:3] += error[3:6] * (self.time - self.filter.time)
         return used.history_row(used.correct(self.mechanization, error))
 
@@ -304,7 +304,7 @@ class GeneralEngine(Engine):
         self.open_rows, self.open_history = [], [self.row]
 
 
-# What is raised where a covariance is none any more.
+# Error of an invalid covariance.
 
 
 class LostCovarianceError(DivergenceError):
@@ -313,7 +313,7 @@ class LostCovarianceError(DivergenceError):
     Attributes
     ----------
     place : ndarray, (3,), m²
-        What stood for the variances of the place then.
+        Values of the variances of position then.
     """
 
     def __init__(self, code: str | Finding, *, place: Array | None = None, **values: Any) -> None:
@@ -321,21 +321,21 @@ class LostCovarianceError(DivergenceError):
         self.place = np.zeros(3) if place is None else place
 
 
-# What a filter leaves for a smoother on its way: how its errors grew, and what was observed.
+# Smoother history of a filter: growth of its errors, and its updates.
 
 
 #: Nodes that are noted before a compiled loop asks for more room: half a megabyte.
 BLOCK = 256
-#: Where nothing is noted a sample alone must not pay for it.
+#: Without a smoother a single sample must not cost more.
 NOTHING: Array = np.empty((0, 0))
 
 
 class NodeRows:
     """Takes the nodes of a piece of a run: instants of its filter, a row each.
 
-    A node is the begin of a filter, the end of a growth, or an update. Errors are the p physical
-    ones of its model, in level axes of the mechanization; `_kernels.smoothing_rows` has what is
-    where in a row. Compiled loops fill `room` from `used` on; others call `grew` and `updated`.
+    A node is the begin of a filter, a growth of the errors, or an update. Errors are the p physical
+    ones of its model, in level axes of the mechanization; `_kernels.smoothing_rows` has the
+    layout of a row. Compiled loops fill `room` from `used` on; others call `grew` and `updated`.
 
     Parameters
     ----------
@@ -346,7 +346,7 @@ class NodeRows:
     Attributes
     ----------
     room : ndarray, (m, width)
-        Rows, of which `used` are filled; without any where nothing is noted.
+        Rows, of which `used` are filled; empty without a smoother.
     used : int
     """
 
@@ -370,7 +370,7 @@ class NodeRows:
             self.room, self.used = np.empty_like(self.room), 0
 
     def blocks(self) -> tuple[Array, ...]:
-        """Return what was noted, some rows each, (k, width)."""
+        """Return the recorded rows, in blocks of (k, width)."""
         return (*self._full, self.room[: self.used].copy()) if self.used else tuple(self._full)
 
     def began(self, state: FilterState) -> None:

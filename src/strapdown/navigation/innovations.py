@@ -1,4 +1,4 @@
-"""Watches innovations as they come, and tells since when they are not as expected."""
+"""Monitor innovations as they arrive, and detect changes in their statistics."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ class Alarm:
     what : {'larger', 'high', 'low'}
         It scatters more than was expected; it is above zero; it is below.
     since : float, s
-        First epoch after which it was not as expected, as far as the innovations tell.
+        Estimated first epoch after the change.
     known : float, s
-        Epoch at which there was no doubt of it.
+        Epoch at which the change became significant.
     """
 
     component: int
@@ -43,7 +43,7 @@ class Alarm:
 
 @dataclass(frozen=True, eq=False)
 class MonitorState:
-    """What is remembered of a sequence; never changed in place.
+    """State of the monitor of a sequence; never changed in place.
 
     Attributes
     ----------
@@ -105,7 +105,7 @@ class InnovationMonitor:
                 )
 
     def begin(self, components: int) -> MonitorState:
-        """Return what is remembered before the first epoch."""
+        """Return the state before the first epoch."""
         shape = (3, components)
         return MonitorState(np.zeros(shape), np.full(shape, np.nan), np.zeros(shape, dtype=bool))
 
@@ -119,7 +119,7 @@ class InnovationMonitor:
         state : MonitorState
         time : array_like, (n,), s
         normalised : array_like, (n, k)
-            Innovations over their expected standard deviations. What is NaN says nothing.
+            Innovations over their predicted standard deviations. NaN is ignored.
 
         Returns
         -------
@@ -159,7 +159,7 @@ class InnovationMonitor:
         return MonitorState(sums, since, raised), tuple(alarms)
 
 
-#: What the three sums are of.
+#: Quantities of the three sums.
 WHAT: Sequence[str] = ("larger", "high", "low")
 
 
@@ -186,9 +186,9 @@ class Verdict:
     what : str
         In words, with the numbers.
     meaning : str
-        What it would mean, and what to try.
+        Probable cause, and remedy.
     p : float
-        Probability of it by chance; of a change a bound of it.
+        Probability by chance; for a change an upper bound.
     """
 
     kind: str
@@ -200,7 +200,7 @@ class Verdict:
 
 
 class Component(Protocol):
-    """What is asked of the numbers of a component."""
+    """Data of one component for the tests."""
 
     @property
     def label(self) -> str: ...
@@ -233,7 +233,7 @@ def judge(
     level: float,
     fewest: int,
 ) -> tuple[Verdict, ...]:
-    """Say what is wrong.
+    """Return the inconsistencies of an observation.
 
     Parameters
     ----------
@@ -244,14 +244,14 @@ def judge(
     components : sequence of ComponentConsistency
     alarms : sequence of Alarm
     level : float
-        Below this probability something is no chance.
+        Below this probability a deviation is significant.
     fewest : int
-        Fewer epochs tell of nothing.
+        Fewer epochs allow no test.
 
     Returns
     -------
     tuple of Verdict
-        The least probable first; what is said of gross errors and of too few epochs last.
+        The least probable first; gross errors and too few epochs last.
     """
     found: list[Verdict] = []
     for k, one in enumerate(components):
@@ -274,7 +274,7 @@ def _named(one: Component) -> str:
 
 
 def _unit(one: Component) -> str:
-    """Of 'north, m' a blank and the m; nothing where it has none."""
+    """Of 'north, m' a blank and the m; empty without a unit."""
     unit = one.label.partition(", ")[2]
     return f" {unit}" if unit else ""
 
@@ -329,7 +329,7 @@ def _begun(time: Array, u: Array, known: float) -> tuple[float, float]:
     second = np.cumsum(x[::-1] ** 2)[::-1] / n
     variance = np.maximum(second - first**2, 1e-12)
     ratio = 0.5 * n * (second - 1.0 - np.log(variance))
-    # What is fitted to a few epochs is always likely.
+    # A fit to a few epochs is always likely.
     ratio[(t > known) | (n < FEWEST_AFTER)] = -np.inf
     at = int(np.argmax(ratio))
     return float(t[at]), float(ratio[at] - ratio[0])
@@ -347,7 +347,7 @@ def _throughout(one: Component, first: float, level: float) -> list[Verdict]:
     if correlated < level and rho > 0.0:
         spread *= math.sqrt((1.0 + rho) / max(1.0 - rho, 1.0 / n))
     bias_p = 2.0 * float(normal_above(abs(one.bias) * math.sqrt(n) / spread))
-    # The mean is no part of the scatter where it is no chance.
+    # A significant mean is not part of the scatter.
     scale, scale_p = one.scale, one.scale_p
     if bias_p < level:
         square = n * (scale**2 - one.bias**2)

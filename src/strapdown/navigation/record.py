@@ -1,4 +1,4 @@
-"""What is known of a run of navigation: the flow of its states, and what was observed."""
+"""Record of a navigation run: its states, covariance and innovations."""
 
 from __future__ import annotations
 
@@ -78,8 +78,8 @@ class NavigationRecord:
     units : mapping of str to str
         Unit of each of these columns.
     innovations : mapping of str to DataFrame
-        By name of the observation, by time: for each component ``nu LABEL`` (computed less
-        observed, less what was expected of it), ``s LABEL`` (its expected variance),
+        By name of the observation, by time: for each component ``nu LABEL`` (innovation:
+        computed − observed − predicted), ``s LABEL`` (its predicted variance),
         ``weight LABEL``.
     events : tuple of Event
         In the order of time.
@@ -100,7 +100,7 @@ class NavigationRecord:
     outages: Mapping[str, tuple[Span, ...]] = field(default_factory=dict)
 
 
-# What a navigator gives for a piece of a log.
+# Output of a navigator for a chunk of a log.
 
 
 class InnovationRecord(NamedTuple):
@@ -114,7 +114,7 @@ class InnovationRecord(NamedTuple):
     labels : tuple of str
         Of its components, with units.
     innovations : Innovations
-        Computed less observed less what was expected of it; variance that was expected; weight.
+        Innovation: computed − observed − predicted; its predicted variance; weight.
     observation : Observation, optional
         Of the state before anything of this epoch was taken, estimates that are kept beside taken
         off; none of a lone receiver in a compiled loop.
@@ -128,10 +128,10 @@ class InnovationRecord(NamedTuple):
 
 
 class CovarianceSnapshot(NamedTuple):
-    """Covariance and estimates at an instant, after what was observed then.
+    """Covariance and estimates at an instant, after the update then.
 
-    Where nothing was observed for a while there is one before the observation, too, with a stamp
-    that is a microsecond earlier: there an outage ends, and what is known is least.
+    After a while without observations there is another one before the update, with a time stamp
+    a microsecond earlier: there an outage ends, and the uncertainty is largest.
 
     Attributes
     ----------
@@ -152,14 +152,14 @@ class CovarianceSnapshot(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class NavigationChunk:
-    """What came of a piece of a log.
+    """Result of a chunk of a log.
 
     Attributes
     ----------
     time : ndarray, (n,), s
         Ends of the steps.
     history : ndarray, (n, row)
-        Rows of the mechanization then, what was estimated taken off.
+        Rows of the mechanization then, with the estimates subtracted.
     seen : tuple of Seen
         In the order in which they were taken.
     marks : tuple of Mark
@@ -195,7 +195,7 @@ class _Room:
 class GrowingRows:
     """Rows of numbers: a value that never changes, whose further growth shares its memory.
 
-    Adding to the newest value costs as much as what is added; adding to an older one copies it.
+    Appending to the newest value costs only the new rows; appending to an older one copies it.
 
     Attributes
     ----------
@@ -212,7 +212,7 @@ class GrowingRows:
 
     @property
     def rows(self) -> Array:
-        """All of them, (`count`, columns); not to be written to."""
+        """All rows, (`count`, columns); read-only."""
         return self.room.buffer[: self.count]
 
     def and_then(self, rows: Array) -> GrowingRows:

@@ -1,4 +1,4 @@
-"""Keeps of a run what is wanted of it, at the rate that is wanted."""
+"""Recorders: the output of a run, at the requested rate."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ NEAR = 1e-6
 
 @dataclass(frozen=True)
 class Recorder(ABC):
-    """What of a run is kept; it holds no state of its own."""
+    """Selection of a run's output; stateless."""
 
     name: ClassVar[str]
     summary: ClassVar[str]
@@ -47,7 +47,7 @@ class Recorder(ABC):
     @property
     @abstractmethod
     def rate(self) -> float:
-        """Most states and marks a second that are kept; infinite for all of them."""
+        """Highest rate of states and marks that are kept, Hz; infinite for all."""
 
     def begin(self, navigator: Navigator) -> Tape:
         """Return an empty tape."""
@@ -64,7 +64,7 @@ class FullRecorder(Recorder):
 
     @property
     def rate(self) -> float:
-        """All of them."""
+        """Every state and mark."""
         return math.inf
 
 
@@ -79,7 +79,7 @@ class IntervalRecorder(Recorder):
     Raises
     ------
     ConfigError
-        It is no rate.
+        The rate is invalid.
     """
 
     name: ClassVar[str] = "interval"
@@ -114,7 +114,7 @@ class _Observed:
 
 @dataclass
 class Tape:
-    """What was kept so far of a run.
+    """Recorded output of a run so far.
 
     Its memory grows with the states and marks that it keeps, and with every observation: three
     numbers a component, and its time.
@@ -141,7 +141,7 @@ class Tape:
         self._marks = GrowingRows.of(1 + 81 + 2 * count)
 
     def take(self, piece: NavigationChunk) -> None:
-        """Take what came of a further piece."""
+        """Append the result of a chunk."""
         cells = self._cells(piece.time)
         if len(cells) and cells[-1] > self._state_cell:
             first = np.empty(len(cells), dtype=bool)
@@ -258,7 +258,7 @@ class Tape:
 def record_of(
     navigator: Navigator, pieces: Sequence[NavigationChunk], source: str | None = None
 ) -> NavigationRecord:
-    """Put the pieces of a run together, every sample of them.
+    """Join the chunks of a run, every sample included.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A run seen from its end: what later observations tell of earlier states."""
+"""Rauch-Tung-Striebel (RTS) smoothing of a navigation run."""
 
 from __future__ import annotations
 
@@ -49,15 +49,15 @@ class Smoother(ABC):
 class RauchTungStriebel(Smoother):
     """Fixed-interval smoother over the filter that ran: any error model, form, rule and aid.
 
-    Of each growth and each update of the filter its covariance, the transition, and what was taken
-    off are kept; from the end back to the start it then adds what came later. States and
+    The smoother history holds the covariance, the transition and the correction of each
+    propagation and update of the filter; the backward pass adds the later observations. States and
     covariances are those of Rauch, Tung and Striebel (AIAA Journal 3 (1965) 1445, Eqs. 3.28 to
-    3.31); they are reckoned in the adjoint form of Bryson and Frazier, which inverts nothing
-    where errors only grow, so that what is known exactly does no harm.
+    3.31), computed in the adjoint form of Bryson and Frazier. Where errors only grow it needs no
+    inverse, so that exactly known states do no harm.
 
-    It is linear about the filter's own states: where the filter was far from the truth, as with a
-    heading that is off by tens of degrees, the smoothed states of that time are no better than
-    the linear model there. What a rule took for an outlier stays one.
+    It is linear about the filter's own states: where the filter had large errors, as a heading
+    error of tens of degrees, the smoothed states of that time are no better than the linear model
+    there. Outliers rejected by a rule stay rejected.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class RauchTungStriebel(Smoother):
     Raises
     ------
     ConfigError
-        It is no size.
+        The size is invalid.
     """
 
     name: ClassVar[str] = "rts"
@@ -92,7 +92,7 @@ SMOOTHERS: dict[str, type[Smoother]] = {"rts": RauchTungStriebel}
 
 
 class Smoothing:
-    """What a smoother knows of a run so far.
+    """Smoother history of a run so far.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ class Smoothing:
         self._navigator = navigator
 
     def take(self, piece: NavigationChunk) -> None:
-        """Take what came of a further piece."""
+        """Append the result of a chunk."""
         for rows in piece.nodes:
             self._tape.take(rows)
 
@@ -167,10 +167,10 @@ class Smoothing:
         Returns
         -------
         error : ndarray, (m, l)
-            Smoothed less observed, to first order in what the smoother takes off: everything that
-            the observation depends on is smoothed, errors of an aid too.
+            Smoothed minus observed, to first order in the smoother's corrections: every quantity of
+            the observation is smoothed, including errors of an aid.
         covariance : ndarray, (m, l, l)
-            Expected of it, noise of the observation and all.
+            Its predicted covariance, including the noise of the observation.
         """
         time = self._tape.times()
         # The first of an instant is of the state before anything was taken at it.
@@ -216,12 +216,12 @@ class Smoothing:
             end = begin
 
 
-# What a smoother found of a run.
+# Result of a smoother.
 
 
 @dataclass(frozen=True, eq=False)
 class Smoothed:
-    """Errors that a filter's states have, by all observations, and what is left unknown.
+    """Smoothed corrections to a filter's states, with their covariance.
 
     Attributes
     ----------
@@ -235,7 +235,7 @@ class Smoothed:
     covariance : ndarray, (m, 9, 9)
         At the marks, north-east-down.
     sensors : ndarray, (m, s)
-        What the estimates of the sensors then still lack.
+        Smoothed correction of the sensor estimates.
     sensors_sd : ndarray, (m, s)
     """
 
@@ -250,8 +250,8 @@ class Smoothed:
     def corrected(self, time: Array, history: Array) -> Array:
         """Return rows of a history without the errors that were found.
 
-        Between two nodes an error goes along a line: a tenth of a second apart, what is left is
-        less than a thousandth of what is smoothed.
+        Between two nodes the correction is interpolated linearly: a tenth of a second apart, the
+        error is less than a thousandth of the correction.
 
         Parameters
         ----------
@@ -269,7 +269,7 @@ class Smoothed:
         length = self.time[after] - self.time[before]
         part = np.clip(time - self.time[before], 0.0, None)
         share = np.divide(part, length, out=np.zeros_like(part), where=length > 0.0)
-        # Beyond the last node of a filter nothing grows that was noted.
+        # Beyond the last node of a filter no growth is recorded.
         share = np.minimum(share, 1.0)[:, None]
         errors = (1.0 - share) * self.errors[before] + share * self.errors[after]
         return self.mechanization.corrected_history(history, errors)
@@ -380,6 +380,6 @@ class SmoothingTape:
 
 
 def _close(file: IO[bytes]) -> None:
-    """Close a file; where what it holds finds no room any more, it is not missed."""
+    """Close a file; a failure to write its contents does not matter any more."""
     with suppress(OSError):
         file.close()

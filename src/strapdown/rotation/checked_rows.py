@@ -1,4 +1,4 @@
-"""What every function here takes: checked, and laid out as rows for the kernels."""
+"""Check the arguments of rotation functions, and arrange them as rows for the kernels."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def rows_of(values: ArrayLike, shape: tuple[int, ...], name: str) -> tuple[Array
         )
     leading = array.shape[: array.ndim - len(shape)]
     rows = np.ascontiguousarray(array.reshape(-1, int(np.prod(shape))))
-    # A square that overflows is no more use than infinity.
+    # A square that overflows is as useless as infinity.
     bad = np.flatnonzero(~(np.abs(rows) < LARGEST).all(axis=1))
     if bad.size:
         raise DataError(
@@ -85,7 +85,7 @@ def common_shape(a: tuple[int, ...], b: tuple[int, ...]) -> tuple[int, ...]:
 def apply(
     loop: Callable[[Array, Array], Any], rows: Array, leading: tuple[int, ...], *shape: int
 ) -> Array:
-    """Return what a kernel makes of each row, each of `shape` below the leading one."""
+    """Apply a kernel to each row, each of `shape` below the leading one."""
     out = np.empty((rows.shape[0], int(np.prod(shape))))
     loop(rows, out)
     return out.reshape(leading + shape)

@@ -245,7 +245,7 @@ def within_half_turn(angles_deg: Array) -> Array:
     Returns
     -------
     ndarray, (...), deg
-        From -180 to 180; what is within already keeps every digit.
+        From -180 to 180; values already within keep every digit.
     """
     wrapped = np.remainder(angles_deg + 180.0, 360.0) - 180.0
     return np.where(np.abs(angles_deg) <= 180.0, angles_deg, wrapped)
