@@ -178,7 +178,7 @@ class Gnss(TabulatedMeasurement):
         return self.time_offset_sd > 0.0
 
     def epochs(self, table: pd.DataFrame) -> Epochs:
-        """Return an epoch for each place and for each velocity; see `TabulatedMeasurement.epochs`.
+        """Return an epoch for each position and velocity; see `TabulatedMeasurement.epochs`.
 
         A velocity without a vertical component is one of two components.
         """
@@ -226,7 +226,7 @@ class Gnss(TabulatedMeasurement):
         return Epochs(at[order], np.concatenate(rows)[order])
 
     def observe(self, view: View, values: Array) -> list[Observation]:
-        """Return the innovation of a position or velocity, north, east, down: computed − measured."""
+        """Return the innovation of a position or velocity, NED: computed − measured."""
         arm = arm_of(view, self._arm, np.asarray(self.lever_arm))
         place, velocity, acceleration = moving(view, arm, self._arm)
         of_place = values[0] == POSITION_CODE

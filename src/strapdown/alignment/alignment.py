@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Alignment:
-    """Attitude of a body at one instant, and how well it is known.
+    """Attitude of a body at one instant, with its covariance.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ class Alignment:
         return euler_sd(self.roll_pitch_heading, self.covariance)
 
     def sd_deg_after(self, seconds: float) -> Array:
-        """Standard deviations of roll, pitch and heading when the gyros have carried them on.
+        """Standard deviations of roll, pitch and heading after propagation by the gyros.
 
         Parameters
         ----------
@@ -126,7 +126,7 @@ class Site:
     Raises
     ------
     DataError
-        A latitude beyond 90 deg, a longitude of more than a turn, or no finite number.
+        A latitude beyond 90 deg, a longitude beyond a full turn, or not a finite number.
     """
 
     lat_deg: float
@@ -153,7 +153,7 @@ class Site:
 
 @dataclass(frozen=True)
 class CoarseAlignment(ABC):
-    """A way to find the attitude from the sensors' outputs; it holds no state of its own."""
+    """A method that finds the attitude from the sensor outputs; stateless."""
 
     name: ClassVar[str]
     summary: ClassVar[str]

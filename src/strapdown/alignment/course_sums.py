@@ -1,4 +1,4 @@
-"""What errors of gyros and accelerometers do to the attitude and velocity of a drive, backward."""
+"""Effect of gyro and accelerometer errors on attitude and velocity of a drive, backward."""
 
 from __future__ import annotations
 
@@ -53,13 +53,13 @@ __all__ = [
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-#: Over so much before and after it the rate at an instant is a mean, s.
+#: The rate at an instant is a mean over so much before and after it, s.
 STEADY = 0.1
 
 
 @dataclass(frozen=True, eq=False)
 class DriveSums:
-    """A record summed from the instants of fixes to its end, k fixes, m nodes, s stretches.
+    """A record integrated from the fixes to its end: k fixes, m nodes, s stretches.
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ class DriveSums:
 
 
 def drive_sums(imu: pd.DataFrame, time: Array, means: Array, errors: Array) -> DriveSums:
-    """Sum a record between fixes and its end.
+    """Integrate a record from its fixes to its end.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def drive_sums(imu: pd.DataFrame, time: Array, means: Array, errors: Array) -> D
     means : ndarray, (6,)
         Of rate and force, about which errors in proportion to the input are counted.
     errors : ndarray
-        The columns `course_unknowns.OF_SENSORS`, which are taken off.
+        The columns `course_unknowns.OF_SENSORS`, which are subtracted.
 
     Returns
     -------
@@ -115,7 +115,7 @@ def drive_sums(imu: pd.DataFrame, time: Array, means: Array, errors: Array) -> D
 
     Notes
     -----
-    With theta the rotation by which the true attitude is off the computed one,
+    With theta the rotation from the computed attitude to the true one,
     ``C_true = exp([theta x]) C``, and the true rate and force less by db and da than taken, it is
     ``theta(t) = theta_e + int_t^e C db`` and
     ``v(t) = v_e - int_t^e (C f + theta x C f - C da)``.
@@ -158,12 +158,12 @@ def drive_sums(imu: pd.DataFrame, time: Array, means: Array, errors: Array) -> D
 
 
 def _stretch_of(since: Array, length: float) -> Indices:
-    """Stretch in which instants after the beginning lie."""
+    """Index of the stretch that contains each instant; times from the beginning."""
     return np.clip((since / length * STRETCHES).astype(np.int64), 0, STRETCHES - 1)
 
 
 def _mended(values: Array, stamps: Array, means: Array, errors: Array) -> Array:
-    """Rates and forces without errors."""
+    """Rates and forces with the errors subtracted."""
     x = np.concatenate([np.zeros(OF_SENSORS.start), errors])
     matrix, by_force = x[GYRO_MATRIX].reshape(3, 3), x[GYRO_BY_FORCE].reshape(3, 3)
     before = np.diff(stamps, prepend=stamps[0] - (stamps[1] - stamps[0]))
@@ -179,7 +179,7 @@ def _mended(values: Array, stamps: Array, means: Array, errors: Array) -> Array:
 def _partials(
     sums: InertialSums, end: Array, gained: Array, means: Array
 ) -> tuple[Array, Array, Array, Array]:
-    """Lengths of the stretches, and what errors add at the beginning of each node."""
+    """Lengths of the stretches, and the contribution of errors at the beginning of each node."""
     m = len(sums.node_length)
     times = end @ sums.times
     middle = sums.middles
@@ -217,16 +217,16 @@ def _rate(turned: Array, stamps: Array, time: Array) -> Array:
     return np.asarray(rotation.rotation_vector_from_quaternion(turn) / length)
 
 
-# Velocities of the fixes of a drive, and which of them have a course.
+# Velocities of the fixes of a drive, and the fixes with a valid course.
 
 
-#: No receiver knows a velocity better, m/s.
+#: Lower bound of the standard deviation of a velocity, m/s.
 LEAST_SD = 1e-6
 
 
 @dataclass(frozen=True)
 class Antenna:
-    """Where a receiver measures, and when.
+    """Lever arm and clock of a receiver.
 
     Attributes
     ----------
@@ -287,7 +287,7 @@ def course_fixes(
     largest_sd: float,
     velocity_delay: float = 0.0,
 ) -> CourseFixes:
-    """Take the fixes with a velocity of a record that ends while it drives.
+    """Select the fixes with a velocity of a record that ends in motion.
 
     Parameters
     ----------
@@ -354,7 +354,7 @@ def course_fixes(
 # Gyro means while the fixes of a drive show the vehicle stationary.
 
 
-#: A velocity within so many standard deviations is none, nor one below what no one drives at.
+#: A velocity within so many standard deviations counts as zero, or one below any driving speed.
 CLEAR, CREEP = 4.0, 0.1
 #: A shorter rest, s, determines the bias less well than the fixes of the drive.
 LEAST = 1.0
@@ -381,7 +381,7 @@ class RestRate:
 def rest_rates(
     imu: pd.DataFrame, fixes: CourseFixes, sensors: ImuUncertainty
 ) -> tuple[RestRate, ...]:
-    """Find the rests of a record in which the receiver stood, too.
+    """Find the rests of a record in which the receiver was stationary, too.
 
     A gyro cannot distinguish a stationary vehicle from one on a straight road; the fixes can.
 
@@ -394,13 +394,13 @@ def rest_rates(
     Returns
     -------
     tuple of RestRate
-        Nothing where no fix lies in a rest.
+        Empty if no fix lies in a rest.
     """
     speed = np.hypot(fixes.velocity[:, 0], fixes.velocity[:, 1])
     slow = speed <= np.maximum(CLEAR * fixes.sd[:, :2].max(axis=1), CREEP)
     if not slow.any():
         return ()
-    # One fix that is wrong neither ends a rest nor makes one.
+    # A single outlier neither ends a rest nor makes one.
     near = np.clip(np.arange(len(slow))[:, None] + np.arange(-1, 2), 0, len(slow) - 1)
     slow = slow[near].sum(axis=1) >= 2
     drift, out = sensors.gyro_drift, []
@@ -436,11 +436,11 @@ def _while_slow(
 # Unknowns of the least squares of a drive, in the order of their columns.
 
 
-#: Stretches of a record with a noise of their own: what white noise adds is known at their ends.
+#: Stretches of a record with a noise of their own: the sum of white noise is known at their ends.
 STRETCHES: Final = 24
 
-# At the end of the record: velocity, rotation by which the true attitude is off the computed one,
-# biases of gyros and accelerometers.
+# At the end of the record: velocity, rotation from the computed attitude to the true one, biases of
+# gyros and accelerometers.
 COURSE_UNKNOWNS_VELOCITY, TURN, COURSE_UNKNOWNS_GYRO, COURSE_UNKNOWNS_ACCEL = (
     slice(0, 3),
     slice(3, 6),
@@ -454,7 +454,7 @@ GYRO_MATRIX, GYRO_BY_FORCE = slice(12, 21), slice(21, 30)
 GYRO_NOISE = slice(30, 30 + 3 * STRETCHES)
 ACCEL_MATRIX = slice(GYRO_NOISE.stop, GYRO_NOISE.stop + 9)
 ACCEL_NOISE = slice(ACCEL_MATRIX.stop, ACCEL_MATRIX.stop + 3 * STRETCHES)
-# Of the heading less the course; how far the unit is ahead of the axle; of the stamps of the fixes.
+# Heading minus course; distance of the unit ahead of the axle; offset of the stamps of the fixes.
 YAW: Final = ACCEL_NOISE.stop
 AXLE: Final = YAW + 1
 OFFSET: Final = YAW + 2

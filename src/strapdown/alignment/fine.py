@@ -51,7 +51,7 @@ __all__ = ["FineAlignment", "heading_floor_deg", "refuse_false_claims", "telling
 
 Array = NDArray[np.float64]
 
-# A body on a floor in a town moves by so much; less is not claimed.
+# Motion of a body on a floor in a town; a smaller one is not assumed.
 LEAST = Standing(
     position=np.full(3, 1e-3),  # m
     velocity=np.full(3, 3e-4),  # m/s
@@ -136,7 +136,7 @@ class FineAlignment:
         coarse : Alignment
             The attitude at the first or at the last sample, within 20 deg of the truth.
         progress : callable, optional
-            Told the share that is done.
+            Called with the completed fraction.
         increments : DataFrame, optional
             A MotionIncrements table that covers the record, as a pre-filter makes it; formed of
             `imu`, if not given.
@@ -151,7 +151,7 @@ class FineAlignment:
             The record is too short or has gaps, the coarse alignment belongs to another instant or
             does not know the heading, or the sensors' errors are beyond a linear filter.
         DivergenceError
-            The mechanization has left the range in which it means anything.
+            The mechanization has left its range of validity.
         """
         _check_coarse(coarse, imu, site)
         increments = motion_increments(imu) if increments is None else _within(increments, imu)
@@ -233,7 +233,7 @@ class FineAlignment:
     def _start(
         self, increments: pd.DataFrame, site: Site, coarse: Alignment, begin: float
     ) -> NavState:
-        """The state at the first sample; an attitude at the last one is carried back."""
+        """The state at the first sample; an attitude at the last one is propagated back."""
         end = float(increments.index[-1])
         slack = float(increments["dt"].max())
         home = replace(home_of(site, coarse.time), q_nb=coarse.q_nb)
@@ -328,7 +328,7 @@ def _within(increments: pd.DataFrame, imu: pd.DataFrame) -> pd.DataFrame:
     return part
 
 
-# The epochs of a fine alignment: where it begins, and how it goes from one to the next.
+# Epochs of a fine alignment: start, and propagation from one to the next.
 
 
 # Tilt and heading before the filter: much more than a coarse alignment leaves, which comes from the
@@ -377,7 +377,7 @@ def settled(
     standing: Standing,
     observe: tuple[str, ...],
 ) -> Iterator[tuple[FilterState, Seen]]:
-    """Go from epoch to epoch over a rest.
+    """Process the epochs of a rest.
 
     Parameters
     ----------
@@ -444,10 +444,10 @@ def initial_covariance(filter_: ErrorFilter, coarse: Alignment, standing: Standi
 # Lower bounds of the heading uncertainty of a stationary body, where errors are too large for it.
 
 
-#: Part of the least standard deviation below which a heading is claimed and not found. Rocking, by
-#: which the drifts go through other directions, gains less.
+#: Fraction of the least standard deviation below which a heading is a false claim. Rocking, which
+#: points the drifts in other directions, gains less.
 CLAIMED = 0.7
-#: A body that turns by more than this does not rest at one attitude, and its drifts show.
+#: A body that turns by more than this changes its attitude, and its drifts become observable.
 TURNED_DEG = 30.0
 #: A heading that moved by more prior standard deviations was wrong before.
 BEYOND = 4.0
@@ -455,7 +455,7 @@ CLAIMS_DEG_PER_HOUR = math.degrees(3600.0)
 
 
 def heading_floor_deg(result: FineResult, site: Site) -> float:
-    """Least standard deviation of a heading that a rest can give, however long it is.
+    """Least standard deviation of the heading of a stationary body, however long the rest.
 
     A heading and an east drift look alike, ``b_E = omega cos(lat) psi``, and so the information on
     the heading is the prior information plus that on the drift:
@@ -481,8 +481,8 @@ def heading_floor_deg(result: FineResult, site: Site) -> float:
 def refuse_false_claims(result: FineResult, site: Site) -> None:
     """Refuse a heading that is stated to be more accurate than the sensors allow.
 
-    A filter is linear: where biases are so large that the second order of tilt, heading and bias
-    is beyond the noise, it takes that for knowledge.
+    A filter is linear: with biases so large that the second order of tilt, heading and bias
+    exceeds the noise, it takes that for information.
 
     Parameters
     ----------
@@ -539,7 +539,7 @@ def telling_record(imu: pd.DataFrame) -> Iterator[None]:
         yield
     except DataError as error:
         f = error.finding
-        # The remedy of the mechanization is an argument that an alignment does not have.
+        # The remedy of the mechanization is an argument that an alignment lacks.
         if f.code not in GAPS:
             raise
         raise DataError(
@@ -561,7 +561,7 @@ def telling_record(imu: pd.DataFrame) -> Iterator[None]:
 # Findings of a fine alignment.
 
 
-#: Code of the finding of a body that rocks: no fault, where a coarse alignment lets it.
+#: Code of the finding of a rocking body: harmless, if the coarse alignment allows it.
 ROCKS = "alignment.body-rocks"
 #: Code of the finding of a bias beyond the data sheet; data `sensor`.
 BIASED = "alignment.bias-beyond-data-sheet"
@@ -569,7 +569,7 @@ BIASED = "alignment.bias-beyond-data-sheet"
 NO_NORTH = 5.0  # deg
 # Ratio to the prior standard deviation above which a quantity is not observable.
 UNCHANGED = 0.5
-# What people, wind and an engine do to a parked vehicle stays below.
+# Upper bounds of the motion of a parked vehicle by people, wind and engine.
 MOST_VELOCITY = 0.05  # m/s
 MOST_TURN = 0.5  # deg from epoch to epoch
 # Ratio to the motion that sensor noise shows for a stationary body.
@@ -641,7 +641,7 @@ def _stands(result: FineResult) -> Iterator[Finding]:
 
 def _fits(result: FineResult) -> Iterator[Finding]:
     for name, table in result.innovations.items():
-        # The first tenth is where the filter settles.
+        # The filter settles in the first tenth.
         late = table.iloc[len(table) // 10 :]
         parts = len(table.columns) // 3
         nu, s = late.iloc[:, :parts].to_numpy(), late.iloc[:, parts : 2 * parts].to_numpy()

@@ -43,16 +43,16 @@ class FineResult:
         By name of the observation, by time: ``nu``, ``s`` and ``weight`` of each component, as
         ``nu x, m/s``.
     standing : Standing
-        How still the body stood.
+        Residual motion of the body.
     interval : float, s
         From epoch to epoch.
     heading_given : bool
         Whether the heading before it is independent of the gyros.
     prior_heading_sd_deg : float, deg
-        How well the heading was taken to be known before the first epoch.
+        Assumed standard deviation of the heading before the first epoch.
     filter : ErrorFilter
     state : FilterState
-        At the last epoch: navigation goes on from here.
+        At the last epoch, for navigation to continue from.
     findings : tuple of Finding
     source : str, optional
     """
@@ -72,7 +72,7 @@ class FineResult:
 
 
 def alignment_of(filter_: ErrorFilter, state: FilterState) -> Alignment:
-    """Read a state of a filter as an alignment.
+    """Convert a filter state to an alignment.
 
     The rotation of the local level with position, 1.6e-7 rad per meter, is negligible beside
     the attitude's own uncertainty and left out.
@@ -94,7 +94,7 @@ def alignment_of(filter_: ErrorFilter, state: FilterState) -> Alignment:
 
 
 class Epochs:
-    """Collects the epochs of a run.
+    """Epochs of a run.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ class Epochs:
         self._seen: dict[str, list[tuple[float, Observation, Innovations]]] = {}
 
     def add(self, state: FilterState, seen: Mapping[str, tuple[Observation, Innovations]]) -> None:
-        """Take an epoch."""
+        """Append an epoch."""
         alignment = alignment_of(self._filter, state)
         assert alignment.gyro_bias is not None and alignment.accel_bias is not None
         assert alignment.gyro_bias_sd is not None and alignment.accel_bias_sd is not None

@@ -55,12 +55,12 @@ EPOCHS = ("end", "start")
 
 @dataclass(frozen=True)
 class InertialFrame(CoarseAlignment):
-    """Gravity turns with the Earth, and is seen to, from axes that the gyros hold still.
+    """The direction of gravity turns with the Earth, observed in inertial axes held by the gyros.
 
     Attributes
     ----------
     at : {'end', 'start'}
-        The sample at which the attitude is wanted.
+        The sample of the resulting attitude.
 
     Raises
     ------
@@ -100,8 +100,8 @@ class InertialFrame(CoarseAlignment):
         ------
         DataError
             The record has no accelerometer, a dead channel, a value that is not finite or too
-            few samples; its force is not gravity; the body travelled; or the heading is not
-            known to 1 rad.
+            few samples; its force is not gravity; the body traveled; or the standard deviation of
+            the heading exceeds 1 rad.
         """
         source = source_of(imu)
         findings = [*check_record(imu)]
@@ -150,12 +150,12 @@ def _own_covariance(
 ) -> Array:
     """Covariance by the sensors alone: of attitude at the start, latitude and gravity (5, 5).
 
-    With `level`, which turns the local level at the start into that at the end, of the attitude
+    With `level`, which rotates the local level at the start to that at the end, of the attitude
     at the end (3, 3).
     """
     turn, push = fit.response.turn, fit.response.push
     if level is not None:
-        # The gyros carry the attitude to the end, with every error of theirs.
+        # The gyros propagate the attitude to the end, with all their errors.
         turn = level @ (turn[:, :3] + fit.C_nb)
         push = level @ push[:, :3]
     return sensor_covariance(sums, turn, push, sensors) + sensor_noise(sums, turn, push, sensors)
@@ -164,12 +164,12 @@ def _own_covariance(
 def _refuse_travel(
     noise: ResidualNoise, sd: Array, imu: pd.DataFrame, site: Site, findings: list[Finding]
 ) -> None:
-    """Refuse a record whose leftovers drown north."""
+    """Refuse a record whose residuals are too large to find north."""
     if not (noise.significant and sd[2] > LARGEST_SD):
         return
     rate = imu[GYRO].to_numpy(dtype=np.float64).mean(axis=0)
     length = float(imu.index[-1] - imu.index[0])
-    # A burst of outliers or a gap explains it better than a drive.
+    # A burst of outliers or a gap is a likelier cause than a drive.
     known = [f for f in findings if f.row is not None]
     if known:
         raise DataError(
@@ -219,8 +219,8 @@ def _left_over(noise: ResidualNoise, sd: float, length: float, source: str | Non
 # accelerometers it costs a fifth of the standard deviation against the plain mean.
 
 
-# Degrees 0 and 1 are nuisance and 2 and 3 hold the attitude; the noise is judged by those above,
-# ten periods over the record at the most.
+# Degrees 0 and 1 are nuisance, 2 and 3 hold the attitude; those above, at most ten periods over the
+# record, determine the noise.
 DEGREES = 21
 FIRST_FREE = 4
 _STEP = 1e-4  # rad of latitude, for a derivative that is a sine
@@ -230,8 +230,8 @@ _STEP = 1e-4  # rad of latitude, for a derivative that is a sine
 class Response:
     """Sensitivity of the estimates to an error in a node, (m, 5, 3) each.
 
-    The answer is: error of the attitude at the first instant (3, north-east-down, rad), that of
-    the latitude (rad) and of the size of gravity (relative). An error is a vector in the body's
+    The estimates are: error of the attitude at the first instant (3, north-east-down, rad), of the
+    latitude (rad) and of the magnitude of gravity (relative). An error is a vector in the body
     axes at the first instant.
 
     Attributes
@@ -258,11 +258,11 @@ class InertialFit:
     C_nb : ndarray, (3, 3)
         Body to local level at the first instant.
     measured, known : ndarray, (DEGREES, 3), m
-        Coefficients of S in north-east-down by that attitude, and of W.
+        Coefficients of S in north-east-down by the fitted attitude, and of W.
     latitude_change : float, rad
-        Measured latitude less the site's: from the Earth's rate across the vertical.
+        Measured latitude minus the site's: from the Earth's rate across the vertical.
     gravity_change : float
-        Measured gravity less the site's, relative.
+        Measured gravity minus the site's, relative.
     response : Response
     """
 
@@ -405,18 +405,18 @@ def functionals(sums: InertialSums) -> tuple[Array, Array]:
 
 def _response(sums: InertialSums, gain: Array, C_nb: Array) -> Response:
     place, push = functionals(sums)
-    # Errors come in the body's first axes; the gain wants north, east, down.
+    # Errors are in the initial body axes; the gain is for north, east, down.
     gain_b = gain @ C_nb
     of_place = np.einsum("kdi,dm->mki", gain_b, place)
     of_push = np.einsum("kdi,dm->mki", gain_b, push)
-    # An angle error d turns what comes after it: d x dv = -[dv x] d; half of its own node.
+    # An angle error d rotates all that follows: d x dv = -[dv x] d; half of its own node.
     crosses = np.array([rotation.cross_matrix(v) for v in sums.node_velocity])
     turned = -of_push @ crosses
     after = np.cumsum(turned[::-1], axis=0)[::-1]
     return Response(after - 0.5 * turned, of_push, of_place)
 
 
-# Whether a body turned against the local level, or the gyros' vertical and the latitude differ.
+# Rotation of a body against the local level, or mismatch of the gyros' vertical and the latitude.
 
 
 BLOCKS = 10
@@ -425,7 +425,7 @@ BLOCKS = 10
 def heading_rate(
     sums: InertialSums, C_nb: Array, site: Site, sensors: ImuUncertainty
 ) -> tuple[float, float]:
-    """Rate at which the body turns about the vertical against the local level.
+    """Rate of the body about the vertical against the local level.
 
     Parameters
     ----------
@@ -438,8 +438,8 @@ def heading_rate(
     Returns
     -------
     rate, sd : float, rad/s
-        Slope of the line through the turn. To the sensors' errors it adds the scatter of the
-        turn about the line, ``12 s²/(m T²)`` with s that of the means of m = 10 parts.
+        Slope of the line through the angle. The variance adds to the sensor errors the scatter of
+        the angle about the line, ``12 s²/(m T²)`` with s that of the means of m = 10 parts.
     """
     picked = np.unique(np.linspace(0, len(sums.stamps) - 1, 50 * BLOCKS).astype(np.int64))
     time = sums.stamps[picked]
@@ -465,13 +465,13 @@ def heading_rate(
 def turn_findings(
     sums: InertialSums, C_nb: Array, site: Site, sensors: ImuUncertainty, source: str | None
 ) -> tuple[Finding, ...]:
-    """Say where a body turned about the vertical; parameters as of `heading_rate`.
+    """Report a rotation about the vertical; parameters as of `heading_rate`.
 
     Returns
     -------
     tuple of Finding
-        One, where the rate is more than five standard deviations from zero. It does no harm to
-        an inertial-frame alignment of a body that turned; it does where the body stood.
+        One, if the rate is more than five standard deviations from zero. It does no harm to
+        an inertial-frame alignment of a body that turned; it does if the body was stationary.
     """
     rate, sd = heading_rate(sums, C_nb, site, sensors)
     if not abs(rate) > CONTRADICTION * sd:
@@ -515,12 +515,12 @@ _ROUNDS = 300
 
 @dataclass(frozen=True, eq=False)
 class ResidualNoise:
-    """Excess over the noise of the sensors.
+    """Excess noise over the noise of the sensors.
 
     Attributes
     ----------
     ratio : float
-        Root of the mean ratio of energies: measured over what the sensors explain.
+        Root of the mean ratio of energies: measured over predicted by the sensors.
     significant : bool
         Whether chance gives so much less often than one time in a million.
     excess : ndarray, (4,)
@@ -560,12 +560,12 @@ class ResidualNoise:
 
 
 def _onward(response: Array) -> Array:
-    """Sum over all later nodes, and half of the own."""
+    """Sum over all later nodes, and half of the node itself."""
     return np.asarray(np.cumsum(response[::-1], axis=0)[::-1] - 0.5 * response)
 
 
 def residual_noise(sums: InertialSums, fit: InertialFit, sensors: ImuUncertainty) -> ResidualNoise:
-    """Judge what a fit leaves over.
+    """Test and estimate the noise in the residuals of a fit.
 
     Parameters
     ----------
@@ -592,7 +592,7 @@ def residual_noise(sums: InertialSums, fit: InertialFit, sensors: ImuUncertainty
     walk += 2.0 * max(drift.triad) ** 2 / drift.correlation_time
     known = known + walk * shapes[3]
     energy = np.square(fit.residual[FIRST_FREE:, :2]).sum(axis=1)
-    # What rounding leaves of a second integral of some 1e6 m.
+    # Rounding error of a second integral of some 1e6 m.
     known = known + (1e-14 * float(np.abs(sums.fallen[-1]).max())) ** 2
     axes = 2 * len(energy)
     statistic = float((energy / known).sum())

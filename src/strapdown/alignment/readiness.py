@@ -1,4 +1,4 @@
-"""How good an alignment is after how long."""
+"""Accuracy of an alignment by its duration."""
 
 from __future__ import annotations
 
@@ -56,17 +56,17 @@ class Readiness:
     ----------
     method : str
     table : DataFrame
-        Index ``duration``, s. Columns: ``time``, s, at which the attitude holds; ``roll pitch
-        heading``, deg; ``*_sd``, deg, as stated; ``*_error``, deg, estimate less reference, NaN
-        without one; ``findings``, how many there are; ``refused``, the `Finding` of a record
-        that gives no attitude, whose numbers are NaN, else None.
+        Index ``duration``, s. Columns: ``time``, s, of validity; ``roll pitch heading``, deg;
+        ``*_sd``, deg, as stated; ``*_error``, deg, estimate − reference, NaN without one;
+        ``findings``, their number; ``refused``, the `Finding` of a record without an attitude,
+        whose numbers are NaN, else None.
     """
 
     method: str
     table: pd.DataFrame
 
     def ready(self, heading_sd_deg: float) -> float:
-        """Shortest duration from which on the heading is stated at least so well.
+        """Shortest duration from which on the stated heading is at least so accurate.
 
         Parameters
         ----------
@@ -100,7 +100,7 @@ def durations_of(imu: pd.DataFrame, count: int = 10) -> Array:
     Raises
     ------
     ConfigError
-        Fewer than two are asked for.
+        Fewer than two are requested.
     DataError
         The record is shorter than 10 s.
     """
@@ -126,7 +126,7 @@ def readiness(
     durations: Sequence[float] | Array | None = None,
     reference: pd.DataFrame | None = None,
 ) -> Readiness:
-    """Align over ever longer stretches from the start of a record.
+    """Align over increasing durations from the start of a record.
 
     Parameters
     ----------
@@ -214,7 +214,7 @@ def _row(
 # Unobservable errors of a stationary body, and rotations of the body that make them observable.
 
 
-# A turn by hand or by a vehicle, and the length of a step of the forecast.
+# Duration of a turn by hand or by a vehicle, and step of the prediction.
 TURN_TIME, STEP = 20.0, 0.1  # s
 #: Possible rotations of the body: a rotation vector in its own axes, deg.
 TURNS: dict[str, tuple[float, float, float]] = {
@@ -228,14 +228,14 @@ STAY = "leave it as it stands"
 
 @dataclass(frozen=True, eq=False)
 class Manoeuvre:
-    """What would be known after a turn and a further rest.
+    """Predicted accuracy after a rotation and a further rest.
 
     Attributes
     ----------
     name : str
-        What to do.
+        Description of the rotation.
     rest : float, s
-        How long it rests afterwards.
+        Duration of the rest afterwards.
     sd_deg : ndarray, (3,), deg
         Of the tilts about north and east and of the heading.
     gyro_bias_sd, accel_bias_sd : ndarray, (3,), rad/s and m/s²
@@ -249,7 +249,7 @@ class Manoeuvre:
 
 
 def null_space(lat_deg: float, q_nb: Array, gravity: float, earth_rate: float) -> Array:
-    """Return the errors that leave no trace in any observation of a rest.
+    """Return the errors that no observation of a rest reveals.
 
     Any constant rotation psi of the computed attitude, with ``C_nb b_a = f x psi`` and
     ``C_nb b_g = omega_ie x psi``, leaves velocity and attitude relative to the Earth constant. So
@@ -314,7 +314,7 @@ def manoeuvres_after(
 
 def _forecast(result: FineResult, site: Site, name: str, turn: Array, rest: float) -> Manoeuvre:
     filter_ = result.filter
-    # A body at rest without errors: only the covariance is wanted.
+    # A body at rest without errors: only the covariance is needed.
     home = home_of(site, result.state.time)
     used = filter_.mechanization
     here = used.nav_state(result.state.mechanization, result.state.time)
@@ -373,7 +373,7 @@ def _turning(site: Site, q_nb: Array, turn: Array, steps: int) -> tuple[Array, A
     rows = np.empty((steps, 10))
     step = rotation.quaternion_from_rotation_vector(turn / steps)
     for i in range(steps):
-        # Force is constant in level: over the step it is met from halfway.
+        # Force is constant in level axes: over the step it is rotated halfway.
         half = rotation.quaternion_from_rotation_vector(0.5 * turn / steps)
         rows[i] = _resting(site, rotation.compose(q_nb, half))
         rows[i, 4:10] = np.concatenate(
@@ -384,7 +384,7 @@ def _turning(site: Site, q_nb: Array, turn: Array, steps: int) -> tuple[Array, A
     return rows, q_nb
 
 
-# An alignment taken to another instant, or over its whole record, by the gyros.
+# Propagation of an alignment to another instant, or over its whole record, by the gyros.
 
 
 def carry(
@@ -394,7 +394,7 @@ def carry(
     site: Site,
     sensors: ImuUncertainty | None = None,
 ) -> Alignment:
-    """Carry an attitude forward or backward in time.
+    """Propagate an attitude forward or backward in time.
 
     Parameters
     ----------
@@ -439,7 +439,7 @@ def carry(
     C_there = level @ C_here @ (turned if forward else turned.T)
     covariance = level @ alignment.covariance @ level.T
     if sensors is not None:
-        # Angle errors come in the axes at the first sample of the piece.
+        # Angle errors are in the axes at the first sample of the segment.
         axes = level @ C_here if forward else C_there
         turn = np.tile(axes, (len(sums.node_length), 1, 1))
         none = np.zeros_like(turn)
@@ -454,7 +454,7 @@ def carry(
 
 
 def carried_attitude(alignment: Alignment, imu: pd.DataFrame, site: Site) -> pd.DataFrame:
-    """Carry an attitude over the record that it was found in.
+    """Propagate an attitude over its own record.
 
     Parameters
     ----------
@@ -467,9 +467,9 @@ def carried_attitude(alignment: Alignment, imu: pd.DataFrame, site: Site) -> pd.
     Returns
     -------
     DataFrame
-        Attitude table: ``q_nb(t) = q_n(t)n(T) q_nb(T) q_b(T)b(t)``, the body's turn in inertial
-        space by the gyros and that of the level by the Earth's rate. One sample of a mean rate
-        has no step before it and is that of the first whole interval's start.
+        Attitude table: ``q_nb(t) = q_n(t)n(T) q_nb(T) q_b(T)b(t)``, the body's rotation in
+        inertial space by the gyros and that of the level by the Earth's rate. One sample of a
+        mean rate has no step before it and takes the start of the first whole interval.
 
     Raises
     ------

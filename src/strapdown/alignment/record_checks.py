@@ -32,16 +32,16 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-# As levelling has it: what no bias, scale or rocking makes of gravity.
+# As in levelling: deviation from gravity beyond any bias, scale or rocking.
 NEAR_GRAVITY = 0.2
 #: Fewer samples do not determine the scatter.
 LEAST_SAMPLES = 20
-# rad/s or m/s²; no sensor is as quiet, and no simulation without errors as loud.
+# rad/s or m/s²; below any sensor's noise, above the rounding of an error-free simulation.
 ROUNDING = 1e-12
 
 
 def check_record(imu: pd.DataFrame) -> tuple[Finding, ...]:
-    """Check an Imu table that is to be aligned.
+    """Check an Imu table before alignment.
 
     Parameters
     ----------
@@ -120,20 +120,20 @@ def check_gravity(force: Array, source: str | None) -> tuple[Finding, ...]:
 
 
 def gravity_findings(change: float, sd: float, source: str | None) -> tuple[Finding, ...]:
-    """Compare the size of a mean specific force with the gravity of the site.
+    """Compare the magnitude of a mean specific force with the gravity of the site.
 
     Parameters
     ----------
     change : float
-        Measured less the site's, relative.
+        Measured minus the site's, relative.
     sd : float
-        Of it.
+        Its standard deviation.
     source : str, optional
 
     Returns
     -------
     tuple of Finding
-        One, where it is more than five standard deviations.
+        One, if it is more than five standard deviations.
     """
     if not abs(change) > CONTRADICTION * sd:
         return ()
@@ -199,7 +199,7 @@ FACTOR = 10.0
 
 
 def outlier_findings(values: Array, columns: list[str], source: str | None) -> tuple[Finding, ...]:
-    """Find jumps that neither noise nor rocking makes.
+    """Find jumps beyond noise and rocking.
 
     Parameters
     ----------
@@ -240,7 +240,7 @@ def outlier_findings(values: Array, columns: list[str], source: str | None) -> t
 # Check against GNSS that a vehicle was stationary.
 
 
-#: A velocity that errs by more than this many standard deviations is a velocity.
+#: A velocity of more standard deviations is significant.
 CLEAR = 5.0
 
 
@@ -261,14 +261,14 @@ def still_by_gnss(
     Returns
     -------
     tuple of Finding
-        One, where the vehicle moves and the heading bears it.
+        One, if the vehicle moves and the heading uncertainty covers the error.
 
     Raises
     ------
     DataError
-        The vehicle moves, and the heading found as if it stood errs by more than its standard
-        deviation: the level of a vehicle that goes north turns like one on an Earth that turns
-        faster about east, by ``v_N/(R w cos(lat))``.
+        The vehicle moves, and the error of the heading found as if stationary exceeds its
+        standard deviation: the level of a vehicle that goes north rotates like one on an Earth
+        that rotates faster about east, by ``v_N/(R w cos(lat))``.
     """
     if gnss is None:
         return ()
@@ -303,7 +303,7 @@ def still_by_gnss(
     return (moves,)
 
 
-# Whether gyros can find north, and what they say of the latitude.
+# Check that the gyros can find north, and compare their latitude with the site's.
 
 
 #: A heading with a larger standard deviation, rad, counts as unknown: a uniform one has 1.81.
@@ -317,7 +317,7 @@ CONTRADICTION = 5.0
 def north_findings(
     site: Site, sd: float, sensors: ImuUncertainty, source: str | None
 ) -> tuple[Finding, ...]:
-    """Say how well north is known.
+    """Report the standard deviation of north.
 
     Parameters
     ----------
@@ -387,7 +387,7 @@ def seems_in_deg_per_s(rate: Array, site: Site) -> bool:
 
 
 def _rounded(rate: float) -> str:
-    """A rate in deg/h; what rounding leaves of none is none."""
+    """A rate in deg/h; a rounding error counts as zero."""
     return f"{rate:.3g}" if rate > 1e-9 else "0"
 
 
@@ -406,7 +406,7 @@ def latitude_findings(
     Returns
     -------
     tuple of Finding
-        One, where they differ by more than five standard deviations.
+        One, if they differ by more than five standard deviations.
     """
     off = measured_deg - site.lat_deg
     if not abs(off) > CONTRADICTION * sd_deg:

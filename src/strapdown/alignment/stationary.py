@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 AXES = ("x", "y", "z")
 #: Observations of a rest: Earth rate, constant position, zero velocity.
 OBSERVATIONS = ("rate", "position", "velocity")
-# Fewer say little of how much they vary.
+# Fewer do not determine the variance.
 LEAST_STRETCHES = 8
 # The largest of several variances of few samples, over the expected one: of eight
 # chi-square with 8 degrees of freedom one in a thousand is beyond 3.9.
@@ -65,7 +65,7 @@ def still_observations(
     standing: Standing,
     names: Sequence[str],
 ) -> list[Observation]:
-    """Make the observations of the end of an epoch: (17) and (18).
+    """Return the observations at the end of an epoch: (17) and (18).
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def position_observation(
 ) -> Observation:
     """The computed position minus that of alignment: (17), as a displacement in level axes.
 
-    In height, too, where the mechanization's is free.
+    Includes the height, if the mechanization's is free.
     """
     used = filter_.mechanization
     here = used.nav_state(state.mechanization, state.time)
@@ -129,7 +129,7 @@ def velocity_observation(
 def rate_observation(
     filter_: ErrorFilter, segment: Segment, home: NavState, standing: Standing
 ) -> Observation:
-    """The turn that the gyros have measured less that of the Earth: (16).
+    """The rotation measured by the gyros minus that of the Earth: (16).
 
     As printed it is an integral of rates rotated into fixed axes. For a body that rocks about two
     axes at once such an integral grows by the area of the cone although the body does not turn:
@@ -187,7 +187,7 @@ def turns_between(used: Mechanization, segment: Segment, home: NavState, every: 
     away = rotation.rotation_vector_from_quaternion(
         rotation.compose(levels[:, Q_LB : Q_LB + 4], rotation.conjugate(rest))
     )
-    # The level turns, too, with the velocity that is computed.
+    # The level rotates with the computed velocity, too.
     turned = used.levels(segment.history[:-1])[:, OMEGA_EL : OMEGA_EL + 3]
     turned = _stretches(turned * segment.increments[:, :1], every).sum(axis=1)
     return np.asarray(np.diff(away, axis=0)[: len(turned)] + turned)
@@ -197,7 +197,7 @@ def attitude_of_rest(segment: Segment) -> Array:
     """Mean attitude of a run, body to north-east-down, (4,)."""
     used = segment.mechanization
     q = used.levels(segment.history)[:, Q_LB : Q_LB + 4]
-    # The sign of a quaternion is not its own.
+    # The sign of a quaternion is arbitrary.
     mean = (q * np.sign(q @ q[0])[:, None]).mean(axis=0)
     mean /= np.sqrt(mean @ mean)
     level = used.level_from_ned(segment.history[0])
@@ -287,8 +287,8 @@ def measured_standing(
 
 
 def _as_independent(values: Array, order: int) -> Array:
-    """Deviation of independent epochs whose means over stretches would vary as much, (3,)."""
-    # Of a difference of independent numbers: the sum of the squares of its binomials.
+    """Standard deviation of independent epochs with the same variance of stretch means, (3,)."""
+    # For a difference of independent numbers: the sum of the squares of its binomials.
     gain = math.sqrt(math.comb(2 * order, order))
     found = np.zeros(3)
     length = 1
@@ -310,7 +310,7 @@ def velocity_of_noise(gyro: Triad, accel: Triad, interval: float, epochs: int) -
     interval : float, s
         From epoch to epoch.
     epochs : int
-        How many there are.
+        Number of epochs.
 
     Returns
     -------

@@ -68,7 +68,7 @@ class DirectionCosine(AttitudeAlgorithm):
 
     @property
     def accuracy(self) -> Accuracy:
-        """Two, whatever the order of the series: truncation scales the matrix without rotating it."""
+        """Two, whatever the order of the series: truncation only scales the matrix."""
         return Accuracy(increments=2, rates=2, coning=2)
 
     def kernel_options(self) -> tuple[float, float]:

@@ -31,13 +31,13 @@ NO_WAY = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class ControlPointScore:
-    """A path at its control points.
+    """Errors of a path at its control points.
 
     Attributes
     ----------
     time : ndarray, (n,), s
     points : ndarray, (n, 2), m
-        Control points, turned and shifted onto the path: north and east of the path's start.
+        Control points, rotated and shifted onto the path: north and east of the path's start.
     error : ndarray, (n, 2), m
         Computed less these.
     turn_deg : float, deg
@@ -45,7 +45,7 @@ class ControlPointScore:
     way : float, m
         From point to point in all.
     given : int
-        Points that there are, those before and after the run counted, too.
+        Number of points, including those before and after the run.
     """
 
     time: Array
@@ -77,12 +77,12 @@ class ControlPointScore:
 
     @property
     def largest_at(self) -> float:
-        """When it is, s."""
+        """Time of the largest distance, s."""
         return float(self.time[int(np.argmax(self.distance))])
 
 
 def rigid_fit(points: ArrayLike, onto: ArrayLike) -> tuple[float, Array]:
-    """Return the turn and the shift that bring points of a plane nearest to others.
+    """Return the rotation and the shift that best fit points of a plane to others.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def rigid_fit(points: ArrayLike, onto: ArrayLike) -> tuple[float, Array]:
     turn : float, rad
         From north to east.
     placed : ndarray, (n, 2)
-        The points, turned and shifted: the sum of squared distances to `onto` is least.
+        The points, rotated and shifted: the sum of squared distances to `onto` is least.
 
     Notes
     -----
@@ -119,8 +119,8 @@ def score_control_points(
     trajectory : DataFrame
         Trajectory table.
     points : DataFrame
-        By time in s on its clock, ``north`` and ``east`` in m (`read_control_points`). Those
-        before its begin and after its end are left out.
+        By time in s on its clock, ``north`` and ``east`` in m (`read_control_points`). Points
+        outside its time span are left out.
     ellipsoid : Ellipsoid
 
     Returns

@@ -33,8 +33,8 @@ def attitude_at(attitude: pd.DataFrame, time: ArrayLike) -> Array:
     Returns
     -------
     ndarray, (n, 4)
-        The rows themselves where the stamps are in the table; between them, turned at a
-        constant rate from one to the next.
+        The rows themselves at their time stamps; between them, rotated at a constant rate from
+        one to the next.
     """
     stamps = attitude.index.to_numpy(dtype=np.float64)
     q = attitude[QUATERNION].to_numpy(dtype=np.float64)
@@ -111,7 +111,7 @@ class Known:
     Attributes
     ----------
     q_nb : ndarray, (n, 4)
-        At every sample; without meaning where it does not count.
+        At every sample; not valid where `counts` is False.
     counts : ndarray of bool, (n,)
     """
 
@@ -148,14 +148,14 @@ def angles_to_errors(angles: Array) -> Errors:
 
 
 def known_at(truth: pd.DataFrame, scored: Mask, stamps: Array) -> Known:
-    """Lay a truth over the samples of a log.
+    """Interpolate a truth at the samples of a log.
 
     Parameters
     ----------
     truth : DataFrame
         An Attitude table, on stamps of its own or on (some of) the log's.
     scored : ndarray of bool
-        Which of its rows count.
+        Rows of the truth to be used.
     stamps : ndarray, (n,), s
         Of the log.
 

@@ -1,4 +1,4 @@
-"""Fixes withheld from a navigator, and how far it then is from them.
+"""GNSS outage test: position error of a navigator at withheld fixes.
 
 A good receiver replaces a reference: some seconds of its fixes are withheld, and the navigator,
 which continues without them, is scored against them. Its stated error is tested on the same
@@ -42,7 +42,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Withholding:
-    """The rule of an aid whose observations are looked at and not used."""
+    """Update rule with zero weight: innovations are computed but not used."""
 
     def step(self, nu: float, s: float, r: float) -> Step:
         """Return a step of zero corrections."""
@@ -51,7 +51,7 @@ class Withholding:
 
 @dataclass(frozen=True, eq=False)
 class WithheldScore:
-    """A navigator over one span without fixes.
+    """Errors of a navigator over one span without fixes.
 
     Attributes
     ----------
@@ -84,40 +84,40 @@ class WithheldScore:
 
     @property
     def bound(self) -> Array:
-        """Distance that 95 of 100 errors are within, in the direction of the error, (n,), m.
+        """95 % bound of the error, in the direction of the error, (n,), m.
 
-        Where the ray through the error leaves the ellipse of 95 %: `horizontal` is below it if and
-        only if the error is within the ellipse.
+        Distance at which the ray through the error leaves the 95 % ellipse: `horizontal` is below it
+        if and only if the error is within the ellipse.
         """
         return plane_reach(self.horizontal, self.distance, self.covariance)
 
     @property
     def distance(self) -> Array:
-        """Mahalanobis distance of the horizontal error, (n,): 2.45 is the bound of 95 %."""
+        """Mahalanobis distance of the horizontal error, (n,): 2.45 is the 95 % bound."""
         e = self.error[:, :2]
         weighed = np.linalg.solve(self.covariance, e[:, :, None])[..., 0]
         return np.asarray(np.sqrt((e * weighed).sum(axis=1)))
 
     @property
     def inside(self) -> bool:
-        """Whether the largest horizontal error is within the ellipse of 95 % of its instant."""
+        """Whether the largest horizontal error is within the 95 % ellipse of its instant."""
         return bool(self.distance[int(np.argmax(self.horizontal))] <= PLANE_95)
 
 
 def spans_to_withhold(begin: float, end: float, length: float, places: int = 5) -> tuple[Span, ...]:
-    """Return spans of one length, spread evenly: the first at the begin, the last at the end.
+    """Return evenly spread spans of one length: the first at the begin, the last at the end.
 
     Parameters
     ----------
     begin, end : float, s
-        Between which there are fixes and the filter has settled.
+        Interval with fixes in which the filter has settled.
     length : float, s
     places : int
 
     Returns
     -------
     tuple of Span
-        They overlap where there is not room for them side by side; each is tried by itself.
+        They overlap if the interval is too short; each is tested by itself.
 
     Raises
     ------
@@ -138,7 +138,7 @@ def spans_to_withhold(begin: float, end: float, length: float, places: int = 5) 
 
 
 def without_spans(table: pd.DataFrame, spans: Sequence[Span]) -> pd.DataFrame:
-    """Return the rows of a table whose stamps are in no span.
+    """Return the rows of a table outside all spans.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def without_spans(table: pd.DataFrame, spans: Sequence[Span]) -> pd.DataFrame:
     Raises
     ------
     ConfigError
-        Nothing is left, or a span has no row in it.
+        All rows are in spans, or a span has no row.
     """
     time = index_of(table)
     kept = np.ones(len(time), dtype=np.bool_)
@@ -189,10 +189,10 @@ def score_withheld(
     table: pd.DataFrame,
     spans: Sequence[Span],
 ) -> tuple[WithheldScore, ...]:
-    """Navigate with every fix up to each span, and through it with none.
+    """Navigate with all fixes up to each span, and without fixes through it.
 
-    The aid stays in the navigator and its observations are computed, but not used. Each span is by
-    itself: the run that goes on from its end has had the fixes.
+    The aid stays in the navigator and its innovations are computed, but not used. Spans are
+    independent: the run continued after a span has used its fixes.
 
     Parameters
     ----------
@@ -370,7 +370,7 @@ def _beyond_place(s: Array, P: Array) -> Array:
     return np.asarray(np.eye(2) * beyond[:, None, :])
 
 
-# Fixes withheld from a navigator, and how far its smoother then is from them.
+# GNSS outage test of a smoother: its error at withheld fixes.
 
 
 #: A smoother gets so many lengths of the stretch after it, and at least so many seconds: later
@@ -379,7 +379,7 @@ AFTER, LEAST_AFTER = 2.0, 60.0
 
 
 def end_of_what_tells(span: Span) -> float:
-    """Return the time up to which a smoother is given what follows a stretch, s."""
+    """Return the time up to which a smoother gets data after a span, s."""
     return span.end + max(AFTER * (span.end - span.begin), LEAST_AFTER)
 
 
@@ -391,7 +391,7 @@ def score_withheld_smoothed(
     name: str,
     spans: Sequence[Span],
 ) -> tuple[WithheldScore, ...]:
-    """Score a navigator's smoother by each of some spans without fixes, by itself.
+    """Score a navigator's smoother over spans without fixes, each by itself.
 
     Parameters
     ----------
@@ -446,7 +446,7 @@ def score_of_smoothed(
     navigator : Navigator
         With a smoother.
     pieces : sequence of NavigationChunk
-        Of the span, in which the aid was looked at and not used.
+        Of the span, in which the aid's innovations were computed but not used.
     later : sequence of NavigationChunk
         That follow, with the aid.
     name : str

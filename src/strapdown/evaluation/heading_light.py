@@ -1,4 +1,4 @@
-"""Whether a heading can be trusted, second by second: a traffic light.
+"""Heading integrity, second by second: trusted, unverified or rejected (green, amber, red).
 
 Green is a promise: the heading error is within the requested limit. It requires two solutions that
 do not share the assumptions made at the start: the run by its own bound, and an independent heading
@@ -40,7 +40,7 @@ Array = NDArray[np.float64]
 
 COLOURS = ("green", "amber", "red")
 GREEN, AMBER, RED = range(3)
-#: Why it is not green, by its code.
+#: Reason of a status other than green, by its code.
 REASONS: dict[str, str] = {
     "": "two reckonings agree that it is within the limit",
     "assumed": "its own bound is good, but rests on what it began with or on one aid alone",
@@ -50,7 +50,7 @@ REASONS: dict[str, str] = {
     "apart": "a reckoning that began without a heading says otherwise",
     "unknown": "it is hardly known",
 }
-#: Who bears a heading out, by kind.
+#: Independent heading checks, by kind.
 WITNESSES: dict[str, str] = {
     "motion": "a second reckoning by fixes",
     "gyrocompass": "north as the gyros found it at rest",
@@ -93,7 +93,7 @@ class Heard(Protocol):
 
 @dataclass(frozen=True)
 class LightSpan:
-    """Seconds in a row of one colour for one reason.
+    """Consecutive seconds of one status for one reason.
 
     Attributes
     ----------
@@ -111,7 +111,7 @@ class LightSpan:
 
 @dataclass(frozen=True, eq=False)
 class HeadingIntegrity:
-    """A light for each second.
+    """Heading integrity of each second of a run.
 
     Attributes
     ----------
@@ -132,13 +132,13 @@ class HeadingIntegrity:
     red: float
 
     def share(self, colour: str) -> float:
-        """Share of the seconds that are of a colour."""
+        """Share of the seconds with a status."""
         light = self.table["light"].to_numpy()
         return float(np.mean(light == COLOURS.index(colour))) if len(light) else 0.0
 
     @property
     def spans(self) -> tuple[LightSpan, ...]:
-        """Seconds in a row of one colour for one reason, in the order of time."""
+        """Consecutive seconds of one status for one reason, in order of time."""
         time = self.table.index.to_numpy(dtype=np.float64)
         if not len(time):
             return ()
@@ -159,7 +159,7 @@ def heading_light(
     green: float = 3.0,
     red: float = 10.0,
 ) -> HeadingIntegrity:
-    """Return the light of each second of a run.
+    """Return the heading integrity of each second of a run.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def heading_light(
     Raises
     ------
     ConfigError
-        The limits are none.
+        The limits are invalid.
 
     Notes
     -----
@@ -245,7 +245,7 @@ def seconds_of(record: NavigationRecord) -> Array:
 
 
 def recent_scatter(record: NavigationRecord) -> Array:
-    """How much more than expected observations scattered lately, at each second of a run.
+    """Recent scatter of the innovations over the predicted one, at each second of a run.
 
     Parameters
     ----------
@@ -286,7 +286,7 @@ def recent_scatter(record: NavigationRecord) -> Array:
 
 
 def doubted(record: NavigationRecord, evidence: Sequence[Heard], upto: float, green: float) -> bool:
-    """Whether a run was contradicted, or scattered more than it should, until an instant.
+    """Whether a run was contradicted, or its innovations scattered too much, until an instant.
 
     Parameters
     ----------
@@ -311,7 +311,7 @@ def _own_sd(record: NavigationRecord, seconds: Array) -> Array:
     """Standard deviation of the heading of a run at each second, deg."""
     marks = record.sd.index.to_numpy(dtype=np.float64)
     sd = record.sd["heading"].to_numpy(dtype=np.float64)
-    # A bound grows to the next mark: the larger one of those beside a second.
+    # A standard deviation grows to the next mark: the larger of the two marks around a second.
     after = np.clip(np.searchsorted(marks, seconds - 1e-6), 0, len(marks) - 1)
     before = np.clip(after - 1, 0, None)
     return np.where(marks[after] <= seconds + 1e-6, sd[after], np.maximum(sd[before], sd[after]))

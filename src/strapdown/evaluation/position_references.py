@@ -65,7 +65,7 @@ class PlaceReference:
     moved : tuple of float, m
         Along the axes of the run's local level (north, east, down by its own heading).
     sd : float or None, m
-        How well it is known, root mean square of the length.
+        Its standard deviation, root mean square of the length.
     """
 
     time: float
@@ -95,7 +95,7 @@ def is_place(text: str) -> bool:
 
 
 def parse_place(text: str, start: float, end: float) -> PlaceReference:
-    """Read one reference point of position.
+    """Parse one position reference.
 
     Parameters
     ----------
@@ -159,10 +159,10 @@ class SensorErrors:
     gyro_bias_sd : float, rad/s
         Residual bias of each gyro, constant over the log.
     tilt_sd_deg : float, deg
-        Of the initial attitude about each horizontal axis, over and above what levelling with
-        biased accelerometers does.
+        Of the initial attitude about each horizontal axis, in addition to the tilt by
+        levelling with biased accelerometers.
     accel_noise : float or None, m/s²/√Hz
-        White noise of each accelerometer; from the scatter at the rests where it is None.
+        White noise of each accelerometer; if None, from the scatter at the rests.
     levelled : bool
         The run was levelled with these accelerometers where it begins: their biases then tilt
         the start, so that they cancel as long as the body keeps that pose.
@@ -333,8 +333,8 @@ class Leg:
     velocity, position : ndarray, (n, 3), m/s and m
         From zero, along the axes of the run's local level.
     velocity_corrected, position_corrected : ndarray, (n, 3)
-        With a velocity taken off that grows in proportion to time and makes the last one zero:
-        right for an error of acceleration that is constant in the local level.
+        With a velocity subtracted that grows in proportion to time and makes the last one zero:
+        exact for an error of acceleration that is constant in the local level.
     gravity : float, m/s²
     velocity_by_bias, position_by_bias : ndarray, (3, 6)
         Change at the end, for each unit of the biases of accelerometers (m/s²) and gyros
@@ -388,9 +388,9 @@ def dead_reckon(
     Returns
     -------
     Leg
-        Specific force at the stamp is taken to change in proportion to time between two
-        samples, after it was turned; a mean is turned by the mean of the matrices at both ends
-        of its interval. Both are right to the second order of the step.
+        Specific force at the stamp is interpolated linearly between two samples, after its
+        rotation; a mean is rotated by the mean of the matrices at both ends of its interval.
+        Both are accurate to the second order of the step.
 
     Raises
     ------
@@ -484,7 +484,7 @@ def _sensitivities(
     velocity_a, position_a = (v[-1].reshape(3, 3) for v in steps.twice(steps.turn.reshape(2, n, 9)))
     if levelled:
         start = rotation.dcm_from_quaternion(run.attitude[QUATERNION].to_numpy()[0])
-        # psi x (0, 0, -g) takes back the horizontal part of C b_a.
+        # psi x (0, 0, -g) cancels the horizontal part of C b_a.
         tilt = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]) @ start / g
         velocity_a = velocity_a + velocity_psi @ tilt
         position_a = position_a + position_psi @ tilt
@@ -521,7 +521,7 @@ def _turned(attitude: pd.DataFrame, until: float) -> Array:
 def growth_laws(
     seconds: float, *, accel_error: float, tilt_rate: float, gravity: float = STANDARD_GRAVITY
 ) -> tuple[float, float]:
-    """How far constant errors carry a position that is not corrected at the end.
+    """Position error by constant errors, without correction at the end.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
-"""Reference points: instants at which something about the attitude is known.
+"""Reference points: instants with known attitude, tilt or rotation.
 
-In words, on the command line or one to a line in a file::
+As text, on the command line or one per line in a file::
 
     end same as start
     9.0 same as 5.0 sd 0.5
@@ -80,7 +80,7 @@ _HOW = (
 
 
 def parse_reference(text: str, start: float, end: float) -> dict[str, object]:
-    """Read one reference point.
+    """Parse one reference point.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def parse_reference(text: str, start: float, end: float) -> dict[str, object]:
         row["since"] = instant(said["since"], start, end, text)
         since, at = row["since"], row["time"]
         assert isinstance(since, float) and isinstance(at, float)
-        # An interval whose ends are words is as long as the log, which is not known here yet.
+        # An interval whose ends are words is as long as the log, whose length is not known here yet.
         if since >= at and np.isfinite([since, at]).all():
             raise ConfigError(
                 "evaluation.compares-not-before",
@@ -140,7 +140,7 @@ def parse_reference(text: str, start: float, end: float) -> dict[str, object]:
 
 
 def instant(word: str, start: float, end: float, text: str) -> float:
-    """Read an instant of a sentence.
+    """Parse an instant.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def instant(word: str, start: float, end: float, text: str) -> float:
     if word.lower() in ("start", "end"):
         return start if word.lower() == "start" else end
     value = float(word.lower().rstrip("s "))
-    # Stamps are printed to a millisecond; one that is meant as the last sample counts as it.
+    # Stamps are printed to a millisecond; one that means the last sample counts as that sample.
     slack = 1e-3
     if not start - slack <= value <= end + slack:
         raise DataError(
@@ -192,7 +192,7 @@ def _axis(word: str, text: str) -> tuple[str, float]:
 
 
 def in_words(row: pd.Series) -> str:
-    """Say a row of a References table as a sentence.
+    """Return a row of a References table as text.
 
     Parameters
     ----------
@@ -225,12 +225,12 @@ def score_references(
     references : DataFrame
         A References table.
     imu : DataFrame
-        The Imu table that the run used, for the angle turned about an axis.
+        The Imu table that the run used, for the rotation angle about an axis.
 
     Returns
     -------
     tuple of Score
-        One a reference point: the rotation angle between computed and known attitude
+        One per reference point: the rotation angle between computed and known attitude
         (``|log(C_est^T C_ref)|``); for a tilt the angle between computed and known direction
         of gravity.
 
@@ -286,7 +286,7 @@ def reference_errors(attitude: pd.DataFrame, references: pd.DataFrame) -> list[f
 
 
 def _compare(attitude: pd.DataFrame, row: pd.Series, number: int) -> tuple[list[float], float]:
-    """The instants that a reference point speaks of, and the error there in deg."""
+    """The instants of a reference point, and the error there in deg."""
     begin = float(attitude.index[0])
     alone = row["kind"] in ("known", "tilt")
     instants = [float(row["time"])] + ([] if alone else [float(row["since"])])
@@ -312,7 +312,7 @@ def _compare(attitude: pd.DataFrame, row: pd.Series, number: int) -> tuple[list[
 
 
 def with_tilt(q_nb: ArrayLike, roll: float, pitch: float) -> NDArray[np.float64]:
-    """Turn an attitude the shortest way to a roll and a pitch.
+    """Rotate an attitude by the smallest angle to a roll and a pitch.
 
     Parameters
     ----------
@@ -334,7 +334,7 @@ def with_tilt(q_nb: ArrayLike, roll: float, pitch: float) -> NDArray[np.float64]
     across, along = np.cross(there, here), float(there @ here)
     size = float(np.sqrt(across @ across))
     if size < 1e-12 and along < 0.0:
-        # Upside down: every axis square to gravity will do.
+        # Upside down: every axis perpendicular to gravity is equivalent.
         across = np.cross(there, np.eye(3)[int(np.argmin(np.abs(there)))])
         axis, angle = across / np.sqrt(across @ across), np.pi
     else:
@@ -351,7 +351,7 @@ def _turned(imu: pd.DataFrame, axis: int, since: float, until: float) -> float:
 
 
 def references_from_words(words: list[str], start: float, end: float) -> pd.DataFrame:
-    """Make a References table of sentences.
+    """Make a References table from text.
 
     Parameters
     ----------
@@ -376,14 +376,14 @@ def references_from_words(words: list[str], start: float, end: float) -> pd.Data
 
 Array = NDArray[np.float64]
 
-#: Standard deviation that is assumed for the bias of each accelerometer, m/s², by class of
-#: sensor. Consumer: the MPU-6050 may be 50 mg off in x and y and 80 mg in z (data sheet 3.4,
-#: section 6.2), taken as the ends of an even spread, 29 to 46 mg. The others are the usual order
-#: of magnitude, 5 mg, 1 mg and 50 µg: state what your data sheet says instead.
+#: Assumed standard deviation of the bias of each accelerometer, m/s², by class of sensor.
+#: Consumer: the MPU-6050 may be 50 mg off in x and y and 80 mg in z (data sheet 3.4, section 6.2),
+#: taken as the limits of a uniform distribution, 29 to 46 mg. The others are the usual order of
+#: magnitude, 5 mg, 1 mg and 50 µg: state your data sheet's value instead.
 ACCEL_BIAS_SD = {"consumer": 0.3, "industrial": 0.05, "tactical": 0.01, "navigation": 0.0005}
 
-# Two poses count as one where gravity agrees to so many standard deviations of the noise, and
-# to what nobody can put a thing back to by hand, or feel on a table.
+# Two poses count as one if gravity agrees to so many standard deviations of the noise, or to the
+# repeatability of placing a sensor by hand.
 SAME_SIGMAS = 3.0
 LEAST_APART = 0.1  # deg
 
@@ -391,15 +391,15 @@ LEAST_APART = 0.1  # deg
 def tilt_sd_deg(
     rest: RestStretch, *, bias_sd: float = ACCEL_BIAS_SD["consumer"], gravity: float | None = None
 ) -> float:
-    """How well the direction of gravity at a rest is known.
+    """Standard deviation of the direction of gravity at a rest.
 
     Parameters
     ----------
     rest : RestStretch
         With acceleration.
     bias_sd : float, m/s²
-        Standard deviation that is assumed for the bias of each accelerometer, as it is now in
-        the log. One of `ACCEL_BIAS_SD`, or from a calibration.
+        Assumed standard deviation of the bias of each accelerometer, as it is now in the log.
+        One of `ACCEL_BIAS_SD`, or from a calibration.
     gravity : float, m/s², optional
         Local gravity; 9.80665 if not given, which is right to 0.03 m/s² everywhere on the
         surface.
@@ -432,16 +432,16 @@ def tilt_references(
     gravity: float | None = None,
     levelled_from: RestStretch | None = None,
 ) -> pd.DataFrame:
-    """Make a reference point of every rest: its roll and pitch, the heading left open.
+    """Make a reference point of roll and pitch from every rest; the heading stays open.
 
     Parameters
     ----------
     rests : sequence of RestStretch
-        As `sensors.rest.find_rests` finds them; those without acceleration are left out.
+        As returned by `sensors.rest.find_rests`; those without acceleration are left out.
     bias_sd, gravity
         As in `tilt_sd_deg`.
     levelled_from : RestStretch, optional
-        The rest that the run was levelled from. It is left out: the run would be compared with
+        The rest that the run was levelled at. It is left out: the run would be compared with
         its own start.
 
     Returns
@@ -476,7 +476,7 @@ def tilt_references(
 
 
 def same_pose_candidates(rests: Sequence[RestStretch]) -> tuple[SamePose, ...]:
-    """Find rests at which the sensor may have lain as at an earlier one.
+    """Find rests at which the sensor may have the pose of an earlier one.
 
     Parameters
     ----------
@@ -532,7 +532,7 @@ def _force(rest: RestStretch) -> tuple[Array, Array]:
 
 
 def _apart(a: RestStretch, b: RestStretch) -> tuple[float, float]:
-    """Angle between the directions of gravity at two rests, and its sd by the noise, deg."""
+    """Angle between the directions of gravity at two rests, and its standard deviation, deg."""
     (f_a, n_a), (f_b, n_b) = _force(a), _force(b)
     cross = np.cross(f_a, f_b)
     angle = float(np.arctan2(np.sqrt(cross @ cross), f_a @ f_b))
@@ -541,7 +541,7 @@ def _apart(a: RestStretch, b: RestStretch) -> tuple[float, float]:
 
 
 def _across(force: Array, noise: Array) -> float:
-    """Variance of the direction of a force, both axes square to it together, rad²."""
+    """Variance of the direction of a force, sum of both axes perpendicular to it, rad²."""
     up = force / np.sqrt(force @ force)
     # Noise perpendicular to the force: |n|² minus the part along it.
     return float(((noise**2).sum() - ((up * noise) ** 2).sum()) / (force @ force))

@@ -1,4 +1,4 @@
-"""One trajectory compared with another: metres, metres a second and degrees."""
+"""Compare two trajectories in meters, meters per second and degrees."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ __all__ = [
 Array = NDArray[np.float64]
 
 ROTATION_ERROR = ["phi_N", "phi_E", "phi_D"]
-# Trajectories that begin farther apart than this are asked whether they are of one vehicle.
+# Trajectories that begin farther apart are checked for wrong units and signs.
 FAR = 50_000.0  # m
 
 
@@ -81,8 +81,8 @@ def trajectory_differences(
             level of their own position, as in a mechanization.
 
         ``attrs``: ``source``, ``reference``; ``interpolated``, the number of instants at which
-        the reference had no row and was interpolated (`trajectory_at`); ``findings``, a tuple
-        of Finding: what that may cost, and gaps of the reference.
+        the reference had no row and was interpolated (`trajectory_at`); ``findings``, a tuple of
+        Finding: the possible interpolation error, and gaps of the reference.
 
     Raises
     ------
@@ -120,7 +120,7 @@ def trajectory_differences(
 
 
 def _within(estimate: pd.DataFrame, reference: pd.DataFrame) -> pd.DataFrame:
-    """Rows of the estimate in the span of the reference; the ends but for rounding."""
+    """Rows of the estimate in the span of the reference, ends included despite rounding."""
     stamps, known = (t.index.to_numpy(dtype=np.float64) for t in (estimate, reference))
     source = estimate.attrs.get("source")
     for time, name in ((stamps, source), (known, reference.attrs.get("source"))):
@@ -149,7 +149,7 @@ def _far_apart(
     estimate: pd.DataFrame,
     reference: pd.DataFrame,
 ) -> list[Finding]:
-    """Two starts that are far apart: an error if it is explained, or else a finding."""
+    """Check two distant starts: an error if a wrong unit or sign explains them, else a finding."""
 
     def distance(a: Array, b: Array) -> float:
         first, second = (ecef_from_geodetic(p[None], ellipsoid=ellipsoid) for p in (a, b))
@@ -189,7 +189,7 @@ def _far_apart(
 
 
 def _interpolated(time: Array, reference: pd.DataFrame, ellipsoid: Ellipsoid) -> list[Finding]:
-    """What interpolating the reference at these instants may cost, and gaps among them."""
+    """Findings on the interpolation error of the reference at these instants, and on gaps."""
     if not time.size:
         return []
     source, stamps = reference.attrs.get("source"), reference.index.to_numpy(dtype=np.float64)
@@ -227,7 +227,7 @@ def _interpolated(time: Array, reference: pd.DataFrame, ellipsoid: Ellipsoid) ->
     ]
 
 
-# A trajectory at instants between its rows, and what interpolation costs.
+# A trajectory at instants between its rows, and the interpolation error.
 #
 # Everything is interpolated along the axes of the Earth, so that the date line and the poles need
 # no special case.
@@ -240,7 +240,7 @@ SAME_BEAT = 1e-6
 
 @dataclass(frozen=True)
 class InterpolationCost:
-    """What interpolating between the rows of a trajectory may cost at most.
+    """Largest interpolation error between the rows of a trajectory.
 
     Attributes
     ----------
@@ -299,7 +299,7 @@ def _between(
 def same_stamps(
     stamps: Array, time: Array, share: float = 0.0
 ) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Find the nearest stamp of each instant, and whether it is the same but for rounding.
+    """Find the nearest stamp of each instant, and whether it is equal but for rounding.
 
     Parameters
     ----------
@@ -343,12 +343,11 @@ def trajectory_at(
     Returns
     -------
     DataFrame
-        A Trajectory table: the rows themselves where the stamps are the same. Between two rows
-        a step of `h` apart, position is the cubic of Hermite through both positions and
-        velocities, right to ``h⁴/384`` times the largest fourth derivative; velocity changes in
-        proportion to time, right to ``h²/8`` times the largest jerk; attitude turns at a
-        constant rate relative to the Earth, right to ``h²/8`` times the largest angular
-        acceleration.
+        A Trajectory table: the rows themselves at their time stamps. Between two rows a step of
+        `h` apart, position is the cubic of Hermite through both positions and velocities,
+        accurate to ``h⁴/384`` times the largest fourth derivative; velocity is linear,
+        accurate to ``h²/8`` times the largest jerk; attitude rotates at a constant rate relative
+        to the Earth, accurate to ``h²/8`` times the largest angular acceleration.
 
     Raises
     ------
@@ -397,7 +396,7 @@ def trajectory_at(
 def interpolation_cost(
     trajectory: pd.DataFrame, ellipsoid: Ellipsoid = WGS84
 ) -> InterpolationCost | None:
-    """Judge what interpolation costs, by interpolating each row from its two neighbours.
+    """Estimate the interpolation error by interpolating each row from its two neighbors.
 
     Parameters
     ----------
@@ -434,7 +433,7 @@ def interpolation_cost(
     )
 
 
-# The differences of two trajectories in a few numbers.
+# Summary of the differences of two trajectories.
 
 
 @dataclass(frozen=True)
@@ -495,7 +494,7 @@ class DifferenceSummary:
         Raises
         ------
         DataError
-            There is none of that name.
+            The name does not exist.
         """
         for error in self.errors:
             if error.quantity == quantity:
@@ -508,7 +507,7 @@ class DifferenceSummary:
         )
 
     def to_pandas(self) -> pd.DataFrame:
-        """One row a quantity: ``unit rms largest largest_at final``."""
+        """One row per quantity: ``unit rms largest largest_at final``."""
         return pd.DataFrame([vars(e) for e in self.errors]).set_index("quantity")
 
     @property

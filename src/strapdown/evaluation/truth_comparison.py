@@ -52,10 +52,10 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-#: Physical errors, as `mechanization.state_error.state_error` has them, and their units.
+#: Physical errors, in the order of `mechanization.state_error.state_error`, and their units.
 COMPONENTS = ("north", "east", "down", "VN", "VE", "VD", "psi_N", "psi_E", "psi_D")
 UNITS = ("m",) * 3 + ("m/s",) * 3 + ("deg",) * 3
-#: What normalised squares are of.
+#: Groups of components of the normalized squares.
 PARTS = {
     "all": tuple(range(9)),
     "position": (0, 1, 2),
@@ -83,7 +83,7 @@ class TruthComparison:
     differences : DataFrame
         TrajectoryError table at `time`: m, m/s, deg of roll, pitch and heading; NaN as above.
     sd : DataFrame
-        TrajectoryError table of the standard deviations claimed.
+        TrajectoryError table of the stated standard deviations.
     nees : DataFrame
         By time: normalized squares of the `PARTS` that can be computed.
     freedom : dict of str to int
@@ -96,7 +96,7 @@ class TruthComparison:
         absolute value), ``sd`` (root mean square of the stated ones), ``inside`` (share within
         1.96 stated standard deviations; of the ellipse). Rotations in deg.
     findings : tuple of Finding
-        What interpolation of the truth may cost, gaps.
+        Possible interpolation error of the truth; gaps.
     """
 
     time: Array
@@ -251,7 +251,7 @@ def state_errors(computed: pd.DataFrame, true: pd.DataFrame, ellipsoid: Ellipsoi
     """
     a, b = (table[TRAJECTORY].to_numpy(dtype=np.float64) for table in (computed, true))
     q_a, q_b = (rotation.quaternion_from_euler(x[:, 6:]) for x in (a, b))
-    # Of the truth's local level to that of the computed state.
+    # From the truth's local level to that of the computed state.
     between = rotation.compose(q_ne(a[:, 0], a[:, 1]), rotation.conjugate(q_ne(b[:, 0], b[:, 1])))
     psi = rotation.rotation_vector_from_quaternion(
         rotation.compose(q_a, rotation.conjugate(rotation.compose(between, q_b)))
@@ -262,7 +262,7 @@ def state_errors(computed: pd.DataFrame, true: pd.DataFrame, ellipsoid: Ellipsoi
 
 
 def _displacements(computed: Array, true: Array, ellipsoid: Ellipsoid) -> Array:
-    """As `displacement_between`, of degrees and metres."""
+    """As `displacement_between`, from degrees and meters."""
     a, e2 = ellipsoid.semi_major_axis, ellipsoid.eccentricity_squared
     pairs = np.hstack([computed, true])
     pairs[:, [0, 1, 3, 4]] = np.radians(pairs[:, [0, 1, 3, 4]])
@@ -375,8 +375,8 @@ def normalised_squares(errors: Array, covariance: Array) -> Array:
     """Return ``e' P^-1 e`` of each epoch (NEES), chi-square if P is the covariance of e.
 
     Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001,
-    Eq. (5.4.2-1). Each component counts in units of its own standard deviation, so that metres
-    beside radians cost no digits.
+    Eq. (5.4.2-1). Each component is scaled by its own standard deviation, so that meters beside
+    radians cost no digits.
 
     Parameters
     ----------
@@ -407,13 +407,13 @@ def normalised_squares(errors: Array, covariance: Array) -> Array:
 
 
 def bounds(freedom: int, share: float = SHARE) -> tuple[float, float]:
-    """Return the two-sided bounds within which a share of chi-square numbers is."""
+    """Return the two-sided bounds that hold a share of chi-square numbers."""
     outside = 0.5 - 0.5 * share
     return chi_square_quantile(outside, freedom), chi_square_exceeded(outside, freedom)
 
 
 def band_of_mean(freedom: int, runs: int, share: float = SHARE) -> tuple[float, float]:
-    """Return the bounds of the mean over independent runs of a chi-square number each.
+    """Return the bounds of the mean of chi-square numbers over independent runs.
 
     Bar-Shalom et al. (2001), Eq. (5.4.2-9): ``chi2(runs * freedom) / runs``.
     """
@@ -427,7 +427,7 @@ def _not_positive(at: NDArray[np.int_]) -> DataError:
     )
 
 
-# Whether a filter and its smoother can both be right.
+# Consistency of a filter with its smoother.
 
 
 #: Limit of a difference, in its predicted standard deviations.
@@ -448,8 +448,8 @@ class SmootherConsistency:
     instants : ndarray of int, (9,)
         At which the smoother improves on the filter.
     share : ndarray, (9,)
-        Of these, where the difference is within three of its standard deviations; NaN where there
-        are none.
+        Share of these with a difference within three of its standard deviations; NaN without
+        instants.
     rms : ndarray, (9,)
         Root mean square of the difference in them: about 1 where the model is right.
     """
@@ -483,7 +483,7 @@ def smoother_consistency(
     columns = list(TRAJECTORY_ERROR)
     apart = trajectory_differences(forward.trajectory, smoothed.trajectory, ellipsoid)
     rows, marks = apart.index.to_numpy(), forward.sd.index.to_numpy()
-    # A mark is of the first row after it; one that a later mark precedes that row is not.
+    # A mark belongs to the first row after it, unless a later mark precedes that row.
     row = np.searchsorted(rows, marks - 1e-7)
     kept = np.append(row[1:] > row[:-1], True) & (row < len(rows))
     values = apart[columns].to_numpy()[row[kept]]
