@@ -71,7 +71,7 @@ Array = NDArray[np.float64]
 
 #: Largest allowed tilt error, rad: beyond it attitude errors are no longer small.
 LARGEST_TILT_SD = 0.35
-#: Fraction of a sideslip that changes from second to second; the rest is constant.
+#: Sideslip that varies from second to second, relative to the constant part (standard deviations).
 SLIP_SHARE = 0.5
 
 

@@ -39,9 +39,9 @@ class Innovations:
 
 @dataclass(frozen=True)
 class CovarianceForm(ABC):
-    """A way to keep and to change a covariance; it holds no state of its own.
+    """A form in which a covariance is kept and changed; stateless.
 
-    A state is one float64 array (n, n), whose meaning is the form's own: P itself, or U above a
+    A state is one float64 array (n, n), whose meaning depends on the form: P itself, or U above a
     diagonal D.
     """
 
@@ -56,7 +56,7 @@ class CovarianceForm(ABC):
         Parameters
         ----------
         P : ndarray, (n, n)
-            Symmetric, positive semidefinite: a row of zeros is a state that is known.
+            Symmetric, positive semidefinite: a row of zeros is an exactly known state.
 
         Returns
         -------
@@ -90,7 +90,7 @@ class CovarianceForm(ABC):
         R: Array,
         rule: UpdateRule | Sequence[UpdateRule] | None = None,
     ) -> tuple[Array, Array, Innovations]:
-        """Take the observations of an epoch, one after the other.
+        """Update with the observations of an epoch, one after the other.
 
         Parameters
         ----------
@@ -123,7 +123,7 @@ class CovarianceForm(ABC):
         R: Array,
         rule: UpdateRule | Sequence[UpdateRule] | None = None,
     ) -> tuple[Array, Array, Innovations]:
-        """Predict, then take the observations: a form may do both together for less.
+        """Predict, then update: a form may combine both at a lower cost.
 
         Parameters
         ----------
@@ -152,14 +152,14 @@ class CovarianceForm(ABC):
         return np.sqrt(np.diagonal(self.matrix(state)))
 
 
-# How an observation changes an estimate: how far, and how much of its variance it takes off.
+# Effect of an observation on an estimate: gain, and reduction of the covariance.
 
 
 class Step(NamedTuple):
     """One scalar update: ``K = P h' / (slope s + r)``, ``x + K moved``.
 
     The covariance becomes ``(1 - slope K h) P (1 - slope K h)' + slope r K K'``. A plain update has
-    ``moved = nu``, ``slope = 1`` and ``r = R``; one that is believed less has a larger r.
+    ``moved = nu``, ``slope = 1`` and ``r = R``; one with a lower weight has a larger r.
 
     Attributes
     ----------
@@ -198,10 +198,10 @@ class UpdateRule(Protocol):
 
 
 class FullUpdate:
-    """Every observation is believed by its stated variance: Kalman's update."""
+    """Kalman's update: every observation is weighted by its stated variance."""
 
     def step(self, nu: float, s: float, r: float) -> Step:
-        """Return the whole step, as `UpdateRule.step`."""
+        """Return the full step, as `UpdateRule.step`."""
         return Step(nu, 1.0, r, 1.0)
 
 
@@ -210,7 +210,7 @@ class FullUpdate:
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """Computed less observed, and how it depends on the physical errors.
+    """Computed − observed, with its sensitivity to the physical errors.
 
     Attributes
     ----------
@@ -237,7 +237,7 @@ class Observation:
 # Checks of the matrices that a covariance form is given.
 
 
-#: How far correlations may be from symmetric, and below zero as eigenvalues, in n roundings.
+#: Tolerance of asymmetry, and of negative eigenvalues, of correlations, in n roundings.
 ROUNDINGS = 1e3
 
 
@@ -292,7 +292,7 @@ def checked_covariance(P: Array) -> Array:
 
 
 def indefinite(row: int) -> DataError:
-    """Return what to raise where a factorisation finds a covariance indefinite."""
+    """Return the error to raise for a covariance that a factorization finds indefinite."""
     return _bad("estimation.covariance-indefinite-in-row", i=row + 1)
 
 
@@ -301,7 +301,7 @@ def _bad(code: str, **data: Any) -> DataError:
 
 
 def check_prediction(state: Array, Phi: Array, Q: Array) -> None:
-    """Raise `DataError` where the shapes of a prediction do not fit."""
+    """Raise `DataError` if the shapes of a prediction do not match."""
     for name, given in (("Phi", Phi), ("Q", Q)):
         if given.shape != state.shape:
             raise DataError(
@@ -332,7 +332,7 @@ def bad_prediction(row: int, Phi: Array, Q: Array) -> DataError:
 
 
 def check_observations(x: Array, z: Array, H: Array, R: Array) -> None:
-    """Raise `DataError` where the shapes of an epoch's observations do not fit."""
+    """Raise `DataError` if the shapes of an epoch's observations do not match."""
     if H.ndim != 2 or H.shape[1] != len(x) or not H.shape[0] == len(z) == len(R):
         raise DataError(
             "estimation.z-shape-h-r-states",
@@ -345,7 +345,7 @@ def check_observations(x: Array, z: Array, H: Array, R: Array) -> None:
 
 
 def bad_observation(j: int, nu: float, s: float, R: Array) -> DataError:
-    """Return what to raise where observation j cannot be used."""
+    """Return the error to raise for an invalid observation j."""
     if not R[j] >= 0.0 or not np.isfinite(R[j]):
         return DataError("estimation.variance-observation", quantity="R", j=j + 1, r=R[j])
     which, number = (
@@ -354,7 +354,7 @@ def bad_observation(j: int, nu: float, s: float, R: Array) -> DataError:
     return DataError("estimation.observation", quantity="z", which=which, number=number, j=j + 1)
 
 
-# The observations of an epoch, one after the other, under a rule that is asked at each.
+# Sequential update with the observations of an epoch; the rule is evaluated at each.
 
 
 def take_by_rule(
@@ -371,14 +371,14 @@ def take_by_rule(
     Parameters
     ----------
     expect, take : kernels
-        The two halves of a scalar step; between them the rule is asked.
+        The two halves of a scalar step; the rule is evaluated between them.
     parts : (ndarray, ndarray)
         Arrays in which the kernels keep a covariance.
     x : ndarray, (n,)
     observations : (z, H, R)
     rule : UpdateRule, or a sequence of them
     work : ndarray
-        What `expect` leaves to `take`.
+        Passed from `expect` to `take`.
     """
     z, H, R = observations
     matrix, diagonal = parts
@@ -400,7 +400,7 @@ def take_by_rule(
 
 
 def contiguous(*arrays: Array) -> list[Array]:
-    """Return arrays as the kernels want them."""
+    """Return contiguous arrays for the kernels."""
     return [np.ascontiguousarray(a, dtype=np.float64) for a in arrays]
 
 
@@ -409,7 +409,7 @@ def own(array: Array) -> Array:
     return np.array(array, dtype=np.float64, order="C")
 
 
-# The covariance as a matrix: Joseph's update, and the plain one to compare with.
+# The covariance as a matrix: Joseph's update, and the plain one for comparison.
 
 
 @cache
@@ -421,7 +421,7 @@ def _kernels() -> ModuleType:
 
 @dataclass(frozen=True)
 class Plain(CovarianceForm):
-    """``P <- (1 - K h) P``, kept to show where it fails.
+    """``P <- (1 - K h) P``, kept to show its failure.
 
     A difference of two matrices that may be equal to rounding: variances become negative with
     observations much more accurate than the prediction.
@@ -455,7 +455,7 @@ class Plain(CovarianceForm):
         R: Array,
         rule: UpdateRule | Sequence[UpdateRule] | None = None,
     ) -> tuple[Array, Array, Innovations]:
-        """Take the observations of an epoch, one after the other; see `CovarianceForm.update`.
+        """Update with the observations of an epoch; see `CovarianceForm.update`.
 
         Raises
         ------
@@ -489,8 +489,8 @@ class Plain(CovarianceForm):
 class Joseph(Plain):
     """``P <- (1 - K h) P (1 - K h)' + r K K'``.
 
-    A sum of two matrices neither of which is negative, whatever the gain is: rounding of the gain
-    counts in second order only. It holds P itself, which costs half of the digits that U-D has.
+    A sum of two positive semidefinite matrices, whatever the gain is: rounding of the gain has a
+    second-order effect only. It holds P itself, which costs half of the digits that U-D has.
     """
 
     name: ClassVar[str] = "joseph"
@@ -513,8 +513,8 @@ def _kernels_ud() -> tuple[ModuleType, ModuleType]:
 class BiermanThornton(CovarianceForm):
     """Unit upper triangular U and diagonal D; a state holds U above its diagonal and D on it.
 
-    No variance is ever computed as a difference: D stays >= 0, and digits are kept as if by
-    square roots, without taking any.
+    A variance is never computed as a difference: D stays >= 0, and digits are kept as in a square
+    root form, without square roots.
     """
 
     name: ClassVar[str] = "ud"
@@ -555,7 +555,7 @@ class BiermanThornton(CovarianceForm):
         R: Array,
         rule: UpdateRule | Sequence[UpdateRule] | None = None,
     ) -> tuple[Array, Array, Innovations]:
-        """Take the observations of an epoch, one after the other; see `CovarianceForm.update`.
+        """Update with the observations of an epoch; see `CovarianceForm.update`.
 
         Raises
         ------
@@ -583,7 +583,7 @@ class BiermanThornton(CovarianceForm):
         return out
 
 
-# The W-D form: columns are appended over an epoch, and orthogonalised once at its end.
+# The W-D form: columns are appended over an epoch, and orthogonalized once at its end.
 
 
 @cache
@@ -598,8 +598,8 @@ class Chernodarov(BiermanThornton):
     """``P = W D W'`` within an epoch, ``U D U'`` between epochs.
 
     W begins as ``[Phi U, G]``; an observation deflates it and appends its gain as a column, so
-    that Joseph's form is met factor by factor. `epoch` orthogonalises once for prediction
-    and observations together, as the source does; `predict` and `update` alone do so once each.
+    that the result is Joseph's form in factors. `epoch` orthogonalizes once for prediction and
+    observations together, as the source does; `predict` and `update` alone do so once each.
     """
 
     name: ClassVar[str] = "wd"
@@ -615,7 +615,7 @@ class Chernodarov(BiermanThornton):
         R: Array,
         rule: UpdateRule | Sequence[UpdateRule] | None = None,
     ) -> tuple[Array, Array, Innovations]:
-        """Take the observations of an epoch, one after the other; see `CovarianceForm.update`."""
+        """Update with the observations of an epoch; see `CovarianceForm.update`."""
         (state,) = contiguous(state)
         return self._observed(state, state, state, False, x, (z, H, R), rule)
 
@@ -630,7 +630,7 @@ class Chernodarov(BiermanThornton):
         R: Array,
         rule: UpdateRule | Sequence[UpdateRule] | None = None,
     ) -> tuple[Array, Array, Innovations]:
-        """Predict and take the observations, with one orthogonalisation (Eqs. 6-15)."""
+        """Predict and update with one orthogonalization (Eqs. 6-15)."""
         state, Phi, Q = contiguous(state, Phi, Q)
         check_prediction(state, Phi, Q)
         return self._observed(state, Phi, Q, True, x, (z, H, R), rule)

@@ -1,4 +1,4 @@
-"""A Kalman filter over the errors of a mechanization, fed back at every observation."""
+"""Closed-loop Kalman filter over the errors of a mechanization (error-state EKF)."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ Array = NDArray[np.float64]
 # semidefinite: for a noise of deficient rank, as that of a quaternion's four numbers, rounding of
 # the whole, 2e-16, must be negligible beside it (`_kernels.factors.INDEFINITE`).
 ROUNDING = 1e-5
-# Place of the rotation among the physical errors.
+# Position of the rotation among the physical errors.
 ROTATION = slice(6, 9)
 
 
@@ -55,11 +55,11 @@ ROTATION = slice(6, 9)
 class ErrorFilter:
     """Closed loop: estimates are subtracted at once from the mechanization and the sensors.
 
-    Errors are computed less true, and so those of the sensors are what their readings are still
-    too large by after the estimates have been taken off: true error less estimate. In the
-    covariance, the signs between attitude and biases are those of these errors.
+    Error = computed − true. Those of the sensors are the residual errors of the readings after the
+    estimates have been subtracted: true error − estimate. In the covariance, the signs between
+    attitude and biases are those of these errors.
 
-    It holds no state: `begin` makes one, `predict` and `observe` give a new one.
+    Stateless: `begin` makes a state, `predict` and `observe` return a new one.
 
     Attributes
     ----------
@@ -122,7 +122,7 @@ class ErrorFilter:
         )
 
     def compensated(self, state: FilterState, rows: Array) -> Array:
-        """Return rows of motion increments without the errors estimated so far, (k, 10)."""
+        """Return rows of motion increments with the estimated errors subtracted, (k, 10)."""
         out = np.empty_like(rows)
         of_gyros, of_accels = self.errors_of_sensors(state)
         compensate(rows, of_gyros, of_accels, out)
@@ -141,7 +141,7 @@ class ErrorFilter:
     def advance_compensated(
         self, mechanization: Array, time: Array, rows: Array, history: Array
     ) -> None:
-        """Advance a state of the mechanization, in place, over increments without errors.
+        """Advance a state of the mechanization, in place, over compensated increments.
 
         Parameters
         ----------
@@ -168,7 +168,7 @@ class ErrorFilter:
     def follow(
         self, state: FilterState, time: Array, history: Array, rows: Array, mechanization: Array
     ) -> tuple[FilterState, Array]:
-        """Take estimates and covariance over steps that the mechanization has made.
+        """Propagate estimates and covariance over steps that the mechanization has made.
 
         Parameters
         ----------
@@ -200,7 +200,7 @@ class ErrorFilter:
         return after, Phi
 
     def predict(self, state: FilterState, time: Array, rows: Array) -> tuple[FilterState, Segment]:
-        """Go on over motion increments.
+        """Propagate over motion increments.
 
         Parameters
         ----------
@@ -219,7 +219,7 @@ class ErrorFilter:
         Raises
         ------
         DivergenceError
-            The mechanization has left the range in which it means anything.
+            The mechanization has left its range of validity.
         """
         after, segment = self._run(state, time, rows)
         Phi, Q = self._transition(segment)
@@ -246,7 +246,7 @@ class ErrorFilter:
         time, rows : ndarray
             As `predict`.
         observe : callable
-            Makes the observation of a segment: of the errors at its start, R without the noise
+            Returns the observation of a segment: of the errors at its start, R without the noise
             that is in the rotation of the state.
 
         Returns
@@ -263,7 +263,7 @@ class ErrorFilter:
         to_physical = self.model.to_physical(used, after.time, after.row)
         M = Q @ to_physical[ROTATION].T
         shared = to_physical[ROTATION] @ M
-        # As independent components, each with no less than its part.
+        # As independent components, each with at least its part.
         R = observation.R + (1.0 + ROUNDING) * np.abs(shared).sum(axis=1)
         covariance, x, seen = self.form.update(
             state.covariance, np.zeros(len(Q)), observation.z, H, R, self.rule
@@ -295,7 +295,7 @@ class ErrorFilter:
         -------
         state : FilterState
         taken : ndarray, (p,)
-            The physical errors that were taken off.
+            The physical errors that were corrected.
         innovations : list of Innovations
             Of each observation.
         """
@@ -340,7 +340,7 @@ class ErrorFilter:
         return replace(state, covariance=covariance), x, split_innovations(seen, observations)
 
     def widened(self, state: FilterState, Q: Array) -> FilterState:
-        """Return a state of which less is known by a covariance of the states, (n, n)."""
+        """Return a state with its covariance inflated by a covariance of the states, (n, n)."""
         nothing_moves = np.eye(len(Q))
         return replace(state, covariance=self.form.predict(state.covariance, nothing_moves, Q))
 
@@ -353,11 +353,11 @@ class ErrorFilter:
         return symmetric(T @ P @ T.T)
 
     def _transition(self, segment: Segment) -> tuple[Array, Array]:
-        """How errors go over a segment."""
+        """Transition of the errors over a segment, with its noise."""
         return self.model.transition(resting(segment) if self.rests else segment, self.step)
 
     def _run(self, state: FilterState, time: Array, rows: Array) -> tuple[FilterState, Segment]:
-        """The mechanization over increments without estimated errors; the covariance as it was."""
+        """Run the mechanization over compensated increments; the covariance is unchanged."""
         used = self.mechanization
         rows = self.compensated(state, rows)
         history = np.empty((len(rows) + 1, used.row))
@@ -373,7 +373,7 @@ class ErrorFilter:
         return state.sensors * np.exp(-self.model.stacked.decay * (time - state.time))
 
     def _fed_back(self, state: FilterState, to_physical: Array, x: Array) -> FilterState:
-        """Take an estimate off the mechanization and off the sensors."""
+        """Subtract an estimate from the mechanization and from the sensors."""
         used = self.mechanization
         physical = to_physical @ x
         corrected = used.correct(state.mechanization, physical[:PHYSICAL])
@@ -397,7 +397,7 @@ class ErrorFilter:
 
 
 def diverged(time: float) -> DivergenceError:
-    """A state left what its mechanization can do, with the sample at this time."""
+    """Error for a state outside the mechanization's validity, at the sample of this time."""
     return DivergenceError("estimation.state-diverged-sample", quantity="state", time=time)
 
 
@@ -411,13 +411,13 @@ def symmetric(P: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class FilterState:
-    """Everything that a filter remembers: from here it goes on.
+    """State of a filter between steps.
 
     Attributes
     ----------
     time : float, s
     mechanization : ndarray
-        State of the mechanization, errors taken off.
+        State of the mechanization, corrected.
     row : ndarray
         Its row of a history.
     sensors : ndarray, (k,)
@@ -473,17 +473,17 @@ def split_innovations(seen: Innovations, observations: Sequence[Observation]) ->
     return [Innovations(*one) for one in zip(*parts, strict=True)]
 
 
-# How errors go where the body is known to stay where it is (`ErrorFilter.rests`).
+# Error propagation for a body known to be stationary (`ErrorFilter.rests`).
 
 
-# Place of the attitude in a level row.
+# Position of the attitude in a level row.
 ATTITUDE = slice(Q_LB, Q_LB + 4)
-# Blocks of states that are vectors of the body.
+# Blocks of states that are vectors in body axes.
 BIASES = ("gyro_bias", "accel_bias")
 
 
 def resting(segment: Segment) -> Segment:
-    """Return a segment whose forces are gravity in the attitude that it has.
+    """Return a segment whose specific forces are gravity at its attitude.
 
     Parameters
     ----------
@@ -506,7 +506,7 @@ def resting(segment: Segment) -> Segment:
 def biases_in_level(
     mechanization: Mechanization, layout: StateLayout, before: Array, after: Array
 ) -> Array:
-    """Return how states go on where a correction leaves the errors of biases in level axes.
+    """Return the transition by a correction that keeps bias errors constant in level axes.
 
     Parameters
     ----------
@@ -568,7 +568,7 @@ def is_large(P: Array) -> bool:
 def unlearnt_force(
     filter_: ErrorFilter, state: FilterState, before: Array, after: Array
 ) -> Array | None:
-    """Return the variance by which less is known of the accelerometers after a correction of tilt.
+    """Return the added variance of the accelerometer bias after a correction of tilt.
 
     While a vehicle goes straight on, fixes determine the sum of a tilt and of the accelerometer
     bias that hides it, and the whole vertical bias, about the computed attitude. Once the tilt is
@@ -595,10 +595,11 @@ def unlearnt_force(
 
     Notes
     -----
-    Tied is what the bias goes with the tilt: ``T = M P M'/g²`` with the regression M of the force
-    that the accelerometers read too much, level axes, on the tilts. Of an accelerometer that is
-    known M is zero, and so is all of this. Jazwinski, Stochastic Processes and Filtering Theory
-    (1970), sec. 9.3, has the variance of a second order; when it comes in is derived here.
+    Tied is the part of the bias that is correlated with the tilt: ``T = M P M'/g²`` with the
+    regression M of the accelerometers' error, level axes, on the tilts. For an exactly known
+    accelerometer M is zero, and so is the inflation. Jazwinski, Stochastic Processes and
+    Filtering Theory (1970), sec. 9.3, has the variance of a second order; when it applies is
+    derived here.
     """
     layout = filter_.model.layout
     names = [name for name in LARGE_TILT_BIASES if name in layout]

@@ -30,7 +30,7 @@ PHYSICAL = 9
 
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """A piece of a run of a mechanization.
+    """A segment of a run of a mechanization.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Segment:
 
 @dataclass(frozen=True)
 class ErrorModel(ABC):
-    """How the errors of a mechanization and of its sensors go on; it holds no state of its own.
+    """Propagation of the errors of a mechanization and of its sensors; stateless.
 
     Error = computed or measured − truth. Whatever its own states are, a model gives the same
     physical errors: first the nine of the navigation state as in
@@ -74,7 +74,7 @@ class ErrorModel(ABC):
     core: ClassVar[tuple[StateBlock, ...]]
     #: Whether the states are the physical errors themselves.
     states_are_physical: ClassVar[bool] = False
-    #: Whether it has a state of the height.
+    #: Whether the height error is a state.
     has_height: ClassVar[bool] = True
 
     @cached_property
@@ -94,7 +94,7 @@ class ErrorModel(ABC):
 
     @cached_property
     def columns_of(self) -> dict[str, slice]:
-        """Place of each block of the sensors among the physical errors, by name."""
+        """Position of each block of the sensors among the physical errors, by name."""
         out: dict[str, slice] = {}
         at = PHYSICAL
         for one in self.sensors:
@@ -104,7 +104,7 @@ class ErrorModel(ABC):
 
     @abstractmethod
     def transition(self, segment: Segment, step: float) -> tuple[Array, Array]:
-        """Return how errors go from the start of a segment to its end.
+        """Return the transition of the errors from the start of a segment to its end.
 
         Parameters
         ----------
@@ -134,7 +134,7 @@ class ErrorModel(ABC):
 
 
 def refuse_damped_height(mechanization: Mechanization) -> None:
-    """Refuse a mechanization whose height has a loop of its own.
+    """Refuse a mechanization with a height loop of its own.
 
     Parameters
     ----------
@@ -159,11 +159,11 @@ AXES = ("x", "y", "z")
 class RotationVectorModel(ErrorModel):
     """Errors as vectors relative to the Earth: the psi-angle model, in level axes.
 
-    Its nine core states are the physical errors themselves, whatever mechanization they are of:
-    those of `mechanization.state_error.state_error`. With gyro and accelerometer biases it has 15
-    states. Regular everywhere, the poles included, where the mechanization is.
+    Its nine core states are the physical errors themselves, for any mechanization: those of
+    `mechanization.state_error.state_error`. With gyro and accelerometer biases it has 15
+    states. Regular wherever the mechanization is, including the poles.
 
-    To first order in the errors; over a step of attitude and force by their means.
+    To first order in the errors; a step uses mean attitude and force.
 
     Attributes
     ----------
@@ -182,7 +182,7 @@ class RotationVectorModel(ErrorModel):
     )
 
     def transition(self, segment: Segment, step: float) -> tuple[Array, Array]:
-        """Return how errors go over a segment, as `ErrorModel.transition`.
+        """Return the transition of the errors over a segment, as `ErrorModel.transition`.
 
         Raises
         ------
@@ -252,8 +252,8 @@ class QuaternionModel(ErrorModel):
     and they stay zero: norms are kept by the equations, and at the end of every segment the level
     axes of the truth are taken to be those without a turn about zeta.
 
-    Inertial axes are those of the Earth at time zero. To first order in the errors; over a step of
-    attitude and force by their means. Regular at the poles.
+    Inertial axes are those of the Earth at time zero. To first order in the errors; a step uses
+    mean attitude and force. Regular at the poles.
 
     Attributes
     ----------
@@ -275,7 +275,7 @@ class QuaternionModel(ErrorModel):
     )
 
     def transition(self, segment: Segment, step: float) -> tuple[Array, Array]:
-        """Return how errors go over a segment, as `ErrorModel.transition`.
+        """Return the transition of the errors over a segment, as `ErrorModel.transition`.
 
         Parameters
         ----------

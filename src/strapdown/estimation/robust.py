@@ -1,4 +1,4 @@
-"""The robust update: an observation weighs what its residual after the fit deserves."""
+"""Robust measurement updates: M-estimators of the residual after the fit."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Influence(ABC):
     @property
     @abstractmethod
     def linear(self) -> float:
-        """Residual up to which it is least squares: ``psi(u) = u``."""
+        """Residual up to which psi is linear: ``psi(u) = u``."""
 
     @property
     @abstractmethod
@@ -56,7 +56,7 @@ class Influence(ABC):
         """Slope of psi; at a bend, that of the side nearer to zero."""
 
     def weight(self, u: float) -> float:
-        """Share of a residual that counts, ``psi(u) / u``, from 1 at zero downwards to 0."""
+        """Weight of a residual, ``psi(u) / u``, from 1 at zero down to 0."""
         return self.psi(u) / u if u else 1.0
 
 
@@ -80,7 +80,7 @@ def check_rising(name: str, **values: float) -> None:
         before, known = value, quantity
 
 
-# Least squares as an influence function: every residual counts in full.
+# Least squares as an influence function: every residual has full weight.
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ class LeastSquares(Influence):
         return 1.0
 
 
-# Huber's influence function: a residual counts no more than k standard deviations.
+# Huber's influence function: the influence of a residual is limited to k standard deviations.
 
 
 @dataclass(frozen=True)
@@ -163,23 +163,23 @@ class Huber(Influence):
         return 1.0 if abs(u) <= self.k else 0.0
 
 
-#: A weight below it is none: the variance R / w of the observation must stay a number.
+#: A smaller weight counts as zero: the variance R / w of the observation must stay finite.
 NO_WEIGHT = 1e-30
 
 
 @dataclass(frozen=True)
 class RobustUpdate:
-    """The minimiser of ``(x - m)' P^-1 (x - m) / 2 + rho(residual)``, and a Kalman step to it.
+    """The minimizer of ``(x - m)' P^-1 (x - m) / 2 + rho(residual)``, and a Kalman step to it.
 
-    With the weight ``w = psi(beta) / beta`` of the residual beta that the minimiser leaves, the
-    Kalman update with the variance R / w goes to that minimiser. The covariance is that
-    of the update, so that it is never negative, whatever the influence function is.
+    With the weight ``w = psi(beta) / beta`` of the residual beta at the minimizer, the Kalman
+    update with the variance R / w goes to that minimizer. The covariance is that of the update,
+    so that it is never negative, whatever the influence function is.
 
     Attributes
     ----------
     influence : Influence
     scale : float
-        Standard deviation of a good observation over that of its stated variance.
+        Standard deviation of a good observation relative to the stated one.
     """
 
     influence: Influence = field(default_factory=Huber)
@@ -196,8 +196,8 @@ class RobustUpdate:
         """Return the step to the minimiser; see `UpdateRule.step`."""
         r *= self.scale * self.scale
         linear = self.influence.linear
-        # Where the loss of least squares is below rho(linear), so is the minimiser's: its residual
-        # is in the linear range. Written so that an infinite range has no infinity times zero.
+        # Where the loss of least squares is below rho(linear), the minimizer's residual is in the
+        # linear range. Written so that an infinite range does not give infinity times zero.
         if abs(nu) <= linear * math.sqrt(s + r) or r == 0.0:
             return Step(nu, 1.0, r, 1.0)
         beta = post_fit(self.influence, abs(nu) / math.sqrt(r), s / r)
@@ -208,7 +208,7 @@ class RobustUpdate:
 
 
 def check_scale(scale: float) -> None:
-    """Raise `ConfigError` where a scale is not finite and positive."""
+    """Raise `ConfigError` for a scale that is not finite and positive."""
     if not (math.isfinite(scale) and scale > 0.0):
         raise ConfigError("estimation.scale-update", quantity="scale", scale=scale)
 
@@ -252,7 +252,7 @@ class Hampel(Influence):
         return (self.a, self.b, self.c)
 
     def rho(self, u: float) -> float:
-        """Half the square, a straight line, a parabola, and then the same for all."""
+        """Half the square, a straight line, a parabola, and then a constant."""
         u, a, b, c = abs(u), self.a, self.b, self.c
         if u <= a:
             return 0.5 * u * u
@@ -370,7 +370,7 @@ class Igg3(Influence):
         return (self.k0, self.k1)
 
     def rho(self, u: float) -> float:
-        """Half the square, a cubic, and then the same for all."""
+        """Half the square, a cubic, and then a constant."""
         u = abs(u)
         if u <= self.k0:
             return 0.5 * u * u
@@ -406,10 +406,10 @@ INFLUENCES: dict[str, type[Influence]] = {
 }
 
 
-# The residual that an observation leaves where its loss and the prior's are least together.
+# The residual at the minimum of the sum of an observation's loss and the prior's.
 
 
-#: Newton's steps go to the root from one side; they stop where they no longer change it.
+#: Newton's steps approach the root from one side; they stop when they no longer change it.
 STEPS = 200
 
 
@@ -422,7 +422,7 @@ def post_fit(influence: Influence, b: float, kappa: float) -> float:
     several minima; the lowest is taken.
 
     Between two knots F is convex or concave, and has one rising root at most. Newton's method
-    finds it from the left of a concave piece and from the right of a convex one: the tangent then
+    finds it from the left of a concave interval and from the right of a convex one: the tangent then
     lies on the far side of F, no step goes past the root, and a slope that is not positive means
     that there is none.
 
@@ -458,7 +458,7 @@ def post_fit(influence: Influence, b: float, kappa: float) -> float:
 def _rising_root(
     influence: Influence, lo: float, hi: float, b: float, kappa: float
 ) -> float | None:
-    """Return where F rises through b between two neighbouring knots, if it does."""
+    """Return where F rises through b between two neighboring knots, or None."""
     psi, psi_prime = influence.psi, influence.psi_prime
     inside = math.nextafter(lo, math.inf)
     concave = psi_prime(inside) >= psi_prime(hi)
@@ -477,7 +477,7 @@ def _rising_root(
             return hi if after <= hi * (1.0 + 1e-12) else None
         if after < lo:
             return lo if after >= lo * (1.0 - 1e-12) else None
-        # All steps go the same way, until rounding turns one back.
+        # All steps have the same direction, until rounding reverses one.
         if (after <= u) if concave else (after >= u):
             return u
         u = slope_at = after
@@ -502,7 +502,7 @@ class PaperUpdate:
     ----------
     influence : Influence
     scale : float
-        alpha over the standard deviation that is stated.
+        alpha over the stated standard deviation.
     """
 
     influence: Influence = field(default_factory=Huber)
@@ -526,7 +526,7 @@ class PaperUpdate:
         return Step(alpha * psi, slope, r, self.influence.weight(beta))
 
 
-# The scale of an observation's errors, learnt from its innovations.
+# The scale of an observation's errors, learned from its innovations.
 
 
 HUBER = Huber()
@@ -542,7 +542,7 @@ class ScaleState(NamedTuple):
     information : float
         Effective number of observations behind it.
     rejected : int
-        How many of the last observations, one after the other, were given no weight.
+        Number of latest observations in a row that were rejected.
     """
 
     log_square: float
@@ -551,13 +551,13 @@ class ScaleState(NamedTuple):
 
     @property
     def factor(self) -> float:
-        """Standard deviation of a good observation over that of its stated variance."""
+        """Standard deviation of a good observation relative to the stated one."""
         return math.exp(0.5 * self.log_square)
 
 
 @dataclass(frozen=True)
 class AdaptiveScale:
-    """How the factor of a stated standard deviation follows the innovations.
+    """Adaptation of the factor of a stated standard deviation to the innovations.
 
     An innovation nu has the variance ``s + c^2 r``. The factor c is adjusted until the clipped
     squares ``min(nu^2 / (s + c^2 r), clip^2)`` have the mean that they have with normal errors
@@ -583,7 +583,7 @@ class AdaptiveScale:
         to a variance with which everything that follows is rejected. At the upper one the
         variance is 10^4 times the stated one, and it is time to look for a failure.
     clip : float
-        In standard deviations. With 1 the factor rises by 15 % where a tenth of the observations
+        In standard deviations. With 1 the factor rises by 15 % if a tenth of the observations
         are gross errors.
     patience : int
         Rejections in a row after which one observation is taken by Huber's function.
@@ -623,7 +623,7 @@ class AdaptiveScale:
         return within + k * k * (1.0 - inside), within
 
     def begin(self) -> ScaleState:
-        """Return the state in which the stated variance holds."""
+        """Return the initial state: the stated variance."""
         bounded = min(max(1.0, self.lowest), self.highest)
         return ScaleState(2.0 * math.log(bounded), self.prior, 0)
 
@@ -680,8 +680,8 @@ Scales = tuple[ScaleState, ...]
 class AdaptiveRule:
     """`RobustUpdate` with the scale that `AdaptiveScale` learns, component by component.
 
-    It has no state: who observes keeps the `Scales` of each observation, by its name. Where nobody
-    does, `step` is that of the stated variances.
+    Stateless: the caller keeps the `Scales` of each observation, by its name. Without them `step`
+    uses the stated variances.
 
     Attributes
     ----------
@@ -697,7 +697,7 @@ class AdaptiveRule:
     source: ClassVar[str] = "Huber 1981, Sections 6.4 (second proposal) and 7.8; recursion: here"
 
     def step(self, nu: float, s: float, r: float) -> Step:
-        """Return the step before anything has been learnt; see `UpdateRule.step`."""
+        """Return the step with the initial scale; see `UpdateRule.step`."""
         return RobustUpdate(self.influence).step(nu, s, r)
 
     def begin(self, size: int) -> Scales:

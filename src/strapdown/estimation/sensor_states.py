@@ -29,7 +29,7 @@ class SensorStates:
     sd : ndarray, (k,)
         At the start, in the unit of the block.
     gyro, accel : ndarray, (7, 3, k)
-        What they add to the measured rate and specific force in body axes, linear in both:
+        Added to the measured rate and specific force in body axes, linear in both:
         ``(gyro[0] + sum rate_i gyro[1 + i] + sum force_i gyro[4 + i]) @ states``. Zero for states
         that only measurements see, such as a lever arm.
     correlation_time : float, s
@@ -52,7 +52,7 @@ class SensorStates:
         return 0.0 if math.isinf(self.correlation_time) else 1.0 / self.correlation_time
 
     def named(self, name: str) -> SensorStates:
-        """Return the same states under another name, as where two receivers have a lever arm."""
+        """Return the same states under another name, as for two receivers with a lever arm each."""
         return replace(self, block=replace(self.block, name=name))
 
 
@@ -79,7 +79,7 @@ class Stacked(NamedTuple):
 
 
 def stack(blocks: tuple[SensorStates, ...]) -> Stacked:
-    """Put blocks side by side, as kernels take them.
+    """Stack blocks, as kernels take them.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ class StateLayout:
 
     @cached_property
     def places(self) -> dict[str, slice]:
-        """Place of each block, by name."""
+        """Position of each block, by name."""
         out: dict[str, slice] = {}
         at = 0
         for block in self.blocks:
@@ -175,7 +175,7 @@ class StateLayout:
         return name in self.places
 
     def __getitem__(self, name: str) -> slice:
-        """Place of a block; a `ConfigError` names those that there are."""
+        """Position of a block; a `ConfigError` lists the existing ones."""
         if name not in self.places:
             raise ConfigError(
                 "estimation.no-state", quantity="states", name=name, word=name, known=self.places
@@ -183,7 +183,7 @@ class StateLayout:
         return self.places[name]
 
     def labels(self) -> Iterator[str]:
-        """One name a state: ``gyro_bias_x``."""
+        """One name per state: ``gyro_bias_x``."""
         for block in self.blocks:
             for label in block.labels:
                 yield f"{block.name}_{label}"

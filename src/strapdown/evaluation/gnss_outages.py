@@ -87,7 +87,7 @@ class WithheldScore:
         """95 % bound of the error, in the direction of the error, (n,), m.
 
         Distance at which the ray through the error leaves the 95 % ellipse: `horizontal` is below it
-        if and only if the error is within the ellipse.
+        if and only if the error is inside.
         """
         return plane_reach(self.horizontal, self.distance, self.covariance)
 

@@ -473,7 +473,7 @@ class _Steps:
 def _sensitivities(
     run: AttitudeRun, time: Array, steps: _Steps, g: float, gravity_of_rest: bool, levelled: bool
 ) -> tuple[Array, Array, Array, Array]:
-    """First order: velocity and position at the end by the biases, and by an initial tilt.
+    """Velocity and position at the end by the biases and by an initial tilt, to first order.
 
     With ``C_est = (1 + [psi x]) C`` the acceleration error is ``C b_a + psi x f_n``, where psi
     is the initial attitude error plus the integral of ``C b_g``.

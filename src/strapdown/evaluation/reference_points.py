@@ -117,7 +117,7 @@ def parse_reference(text: str, start: float, end: float) -> dict[str, object]:
         row["since"] = instant(said["since"], start, end, text)
         since, at = row["since"], row["time"]
         assert isinstance(since, float) and isinstance(at, float)
-        # An interval whose ends are words is as long as the log, whose length is not known here yet.
+        # An interval whose ends are words is as long as the log; its length is unknown here.
         if since >= at and np.isfinite([since, at]).all():
             raise ConfigError(
                 "evaluation.compares-not-before",
