@@ -422,9 +422,9 @@ def post_fit(influence: Influence, b: float, kappa: float) -> float:
     several minima; the lowest is taken.
 
     Between two knots F is convex or concave, and has one rising root at most. Newton's method
-    finds it from the left of a concave interval and from the right of a convex one: the tangent then
-    lies on the far side of F, no step goes past the root, and a slope that is not positive means
-    that there is none.
+    finds it from the left of a concave interval and from the right of a convex one: the tangent
+    then lies on the far side of F, no step goes past the root, and a slope that is not positive
+    means that there is none.
 
     Parameters
     ----------

@@ -86,8 +86,8 @@ class WithheldScore:
     def bound(self) -> Array:
         """95 % bound of the error, in the direction of the error, (n,), m.
 
-        Distance at which the ray through the error leaves the 95 % ellipse: `horizontal` is below it
-        if and only if the error is inside.
+        Distance at which the ray through the error leaves the 95 % ellipse: `horizontal` is below
+        it if and only if the error is inside.
         """
         return plane_reach(self.horizontal, self.distance, self.covariance)
 

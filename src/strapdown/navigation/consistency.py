@@ -36,15 +36,15 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-#: Beyond so many standard deviations, of those that are usual in the run, an innovation is a gross
-#: error: one in two million normal ones is.
+#: An innovation beyond so many standard deviations, of those that are usual in the run, is a gross
+#: error: one in two million normal ones.
 GROSS = 5.0
 #: Fewer epochs than these allow no test.
 FEWEST = 10
-#: Lags of the test of whiteness, where there are so many epochs for each: with fewer the tail of
-#: its distribution is longer than that of chi-square.
+#: Lags of the whiteness test, if there are so many epochs for each: with fewer the tail of its
+#: distribution is longer than that of chi-square.
 LAGS, EPOCHS_A_LAG = 10, 25
-#: Share within which a bound of 95 % is.
+#: Probability of the 95 % bounds.
 SHARE = 0.95
 
 
@@ -108,9 +108,9 @@ class ObservationConsistency:
     name : str
         Of the observation.
     nis : DataFrame
-        By time of the epochs: ``nis``, the sum of the squares of the normalised innovations of an
-        epoch, ``components``, how many they are, and ``lower``, ``upper``, its 95 % bounds
-        (chi-square). Gross errors are in it.
+        By time of the epochs: ``nis``, the sum of the squares of the normalized innovations of an
+        epoch, ``components``, their number, and ``lower``, ``upper``, its 95 % bounds
+        (chi-square). Includes gross errors.
     windows : DataFrame
         By time of the last epoch of each window, one after the other: ``since``, ``epochs``,
         ``nis`` over the components (1 is expected), ``lower``, ``upper``, its 95 % bounds; without
@@ -169,7 +169,7 @@ def consistency_of(
     Raises
     ------
     ConfigError
-        The window has not at least two epochs, or the probability is none.
+        The window has fewer than two epochs, or the probability is invalid.
     """
     if window < 2:
         raise ConfigError("navigation.window-too-short", quantity="window", window=window)
@@ -189,7 +189,7 @@ def consistency_of(
         _component(label, good[:, k], nu[:, k], int(gross[:, k].sum()))
         for k, label in enumerate(labels)
     )
-    # Of five tests each component has; that of a change has three sums over all epochs.
+    # Each component has five tests; the test for a change has three sums over all epochs.
     each = false_alarm / (5.0 * max(len(labels), 1))
     monitor = InnovationMonitor(threshold=math.log(3.0 * max(len(time), 1) / each))
     _, alarms = monitor.advance(monitor.begin(len(labels)), time, good)
@@ -223,7 +223,7 @@ def whiteness(values: Array, lags: int = LAGS) -> tuple[Array, float]:
     Parameters
     ----------
     values : ndarray, (n,)
-        Equally spaced, as far as it matters; NaN where there is none.
+        Approximately equally spaced; NaN for a missing value.
     lags : int
 
     Returns
@@ -248,7 +248,7 @@ def whiteness(values: Array, lags: int = LAGS) -> tuple[Array, float]:
 
 
 def gross_of(u: Array) -> NDArray[np.bool_]:
-    """Innovations far beyond those that are usual, by the median, which they do not move."""
+    """Innovations far beyond the usual ones by the median, which is insensitive to them."""
     out = np.zeros(u.shape, dtype=bool)
     for k, column in enumerate(u.T):
         told = np.abs(column[~np.isnan(column)])
@@ -341,15 +341,15 @@ def _windows(time: Array, u: Array, window: int) -> pd.DataFrame:
     )
 
 
-# What in the innovations of a run speaks against it, in the order of time.
+# Inconsistent innovations of a run, in order of time.
 
 
-#: Kinds that hold of the whole run.
+#: Kinds that apply to the whole run.
 THROUGHOUT = ("understated", "bias", "correlated")
 #: Significant deviations count from these sizes on: a scatter, a mean in standard deviations, a
 #: correlation.
 SCATTERS, LEANS, REMEMBERS = 1.5, 0.5, 0.3
-#: Of errors that are stated to last, what they do beside independent ones of the stated size.
+#: Effect of errors stated as time-correlated, relative to independent ones of the stated size.
 LASTS = 2.0
 
 
@@ -368,13 +368,13 @@ class Inconsistency:
     since : float, s
         First epoch for which it is so.
     until : float, s
-        Last one; the end of the run, where it holds throughout.
+        Last one; the end of the run, for a whole run.
     epochs : ndarray, (k,), s
-        Of gross errors, those; else none.
+        Epochs of gross errors; empty for other kinds.
     factor : float
         Factor on the standard deviations that makes it consistent; 1 where none does.
     what, meaning : str
-        In words.
+        Description and meaning as text.
     """
 
     name: str
@@ -390,7 +390,7 @@ class Inconsistency:
 
     @property
     def throughout(self) -> bool:
-        """Whether it holds of the whole run."""
+        """Whether it applies to the whole run."""
         return self.kind in THROUGHOUT
 
 
@@ -413,14 +413,14 @@ def inconsistencies(
     innovations : mapping of str to DataFrame
         From which it is.
     lasting : collection of str
-        Names of the aids that state that their errors last: these may do twice as much as
+        Names of the aids with stated time-correlated errors: these may have twice the effect of
         independent ones.
 
     Returns
     -------
     tuple of Inconsistency
-        In the order of time; what begins at one epoch, the least probable first. What holds
-        throughout of an aid with gross errors comes after these.
+        In order of time, for equal epochs the least probable first. Inconsistencies of the whole
+        run of an aid with gross errors come after these.
     """
     found: list[Inconsistency] = []
     chance: dict[int, float] = {}
@@ -432,8 +432,8 @@ def inconsistencies(
                 one = _inconsistency(name, of, verdict, part, innovations[name])
                 found.append(one)
                 chance[id(one)] = verdict.p
-    # What gross errors do to a filter that believes them holds throughout, and has no begin of its
-    # own: it comes after them.
+    # The effect of gross errors on a filter that uses them lasts for the whole run without a begin
+    # of its own: it comes after them.
     gross: dict[str, float] = {}
     for one in found:
         if one.kind == "gross":
@@ -447,7 +447,7 @@ def inconsistencies(
 
 
 def _aid(name: str) -> str:
-    """Of an observation."""
+    """Aid of an observation."""
     return name.rpartition(".")[0] or name
 
 
@@ -465,7 +465,7 @@ def _matters(verdict: Verdict, part: ComponentConsistency, lasts: bool) -> bool:
 
 
 def _lasting(part: ComponentConsistency) -> float:
-    """Scatter of independent errors that would do as much: those of a first-order process."""
+    """Scatter of independent errors of equal effect, for a first-order process."""
     rho = min(max(float(part.autocorrelation[0]), 0.0), 1.0 - 1.0 / max(part.count, 2))
     return part.scale * math.sqrt((1.0 + rho) / (1.0 - rho))
 
@@ -502,7 +502,7 @@ def _inconsistency(
 
 
 def _until(windows: pd.DataFrame, since: float) -> float:
-    """Last epoch of the windows in a row that are beyond their bounds, from a change on."""
+    """Last epoch of the consecutive windows beyond their bounds, from a change on."""
     later = windows[windows.index >= since]
     bad = (later["nis"] > later["upper"]).to_numpy()
     if not bad.any():

@@ -1,4 +1,4 @@
-"""What can be chosen of the filter of a chain: its error model, covariance, rule and steps."""
+"""Options of the filter of a chain: error model, covariance form, update rule and steps."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["DAMPINGS", "ClosedLoop", "Correction", "FilterOptions", "OpenLoop"]
 
 @dataclass(frozen=True)
 class FilterOptions:
-    """Error-state filter, closed loop, covariance at a rate of its own.
+    """Error-state filter, closed loop, with its own covariance step.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class FilterOptions:
     Raises
     ------
     ConfigError
-        A time is none.
+        A time is invalid.
     """
 
     model: type[ErrorModel] = RotationVectorModel
@@ -58,7 +58,7 @@ class FilterOptions:
 
 @dataclass(frozen=True)
 class Correction:
-    """Where estimates go."""
+    """Use of the estimated errors."""
 
     kind: ClassVar[str]
     summary: ClassVar[str]
@@ -69,7 +69,7 @@ class Correction:
 
 @dataclass(frozen=True)
 class ClosedLoop(Correction):
-    """State and sensors are corrected at every epoch, so that errors stay small: damped."""
+    """State and sensors are corrected at every epoch, so that errors stay small ("damping")."""
 
     kind: ClassVar[str] = "feedback"
     summary: ClassVar[str] = "errors are taken off the state and the sensors at each epoch"

@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened at an instant.
+    """An event at an instant.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class Event:
     kind : str
         ``mode``, ``outage``, ``recovered``, ``rejected``, ``late``, ``gap``, ``command``.
     what : str
-        In words.
+        Description as text.
     """
 
     time: float
@@ -46,7 +46,7 @@ class Event:
 
 @dataclass(frozen=True)
 class Span:
-    """A time over which something was so: a mode, an outage of an aid.
+    """A time interval of a condition: a mode, an outage of an aid.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Span:
 
 @dataclass(frozen=True, eq=False)
 class NavigationRecord:
-    """A run of navigation, as it was recorded.
+    """A recorded run of navigation.
 
     Attributes
     ----------
@@ -116,8 +116,8 @@ class InnovationRecord(NamedTuple):
     innovations : Innovations
         Innovation: computed − observed − predicted; its predicted variance; weight.
     observation : Observation, optional
-        Of the state before anything of this epoch was taken, estimates that are kept beside taken
-        off; none of a lone receiver in a compiled loop.
+        Of the state before any update of this epoch, with open-loop estimates subtracted; None
+        for a single receiver in a compiled loop.
     """
 
     time: float
@@ -168,7 +168,7 @@ class NavigationChunk:
     late : tuple of (str, float)
         Epochs of aids that came when the navigator was beyond their time, and were not used.
     nodes : tuple of ndarray, (k, width)
-        For a smoother, where the navigator is to be smoothed: rows of `NodeRows`.
+        Smoother history, if the navigator has a smoother: rows of `NodeRows`.
     """
 
     time: Array
@@ -179,7 +179,7 @@ class NavigationChunk:
     nodes: tuple[Array, ...] = ()
 
 
-# Rows that are added to, without a copy of those that are there.
+# Rows that grow without copying earlier ones.
 
 
 FIRST_ROOM = 64
@@ -193,7 +193,7 @@ class _Room:
 
 @dataclass(frozen=True, eq=False)
 class GrowingRows:
-    """Rows of numbers: a value that never changes, whose further growth shares its memory.
+    """Rows of numbers: an immutable value; longer values share its memory.
 
     Appending to the newest value costs only the new rows; appending to an older one copies it.
 
@@ -207,7 +207,7 @@ class GrowingRows:
 
     @classmethod
     def of(cls, columns: int) -> GrowingRows:
-        """Return no rows of so many columns."""
+        """Return an empty value of so many columns."""
         return cls(_Room(np.empty((0, columns)), 0))
 
     @property
@@ -216,7 +216,7 @@ class GrowingRows:
         return self.room.buffer[: self.count]
 
     def and_then(self, rows: Array) -> GrowingRows:
-        """Return these rows and further ones, (k, columns)."""
+        """Return these rows with further ones, (k, columns), appended."""
         room, count = self.room, self.count + len(rows)
         if room.used != self.count or count > len(room.buffer):
             size = max(FIRST_ROOM, count + count // 2)
@@ -227,6 +227,6 @@ class GrowingRows:
         return GrowingRows(room, count)
 
     def without_first(self, number: int) -> GrowingRows:
-        """Return them without the first ones; the memory of these is given back."""
+        """Return the rows without the first ones, whose memory is freed."""
         left = self.rows[number:].copy()
         return GrowingRows(_Room(left, len(left)), len(left))
