@@ -14,7 +14,7 @@ __all__ = ["ELLIPSOIDS", "WGS84", "Ellipsoid", "find_ellipsoid"]
 
 @dataclass(frozen=True)
 class Ellipsoid:
-    """An ellipsoid of revolution that turns, with its field of normal gravity.
+    """A rotating ellipsoid of revolution with its field of normal gravity.
 
     Attributes
     ----------
@@ -151,7 +151,7 @@ ELLIPSOIDS: dict[str, Ellipsoid] = {
 
 
 def find_ellipsoid(name: str) -> Ellipsoid:
-    """Look an ellipsoid up by its name.
+    """Return an ellipsoid by its name.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Geodetic, Earth-centred and local coordinates, and the axes of each.
+"""Geodetic, Earth-centered and local coordinates, and the axes of each.
 
 * A *position* (`place`) is ``(..., 3)``: geodetic latitude and longitude in degrees, north and east
   positive, and height over the ellipsoid in meters.
@@ -68,12 +68,12 @@ def ecef_from_geodetic(place: ArrayLike, *, ellipsoid: Ellipsoid = WGS84) -> Arr
 
 
 def geodetic_from_ecef(position: ArrayLike, *, ellipsoid: Ellipsoid = WGS84) -> Array:
-    """Places of Earth-centred coordinates.
+    """Positions from Earth-centered coordinates.
 
     Parameters
     ----------
     position : array_like, (..., 3), m
-        From 50 km to 1e9 m from the centre.
+        From 50 km to 1e9 m from the center.
     ellipsoid : Ellipsoid
 
     Returns
@@ -90,7 +90,7 @@ def geodetic_from_ecef(position: ArrayLike, *, ellipsoid: Ellipsoid = WGS84) -> 
     Notes
     -----
     The closed form of Vermeille, J. Geodesy 76 (2002) 451-454, at every height; pymap3d's own
-    (You 2000) is 1 µm off at 100 km, 9 mm at 1000 km and 60 m at 30 000 km.
+    (You 2000) has an error of 1 µm at 100 km, 9 mm at 1000 km and 60 m at 30 000 km.
     """
     (x, y, z), leading = _columns(position, ("x", "y", "z"), "position")
     xyz = np.column_stack([x, y, z])
@@ -111,13 +111,13 @@ def geodetic_from_ecef(position: ArrayLike, *, ellipsoid: Ellipsoid = WGS84) -> 
 
 
 def ned_from_ecef(position: ArrayLike, origin: ArrayLike, *, ellipsoid: Ellipsoid = WGS84) -> Array:
-    """Local coordinates of Earth-centred ones.
+    """Local coordinates from Earth-centered ones.
 
     Parameters
     ----------
     position : array_like, (..., 3), m
     origin : array_like, (3,)
-        Place of the origin and of the axes.
+        Position of the origin and of the axes.
     ellipsoid : Ellipsoid
 
     Returns
@@ -138,14 +138,14 @@ def ned_from_ecef(position: ArrayLike, origin: ArrayLike, *, ellipsoid: Ellipsoi
 
 
 def ecef_from_ned(ned: ArrayLike, origin: ArrayLike, *, ellipsoid: Ellipsoid = WGS84) -> Array:
-    """Earth-centred coordinates of local ones.
+    """Earth-centered coordinates from local ones.
 
     Parameters
     ----------
     ned : array_like, (..., 3), m
         North, east, down.
     origin : array_like, (3,)
-        Place of the origin and of the axes.
+        Position of the origin and of the axes.
     ellipsoid : Ellipsoid
 
     Returns
@@ -174,7 +174,7 @@ def ned_from_geodetic(
     place : array_like, (..., 3)
         Latitude and longitude in deg, height in m.
     origin : array_like, (3,)
-        Place of the origin and of the axes.
+        Position of the origin and of the axes.
     ellipsoid : Ellipsoid
 
     Returns
@@ -193,14 +193,14 @@ def ned_from_geodetic(
 
 
 def geodetic_from_ned(ned: ArrayLike, origin: ArrayLike, *, ellipsoid: Ellipsoid = WGS84) -> Array:
-    """Places of local coordinates.
+    """Positions from local coordinates.
 
     Parameters
     ----------
     ned : array_like, (..., 3), m
         North, east, down.
     origin : array_like, (3,)
-        Place of the origin and of the axes.
+        Position of the origin and of the axes.
     ellipsoid : Ellipsoid
 
     Returns

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class NavState:
-    """Place, velocity and attitude relative to local north-east-down.
+    """Position, velocity and attitude relative to local north-east-down.
 
     In radians, as the kernels need it; `from_degrees` takes degrees.
 
@@ -148,7 +148,7 @@ class NavState:
 
     @classmethod
     def from_trajectory(cls, trajectory: pd.DataFrame, row: int = 0) -> NavState:
-        """Take a row of a Trajectory table.
+        """Return a state from a row of a Trajectory table.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Heights by the pressure of the air."""
+"""Heights from barometric pressure."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ HOUR = 3600.0
 
 @dataclass(frozen=True)
 class Barometer(TabulatedMeasurement):
-    """Height of a barometer: that over the ellipsoid, a bias, and noise.
+    """Barometric height: height above the ellipsoid, a bias, and noise.
 
     The bias is the height of the sea above the ellipsoid plus the deviation of the weather from the
     standard, or the offset of the heights' reference; it is a state ``NAME.bias``, a random walk
@@ -71,14 +71,14 @@ class Barometer(TabulatedMeasurement):
             check_number(self, name, low=0.0)
 
     def states(self) -> tuple[SensorStates, ...]:
-        """Return the state of the bias: height that is read less true."""
+        """Return the state of the bias: height reading − true."""
         bias = unseen(f"{self.name}.bias", ("bias",), "m", self.bias_sd)
         if self.correlation_time > 0.0:
             return (gauss_markov(bias, self.correlation_time),)
         return (random_walk(bias, self.walk / HOUR**0.5),)
 
     def epochs(self, table: pd.DataFrame) -> Epochs:
-        """Return an epoch for each height that was measured; see `TabulatedMeasurement.epochs`."""
+        """Return an epoch for each measured height; see `TabulatedMeasurement.epochs`."""
         check_barometer(table)
         values = values_of(table, BAROMETER)
         told = np.isfinite(values[:, 1])

@@ -1,4 +1,4 @@
-"""Places and velocities of a satellite receiver."""
+"""Positions and velocities of a GNSS receiver."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ Array = NDArray[np.float64]
 POSITION_CODE, VELOCITY_CODE, HORIZONTAL_CODE = 0.0, 1.0, 2.0
 PLACE = ("north, m", "east, m", "down, m")
 SPEED = ("VN, m/s", "VE, m/s", "VD, m/s")
-#: Beyond this a time offset is a wrong clock, and no longer an arc of the second order, s.
+#: Beyond this, s, a time offset is a wrong clock, and the second-order arc is not valid.
 LARGEST_OFFSET = 2.0
 
 
@@ -69,13 +69,13 @@ class Gnss(TabulatedMeasurement):
     lever_arm : tuple of float, (3,), m
         Of the antenna from the inertial sensors, body axes.
     lever_arm_sd : float or tuple of float, (3,), m
-        How well it is known. Above zero it is estimated: states ``NAME.lever_arm``, assumed less
+        Its standard deviation. Above zero it is estimated: states ``NAME.lever_arm``, assumed −
         true.
     time_offset : float, s
         Time stamps of the aid minus the time of the inertial sensors: a stamp t means
         ``t - time_offset``.
     time_offset_sd : float, s
-        How well that is known. Above zero it is estimated: state ``NAME.time_offset``, assumed less
+        Its standard deviation. Above zero it is estimated: state ``NAME.time_offset``, assumed −
         true.
     time_offset_drift : float, s/√s
         By which that state walks.
@@ -84,9 +84,9 @@ class Gnss(TabulatedMeasurement):
         mean over the preceding interval.
     use_position, use_velocity : bool
     position_sd_factor, velocity_sd_factor : float
-        By which the stated standard deviations are multiplied.
+        Factors on the stated standard deviations.
     least_position_sd, least_velocity_sd : float, m and m/s
-        No standard deviation is taken to be less.
+        Lower bounds of the standard deviations.
     qualities : tuple of int
         Fix qualities to be used, as in NMEA 0183 GGA; 6 is dead reckoning by the receiver
         without satellites.
@@ -163,7 +163,7 @@ class Gnss(TabulatedMeasurement):
         lever_arm(self.lever_arm_sd)
 
     def states(self) -> tuple[SensorStates, ...]:
-        """Errors of the lever arm and of the time offset, where they are not known."""
+        """Errors of the lever arm and of the time offset, if these are uncertain."""
         out = []
         if np.any(np.asarray(self.lever_arm_sd) > 0.0):
             out.append(lever_arm(self.lever_arm_sd).named(self._arm))
@@ -174,13 +174,13 @@ class Gnss(TabulatedMeasurement):
 
     @property
     def wants_steady(self) -> bool:
-        """With a time offset that is estimated, by the acceleration."""
+        """Only with an estimated time offset, which needs the acceleration."""
         return self.time_offset_sd > 0.0
 
     def epochs(self, table: pd.DataFrame) -> Epochs:
         """Return an epoch for each position and velocity; see `TabulatedMeasurement.epochs`.
 
-        A velocity without a vertical component is one of two components.
+        A velocity without a vertical component has two components.
         """
         check_gnss(table)
         time = index_of(table) - self.time_offset
@@ -270,7 +270,7 @@ def _later(
     velocity: Moving,
     acceleration: Moving,
 ) -> Moving:
-    """Place or velocity so much after the epoch, by which the assumed offset is too large."""
+    """Position or velocity after the epoch by the error of the assumed offset."""
     speed = velocity.after(acceleration, late)
     out, changes = speed, acceleration
     if of_place:
@@ -312,7 +312,7 @@ def _refuse_certain(
 
 @dataclass(frozen=True, eq=False)
 class Moving:
-    """A vector of the antenna in level axes, and how it depends on the physical errors.
+    """A vector of the antenna in level axes, and its sensitivity to the physical errors.
 
     Attributes
     ----------
@@ -335,15 +335,15 @@ def arm_of(view: View, name: str, assumed: Array) -> Array:
 
 
 def moving(view: View, arm: Array, arm_name: str) -> tuple[Moving, Moving, Moving]:
-    """Return how the antenna is and moves.
+    """Return position, velocity and acceleration of the antenna relative to the body.
 
     Parameters
     ----------
     view : View
     arm : ndarray, (3,), m
-        Body axes, less the estimate of its error.
+        Body axes, minus the estimate of its error.
     arm_name : str
-        Of the block of states of its error; there may be none.
+        Name of the block of states of its error, which may be absent.
 
     Returns
     -------
@@ -396,7 +396,7 @@ def _at(where: slice, columns: int) -> Array:
 
 
 def _steady(view: View) -> tuple[Array, Array]:
-    """Rate and force without the shaking, where it is known, and without the estimated errors."""
+    """Rate and force without vibration, if known, with the estimated errors subtracted."""
     if view.steady is None:
         return view.rate, view.force
     stacked = view.model.stacked
@@ -408,6 +408,6 @@ def _steady(view: View) -> tuple[Array, Array]:
 
 
 def _of_accel(view: View) -> Array:
-    """Errors of the force by the states of the sensors, (3, k), body axes."""
+    """Sensitivity of the specific force to the sensor states, (3, k), body axes."""
     felt = np.concatenate([[1.0], view.rate, view.force])
     return np.tensordot(felt, view.model.stacked.accel, 1)

@@ -1,4 +1,4 @@
-"""Whether a receiver and inertial sensors have one clock, and how far it is off."""
+"""Time offset between a GNSS receiver and the inertial sensors."""
 
 from __future__ import annotations
 
@@ -31,20 +31,20 @@ __all__ = [
 Array = NDArray[np.float64]
 
 WEEK = 604_800.0
-#: Unix time of the first second of GPS time, and the seconds that it is ahead of UTC since 2017.
+#: Unix time of the first second of GPS time, and its lead over UTC since 2017, s.
 GPS_EPOCH, LEAP = 315_964_800.0, 18.0
-#: Unix time since 1995 and until 2040, s.
+#: Unix time in 1995 and in 2040, s.
 UNIX = (7.9e8, 2.21e9)
 #: Range of offsets, s, the step of the search, and of the fit about its result.
 LARGEST, STEP, FINE_STEP = 20.0, 0.1, 0.025
-#: How far apart integrals of the sensors are kept for it, s.
+#: Interval of the stored integrals of the sensors, s.
 NODES = 0.02
 #: Below this speed, m/s, a course is not usable.
 LEAST_SPEED = 3.0
-#: How far an antenna may be from where the vehicle goes as it points, m.
+#: Largest distance of an antenna from the unsteered axle, m.
 ARM = 1.0
-#: Steps that are needed; part of the changes that the sensors must explain; and by how much the
-#: best offset must leave less than any other farther than a second from it.
+#: Number of steps needed; fraction of the changes that the sensors must explain; and factor by
+#: which the best offset's residual must be below that of any other more than a second from it.
 LEAST_STEPS, LEAST_SHARE, CLEAR = 20, 0.6, 1.3
 LONGEST_STEP = 1.5
 #: An offset is reported from so many standard deviations, and at least this, s.
@@ -53,7 +53,7 @@ SURE, LEAST_OFFSET = 3.0, 0.02
 
 @dataclass(frozen=True)
 class TimeOffset:
-    """Stamps of a receiver less the time of the inertial sensors.
+    """Time stamps of a receiver minus the time of the inertial sensors.
 
     Attributes
     ----------
@@ -71,13 +71,13 @@ class TimeOffset:
 
 
 def check_overlap(gnss: pd.DataFrame, imu: pd.DataFrame, offset: float = 0.0) -> list[Finding]:
-    """Refuse fixes that are of another time than the inertial record.
+    """Refuse fixes that do not overlap the inertial record in time.
 
     Parameters
     ----------
     gnss, imu : DataFrame
     offset : float, s
-        Stamps of the receiver less the time of the sensors, as it is configured.
+        Time stamps of the receiver minus the time of the sensors, as configured.
 
     Returns
     -------
@@ -131,9 +131,9 @@ def check_overlap(gnss: pd.DataFrame, imu: pd.DataFrame, offset: float = 0.0) ->
 def time_offset(
     gnss: pd.DataFrame, imu: pd.DataFrame, velocity_delay: float = 0.0
 ) -> TimeOffset | None:
-    """Find the offset at which gyros explain how the course changes, or force how the speed does.
+    """Find the offset at which the gyros explain the course, or the specific force the speed.
 
-    Good to some hundredths of a second: the nominal value of a state that finds the rest.
+    Accurate to some hundredths of a second: the nominal value of an estimated state.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def time_offset(
     rates, whatever the mounting, as long as the vehicle does not tilt by much; its speed by one of
     the integral of force. For every offset of a grid the four numbers are fitted by least squares;
     the least misfit is refined by a parabola, whose curvature gives the standard deviation. The
-    course of an antenna that is a metre before the rear axle is ahead of the heading by a metre
+    course of an antenna that is a meter before the rear axle is ahead of the heading by a meter
     over the speed, which sets the weights of course and speed.
     """
     told = _courses(gnss, velocity_delay)
@@ -254,12 +254,12 @@ def _best(
     columns: list[str],
     by: str,
 ) -> TimeOffset | None:
-    """The offset at which the integrals of three channels explain a change best."""
+    """The offset at which the integrals of three channels best explain a change."""
     stamps = index_of(imu)
     if not set(columns) <= set(imu.columns):
         return None
     values = values_of(imu, columns)
-    # Every offset is judged by the same steps: those within the record at all that leave enough.
+    # Every offset is judged by the same steps: those within the record at all the offsets.
     most = min(LARGEST, 0.25 * float(stamps[-1] - stamps[0]))
     begin, end = at[:-1], at[1:]
     used = used & (begin - most >= stamps[0]) & (end + most <= stamps[-1])
@@ -274,7 +274,7 @@ def _best(
     def misfit(offset: float) -> float:
         piecewise.lines(nodes, sums, at - offset, between)
         X[:, :3] = np.diff(between, axis=0)[used]
-        # Of the normal equations, which keep digits enough to judge by, and are few.
+        # By the small normal equations, which keep enough digits for the comparison.
         fit, *_ = np.linalg.lstsq(X.T @ X, X.T @ change, rcond=None)
         return float(np.square(change - X @ fit).sum())
 
@@ -290,7 +290,7 @@ def _best(
         or not (away.any() and costs[away].min() > CLEAR * costs[k])
     ):
         return None
-    # Again about the least, with a step that is wide beside its noise and narrow beside motions.
+    # Again near the minimum, with a step that is wide against its noise and narrow against motions.
     fine = grid[k] + np.arange(-4, 5) * FINE_STEP
     second, first, _ = np.polyfit(fine - grid[k], [misfit(float(one)) for one in fine], 2)
     if not second > 0.0:
@@ -353,7 +353,7 @@ UNIX_TIME, GPS_WEEK = "Unix time", "seconds of the GPS week"
 
 
 def _kind(first: float, span: float) -> str:
-    """Name of the clock that a first stamp looks like."""
+    """Name of the clock that a first time stamp suggests."""
     if UNIX[0] <= first <= UNIX[1]:
         return UNIX_TIME
     if abs(first) < max(span, 100.0):
@@ -372,7 +372,7 @@ def _to_week(unix: Array) -> float:
 # Delay of a receiver's velocity against its own positions.
 
 
-#: Delays that are looked at, s.
+#: Range of the searched delays, s.
 GNSS_DELAY_LARGEST = 2.0
 #: Number of steps from fix to fix that are needed, and the longest of them, s: over a longer step
 #: the velocity is not representative.
@@ -393,7 +393,7 @@ class VelocityDelay:
     ----------
     delay, sd : float, s
     changing : float, m/s²
-        Root mean square of the acceleration, by which it was found.
+        Root mean square of the acceleration that makes the delay observable.
     steps : int
     """
 
@@ -477,7 +477,7 @@ def velocity_delay(table: pd.DataFrame) -> VelocityDelay | None:
 
 
 def find_velocity_delay(table: pd.DataFrame, assumed: float = 0.0) -> list[Finding]:
-    """Tell a delay that is sure and matters.
+    """Report a delay that is significant and matters.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where an axis of the body points: a compass, or the baseline of two antennas."""
+"""Azimuth of an axis of the body: a compass, or the baseline of two antennas."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Heading(TabulatedMeasurement):
-    """Azimuth of an axis of the body, clockwise from north: that, a misalignment, and noise.
+    """Azimuth of an axis of the body, clockwise from north, with a misalignment and noise.
 
     For a compass the misalignment is the residual of declination and iron; for two antennas, the
     error of the axis. It is observable where another source determines the heading.
@@ -33,8 +33,8 @@ class Heading(TabulatedMeasurement):
     Attributes
     ----------
     axis_deg : float, deg
-        Of the axis in the body, from forward to the right: 0 of a compass, 90 of a baseline from
-        the left antenna to the right one.
+        Of the axis in the body, from forward to the right: 0 for a compass, 90 for a baseline
+        from the left antenna to the right one.
     added_deg : float, deg
         Added to the reading: the declination, east positive, of a magnetic heading.
     misalignment_sd_deg : float, deg
@@ -68,7 +68,7 @@ class Heading(TabulatedMeasurement):
         return (unseen(f"{self.name}.misalignment", ("misalignment",), "rad", sd),)
 
     def epochs(self, table: pd.DataFrame) -> Epochs:
-        """Return an epoch for each heading that was measured; see `TabulatedMeasurement.epochs`."""
+        """Return an epoch for each measured heading; see `TabulatedMeasurement.epochs`."""
         check_heading(table)
         values = np.radians(values_of(table, HEADING))
         told = np.isfinite(values[:, 1])

@@ -1,4 +1,4 @@
-"""What aids of a body at rest have in common: how it is found that it rests."""
+"""Standstill detection, and the measurements of a stationary body: ZUPT and ZARU."""
 
 from __future__ import annotations
 
@@ -43,11 +43,11 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-# A window of fewer samples has no variance worth the name.
+# A window of fewer samples has no meaningful variance.
 LEAST_SAMPLES = 3
-# Part of a window that may be missing from it.
+# Fraction of a window that may be missing.
 GAPS = 0.2
-# Part of a window, or of an interval, by which stamps are rounded.
+# Tolerance of time stamps by rounding, as a fraction of a window or an interval.
 SLACK = 1e-3
 #: Columns of a window: end and length of a step, rate, force.
 TIME, DT, RATE, FORCE = 0, 1, slice(2, 5), slice(5, 8)
@@ -61,7 +61,7 @@ class Window(NamedTuple):
     Attributes
     ----------
     samples : ndarray, (m, 8)
-        The last ones: a window, and one before it.
+        The latest ones: a window, and one sample before it.
     number : float
         Of the interval of the last sample; NaN before the first.
     rule : object
@@ -77,7 +77,7 @@ class Window(NamedTuple):
 class StandstillAid(ImuDerivedMeasurement):
     """An aid that observes while a detector finds the body stationary.
 
-    The detector sees the samples of the `window` that ends at an epoch, and no later ones.
+    The detector uses the samples of the `window` that ends at an epoch, and no later ones.
 
     A vehicle that glides over a smooth road looks like a stationary one. So there is no
     observation while the computed velocity is not near zero: above `largest_speed` by more than
@@ -104,8 +104,9 @@ class StandstillAid(ImuDerivedMeasurement):
         Infinite: the detector alone decides, as on a foot.
     gate : float
     gate_time : float, s
-        After so long without any observation a rest is taken at any speed: a filter that is wrong
-        by more than it knows would take none any more. Zero: never, as for what glides for longer.
+        After this time without an observation a rest is accepted at any speed: a filter with an
+        error beyond its covariance would never accept one again. Zero: never, as for vehicles
+        that glide for longer.
     """
 
     detector: str = "force_variance"
@@ -151,7 +152,7 @@ class StandstillAid(ImuDerivedMeasurement):
         return Window(np.empty((0, 8)), math.nan, rule.begin(self.threshold, self.threshold_time))
 
     def watch(self, memory: Window, time: Array, rows: Array) -> tuple[Window, Epochs]:
-        """Return epochs where the window that ends there is of a rest."""
+        """Return an epoch for each end of a stationary window."""
         if not len(time):
             return memory, Epochs(np.empty(0), np.empty((0, 10)))
         new = len(memory.samples)
@@ -189,7 +190,7 @@ class StandstillAid(ImuDerivedMeasurement):
         return np.floor(time / self.interval + SLACK) if self.interval else np.zeros(len(time))
 
     def _ends(self, seen: Array, new: int, number: float) -> NDArray[np.int64]:
-        """Samples with which an interval ends."""
+        """Indices of the samples that end an interval."""
         if not self.interval:
             return np.arange(new, len(seen))
         numbers = self._number(seen[new:, TIME])
@@ -197,9 +198,9 @@ class StandstillAid(ImuDerivedMeasurement):
         return new + np.flatnonzero(numbers > before)
 
     def _first(self, seen: Array, i: int) -> int:
-        """First sample of the window that ends with one."""
+        """Index of the first sample of the window that ends with a sample."""
         begin = seen[i, TIME] - self.window * (1.0 - SLACK)
-        # Ends of steps: the first that is after the begin of the window.
+        # Ends of steps: the first after the begin of the window.
         return int(seen[: i + 1, TIME].searchsorted(begin, side="right"))
 
     def _look(self, seen: Array, i: int) -> tuple[float, Array] | None:
@@ -241,7 +242,7 @@ class StandstillDetector:
         Squares a sample with an expectation of one at rest.
     of : callable
         ``of(rate, force, gravity)`` with rates (w, 3) and forces (w, 3), each over the standard
-        deviation of its noise, and gravity over that of the force: the mean square a sample.
+        deviation of its noise, and gravity over that of the force: the mean square per sample.
     """
 
     summary: str
@@ -348,14 +349,14 @@ STANDSTILL_DETECTORS: dict[str, StandstillDetector] = {
 # never a later one, so that the chunks of a record give the same as the whole.
 
 
-# Of the histogram of the logarithm of a statistic: first edge, width of a bin, number of bins.
+# Histogram of the logarithm of a statistic: first edge, width of a bin, number of bins.
 LOWEST, WIDTH, BINS = math.log(1e-3), 0.1, 200
-# A class has at least this share, and of two that are apart at least this part of the variance is
-# between them: 0.64 of one normal class cut in two, 0.75 of a uniform one.
+# Least share of a class, and least part of the variance between two separate classes: 0.64 for one
+# normal class cut in two, 0.75 for a uniform one.
 LEAST_SHARE, LEAST_BETWEEN = 0.1, 0.65
-# A motion is so many times a rest.
+# Least ratio of the statistics of motion and rest.
 LEAST_RATIO = 5.0
-# So much must have been seen, s, and after so much the split is made anew.
+# Time before the first split, s, and between splits.
 SEEN, ANEW = 2.0, 0.25
 
 
@@ -374,7 +375,7 @@ class StandstillThreshold(ABC):
         stated : float
             Threshold that is stated.
         scale : float, s
-            Time of the rule: how long it remembers, or how long it is patient.
+            Time scale of the rule: its memory, or its patience.
         """
 
     @abstractmethod
@@ -402,7 +403,7 @@ class Told(NamedTuple):
 
 
 class Stated(StandstillThreshold):
-    """The threshold that is stated."""
+    """Constant stated threshold."""
 
     summary: ClassVar[str] = "the threshold that is stated"
     source: ClassVar[str] = "Skog et al. (2010)"
@@ -417,7 +418,7 @@ class Stated(StandstillThreshold):
 
 
 class Split(NamedTuple):
-    """A histogram that fades.
+    """A histogram with fading memory.
 
     Attributes
     ----------
@@ -427,7 +428,7 @@ class Split(NamedTuple):
     counts : ndarray, (BINS,), s
         Time spent in each bin of the logarithm of the statistic.
     time, made : float, s
-        Of the newest statistic, and when the split was made; NaN before the first.
+        Of the newest statistic, and of the last split; NaN before the first.
     """
 
     now: float
@@ -438,7 +439,7 @@ class Split(NamedTuple):
 
 
 class Otsu(StandstillThreshold):
-    """Between the two classes of the statistics so far: stances and swings."""
+    """Threshold between the two classes of the statistics so far: stances and swings."""
 
     summary: ClassVar[str] = (
         "between the two classes of the statistics so far; until there are two, as stated"
@@ -450,7 +451,7 @@ class Otsu(StandstillThreshold):
         return Split(stated, scale, np.zeros(BINS), math.nan, math.nan)
 
     def next(self, memory: Split, time: float, statistic: float) -> tuple[Split, float]:  # type: ignore[override]
-        """Return the threshold of the newest split, this statistic taken in first."""
+        """Return the threshold of the newest split, this statistic included."""
         now, scale, counts, before, made = memory
         if math.isnan(before):
             return Split(now, scale, counts, time, time), now
@@ -466,7 +467,7 @@ class Otsu(StandstillThreshold):
 
 
 class Waiting(NamedTuple):
-    """Since when no rest was seen; NaN before the first statistic."""
+    """Time since the last rest; NaN before the first statistic."""
 
     stated: float
     scale: float
@@ -474,12 +475,12 @@ class Waiting(NamedTuple):
 
 
 class Patience(StandstillThreshold):
-    """A missed rest costs the more, the longer ago the last one was: so the threshold grows.
+    """The cost of a missed rest grows with the time since the last one, and so does the threshold.
 
-    The likelihood ratio of rest against any motion is ``exp(-n w s²/2)`` of a statistic s (n
-    squares, w samples), and Bayes' rule takes a rest where it is above the cost of a false alarm
-    over that of a missed one, times the odds. With a cost of a missed rest that grows with the
-    time since the last as ``exp(theta t)``, the bound of s² grows with t: here
+    The likelihood ratio of rest against any motion is ``exp(-n w s²/2)`` for a statistic s (n
+    squares, w samples), and Bayes' rule decides for rest where it is above the cost of a false
+    alarm over that of a missed one, times the odds. With a cost of a missed rest that grows with
+    the time since the last as ``exp(theta t)``, the bound of s² grows with t: here
     ``threshold² = stated² (1 + t / scale)``, ``theta = n w stated²/(2 scale)``.
     """
 
@@ -491,7 +492,7 @@ class Patience(StandstillThreshold):
         return Waiting(stated, scale, math.nan)
 
     def next(self, memory: Waiting, time: float, statistic: float) -> tuple[Waiting, float]:  # type: ignore[override]
-        """Return the threshold, and count from here on, if this is a rest."""
+        """Return the threshold; restart the time if this is a rest."""
         since = time if math.isnan(memory.since) else memory.since
         now = memory.stated * math.sqrt(1.0 + max(time - since, 0.0) / memory.scale)
         if statistic < now:
@@ -500,7 +501,7 @@ class Patience(StandstillThreshold):
 
 
 def otsu(counts: Array) -> float | None:
-    """Return where two classes of a histogram part, in bins from its first edge.
+    """Return the threshold between two classes of a histogram, in bins from its first edge.
 
     Parameters
     ----------
@@ -560,8 +561,8 @@ class ZeroVelocity(StandstillAid):
         sways about a position soon has zero mean, so that subsequent observations are at least
         as good as independent ones.
     pivot : float, m
-        From the sensors to the point about which the body rolls while it is called still, as the
-        sole of a shoe does over the ground: the mean rate of the window times this is a velocity,
+        From the sensors to the point about which the body rolls in a detected standstill, as the
+        sole of a shoe over the ground: the mean rate of the window times this is a velocity,
         and its square adds to that of `sd`.
     correlation_time : float, s
         Correlation time of the velocity in a detected standstill: its variance is increased by
@@ -584,7 +585,7 @@ class ZeroVelocity(StandstillAid):
 
     @property
     def lasts(self) -> bool:
-        """As `Aid.lasts`: where a correlation time is stated."""
+        """As `Aid.lasts`: with a stated correlation time."""
         return self.correlation_time > 0.0
 
     def observe(self, view: View, values: Array) -> list[Observation]:
@@ -610,10 +611,9 @@ LABELS = ("VN, m/s", "VE, m/s", "VD, m/s")
 class ZeroRate(StandstillAid):
     """Zero rate relative to the Earth while a detector finds rest (ZARU, zero angular rate update).
 
-    The observation is the mean rate over the window.
-
-    Its variance is that of the samples in the window over their number, and `sd_deg_per_s` squared
-    beside it; where windows overlap, as much more as each sample is used more than once.
+    The observation is the mean rate over the window. Its variance is that of the samples in the
+    window over their number, plus `sd_deg_per_s` squared; where windows overlap, it is increased
+    by the number of uses of each sample.
 
     Attributes
     ----------
@@ -632,7 +632,7 @@ class ZeroRate(StandstillAid):
         check_number(self, "sd_deg_per_s", low=0.0, above=True)
 
     def observe(self, view: View, values: Array) -> list[Observation]:
-        """Return the rate less the Earth's, body axes, unless the velocity is far from zero."""
+        """Return the rate minus the Earth's, body axes, unless the velocity is far from zero."""
         if not self.near_rest(view):
             return []
         earth = view.ellipsoid.rotation_rate * view.level[AXIS : AXIS + 3]

@@ -65,7 +65,7 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True)
 class FineAlignment:
-    """Attitude, drifts and biases of a stationary body, with the unobservable part of each.
+    """Attitude, drifts and biases of a body at rest, with what cannot be known of them.
 
     Chernodarov (2009), Eqs. (16)-(18): the measured rate is that of the Earth, the position is
     constant, the velocity is zero. Errors that a rest cannot separate stay correlated in the

@@ -52,14 +52,14 @@ class DirectionCosine(AttitudeAlgorithm):
             )
 
     def begin(self, q_nb: Array) -> Array:
-        """Return the matrix row by row and the steps since it was orthogonalised."""
+        """Return the matrix row by row and the steps since its orthogonalization."""
         return np.append(rotation.dcm_from_quaternion(q_nb).ravel(), 0.0)
 
     def quaternions(self, history: Array) -> Array:
         """Read the matrices as rotations; those that have lost orthogonality, as the nearest."""
         rows = history
         if self.order:
-            # The nearest rotation in Frobenius norm; a truncated series is none itself.
+            # The nearest rotation in Frobenius norm; a truncated series is not orthogonal.
             left, _, right = np.linalg.svd(history.reshape(-1, 3, 3))
             rows = (left @ right).reshape(-1, 9)
         q = np.empty((len(rows), 4))
@@ -72,7 +72,7 @@ class DirectionCosine(AttitudeAlgorithm):
         return Accuracy(increments=2, rates=2, coning=2)
 
     def kernel_options(self) -> tuple[float, float]:
-        """Return the order and the steps between re-orthogonalisations."""
+        """Return the order and the steps between re-orthogonalizations."""
         return float(self.order), float(self.orthogonalise_every)
 
     def diagnostics(self, state: Array, time: Array) -> dict[str, float]:

@@ -18,7 +18,7 @@ class EulerKrylov(AttitudeAlgorithm):
     """Rates of roll, pitch and heading, integrated step by step.
 
     Singular at a pitch of ±90°: (8) and (10) divide by cos(pitch). The angles stay finite
-    there, and the run records how near it came and when; an error made near the pole stays.
+    there, and the run records its least distance and when; an error made near the pole stays.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class EulerKrylov(AttitudeAlgorithm):
         return np.array([roll, pitch, heading, abs(np.cos(pitch)), 0.0, 0.0])
 
     def quaternions(self, history: Array) -> Array:
-        """Turn the angles into quaternions; pitch beyond ±90° is a legal angle here."""
+        """Convert the angles to quaternions; pitch beyond ±90° is a legal angle here."""
         return quaternions_from_angles(history)
 
     @property

@@ -69,7 +69,7 @@ class RotationVector(AttitudeAlgorithm):
         return state
 
     def quaternions(self, history: Array) -> Array:
-        """Scale each to norm 1, from which rounding alone has taken it."""
+        """Scale each to norm 1, against rounding."""
         return unit_quaternions(history)
 
     @property

@@ -109,7 +109,7 @@ class SignalFilter:
         return math.ceil(-math.log(FORGOTTEN) * math.sqrt(2.0) / (self.pole * epoch))
 
     def noise_factor(self, step: float) -> float:
-        """Standard deviation of the level relative to that of samples of white noise `step` s apart.
+        """Standard deviation of the level relative to that of white samples `step` s apart.
 
         The root mean square of the gain over the samples' band; the filter's is twice the
         smoother's.

@@ -1,4 +1,4 @@
-"""A whole run, or one in pieces."""
+"""Navigation over a whole log, or over chunks."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from strapdown.tables.checks import (
 
 Array = NDArray[np.float64]
 
-# A step that turns by more, in rad, is one that its samples hardly describe.
+# A step with a larger rotation, rad, is poorly described by its samples.
 LARGEST_TURN = 1.0
-# The longest step, in s, over which two samples say what happened between them. Longer holes
-# are for the user to judge.
+# The longest step, s, over which two samples describe the motion between them. The user decides on
+# longer gaps.
 LONGEST_STEP = 1.0
-# Share of a step by which the next may begin later: stamps are rounded, a lost step is a whole one.
+# Allowed delay of the next step as a fraction of a step: stamps are rounded, a lost step is whole.
 LOST = 0.5
 
 
@@ -44,8 +44,7 @@ class NavigationRun:
     ----------
     mechanization : Mechanization
     start, end : NavState
-        The state that was given, and that at the other end: the last, or of a backward run the
-        first.
+        The given state, and that at the other end: the last, or of a backward run the first.
     time : ndarray, (n,), s
         Stamps of the states: both sides of every step.
     history : ndarray, (n, `mechanization.row`)
@@ -66,7 +65,7 @@ class NavigationRun:
 
     @cached_property
     def trajectory(self) -> pd.DataFrame:
-        """Trajectory table, the start included; made when it is first asked for."""
+        """Trajectory table, the start included; made at its first use."""
         return self.mechanization.trajectory(self.time, self.history, self.source)
 
 
@@ -102,7 +101,7 @@ def run_mechanization(
     Raises
     ------
     DataError
-        The table is not valid, a step is too long, there is a hole between two steps, or `start`
+        The table is not valid, a step is too long, there is a gap between two steps, or `start`
         is not at the time where the increments begin.
     ConfigError
         `longest_step` is not a valid time.
@@ -147,9 +146,9 @@ def navigate_segments(
     *,
     longest_step: float = LONGEST_STEP,
 ) -> Iterator[pd.DataFrame]:
-    """Navigate over a log that comes in pieces, in constant memory.
+    """Navigate over a log in chunks, in constant memory.
 
-    The numbers are those of a run over the whole log, to the last bit.
+    The result equals that of a run over the whole log to the last bit.
 
     Parameters
     ----------

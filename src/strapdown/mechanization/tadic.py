@@ -1,4 +1,4 @@
-"""North-east-down with the simplifications of a paper, to see what they cost."""
+"""North-east-down with the simplifications of a paper, to show their cost."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from strapdown.nav_state import NavState
 
 @dataclass(frozen=True)
 class Tadic(Mechanization):
-    """The equations of Tadic and Vukajlovic (2016) with the terms that they leave out.
+    """The equations of Tadic and Vukajlovic (2016), with options for the terms that they neglect.
 
     Slowly varying quantities are taken at the start of a step: first order in the step. Use
     `NorthEastDown` to navigate; this one shows the cost of a simplification.
@@ -63,7 +63,7 @@ class Tadic(Mechanization):
     def advance_rows(
         self, state: Array, increments: Array, heights: Array, earth: Array, history: Array
     ) -> tuple[int, int]:
-        """Advance `state` over rows of increments; return the steps made, and why no more."""
+        """Advance `state` over rows of increments; return the steps made, and why it stopped."""
         switches = (
             float(self.coriolis),
             float(self.earth_rate),

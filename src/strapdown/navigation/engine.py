@@ -379,7 +379,7 @@ class NodeRows:
             self._row(BEGIN, state)
 
     def grew(self, begun: FilterState, Phi: Array, ended: FilterState) -> None:
-        """Note how errors grew from one state of the filter to another.
+        """Record the transition of the errors from one state of the filter to another.
 
         Parameters
         ----------

@@ -289,8 +289,8 @@ class NavigatorState:
 # Processing of a chunk.
 
 
-#: Averaging time that removes vibration from rates and forces, s: receivers do not see vibration
-#: faster than a tenth of a second, in which a vehicle hardly changes its acceleration.
+#: Averaging time that removes vibration from rates and forces, s: receivers do not see it beyond a
+#: tenth of a second, and a vehicle hardly changes its acceleration in that time.
 STEADY_TIME = 0.2
 #: After so many intervals of marks without an observation, a mark is added before the next
 #: observation; its time stamp is so much earlier, s.
