@@ -163,7 +163,7 @@ class NavState:
         Raises
         ------
         DataError
-            As `tables.check_trajectory`; there is no such row.
+            As `tables.check_trajectory`; the row does not exist.
         """
         check_trajectory(trajectory)
         rows = len(trajectory)

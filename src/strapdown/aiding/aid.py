@@ -305,7 +305,7 @@ class View:
         Returns the covariance of the physical errors at this instant; computed on demand.
     steady : ndarray, (6,), optional
         Rate and force as fading means over some tenths of a second, as the sensors gave them, in
-        the axes of the body of now; for an aid that wants them (`Aid.wants_steady`).
+        the present body axes; for an aid that uses them (`Aid.wants_steady`).
     unobserved : float, s
         Since anything was observed.
     """

@@ -48,7 +48,7 @@ class Barometer(TabulatedMeasurement):
         From the inertial sensors to the barometer, body axes.
     bias_sd : float, m
         At the start; by default of an absolute pressure: 10 hPa of weather, 84 m, and a geoid that
-        is up to 106 m off the ellipsoid, 30 m as a rule.
+        is up to 106 m from the ellipsoid, usually 30 m.
     walk : float, m/√h
         How the weather changes: 1 hPa in three hours, by default.
     correlation_time : float, s

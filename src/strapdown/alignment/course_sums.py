@@ -70,7 +70,7 @@ class DriveSums:
     gained : ndarray, (k, 3), m/s
         Integral of the specific force from a fix to the end, in the axes at the end.
     rate : ndarray, (k, 3), rad/s
-        Of the body at the fixes, without its shaking; body axes.
+        Of the body at the fixes, without vibration; body axes.
     stretch : ndarray, (s,), s
         Lengths of the stretches.
     by_gyro : ndarray, (k, 3, 21 + 3 s)
@@ -305,8 +305,8 @@ def course_fixes(
     Raises
     ------
     DataError
-        There is no Gnss table, fewer than two fixes with a velocity during the record, or the
-        last two of them are too slow.
+        The Gnss table is missing, it has fewer than two fixes with a velocity during the
+        record, or the last two are too slow.
     """
     if gnss is None:
         raise DataError("alignment.no-fixes-for-course", file=source_of(imu), quantity="gnss")

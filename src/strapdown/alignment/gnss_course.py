@@ -151,7 +151,7 @@ class GnssCourse(CoarseAlignment):
         Raises
         ------
         DataError
-            There is no Gnss table, there are fewer than two fixes with a velocity within the
+            The Gnss table is missing or has fewer than two fixes with a velocity within the
             record, the vehicle is too slow, or the uncertainty of the accelerometers is too large
             for a level.
         """
@@ -248,7 +248,7 @@ class Found:
     velocity : ndarray, (3,), m/s
         At the end.
     errors : ndarray, rad/s, m/s² and relative
-        Of the sensors, the columns `course_unknowns.OF_SENSORS`; reading less truth.
+        Of the sensors, the columns `course_unknowns.OF_SENSORS`; reading − truth.
     covariance : ndarray, (39, 39)
         As `Alignment.joint`.
     fitted : ndarray, (k, 3), m/s
@@ -258,7 +258,7 @@ class Found:
     scale : float
         By which the velocities of the fixes scatter more than they state; at least 1.
     onward : float
-        Share of the courses that are those of a vehicle that drives as taken.
+        Share of the courses that agree with the assumed direction of driving.
     """
 
     C: Array

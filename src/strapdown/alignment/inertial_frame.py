@@ -522,7 +522,7 @@ class ResidualNoise:
     ratio : float
         Root of the mean ratio of energies: measured over predicted by the sensors.
     significant : bool
-        Whether chance gives so much less often than one time in a million.
+        Whether chance gives this with a probability below one in a million.
     excess : ndarray, (4,)
         Spectral densities of `KINDS`: m²/Hz, (m/s)²/Hz, (m/s²)²/Hz, (m/s³)²/Hz; zero where it
         is not significant.

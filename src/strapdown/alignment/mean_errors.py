@@ -227,7 +227,7 @@ def excursion(imu: pd.DataFrame, density: Triad) -> Array:
     Returns
     -------
     ndarray, (3, 3), rad²
-        Body axes: of the integral of the rate less its line of regression. A walk of the noise
+        Body axes: of the integral of the rate minus its regression line. A walk of the noise
         keeps a fifteenth of its variance at the end on average.
     """
     time = imu.index.to_numpy(dtype=np.float64)

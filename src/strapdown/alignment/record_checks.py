@@ -55,7 +55,7 @@ def check_record(imu: pd.DataFrame) -> tuple[Finding, ...]:
     Raises
     ------
     DataError
-        As `tables.check_imu`; there are no accelerometers, there are fewer than 20 samples, or a
+        As `tables.check_imu`; accelerometers are missing, there are fewer than 20 samples, or a
         channel does not change at all while others do.
     """
     check_imu(imu)
@@ -252,7 +252,7 @@ def still_by_gnss(
     Parameters
     ----------
     gnss : DataFrame, optional
-        Gnss table; without one there is no check.
+        Gnss table; no check if not given.
     imu : DataFrame
     site : Site
     heading_sd : float, rad

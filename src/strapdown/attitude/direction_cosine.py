@@ -26,7 +26,7 @@ class DirectionCosine(AttitudeAlgorithm):
         Highest power of the increment in the series of the exponential, 1 to 20; 0 for the
         closed form (12).
     orthogonalise_every : int
-        Steps between re-orthogonalisations, 0 for never. A truncated exponential is no
+        Steps between re-orthogonalizations, 0 for never. A truncated exponential is no
         rotation, and the loss accumulates; the closed form loses only rounding.
     """
 

@@ -74,7 +74,7 @@ class RotationVector(AttitudeAlgorithm):
 
     @property
     def accuracy(self) -> Accuracy:
-        """By the number of increments; products of three are what general motion needs."""
+        """By the number of increments; general motion needs products of three."""
         if self.samples == 1:
             return Accuracy(increments=2, rates=4, coning=2)
         if self.coefficients == "fit":

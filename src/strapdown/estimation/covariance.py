@@ -25,7 +25,7 @@ class Innovations:
     Attributes
     ----------
     nu : ndarray, (l,)
-        Observation less its prediction, after the observations before it, in its unit.
+        Observation minus its prediction, after the observations before it, in its unit.
     s : ndarray, (l,)
         Predicted variance of each: ``h P h' + R``.
     weight : ndarray, (l,)
@@ -188,7 +188,7 @@ class UpdateRule(Protocol):
         Parameters
         ----------
         nu : float
-            Observation less its prediction.
+            Observation minus its prediction.
         s : float
             ``h P h'``, the variance of the prediction.
         r : float
@@ -215,7 +215,7 @@ class Observation:
     Attributes
     ----------
     name : str
-        Of whatever observes; two receivers have two names.
+        Of the source; two receivers have two names.
     z : ndarray, (l,)
         Computed less observed.
     H : ndarray, (l, p)

@@ -73,7 +73,7 @@ class ErrorFilter:
     rests : bool
         Whether the body is known to be stationary, so that errors grow by gravity and the
         attitude, not by the sensor readings: sensor noise and sway would act as a motion that
-        separates errors, although they are what is observed. Errors of the biases then keep
+        separates errors, although they are themselves observed. Errors of the biases then keep
         their direction in level axes, not in body axes, when an attitude is corrected:
         unobservable directions stay so, while otherwise each correction of a heading by degrees
         adds false information on it (Huang, Mourikis and Roumeliotis, Int. J. Robotics Research
@@ -317,7 +317,7 @@ class ErrorFilter:
         ----------
         state : FilterState
         x : ndarray, (n,)
-            States as they are estimated before.
+            Estimated states before it.
         observations, rules
             As `observe`.
 

@@ -473,7 +473,7 @@ def _rising_root(
             return None
         after = u - excess / slope
         if after > hi:
-            # By rounding alone, or because there is no root before the knot.
+            # By rounding alone, or because F has no root before the knot.
             return hi if after <= hi * (1.0 + 1e-12) else None
         if after < lo:
             return lo if after >= lo * (1.0 - 1e-12) else None
@@ -493,7 +493,7 @@ class PaperUpdate:
     """One Newton step on ``(x - m)' P^-1 (x - m) / 2 + rho(nu / alpha)`` from the prediction.
 
     Uses the residual before the fit. Where the prediction is much less certain than the
-    observation that residual is large although nothing is wrong: Huber's psi' is then 0, the
+    observation that residual is large even without an error: Huber's psi' is then 0, the
     step goes far past the minimum, and the covariance is not reduced. Where psi redescends,
     psi' < 0 increases the covariance, or makes it negative. For comparison only; `RobustUpdate`
     is safe.
@@ -563,7 +563,7 @@ class AdaptiveScale:
     squares ``min(nu^2 / (s + c^2 r), clip^2)`` have the mean that they have with normal errors
     (Huber's second proposal, as a recursion with fading memory): a gross error counts at most as
     clip standard deviations. Each observation is weighted by the share of its own variance: after
-    an outage, where ``s >> r``, almost nothing is learned or forgotten.
+    an outage, where ``s >> r``, almost no scale is learned or forgotten.
 
     An estimate with an error far beyond its covariance would make a redescending function reject
     every later observation: after an outage in which the error grew to three of its standard

@@ -66,7 +66,7 @@ class SignalFilter:
     """Level and slope of a channel, from several samples per epoch.
 
     The slope is a random walk. Its intensity is chosen by `bandwidth`, and so are all gains: they
-    are the same for channels of any noise, so that there is no phase shift between them. The
+    are the same for channels of any noise, so that their phases are equal. The
     smoother's gain is ``1/(1 + (f/bandwidth)^4)`` (Wiener's, of a doubly integrated white noise
     in white noise), its phase is zero; that of the filter alone is not.
 

@@ -39,7 +39,7 @@ class ControlPointScore:
     points : ndarray, (n, 2), m
         Control points, rotated and shifted onto the path: north and east of the path's start.
     error : ndarray, (n, 2), m
-        Computed less these.
+        Computed − control points.
     turn_deg : float, deg
         Heading of the run less that of the points' own north, -180 to 180.
     way : float, m

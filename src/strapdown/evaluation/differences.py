@@ -84,7 +84,7 @@ def largest_differences(runs: tuple[AttitudeRun, ...]) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        Square, symmetric, in deg; labelled by algorithm.
+        Square, symmetric, in deg; labeled by algorithm.
     """
     names = [run.algorithm for run in runs]
     table = pd.DataFrame(0.0, index=names, columns=names)

@@ -62,14 +62,14 @@ SURE = 2.5758293035489004
 #: Scatter of the innovations over the last seconds, relative to the predicted one: beyond the first
 #: limit the status is not green, beyond the second it is red.
 FAR_OFF, REFUTED = 2.0, 3.0
-#: Validity of the result of a check, s; the run's own growth since then is weighted so many times.
+#: Validity of the result of a check, s, and the factor on the run's own growth since then.
 CARRIED, GROWS = 60.0, 2.0
 #: Window of the scatter, s, and fewest components in it.
 RECENT, FEWEST = 30.0, 8
 #: Labels of components without information on the heading.
 VERTICAL = ("down", "VD", "height")
-#: Limit of one normalized innovation, and its value if it was rejected: half the innovations at
-#: that value are as much as refutes a run.
+#: Limit of one normalized innovation, and its value if it was rejected: half of them are as much as
+#: refutes a run.
 CLIP, REJECTED = 4.0, 3.0
 
 

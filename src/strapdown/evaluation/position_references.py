@@ -1,4 +1,4 @@
-"""Position references given in words: known displacements between two rests.
+"""Position references as text: known displacements between two rests.
 
 ::
 

@@ -324,7 +324,7 @@ def with_tilt(q_nb: ArrayLike, roll: float, pitch: float) -> NDArray[np.float64]
     ndarray, (4,)
         The attitude nearest to `q_nb` among those of this roll and pitch. The angle between
         the two is the angle between their directions of gravity in the body, because the
-        least rotation that leads from one direction to another is about an axis square to
+        least rotation that leads from one direction to another is about an axis perpendicular to
         both.
     """
     down = np.array([0.0, 0.0, 1.0])
@@ -377,7 +377,7 @@ def references_from_words(words: list[str], start: float, end: float) -> pd.Data
 Array = NDArray[np.float64]
 
 #: Assumed standard deviation of the bias of each accelerometer, m/s², by class of sensor.
-#: Consumer: the MPU-6050 may be 50 mg off in x and y and 80 mg in z (data sheet 3.4, section 6.2),
+#: Consumer: the MPU-6050 bias may be 50 mg in x and y and 80 mg in z (data sheet 3.4, section 6.2),
 #: taken as the limits of a uniform distribution, 29 to 46 mg. The others are the usual order of
 #: magnitude, 5 mg, 1 mg and 50 µg: state your data sheet's value instead.
 ACCEL_BIAS_SD = {"consumer": 0.3, "industrial": 0.05, "tactical": 0.01, "navigation": 0.0005}
@@ -398,7 +398,7 @@ def tilt_sd_deg(
     rest : RestStretch
         With acceleration.
     bias_sd : float, m/s²
-        Assumed standard deviation of the bias of each accelerometer, as it is now in the log.
+        Assumed standard deviation of the bias of each accelerometer, at present in the log.
         One of `ACCEL_BIAS_SD`, or from a calibration.
     gravity : float, m/s², optional
         Local gravity; 9.80665 if not given, which is right to 0.03 m/s² everywhere on the

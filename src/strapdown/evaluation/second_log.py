@@ -611,10 +611,10 @@ def truth_from_second_log(
         The two Imu tables.
     attitude : DataFrame, optional
         Attitude table of the second sensor on its own clock. If it has one, it is taken; if
-        not, the second log's rates are integrated, sample by sample as they are.
+        not, the second log's rates are integrated sample by sample.
     gyro_bias : array_like, (3,), rad/s
         Bias of the second gyro in its own axes, subtracted beforehand: its residual turns
-        the truth by so much in every second. From a rest, or from its calibration.
+        the truth at its rate. From a rest, or from its calibration.
     q_start : array_like, (4,)
         Attitude of the first sensor at its first stamp that both cover: a gyro gives relative
         attitude only. Not used if `attitude` is given.

@@ -557,7 +557,7 @@ def summarise_differences(differences: pd.DataFrame) -> DifferenceSummary:
     ----------
     differences : DataFrame
         As `trajectory_differences` returns it, or any TrajectoryError table; without
-        ``phi_N phi_E phi_D`` there is no ``rotation``.
+        ``phi_N phi_E phi_D`` the row ``rotation`` is missing.
 
     Returns
     -------

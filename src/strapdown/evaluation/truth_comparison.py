@@ -76,7 +76,7 @@ class TruthComparison:
     time : ndarray, (k,), s
         Of the marks that the truth covers; for positions alone, of the positions.
     errors : ndarray, (k, 9)
-        Computed less true, as `mechanization.state_error.state_error`: m, m/s, rad, in
+        Computed − true, as `mechanization.state_error.state_error`: m, m/s, rad, in
         north-east-down. NaN where the truth has no velocity or attitude.
     covariance : ndarray, (k, 9, 9)
         Stated covariance of the errors.

@@ -165,7 +165,7 @@ class Mechanization(ABC):
         state : ndarray
             It is not changed.
         error : array_like, (9,)
-            State less truth, in level axes of the state: displacement in m, difference of the
+            State − truth, in level axes of the state: displacement in m, difference of the
             velocities as vectors in m/s, and the rotation vector in rad of the attitude relative
             to the Earth, ``C_state = exp([psi x]) C_true``.
 

@@ -29,9 +29,9 @@ def state_error(state: NavState, truth: NavState, ellipsoid: Ellipsoid = WGS84) 
     Returns
     -------
     ndarray, (9,)
-        State less truth, in north-east-down of `state`: displacement in m (to 1e-9 m), difference
+        State − truth, in north-east-down of `state`: displacement in m (to 1e-9 m), difference
         of the velocities as vectors in m/s, and the rotation vector in rad of the attitude relative
-        to the Earth, ``C_state = exp([psi x]) C_true``. `Mechanization.correct` takes it off.
+        to the Earth, ``C_state = exp([psi x]) C_true``. `Mechanization.correct` subtracts it.
     """
     apart = displacement_between(state, truth, ellipsoid)
     # From the truth's local level to that of the state.

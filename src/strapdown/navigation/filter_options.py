@@ -24,7 +24,7 @@ class FilterOptions:
     rule : UpdateRule, optional
         Weighting of observations whose aid has no rule of its own; full weight if not given.
     step : float, s
-        Longest time over which the covariance goes by means of attitude and force.
+        Longest step of the covariance, propagated with mean attitude and force.
     mark_interval : float, s
         Longest time between two records of the covariance.
 
