@@ -307,7 +307,7 @@ class View:
         Rate and force as fading means over some tenths of a second, as the sensors gave them, in
         the present body axes; for an aid that uses them (`Aid.wants_steady`).
     unobserved : float, s
-        Since anything was observed.
+        Time since the last observation.
     """
 
     mechanization: Mechanization

@@ -82,7 +82,7 @@ class GnssCourse(CoarseAlignment):
     Attributes
     ----------
     mounting_yaw_deg : float, deg
-        Heading of the unit's forward axis less that of the vehicle's.
+        Heading of the unit's forward axis minus that of the vehicle's.
     mounting_yaw_sd_deg, sideslip_sd_deg : float, deg
         Standard deviation of that angle, and of the sideslip: 1 deg for a car that does not
         turn hard; an aircraft or a ship drifts more with wind and current.
@@ -256,7 +256,7 @@ class Found:
     weight : ndarray, (k,)
         Weight of each fix.
     scale : float
-        By which the velocities of the fixes scatter more than they state; at least 1.
+        Factor of the scatter of the velocities over their stated one; at least 1.
     onward : float
         Share of the courses that agree with the assumed direction of driving.
     """

@@ -217,7 +217,7 @@ class Observation:
     name : str
         Of the source; two receivers have two names.
     z : ndarray, (l,)
-        Computed less observed.
+        Computed − observed.
     H : ndarray, (l, p)
         ``z = H physical + noise``: columns as `ErrorModel` has the physical errors, nine and those
         of the sensors, in level axes.

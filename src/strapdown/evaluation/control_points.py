@@ -41,7 +41,7 @@ class ControlPointScore:
     error : ndarray, (n, 2), m
         Computed − control points.
     turn_deg : float, deg
-        Heading of the run less that of the points' own north, -180 to 180.
+        Heading of the run minus that of the points' own north, -180 to 180.
     way : float, m
         From point to point in all.
     given : int
