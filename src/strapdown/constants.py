@@ -1,6 +1,6 @@
 """Physical constants and unit factors, each with its source.
 
-Units are turned into SI by multiplication: ``value_si = value * factor``.
+Units are converted to SI by multiplication: ``value_si = value * factor``.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ __all__ = [
 #: Conventional standard acceleration of gravity, m/s² (3rd CGPM, 1901, Resolution 2).
 STANDARD_GRAVITY = 9.80665
 
-#: Factors from rad/s to deg/h and from m/s² to µg, for what is shown to people.
+#: Factors from rad/s to deg/h and from m/s² to µg, for output.
 DEG_PER_HOUR = math.degrees(3600.0)
 MICRO_G = 1e6 / STANDARD_GRAVITY
 
-#: 95 % of a normal distribution lie within so many standard deviations.
+#: 95 % of a normal distribution lie within this number of standard deviations.
 TWO_SIDED_95 = 1.959963984540054
 
 #: Standard deviation of a normal distribution over its median absolute deviation: one over the
@@ -81,7 +81,7 @@ TIME_UNITS: dict[str, float] = {
 
 #: Cycles of one operation on floats on a Cortex-M4F: add, multiply, divide and root from Arm
 #: DDI 0439 (Cortex-M4 Technical Reference Manual), FPU instruction timing. Trigonometric
-#: functions are a library's: 60 to 100 are usual, and 80 is assumed.
+#: functions depend on the library: 60 to 100 are usual, and 80 is assumed.
 CORTEX_M4F_CYCLES: dict[str, float] = {
     "add": 1.0,
     "multiply": 1.0,

@@ -1,6 +1,6 @@
 """The Earth as an ellipsoid: radii of curvature, gravity, and the rates of the local level.
 
-Latitudes are geodetic and in degrees, heights in metres over the ellipsoid, vectors north, east,
+Latitudes are geodetic and in degrees, heights in meters over the ellipsoid, vectors north, east,
 down. Every argument may be a number or an array; they are broadcast against each other. The
 formulas are those of the compiled kernels, which mechanizations run.
 """
@@ -28,9 +28,9 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-# Inside of this normals to the ellipsoid begin to meet; outside, a number is no height.
+# Deeper, normals to the ellipsoid intersect; beyond the upper limit a number is not a height.
 _DEEPEST, _HIGHEST = -1e6, 1e9  # m
-# Where the continuation of gravity has lost its meaning.
+# Limit of the continuation of gravity with height.
 _HIGHEST_GRAVITY = 1e6  # m
 
 
@@ -56,7 +56,7 @@ def radii_of_curvature(lat_deg: ArrayLike, *, ellipsoid: Ellipsoid = WGS84) -> t
     Notes
     -----
     ``M = a (1 - e²)/W³`` and ``N = a/W`` with ``W² = 1 - e² sin²``. The one radius of Chernodarov
-    (2009), Eq. (7), ``a (1 - e² sin²/2)``, is the distance from the centre and no radius of
+    (2009), Eq. (7), ``a (1 - e² sin²/2)``, is the distance from the center and not a radius of
     curvature.
     """
     (lat,), leading = rows(lat_deg=lat_deg)
@@ -101,8 +101,8 @@ def gravity(lat_deg: ArrayLike, alt: ArrayLike, *, ellipsoid: Ellipsoid = WGS84)
     north          1e-17   2e-9    5e-9    3e-8    2e-7    3e-6    4e-5
     ============== ======= ======= ======= ======= ======= ======= =======
 
-    The usual second order of the height (their Eq. (2-124)) is 1.5e-4 off at 100 km and 1.4e-6 at
-    20 km. The real field differs from the normal one by some 1e-4 to 1e-3 m/s². Below the
+    The usual second order of the height (their Eq. (2-124)) has an error of 1.5e-4 at 100 km and
+    1.4e-6 at 20 km. The real field differs from the normal one by some 1e-4 to 1e-3 m/s². Below the
     ellipsoid this is the same field continued inward, without the mass above.
     """
     (lat, height), leading = rows(lat_deg=lat_deg, alt=alt)
@@ -111,7 +111,7 @@ def gravity(lat_deg: ArrayLike, alt: ArrayLike, *, ellipsoid: Ellipsoid = WGS84)
 
 
 def centrifugal(lat_deg: ArrayLike, alt: ArrayLike, *, ellipsoid: Ellipsoid = WGS84) -> Array:
-    """Centrifugal acceleration of a place that turns with the Earth.
+    """Centrifugal acceleration of a position that rotates with the Earth.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def centrifugal(lat_deg: ArrayLike, alt: ArrayLike, *, ellipsoid: Ellipsoid = WG
 def gravitation(lat_deg: ArrayLike, alt: ArrayLike, *, ellipsoid: Ellipsoid = WGS84) -> Array:
     """Attraction of the ellipsoid alone: `gravity` without the centrifugal acceleration.
 
-    What Chernodarov (2009), Eq. (4), calls g. It is not along the vertical: at 55 deg it leans
+    Called g in Chernodarov (2009), Eq. (4). It is not along the vertical: at 55 deg it leans
     0.016 m/s², or 5.6 minutes of arc, to the north.
 
     Parameters
@@ -189,7 +189,7 @@ def earth_rate(lat_deg: ArrayLike, *, ellipsoid: Ellipsoid = WGS84) -> Array:
 def transport_rate(
     lat_deg: ArrayLike, alt: ArrayLike, v_n: ArrayLike, *, ellipsoid: Ellipsoid = WGS84
 ) -> Array:
-    """Rate of north-east-down relative to the Earth, as the place moves over the ellipsoid.
+    """Rate of north-east-down relative to the Earth by motion over the ellipsoid.
 
     Parameters
     ----------
@@ -243,7 +243,7 @@ def rows(**quantities: ArrayLike) -> tuple[list[Array], tuple[int, ...]]:
     ----------
     **quantities : array_like
         Finite numbers; one whose name begins with ``lat`` is a latitude, with ``lon`` a
-        longitude, in degrees, and with ``alt`` a height in metres.
+        longitude, in degrees, and with ``alt`` a height in meters.
 
     Returns
     -------
@@ -300,7 +300,7 @@ def rows(**quantities: ArrayLike) -> tuple[list[Array], tuple[int, ...]]:
 
 
 def refuse(bad: NDArray[np.bool_], values: Array, name: str, code: str, **data: Any) -> None:
-    """Raise what is wrong with the first bad row, if there is one.
+    """Raise the error of the first bad row, if any.
 
     Parameters
     ----------
@@ -309,7 +309,7 @@ def refuse(bad: NDArray[np.bool_], values: Array, name: str, code: str, **data: 
     name, code : str
         Of the quantity, and of the error.
     **data
-        Of the error, beside the value.
+        Of the error, in addition to the value.
 
     Raises
     ------

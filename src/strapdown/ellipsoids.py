@@ -14,7 +14,7 @@ __all__ = ["ELLIPSOIDS", "WGS84", "Ellipsoid", "find_ellipsoid"]
 
 @dataclass(frozen=True)
 class Ellipsoid:
-    """An ellipsoid of revolution that turns, with its field of normal gravity.
+    """A rotating ellipsoid of revolution with its field of normal gravity.
 
     Attributes
     ----------
@@ -27,14 +27,14 @@ class Ellipsoid:
     gravity_at_equator, gravity_at_pole : float, m/s²
         Normal gravity on the surface.
     source : str
-        Where the published figures stand.
+        Publication of the figures.
     derived : tuple of str
         Names of the attributes that no publication gives to these digits: calculated from the
-        others, as `gravity_at_equator` of ``GM/(a b) (1 - m - m e' q0'/(6 q0))`` and
-        `gravity_at_pole` of ``GM/a² (1 + m e' q0'/(3 q0))``, with ``m = rate² a² b/GM``
+        others, as `gravity_at_equator` from ``GM/(a b) (1 - m - m e' q0'/(6 q0))`` and
+        `gravity_at_pole` from ``GM/a² (1 + m e' q0'/(3 q0))``, with ``m = rate² a² b/GM``
         (Heiskanen and Moritz 1967, Eqs. (2-73), (2-74)), unless `note` says otherwise.
     note : str
-        What a user should know about the figures.
+        Notes on the figures.
     """
 
     name: str
@@ -151,7 +151,7 @@ ELLIPSOIDS: dict[str, Ellipsoid] = {
 
 
 def find_ellipsoid(name: str) -> Ellipsoid:
-    """Look an ellipsoid up by its name.
+    """Return an ellipsoid by its name.
 
     Parameters
     ----------

@@ -1,11 +1,11 @@
-"""Geodetic, Earth-centred and local coordinates, and the axes of each.
+"""Geodetic, Earth-centered and local coordinates, and the axes of each.
 
-* A *place* is ``(..., 3)``: geodetic latitude and longitude in degrees, north and east positive,
-  and height over the ellipsoid in metres.
-* *ECEF* is Earth-centred, earth-fixed, ``(..., 3)`` in metres: x through latitude and longitude
+* A *position* (`place`) is ``(..., 3)``: geodetic latitude and longitude in degrees, north and east
+  positive, and height over the ellipsoid in meters.
+* *ECEF* is Earth-centered, Earth-fixed, ``(..., 3)`` in meters: x through latitude and longitude
   zero, z through the north pole.
-* *Local* coordinates are north, east, down, ``(..., 3)`` in metres, along the axes at an origin,
-  which is a place: straight lines, and not along the surface.
+* *Local* coordinates are north, east, down, ``(..., 3)`` in meters, along the axes at an origin,
+  which is a position: straight lines, and not along the surface.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-#: Distances from the centre of the Earth between which a point in ECEF is a place, m. Nearer,
-#: more than one normal to the ellipsoid goes through it.
+#: Valid distances of a point in ECEF from the center of the Earth, m. Nearer, more than one normal
+#: to the ellipsoid goes through it.
 NEAREST, FARTHEST = 5e4, 1e9
 
 
 def ecef_from_geodetic(place: ArrayLike, *, ellipsoid: Ellipsoid = WGS84) -> Array:
-    """Earth-centred coordinates of places.
+    """Earth-centered coordinates of positions.
 
     Parameters
     ----------
@@ -68,12 +68,12 @@ def ecef_from_geodetic(place: ArrayLike, *, ellipsoid: Ellipsoid = WGS84) -> Arr
 
 
 def geodetic_from_ecef(position: ArrayLike, *, ellipsoid: Ellipsoid = WGS84) -> Array:
-    """Places of Earth-centred coordinates.
+    """Positions from Earth-centered coordinates.
 
     Parameters
     ----------
     position : array_like, (..., 3), m
-        From 50 km to 1e9 m from the centre.
+        From 50 km to 1e9 m from the center.
     ellipsoid : Ellipsoid
 
     Returns
@@ -90,11 +90,11 @@ def geodetic_from_ecef(position: ArrayLike, *, ellipsoid: Ellipsoid = WGS84) -> 
     Notes
     -----
     The closed form of Vermeille, J. Geodesy 76 (2002) 451-454, at every height; pymap3d's own
-    (You 2000) is 1 µm off at 100 km, 9 mm at 1000 km and 60 m at 30 000 km.
+    (You 2000) has an error of 1 µm at 100 km, 9 mm at 1000 km and 60 m at 30 000 km.
     """
     (x, y, z), leading = _columns(position, ("x", "y", "z"), "position")
     xyz = np.column_stack([x, y, z])
-    # Clipped, as a square that overflows is no distance.
+    # Clipped against overflow of the square.
     distance = np.linalg.norm(np.clip(xyz, -FARTHEST, FARTHEST), axis=1)
     refuse(
         (distance < NEAREST) | (distance >= FARTHEST),
@@ -111,13 +111,13 @@ def geodetic_from_ecef(position: ArrayLike, *, ellipsoid: Ellipsoid = WGS84) -> 
 
 
 def ned_from_ecef(position: ArrayLike, origin: ArrayLike, *, ellipsoid: Ellipsoid = WGS84) -> Array:
-    """Local coordinates of Earth-centred ones.
+    """Local coordinates from Earth-centered ones.
 
     Parameters
     ----------
     position : array_like, (..., 3), m
     origin : array_like, (3,)
-        Place of the origin and of the axes.
+        Position of the origin and of the axes.
     ellipsoid : Ellipsoid
 
     Returns
@@ -138,14 +138,14 @@ def ned_from_ecef(position: ArrayLike, origin: ArrayLike, *, ellipsoid: Ellipsoi
 
 
 def ecef_from_ned(ned: ArrayLike, origin: ArrayLike, *, ellipsoid: Ellipsoid = WGS84) -> Array:
-    """Earth-centred coordinates of local ones.
+    """Earth-centered coordinates from local ones.
 
     Parameters
     ----------
     ned : array_like, (..., 3), m
         North, east, down.
     origin : array_like, (3,)
-        Place of the origin and of the axes.
+        Position of the origin and of the axes.
     ellipsoid : Ellipsoid
 
     Returns
@@ -167,14 +167,14 @@ def ecef_from_ned(ned: ArrayLike, origin: ArrayLike, *, ellipsoid: Ellipsoid = W
 def ned_from_geodetic(
     place: ArrayLike, origin: ArrayLike, *, ellipsoid: Ellipsoid = WGS84
 ) -> Array:
-    """Local coordinates of places.
+    """Local coordinates of positions.
 
     Parameters
     ----------
     place : array_like, (..., 3)
         Latitude and longitude in deg, height in m.
     origin : array_like, (3,)
-        Place of the origin and of the axes.
+        Position of the origin and of the axes.
     ellipsoid : Ellipsoid
 
     Returns
@@ -193,14 +193,14 @@ def ned_from_geodetic(
 
 
 def geodetic_from_ned(ned: ArrayLike, origin: ArrayLike, *, ellipsoid: Ellipsoid = WGS84) -> Array:
-    """Places of local coordinates.
+    """Positions from local coordinates.
 
     Parameters
     ----------
     ned : array_like, (..., 3), m
         North, east, down.
     origin : array_like, (3,)
-        Place of the origin and of the axes.
+        Position of the origin and of the axes.
     ellipsoid : Ellipsoid
 
     Returns
@@ -219,11 +219,11 @@ def geodetic_from_ned(ned: ArrayLike, origin: ArrayLike, *, ellipsoid: Ellipsoid
 def place_difference(
     place: ArrayLike, reference: ArrayLike, *, ellipsoid: Ellipsoid = WGS84
 ) -> Array:
-    """How far places are from others, in metres north, east and down.
+    """Displacement of positions from others, in meters north, east and down.
 
     The straight line from `reference` to `place`, along the axes halfway between the two. So it
-    changes its sign when they are exchanged, its length is the distance, two places of one height
-    have no difference down, and nothing happens at the date line or at a pole.
+    changes its sign when they are exchanged, its length is the distance, two positions of equal
+    height have a zero down component, and the date line and the poles need no special case.
 
     Parameters
     ----------
@@ -240,7 +240,7 @@ def place_difference(
     Raises
     ------
     DataError
-        As `ecef_from_geodetic`; or the places are on opposite sides of the Earth.
+        As `ecef_from_geodetic`; or the positions are on opposite sides of the Earth.
     """
     to = ecef_from_geodetic(place, ellipsoid=ellipsoid)
     start = ecef_from_geodetic(reference, ellipsoid=ellipsoid)

@@ -1,4 +1,4 @@
-"""Where a vehicle is, how it moves and how it stands, at one instant."""
+"""Position, velocity and attitude of a vehicle at one instant."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class NavState:
-    """Place, velocity and attitude relative to local north-east-down.
+    """Position, velocity and attitude relative to local north-east-down.
 
-    In radians, as the kernels have it; `from_degrees` takes what a person writes.
+    In radians, as the kernels need it; `from_degrees` takes degrees.
 
     Attributes
     ----------
@@ -40,7 +40,8 @@ class NavState:
     Raises
     ------
     DataError
-        A number is not finite, the latitude is beyond a right angle, or `q_nb` is no rotation.
+        A number is not finite, the latitude is beyond a right angle, or `q_nb` is not a
+        rotation.
     """
 
     time: float
@@ -118,7 +119,7 @@ class NavState:
         Raises
         ------
         DataError
-            As the class; a latitude over 90 deg says so.
+            As the class; a latitude over 90 deg has its own message.
         """
         angles = (lat_deg, lon_deg, roll_deg, pitch_deg, heading_deg)
         for name, value in zip(("lat_deg", "lon_deg", *EULER), angles, strict=True):
@@ -147,7 +148,7 @@ class NavState:
 
     @classmethod
     def from_trajectory(cls, trajectory: pd.DataFrame, row: int = 0) -> NavState:
-        """Take a row of a Trajectory table.
+        """Return a state from a row of a Trajectory table.
 
         Parameters
         ----------
@@ -162,7 +163,7 @@ class NavState:
         Raises
         ------
         DataError
-            As `tables.check_trajectory`; there is no such row.
+            As `tables.check_trajectory`; the row does not exist.
         """
         check_trajectory(trajectory)
         rows = len(trajectory)

@@ -1,12 +1,12 @@
-"""Readers, attitude algorithms and measurements that other distributions add by entry points.
+"""Plug-ins: readers, attitude algorithms and measurements of other distributions (entry points).
 
 A distribution names them in its ``pyproject.toml``::
 
     [project.entry-points."strapdown.attitude"]
     midpoint = "my_package.midpoint:Midpoint"
 
-They are looked for only where a name is in none of the package's own tables, or where all are
-listed. One that cannot be used is an error that names its distribution, and never a traceback.
+They are searched only for a name that is in none of the package's own tables, or when all are
+listed. A defective one raises an error that names its distribution, never a traceback.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ def plugin(kind: str, name: str, base: type) -> Any | None:
         A key of `GROUPS`.
     name : str
     base : type
-        What it must be: a subclass, or an instance.
+        Required type: a subclass, or an instance.
 
     Returns
     -------
     object or None
-        None where no distribution offers the name.
+        None if no distribution offers the name.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def plugins(kind: str, base: type) -> tuple[dict[str, Any], tuple[Finding, ...]]
     Returns
     -------
     found : dict
-        By name.
+        Plug-ins by name.
     findings : tuple of Finding
         One of each that cannot be used.
     """
@@ -111,10 +111,10 @@ def _loaded(point: EntryPoint, base: type) -> Any:
 
 
 class WithPlugins(Mapping[str, Any]):
-    """A literal table, and behind it the plug-ins of its kind.
+    """A literal table, extended by the plug-ins of its kind.
 
-    Its keys are those of the table: a plug-in is found by its name alone, so that nothing of
-    other distributions is imported until it is asked for.
+    Its keys are those of the table: a plug-in is found by its name alone, so that no module of
+    another distribution is imported until it is requested.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What tells a navigator more than its inertial sensors: one file per aid, one table of them."""
+"""Measurements of aided navigation: one file per aid, one table of all aids."""
 
 from __future__ import annotations
 

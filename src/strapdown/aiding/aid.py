@@ -1,4 +1,4 @@
-"""What every aid is: when it observes, what it computes, what it adds to the states."""
+"""Interface of every aid: its epochs, its observations, its additional states."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Epochs:
-    """When an aid observes, and what it was told then.
+    """Times and measured values of an aid.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Epochs:
 
 @dataclass(frozen=True)
 class Measurement(ABC):
-    """A source of observations; it holds no state of its own.
+    """A source of observations; stateless.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Measurement(ABC):
         The user's: two receivers have two names. States and observations are named after it:
         ``rtk.lever_arm``, ``rtk.position``.
     rule : UpdateRule, optional
-        How far its observations are believed; that of the filter, if not given.
+        Weighting of its observations; the filter's rule, if not given.
     """
 
     name: str = ""
@@ -81,21 +81,21 @@ class Measurement(ABC):
 
     @property
     def wants_steady(self) -> bool:
-        """Whether it looks at rate and force without the shaking: `View.steady`."""
+        """Whether it uses rate and specific force without vibration: `View.steady`."""
         return False
 
     @property
     def lasts(self) -> bool:
-        """Whether it states, and allows for, errors that last from one epoch to the next."""
+        """Whether it states time-correlated errors and allows for them."""
         return False
 
     def states(self) -> tuple[SensorStates, ...]:
-        """States that it needs beside those of the inertial sensors, named ``name.block``."""
+        """Its states in addition to those of the inertial sensors, named ``name.block``."""
         return ()
 
     @abstractmethod
     def observe(self, view: View, values: Array) -> list[Observation]:
-        """Return what it observes at one of its epochs; nothing, where it tells nothing.
+        """Return the observation at one of its epochs, or None without one.
 
         Parameters
         ----------
@@ -108,19 +108,19 @@ class Measurement(ABC):
 
 @dataclass(frozen=True)
 class TabulatedMeasurement(Measurement):
-    """An aid with a table of what it measured."""
+    """An aid with a table of measurements."""
 
     #: Columns that its table must have.
     columns: ClassVar[tuple[str, ...]] = ()
 
     @abstractmethod
     def epochs(self, table: pd.DataFrame) -> Epochs:
-        """Return the epochs of a table, without the rows that say nothing.
+        """Return the epochs of a table, without rows that have no values.
 
         Parameters
         ----------
         table : DataFrame
-            By time in s of the clock of the inertial sensors, but for a known offset.
+            By time in s of the clock of the inertial sensors, except for a known offset.
 
         Raises
         ------
@@ -131,15 +131,15 @@ class TabulatedMeasurement(Measurement):
 
 @dataclass(frozen=True)
 class ImuDerivedMeasurement(Measurement):
-    """An aid that watches the inertial sensors, and observes where they tell it to."""
+    """An aid that derives its observations from the inertial sensors."""
 
     @abstractmethod
     def begin(self) -> Any:
-        """Return what it remembers before the first sample; never changed in place."""
+        """Return the state before the first sample; never changed in place."""
 
     @abstractmethod
     def watch(self, memory: Any, time: Array, rows: Array) -> tuple[Any, Epochs]:
-        """Look at samples: pieces of any length give the same as the whole.
+        """Process samples: chunks of any length give the same as the whole.
 
         Parameters
         ----------
@@ -153,16 +153,16 @@ class ImuDerivedMeasurement(Measurement):
         -------
         memory : object
         epochs : Epochs
-            Where it observes: at the ends of some of these steps; and what it saw up to there.
+            Times of observation, at the ends of some of these steps, with their values.
         """
 
 
 def lasting(aids: Iterable[Measurement]) -> tuple[str, ...]:
-    """Return the names of the aids that state that their errors last."""
+    """Return the names of the aids with stated time-correlated errors."""
     return tuple(one.name for one in aids if one.lasts)
 
 
-# Options of aids that are no numbers, or out of range.
+# Checks of the options of aids.
 
 
 def check_number(
@@ -173,7 +173,7 @@ def check_number(
     high: float = math.inf,
     above: bool = False,
 ) -> None:
-    """Refuse an option that is no number within limits.
+    """Refuse an option that is not a number within limits.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ def check_number(
 
 
 def check_numbers(aid: Measurement, name: str, count: int, *, low: float = -math.inf) -> None:
-    """Refuse an option that is not so many finite numbers; keep them as a tuple of float.
+    """Refuse an option that is not a given count of finite numbers; return a tuple of float.
 
     Parameters
     ----------
@@ -238,7 +238,7 @@ def check_numbers(aid: Measurement, name: str, count: int, *, low: float = -math
 
 
 def check_block(view: View, name: str) -> None:
-    """Refuse a block of states that the filter does not have.
+    """Refuse a block of states that the filter lacks.
 
     Parameters
     ----------
@@ -248,13 +248,13 @@ def check_block(view: View, name: str) -> None:
     Raises
     ------
     ConfigError
-        It is not there; what is is named.
+        The block does not exist; the message lists the existing ones.
     """
     view.model.layout[name]
 
 
 def check_other_name(aid: Measurement, name: str) -> None:
-    """Refuse an option that is no name of another aid; nothing is one.
+    """Refuse an option that is not the name of another aid; empty is allowed.
 
     Parameters
     ----------
@@ -265,7 +265,7 @@ def check_other_name(aid: Measurement, name: str) -> None:
     Raises
     ------
     ConfigError
-        It is no text, or the aid's own name.
+        It is not a text, or it is the aid's own name.
     """
     value = getattr(aid, name)
     if not isinstance(value, str) or (value and value == aid.name):
@@ -274,7 +274,7 @@ def check_other_name(aid: Measurement, name: str) -> None:
         )
 
 
-# What an aid sees of a navigator at the instant of an epoch.
+# State of a navigator as an aid sees it at an epoch.
 
 
 #: Columns of the physical errors: displacement, velocity, rotation.
@@ -283,7 +283,7 @@ DISPLACEMENT, VELOCITY, ROTATION = slice(0, 3), slice(3, 6), slice(6, 9)
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """The computed state, and what the body does, at an epoch.
+    """Computed state, and motion of the body, at an epoch.
 
     Attributes
     ----------
@@ -298,16 +298,16 @@ class View:
         Estimates of the errors of the sensors, in the order of the model's `sensors`.
     rate : ndarray, (3,), rad/s
         Of the body relative to inertial space, body axes: the mean over the step that ends here,
-        estimated errors taken off.
+        with the estimated errors subtracted.
     force : ndarray, (3,), m/s²
         Specific force, the same.
     covariance_of : callable, optional
-        Makes the covariance of the physical errors at this instant; it costs something.
+        Returns the covariance of the physical errors at this instant; computed on demand.
     steady : ndarray, (6,), optional
         Rate and force as fading means over some tenths of a second, as the sensors gave them, in
-        the axes of the body of now; for an aid that wants them (`Aid.wants_steady`).
+        the present body axes; for an aid that uses them (`Aid.wants_steady`).
     unobserved : float, s
-        Since anything was observed.
+        Time since the last observation.
     """
 
     mechanization: Mechanization
@@ -324,7 +324,7 @@ class View:
 
     @cached_property
     def covariance(self) -> Array:
-        """Of the physical errors, level axes, (columns, columns); zero where it is not known."""
+        """Of the physical errors, level axes, (columns, columns); zero if unknown."""
         if self.covariance_of is None:
             return np.zeros((self.columns, self.columns))
         return self.covariance_of()
@@ -337,12 +337,12 @@ class View:
 
     @cached_property
     def here(self) -> NavState:
-        """Place, velocity and attitude."""
+        """Position, velocity and attitude."""
         return self.mechanization.nav_state(self.state, self.time)
 
     @cached_property
     def ellipsoid(self) -> Ellipsoid:
-        """That of the mechanization."""
+        """Ellipsoid of the mechanization."""
         return find_ellipsoid(self.mechanization.ellipsoid)
 
     @cached_property
@@ -367,11 +367,11 @@ class View:
 
     @property
     def columns(self) -> int:
-        """Number of the physical errors: of the columns of an observation's H."""
+        """Number of the physical errors: columns of an observation's H."""
         return self.model.physical_size
 
     def has(self, name: str) -> bool:
-        """Whether the filter has such a block of states."""
+        """Whether the filter has a block of states of this name."""
         return name in self.model.layout
 
     def place(self, name: str) -> slice:
@@ -383,7 +383,7 @@ class View:
         return next(s.block.labels for s in self.model.sensors if s.block.name == name)
 
     def without_errors(self, readings: Array) -> Array:
-        """Rate and force that were read, (6,), with the estimated errors taken off."""
+        """Measured rate and specific force, (6,), with the estimated errors subtracted."""
         stacked, errors, out = self.model.stacked, np.empty((2, 7, 3)), np.empty(6)
         errors_of_states(stacked.gyro_terms, self.sensors, errors[0])
         errors_of_states(stacked.accel_terms, self.sensors, errors[1])
@@ -391,16 +391,16 @@ class View:
         return out
 
     def estimate(self, name: str) -> Array:
-        """Estimate of a block: error of what was assumed, as its block is defined."""
+        """Estimate of a block: error of the assumed value, as its block is defined."""
         at = self.place(name)
         return self.sensors[at.start - PHYSICAL : at.stop - PHYSICAL]
 
 
-# Observations whose errors last, for a filter that takes each for new.
+# Time-correlated errors in a filter that takes observations as independent.
 
 
 def longer_by(interval: float, correlation_time: float) -> float:
-    """Return by how much the variance of a mean of correlated errors exceeds that of others.
+    """Return the variance of the mean of correlated errors relative to independent ones.
 
     Parameters
     ----------
@@ -412,8 +412,8 @@ def longer_by(interval: float, correlation_time: float) -> float:
     Returns
     -------
     float
-        ``(1 + rho) / (1 - rho)``, ``rho = exp(-interval / correlation_time)``: what the variance of
-        the mean of many is times their number.
+        ``(1 + rho) / (1 - rho)``, ``rho = exp(-interval / correlation_time)``: ratio of the
+        variance of the mean of many to that of independent ones.
     """
     if correlation_time == 0.0:
         return 1.0

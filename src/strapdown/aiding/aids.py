@@ -1,4 +1,4 @@
-"""The one table of aids."""
+"""Aids by name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Heights by the pressure of the air."""
+"""Heights from barometric pressure."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ HOUR = 3600.0
 
 @dataclass(frozen=True)
 class Barometer(TabulatedMeasurement):
-    """Height of a barometer: that over the ellipsoid, a bias, and noise.
+    """Barometric height: height above the ellipsoid, a bias, and noise.
 
-    The bias is what the sea is over the ellipsoid and the weather is from the standard, or
-    whatever the heights are counted from; it is a state ``NAME.bias`` that walks with the weather,
-    or that is a Gauss-Markov process. Not modelled are the air of another temperature, which makes
-    heights over the start wrong by 0.4 percent a kelvin, and the wind of travel, which makes up to
-    0.5 m at 10 m/s and nine times that at 30 m/s.
+    The bias is the height of the sea above the ellipsoid plus the deviation of the weather from the
+    standard, or the offset of the heights' reference; it is a state ``NAME.bias``, a random walk
+    with the weather or a Gauss-Markov process. Not modeled: air of another temperature, an error of
+    0.4 percent a kelvin in heights over the start, and the wind of travel, up to 0.5 m at 10 m/s
+    and nine times that at 30 m/s.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Barometer(TabulatedMeasurement):
         From the inertial sensors to the barometer, body axes.
     bias_sd : float, m
         At the start; by default of an absolute pressure: 10 hPa of weather, 84 m, and a geoid that
-        is up to 106 m off the ellipsoid, 30 m as a rule.
+        is up to 106 m from the ellipsoid, usually 30 m.
     walk : float, m/√h
         How the weather changes: 1 hPa in three hours, by default.
     correlation_time : float, s
@@ -71,21 +71,21 @@ class Barometer(TabulatedMeasurement):
             check_number(self, name, low=0.0)
 
     def states(self) -> tuple[SensorStates, ...]:
-        """Return the state of the bias: height that is read less true."""
+        """Return the state of the bias: height reading − true."""
         bias = unseen(f"{self.name}.bias", ("bias",), "m", self.bias_sd)
         if self.correlation_time > 0.0:
             return (gauss_markov(bias, self.correlation_time),)
         return (random_walk(bias, self.walk / HOUR**0.5),)
 
     def epochs(self, table: pd.DataFrame) -> Epochs:
-        """Return an epoch for each height that was measured; see `TabulatedMeasurement.epochs`."""
+        """Return an epoch for each measured height; see `TabulatedMeasurement.epochs`."""
         check_barometer(table)
         values = values_of(table, BAROMETER)
         told = np.isfinite(values[:, 1])
         return Epochs(index_of(table)[told], values[told])
 
     def observe(self, view: View, values: Array) -> list[Observation]:
-        """Return the height less what was measured."""
+        """Return the innovation of the height: computed minus measured."""
         arm = view.C_lb @ np.asarray(self.lever_arm)
         # Up, in level axes.
         up = -view.C_ln[:, 2]

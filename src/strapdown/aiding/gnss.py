@@ -1,4 +1,4 @@
-"""Places and velocities of a satellite receiver."""
+"""Positions and velocities of a GNSS receiver."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ __all__ = ["Gnss", "Moving", "arm_of", "moving"]
 
 Array = NDArray[np.float64]
 
-#: What an epoch is of: the first of its values.
+#: Kind of an epoch: the first of its values.
 POSITION_CODE, VELOCITY_CODE, HORIZONTAL_CODE = 0.0, 1.0, 2.0
 PLACE = ("north, m", "east, m", "down, m")
 SPEED = ("VN, m/s", "VE, m/s", "VD, m/s")
-#: Beyond this a time offset is a wrong clock, and no longer an arc of the second order, s.
+#: Beyond this, s, a time offset is a wrong clock, and the second-order arc is not valid.
 LARGEST_OFFSET = 2.0
 
 
@@ -54,42 +54,42 @@ def _in(unit: str, default: float = 0.0) -> float:
 
 @dataclass(frozen=True)
 class Gnss(TabulatedMeasurement):
-    """A satellite receiver: places of its antenna, velocities, or both.
+    """A GNSS receiver: positions of its antenna, velocities, or both.
 
-    A time offset that is a state is met by the antenna's place, velocity and acceleration at the
-    epoch: what is left out is a sixth of its jerk times the offset's third power. Where a state
-    finds more than 0.1 s, begin again with what was found as `time_offset`.
+    A time offset as a state is modeled by the antenna's position, velocity and acceleration at the
+    epoch; the neglected term is a sixth of its jerk times the offset's third power. If the
+    estimated state exceeds 0.1 s, start again with the estimate as `time_offset`.
 
-    The acceleration is that of `View.steady`. What an accelerometer reads at an instant is mostly
-    shaking that no receiver sees: taken for the acceleration, it would seem to tell at every
-    velocity that nothing is off.
+    The acceleration is that of `View.steady`. An accelerometer reading at an instant is mostly
+    vibration that a receiver does not see: as acceleration, it would make every velocity falsely
+    confirm a zero offset.
 
     Attributes
     ----------
     lever_arm : tuple of float, (3,), m
         Of the antenna from the inertial sensors, body axes.
     lever_arm_sd : float or tuple of float, (3,), m
-        How well it is known. Above zero it is estimated: states ``NAME.lever_arm``, assumed less
+        Its standard deviation. Above zero it is estimated: states ``NAME.lever_arm``, assumed −
         true.
     time_offset : float, s
-        Stamps of the aid less the time of the inertial sensors: what is stamped t is of
+        Time stamps of the aid minus the time of the inertial sensors: a stamp t means
         ``t - time_offset``.
     time_offset_sd : float, s
-        How well that is known. Above zero it is estimated: state ``NAME.time_offset``, assumed less
+        Its standard deviation. Above zero it is estimated: state ``NAME.time_offset``, assumed −
         true.
     time_offset_drift : float, s/√s
         By which that state walks.
     velocity_delay : float, s
-        The velocity is of an instant so much before that of the place of the same row: half of
-        the interval where it is a mean over the interval before.
+        Delay of the velocity against the position of the same row: half of the interval for a
+        mean over the preceding interval.
     use_position, use_velocity : bool
     position_sd_factor, velocity_sd_factor : float
-        By which the stated standard deviations are multiplied.
+        Factors on the stated standard deviations.
     least_position_sd, least_velocity_sd : float, m and m/s
-        No standard deviation is taken to be less.
+        Lower bounds of the standard deviations.
     qualities : tuple of int
-        Of which fixes are used, as NMEA 0183 GGA has them; 6 is what a receiver guesses without
-        satellites.
+        Fix qualities to be used, as in NMEA 0183 GGA; 6 is dead reckoning by the receiver
+        without satellites.
 
     Raises
     ------
@@ -163,7 +163,7 @@ class Gnss(TabulatedMeasurement):
         lever_arm(self.lever_arm_sd)
 
     def states(self) -> tuple[SensorStates, ...]:
-        """Errors of the lever arm and of the time offset, where they are not known."""
+        """Errors of the lever arm and of the time offset, if these are uncertain."""
         out = []
         if np.any(np.asarray(self.lever_arm_sd) > 0.0):
             out.append(lever_arm(self.lever_arm_sd).named(self._arm))
@@ -174,13 +174,13 @@ class Gnss(TabulatedMeasurement):
 
     @property
     def wants_steady(self) -> bool:
-        """With a time offset that is estimated, by the acceleration."""
+        """Only with an estimated time offset, which needs the acceleration."""
         return self.time_offset_sd > 0.0
 
     def epochs(self, table: pd.DataFrame) -> Epochs:
-        """Return an epoch for each place and for each velocity; see `TabulatedMeasurement.epochs`.
+        """Return an epoch for each position and velocity; see `TabulatedMeasurement.epochs`.
 
-        A velocity without a vertical component is one of two components.
+        A velocity without a vertical component has two components.
         """
         check_gnss(table)
         time = index_of(table) - self.time_offset
@@ -213,7 +213,7 @@ class Gnss(TabulatedMeasurement):
             if code == POSITION_CODE:
                 value = np.column_stack([np.radians(value[:, :2]), value[:, 2]])
             elif used:
-                # Speed and course are all that many a receiver tells.
+                # Many receivers output speed and course only.
                 level = good & measured[:, :2].all(axis=1) & ~measured[:, 2]
                 codes[level], told = HORIZONTAL_CODE, told | level
                 value, sd = np.where(measured, value, 0.0), np.where(measured, sd, np.inf)
@@ -226,7 +226,7 @@ class Gnss(TabulatedMeasurement):
         return Epochs(at[order], np.concatenate(rows)[order])
 
     def observe(self, view: View, values: Array) -> list[Observation]:
-        """Return a place or a velocity, north, east, down, less what was measured."""
+        """Return the innovation of a position or velocity, NED: computed − measured."""
         arm = arm_of(view, self._arm, np.asarray(self.lever_arm))
         place, velocity, acceleration = moving(view, arm, self._arm)
         of_place = values[0] == POSITION_CODE
@@ -270,7 +270,7 @@ def _later(
     velocity: Moving,
     acceleration: Moving,
 ) -> Moving:
-    """Place or velocity so much after the epoch, by which the assumed offset is too large."""
+    """Position or velocity after the epoch by the error of the assumed offset."""
     speed = velocity.after(acceleration, late)
     out, changes = speed, acceleration
     if of_place:
@@ -297,22 +297,22 @@ def _refuse_certain(
         )
 
 
-# How an antenna moves by what a navigator knows, and how that depends on the navigator's errors.
+# Motion of an antenna by the navigator's state, and its sensitivity to the navigator's errors.
 #
 # With the arm r of the antenna in level axes, ``W = C_lb w_ib - w_ie`` the rate of the body
 # relative to the Earth and f the specific force, relative to the Earth
 #
-#     place        p + r
+#     position     p + r
 #     velocity     v + W x r
 #     acceleration f + g - 2 w_ie x v + W x (W x r)
 #
-# Gravity g has the centrifugal part in it. The turn of the rate, ``W' x r``, is not known and not
-# in the acceleration, nor how g changes with the place.
+# Gravity g includes the centrifugal part. The angular acceleration term, ``W' x r``, is unknown and
+# neglected, as is the change of g with position.
 
 
 @dataclass(frozen=True, eq=False)
 class Moving:
-    """A vector of the antenna in level axes, and how it depends on the physical errors.
+    """A vector of the antenna in level axes, and its sensitivity to the physical errors.
 
     Attributes
     ----------
@@ -330,25 +330,25 @@ class Moving:
 
 
 def arm_of(view: View, name: str, assumed: Array) -> Array:
-    """Return an arm in body axes, (3,), m, less what a filter has found of its error."""
+    """Return an arm in body axes, (3,), m, minus the filter's estimate of its error."""
     return assumed - view.estimate(name) if view.has(name) else assumed
 
 
 def moving(view: View, arm: Array, arm_name: str) -> tuple[Moving, Moving, Moving]:
-    """Return how the antenna is and moves.
+    """Return position, velocity and acceleration of the antenna relative to the body.
 
     Parameters
     ----------
     view : View
     arm : ndarray, (3,), m
-        Body axes, less the estimate of its error.
+        Body axes, minus the estimate of its error.
     arm_name : str
-        Of the block of states of its error; there may be none.
+        Name of the block of states of its error, which may be absent.
 
     Returns
     -------
     place : Moving, m
-        The value is the arm: what it is beyond the place of the body. H has the place's error, too.
+        The value is the arm: antenna minus body position. H includes the position error, too.
     velocity : Moving, m/s
         Relative to the Earth.
     acceleration : Moving, m/s²
@@ -396,7 +396,7 @@ def _at(where: slice, columns: int) -> Array:
 
 
 def _steady(view: View) -> tuple[Array, Array]:
-    """Rate and force without the shaking, where it is known, and without the estimated errors."""
+    """Rate and force without vibration, if known, with the estimated errors subtracted."""
     if view.steady is None:
         return view.rate, view.force
     stacked = view.model.stacked
@@ -408,6 +408,6 @@ def _steady(view: View) -> tuple[Array, Array]:
 
 
 def _of_accel(view: View) -> Array:
-    """Errors of the force by the states of the sensors, (3, k), body axes."""
+    """Sensitivity of the specific force to the sensor states, (3, k), body axes."""
     felt = np.concatenate([[1.0], view.rate, view.force])
     return np.tensordot(felt, view.model.stacked.accel, 1)

@@ -1,4 +1,4 @@
-"""Whether a receiver and inertial sensors have one clock, and how far it is off."""
+"""Time offset between a GNSS receiver and the inertial sensors."""
 
 from __future__ import annotations
 
@@ -31,29 +31,29 @@ __all__ = [
 Array = NDArray[np.float64]
 
 WEEK = 604_800.0
-#: Unix time of the first second of GPS time, and the seconds that it is ahead of UTC since 2017.
+#: Unix time of the first second of GPS time, and its lead over UTC since 2017, s.
 GPS_EPOCH, LEAP = 315_964_800.0, 18.0
-#: Unix time since 1995 and until 2040, s.
+#: Unix time in 1995 and in 2040, s.
 UNIX = (7.9e8, 2.21e9)
-#: Offsets that are looked at, s, the step of the search, and of the fit about what it finds.
+#: Range of offsets, s, the step of the search, and of the fit about its result.
 LARGEST, STEP, FINE_STEP = 20.0, 0.1, 0.025
-#: How far apart integrals of the sensors are kept for it, s.
+#: Interval of the stored integrals of the sensors, s.
 NODES = 0.02
-#: Below this speed a course says nothing, m/s.
+#: Below this speed, m/s, a course is not usable.
 LEAST_SPEED = 3.0
-#: How far an antenna may be from where the vehicle goes as it points, m.
+#: Largest distance of an antenna from the unsteered axle, m.
 ARM = 1.0
-#: Steps that are needed; part of the changes that the sensors must explain; and by how much the
-#: best offset must leave less than any other farther than a second from it.
+#: Number of steps needed; fraction of the changes that the sensors must explain; and factor by
+#: which the best offset's residual must be below that of any other more than a second from it.
 LEAST_STEPS, LEAST_SHARE, CLEAR = 20, 0.6, 1.3
 LONGEST_STEP = 1.5
-#: An offset is told where it is so many standard deviations, and not less than this, s.
+#: An offset is reported from so many standard deviations, and at least this, s.
 SURE, LEAST_OFFSET = 3.0, 0.02
 
 
 @dataclass(frozen=True)
 class TimeOffset:
-    """Stamps of a receiver less the time of the inertial sensors.
+    """Time stamps of a receiver minus the time of the inertial sensors.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class TimeOffset:
     share : float
         Of the changes of that course or speed that the sensors explain.
     by : {'course', 'speed'}
-        What it was found by, or most of it.
+        Main source of the estimate.
     """
 
     offset: float
@@ -71,13 +71,13 @@ class TimeOffset:
 
 
 def check_overlap(gnss: pd.DataFrame, imu: pd.DataFrame, offset: float = 0.0) -> list[Finding]:
-    """Refuse fixes that are of another time than the inertial record.
+    """Refuse fixes that do not overlap the inertial record in time.
 
     Parameters
     ----------
     gnss, imu : DataFrame
     offset : float, s
-        Stamps of the receiver less the time of the sensors, as it is configured.
+        Time stamps of the receiver minus the time of the sensors, as configured.
 
     Returns
     -------
@@ -87,7 +87,7 @@ def check_overlap(gnss: pd.DataFrame, imu: pd.DataFrame, offset: float = 0.0) ->
     Raises
     ------
     DataError
-        No fix is within the record; what the difference of the clocks looks like is told.
+        No fix is within the record; the message describes the difference of the clocks.
     """
     time, stamps = index_of(gnss) - offset, index_of(imu)
     source = source_of(gnss)
@@ -131,22 +131,22 @@ def check_overlap(gnss: pd.DataFrame, imu: pd.DataFrame, offset: float = 0.0) ->
 def time_offset(
     gnss: pd.DataFrame, imu: pd.DataFrame, velocity_delay: float = 0.0
 ) -> TimeOffset | None:
-    """Find the offset at which gyros explain how the course changes, or force how the speed does.
+    """Find the offset at which the gyros explain the course, or the specific force the speed.
 
-    Good to some hundredths of a second: the nominal value of a state that finds the rest.
+    Accurate to some hundredths of a second: the nominal value of an estimated state.
 
     Parameters
     ----------
     gnss, imu : DataFrame
     velocity_delay : float, s
-        Of the receiver (`gnss_delay.velocity_delay`). Where it tells no velocity, the mean between
-        places is taken in its place.
+        Of the receiver (`gnss_delay.velocity_delay`). Without measured velocities the mean
+        between positions is used instead.
 
     Returns
     -------
     TimeOffset or None
-        None where nothing turns or changes its speed, another offset does about as well, or the
-        two disagree.
+        None if the vehicle neither turns nor changes its speed, another offset fits about as
+        well, or course and speed disagree.
 
     Notes
     -----
@@ -154,8 +154,8 @@ def time_offset(
     rates, whatever the mounting, as long as the vehicle does not tilt by much; its speed by one of
     the integral of force. For every offset of a grid the four numbers are fitted by least squares;
     the least misfit is refined by a parabola, whose curvature gives the standard deviation. The
-    course of an antenna that is a metre before the rear axle is ahead of the heading by a metre
-    over the speed; what course and speed tell is weighed with that.
+    course of an antenna that is a meter before the rear axle is ahead of the heading by a meter
+    over the speed, which sets the weights of course and speed.
     """
     told = _courses(gnss, velocity_delay)
     if told is None:
@@ -195,18 +195,18 @@ def find_time_offset(
     velocity_delay: float = 0.0,
     assumed_sd: float = 0.0,
 ) -> list[Finding]:
-    """Tell an offset that is sure, and beyond what is assumed.
+    """Report an offset that is significant, and beyond the assumed one.
 
     Parameters
     ----------
     gnss, imu : DataFrame
     assumed, velocity_delay, assumed_sd : float, s
-        As configured; what is within three standard deviations is left to the filter.
+        As configured; an offset within three standard deviations is left to the filter.
 
     Returns
     -------
     list of Finding
-        With the option that takes it away; empty where there is nothing to tell.
+        With the option that removes it; empty without a significant offset.
     """
     found = time_offset(gnss, imu, velocity_delay)
     if found is None or abs(found.offset - assumed) < max(
@@ -232,7 +232,7 @@ def find_time_offset(
 
 
 def _courses(gnss: pd.DataFrame, delay: float) -> tuple[Array, Array] | None:
-    """Instants on the clock of the places, and horizontal velocity then."""
+    """Times on the clock of the positions, and horizontal velocity then."""
     time = index_of(gnss)
     good = values_of(gnss, ["quality"])[:, 0] > 0.0
     by_velocity = good & np.isfinite(values_of(gnss, VELOCITY_SD[:2])).all(axis=1)
@@ -254,12 +254,12 @@ def _best(
     columns: list[str],
     by: str,
 ) -> TimeOffset | None:
-    """The offset at which the integrals of three channels explain a change best."""
+    """The offset at which the integrals of three channels best explain a change."""
     stamps = index_of(imu)
     if not set(columns) <= set(imu.columns):
         return None
     values = values_of(imu, columns)
-    # Every offset is judged by the same steps: those within the record at all that leave enough.
+    # Every offset is judged by the same steps: those within the record at all the offsets.
     most = min(LARGEST, 0.25 * float(stamps[-1] - stamps[0]))
     begin, end = at[:-1], at[1:]
     used = used & (begin - most >= stamps[0]) & (end + most <= stamps[-1])
@@ -274,7 +274,7 @@ def _best(
     def misfit(offset: float) -> float:
         piecewise.lines(nodes, sums, at - offset, between)
         X[:, :3] = np.diff(between, axis=0)[used]
-        # Of the normal equations, which keep digits enough to judge by, and are few.
+        # By the small normal equations, which keep enough digits for the comparison.
         fit, *_ = np.linalg.lstsq(X.T @ X, X.T @ change, rcond=None)
         return float(np.square(change - X @ fit).sum())
 
@@ -290,19 +290,19 @@ def _best(
         or not (away.any() and costs[away].min() > CLEAR * costs[k])
     ):
         return None
-    # Again about the least, with a step that is wide beside its noise and narrow beside motions.
+    # Again near the minimum, with a step that is wide against its noise and narrow against motions.
     fine = grid[k] + np.arange(-4, 5) * FINE_STEP
     second, first, _ = np.polyfit(fine - grid[k], [misfit(float(one)) for one in fine], 2)
     if not second > 0.0:
         return None
     offset = float(grid[k] - 0.5 * first / second)
-    # What is left is correlated from step to step: twice what independent steps would give.
+    # The residuals are correlated from step to step: twice the result for independent steps.
     sd = 2.0 * math.sqrt(costs[k] / max(len(change) - 5, 1) / second)
     return TimeOffset(offset, sd, share, by)
 
 
 def _integrals(stamps: Array, values: Array, means: bool) -> tuple[Array, Array]:
-    """Integrals of three channels, (m, 3), at stamps that are no closer than the search needs."""
+    """Integrals of three channels, (m, 3), at times no closer than the search needs."""
     sums = running_integral(stamps, values, means=means)
     each = max(1, int(NODES / float(np.median(np.diff(stamps)))))
     last = len(stamps) - 1
@@ -311,7 +311,7 @@ def _integrals(stamps: Array, values: Array, means: bool) -> tuple[Array, Array]
 
 
 def _difference(time: Array, stamps: Array) -> tuple[str, dict[str, Any]]:
-    """The code of what the difference of two clocks looks like, and its data."""
+    """The finding code of the difference of two clocks, and its data."""
     apart = float(time[0] - stamps[0])
     span = max(float(time[-1] - time[0]), float(stamps[-1] - stamps[0]), 60.0)
     known = (
@@ -353,7 +353,7 @@ UNIX_TIME, GPS_WEEK = "Unix time", "seconds of the GPS week"
 
 
 def _kind(first: float, span: float) -> str:
-    """Name of the clock that a first stamp looks like."""
+    """Name of the clock that a first time stamp suggests."""
     if UNIX[0] <= first <= UNIX[1]:
         return UNIX_TIME
     if abs(first) < max(span, 100.0):
@@ -369,31 +369,31 @@ def _to_week(unix: Array) -> float:
     return math.floor(gps / WEEK) * WEEK + GPS_EPOCH - LEAP
 
 
-# How late the velocity of a receiver is against its own places.
+# Delay of a receiver's velocity against its own positions.
 
 
-#: Delays that are looked at, s.
+#: Range of the searched delays, s.
 GNSS_DELAY_LARGEST = 2.0
-#: Steps from fix to fix that are needed, and the longest of them, s: beyond, a velocity says little
-#: of what is between.
+#: Number of steps from fix to fix that are needed, and the longest of them, s: over a longer step
+#: the velocity is not representative.
 GNSS_DELAY_LEAST_STEPS, GNSS_DELAY_LONGEST_STEP = 20, 1.5
-#: Length of the pieces over which places and velocities are compared, s: long beside their noise,
-#: short beside what the errors of places are correlated over.
+#: Length of the segments over which positions and velocities are compared, s: long against their
+#: noise, short against the correlation time of position errors.
 PIECE = 2.0
-#: A delay is told where it is so many standard deviations, and matters: where it makes the velocity
-#: wrong by this part of its stated standard deviation.
+#: A delay is reported from so many standard deviations, if it matters: if the velocity error by it
+#: is at least this part of the stated standard deviation.
 GNSS_DELAY_SURE, MATTERS = 4.0, 0.5
 
 
 @dataclass(frozen=True)
 class VelocityDelay:
-    """How late the velocity is against the places of the same rows.
+    """Delay of the velocity against the positions of the same rows.
 
     Attributes
     ----------
     delay, sd : float, s
     changing : float, m/s²
-        Root mean square of the acceleration, by which it was found.
+        Root mean square of the acceleration that makes the delay observable.
     steps : int
     """
 
@@ -404,7 +404,7 @@ class VelocityDelay:
 
 
 def velocity_delay(table: pd.DataFrame) -> VelocityDelay | None:
-    """Find the delay at which the integral of the velocity goes from place to place best.
+    """Find the delay at which the integral of the velocity best fits the positions.
 
     Parameters
     ----------
@@ -414,15 +414,15 @@ def velocity_delay(table: pd.DataFrame) -> VelocityDelay | None:
     Returns
     -------
     VelocityDelay or None
-        None where there are no 20 steps of no more than 1.5 s with both, or nothing accelerates.
+        None without 20 steps of at most 1.5 s with both, or without acceleration.
 
     Notes
     -----
-    A place moves by ``V(t_k + d) - V(t_j + d)``, V the integral of the velocity by its stamps (a
-    cubic spline), d the delay, and k as many steps after j as make 2 s. The sum of the squares of
-    what is left is least where d is right, by Gauss-Newton from the best of a grid. The standard
-    deviation allows for what is correlated, as pieces that overlap are (Newey and West,
-    Econometrica 55 (1987) 703).
+    A position changes by ``V(t_k + d) - V(t_j + d)``, V the integral of the velocity by its stamps
+    (a cubic spline), d the delay, and k as many steps after j as make 2 s. The sum of the squared
+    residuals is least at the true d, found by Gauss-Newton from the best of a grid. The standard
+    deviation allows for correlation, as of overlapping segments (Newey and West, Econometrica 55
+    (1987) 703).
     """
     good = values_of(table, ["quality"])[:, 0] > 0.0
     good &= np.isfinite(values_of(table, [*POSITION_SD, *VELOCITY_SD])).all(axis=1)
@@ -440,7 +440,7 @@ def velocity_delay(table: pd.DataFrame) -> VelocityDelay | None:
     moved = place_difference(place[apart:], place[:-apart])
     speed = CubicSpline(time, velocity)
     way = speed.antiderivative()
-    # Where the spline goes over a gap, or would be asked beyond its end, nothing is known.
+    # In a gap, or beyond its end, the spline is not valid.
     holes = time[:-1][steps > GNSS_DELAY_LONGEST_STEP], time[1:][steps > GNSS_DELAY_LONGEST_STEP]
     begin, end = time[:-apart] - GNSS_DELAY_LARGEST, time[apart:] + GNSS_DELAY_LARGEST
     near = (begin >= time[0]) & (end <= time[-1])
@@ -466,7 +466,7 @@ def velocity_delay(table: pd.DataFrame) -> VelocityDelay | None:
         delay = min(max(delay, -GNSS_DELAY_LARGEST), GNSS_DELAY_LARGEST)
     score = (gained * left(delay)).sum(axis=1)
     variance, lags = float(score @ score), 2 * apart
-    # Where what is left is correlated against itself, the sum may come to nothing.
+    # With negatively correlated residuals the sum may vanish.
     least = 0.05 * variance
     for lag in range(1, min(lags, len(score) - 1) + 1):
         variance += 2.0 * (1.0 - lag / (lags + 1)) * float(score[lag:] @ score[:-lag])
@@ -477,19 +477,19 @@ def velocity_delay(table: pd.DataFrame) -> VelocityDelay | None:
 
 
 def find_velocity_delay(table: pd.DataFrame, assumed: float = 0.0) -> list[Finding]:
-    """Tell a delay that is sure and matters.
+    """Report a delay that is significant and matters.
 
     Parameters
     ----------
     table : DataFrame
         Gnss table.
     assumed : float, s
-        What is configured already.
+        Delay in the configuration.
 
     Returns
     -------
     list of Finding
-        With the option that takes it away; empty where there is nothing to tell.
+        With the option that removes it; empty without a significant delay.
     """
     found = velocity_delay(table)
     if found is None:

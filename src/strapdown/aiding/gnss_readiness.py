@@ -1,4 +1,4 @@
-"""What to know of a receiver's fixes before a record is navigated with them."""
+"""Check a receiver's fixes before a record is navigated with them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ __all__ = ["check_fixes", "gnss_readiness"]
 def gnss_readiness(
     table: pd.DataFrame, imu: pd.DataFrame | None = None, aid: Gnss | None = None
 ) -> tuple[Finding, ...]:
-    """Look at fixes by themselves, and beside the inertial record that they are to aid.
+    """Check fixes by themselves, and against the inertial record.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def gnss_readiness(
     imu : DataFrame, optional
         Imu table.
     aid : Gnss, optional
-        As it is configured: what it has already is not told again.
+        As it is configured: options already set are not reported again.
 
     Returns
     -------
@@ -60,26 +60,26 @@ def gnss_readiness(
     return tuple(found)
 
 
-# What a Gnss table shows to be wrong with its fixes, from itself alone.
+# Errors of fixes that a Gnss table alone reveals.
 
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-#: What no vehicle does: a speed over the ground, m/s, and an acceleration, m/s².
+#: Limits beyond any vehicle: a speed over the ground, m/s, and an acceleration, m/s².
 LARGEST_SPEED, LARGEST_ACCELERATION = 12_000.0, 60.0
-#: In standard deviations of the places and of the way between.
+#: In standard deviations of the positions and of the displacement between them.
 JUMP = 8.0
-#: Steps by which units are judged, and the speed from which they are, m/s.
+#: Number of steps for the check of units, and the least speed for it, m/s.
 LEAST_STEPS, LEAST_SPEED = 10, 2.0
-#: A receiver repeats itself where so many rows in a row are alike, and it moved.
+#: A receiver repeats itself if so many consecutive rows are equal while it moves.
 ALIKE = 3
-#: Rows that a message names.
+#: Number of rows that a message lists.
 NAMED = 5
 
 
 def check_fixes(table: pd.DataFrame) -> list[Finding]:
-    """Look at the fixes of a table.
+    """Check the fixes of a table.
 
     Parameters
     ----------
@@ -89,13 +89,13 @@ def check_fixes(table: pd.DataFrame) -> list[Finding]:
     Returns
     -------
     list of Finding
-        Standard deviations of zero; gaps; places that jump; a receiver that repeats itself.
+        Standard deviations of zero; gaps; positions that jump; a receiver that repeats itself.
 
     Raises
     ------
     DataError
-        As `check_gnss`; there is no fix at all; places are in radians or minutes;
-        they move faster than anything does.
+        As `check_gnss`; there are no fixes; positions are in radians or minutes; they move
+        faster than any vehicle.
     """
     check_gnss(table)
     source = source_of(table)
@@ -126,7 +126,7 @@ def check_fixes(table: pd.DataFrame) -> list[Finding]:
 
 
 def _refuse_units(table: pd.DataFrame, time: Array, placed: Flags, source: str | None) -> None:
-    """Places that are no degrees, as their speed tells."""
+    """Refuse positions whose speed shows that they are not in degrees."""
     rows = np.flatnonzero(placed)
     if len(rows) < 2:
         return
@@ -152,7 +152,7 @@ def _refuse_units(table: pd.DataFrame, time: Array, placed: Flags, source: str |
         return
     ratio = float(np.median(speed[clear] / told[clear]))
     row = int(rows[np.flatnonzero(clear)[0]]) + 1
-    # Radians taken for degrees are near the equator, where a degree of longitude is longer.
+    # Radians taken as degrees are near the equator, where a degree of longitude is longer.
     small = bool((np.abs(place[:, :2]) <= [0.5 * np.pi, np.pi]).all())
     for fits, code in (
         (small and 0.016 < ratio < 0.1, "navigation.fixes-in-radians"),
@@ -208,7 +208,7 @@ def _gaps(time: Array, told: Flags, source: str | None) -> list[Finding]:
 def _jumps(
     table: pd.DataFrame, time: Array, placed: Flags, fast: Flags, source: str | None
 ) -> list[Finding]:
-    """Places that are where no vehicle comes to from both of their neighbours."""
+    """Positions that no vehicle reaches from the previous one."""
     rows = np.flatnonzero(placed)
     if len(rows) < 3:
         return []
@@ -218,11 +218,11 @@ def _jumps(
     steps = np.diff(time[rows])
     has = (fast[rows][1:] & fast[rows][:-1])[:, None]
     v = np.where(fast[rows][:, None], values_of(table, VELOCITY)[rows], 0.0)
-    # Where no velocity is told, that of the step before stands for it.
+    # Without a velocity that of the step before is used.
     before = np.vstack([moved[1] / steps[1], (moved / steps[:, None])[:-1]])
     way = np.where(has, 0.5 * (v[1:] + v[:-1]), before) * steps[:, None]
     off = np.linalg.norm(moved - way, axis=1)
-    # What an acceleration does beyond the mean of two velocities, or beyond one speed.
+    # Effect of an acceleration beyond the mean of two velocities, or beyond one speed.
     free = np.where(has[:, 0], 0.125, 1.0) * LARGEST_ACCELERATION * steps**2
     allowed = JUMP * np.hypot(sd[1:], sd[:-1]) + free
     struck = off > allowed
@@ -245,7 +245,7 @@ def _jumps(
 
 
 def _repeats(table: pd.DataFrame, placed: Flags, fast: Flags, source: str | None) -> list[Finding]:
-    """Rows that are the same, while the receiver says that it moves."""
+    """Rows that are identical while the receiver reports motion."""
     values = values_of(table, [*GEODETIC, *VELOCITY])
     same = np.zeros(len(values), dtype=np.bool_)
     same[1:] = (values[1:] == values[:-1]).all(axis=1) & placed[1:] & placed[:-1]
@@ -273,6 +273,6 @@ def _repeats(table: pd.DataFrame, placed: Flags, fast: Flags, source: str | None
 
 
 def _rows(struck: Flags) -> list[int | str]:
-    """The first rows, counted from 1; dots where there are more."""
+    """The first rows, counted from 1, as text; dots for further ones."""
     at: list[int | str] = [*(np.flatnonzero(struck) + 1).tolist()]
     return [*at[:NAMED], "…"] if len(at) > NAMED else at

@@ -1,4 +1,4 @@
-"""Where an axis of the body points: a compass, or the baseline of two antennas."""
+"""Azimuth of an axis of the body: a compass, or the baseline of two antennas."""
 
 from __future__ import annotations
 
@@ -25,23 +25,23 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Heading(TabulatedMeasurement):
-    """Azimuth of an axis of the body, clockwise from north: that, a misalignment, and noise.
+    """Azimuth of an axis of the body, clockwise from north, with a misalignment and noise.
 
-    Of a compass the misalignment is what declination and iron leave; of two antennas, what is
-    wrong with the axis. It is told from the heading where something else knows that.
+    For a compass the misalignment is the residual of declination and iron; for two antennas, the
+    error of the axis. It is observable where another source determines the heading.
 
     Attributes
     ----------
     axis_deg : float, deg
-        Of the axis in the body, from forward to the right: 0 of a compass, 90 of a baseline from
-        the left antenna to the right one.
+        Of the axis in the body, from forward to the right: 0 for a compass, 90 for a baseline
+        from the left antenna to the right one.
     added_deg : float, deg
-        Added to what is read: the declination, east positive, of a magnetic heading.
+        Added to the reading: the declination, east positive, of a magnetic heading.
     misalignment_sd_deg : float, deg
-        More than zero adds the state ``NAME.misalignment``: what is read less the truth.
+        More than zero adds the state ``NAME.misalignment``: reading − truth.
     steepest_deg : float, deg
-        While the axis is steeper, nothing is observed: an axis that is nearly vertical points
-        nowhere.
+        No observation while the axis is steeper: an axis that is nearly vertical has no
+        azimuth.
     """
 
     axis_deg: float = 0.0
@@ -68,14 +68,14 @@ class Heading(TabulatedMeasurement):
         return (unseen(f"{self.name}.misalignment", ("misalignment",), "rad", sd),)
 
     def epochs(self, table: pd.DataFrame) -> Epochs:
-        """Return an epoch for each heading that was measured; see `TabulatedMeasurement.epochs`."""
+        """Return an epoch for each measured heading; see `TabulatedMeasurement.epochs`."""
         check_heading(table)
         values = np.radians(values_of(table, HEADING))
         told = np.isfinite(values[:, 1])
         return Epochs(index_of(table)[told], values[told])
 
     def observe(self, view: View, values: Array) -> list[Observation]:
-        """Return the azimuth less what was measured, unless the axis is too steep."""
+        """Return the azimuth innovation, computed − measured; None if the axis is too steep."""
         angle = math.radians(self.axis_deg)
         axis = view.C_lb @ [math.cos(angle), math.sin(angle), 0.0]
         C_nl = view.C_ln.T

@@ -1,4 +1,4 @@
-"""What aids of a body at rest have in common: how it is found that it rests."""
+"""Standstill detection, and the measurements of a stationary body: ZUPT and ZARU."""
 
 from __future__ import annotations
 
@@ -43,29 +43,29 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-# A window of fewer samples has no variance worth the name.
+# A window of fewer samples has no meaningful variance.
 LEAST_SAMPLES = 3
-# Part of a window that may be missing from it.
+# Fraction of a window that may be missing.
 GAPS = 0.2
-# Part of a window, or of an interval, by which stamps are rounded.
+# Tolerance of time stamps by rounding, as a fraction of a window or an interval.
 SLACK = 1e-3
-#: Columns of what is remembered: end and length of a step, rate, force.
+#: Columns of a window: end and length of a step, rate, force.
 TIME, DT, RATE, FORCE = 0, 1, slice(2, 5), slice(5, 8)
 #: Values of an epoch: number of samples, means of rate and force, variances of the rates.
 COUNT, MEAN_RATE, MEAN_FORCE, RATE_VARIANCE = 0, slice(1, 4), slice(4, 7), slice(7, 10)
 
 
 class Window(NamedTuple):
-    """What is remembered between pieces.
+    """State of a detector between chunks.
 
     Attributes
     ----------
     samples : ndarray, (m, 8)
-        The last ones: a window, and one before it.
+        The latest ones: a window, and one sample before it.
     number : float
         Of the interval of the last sample; NaN before the first.
     rule : object
-        What the rule of the threshold remembers.
+        State of the threshold rule.
     """
 
     samples: Array
@@ -75,13 +75,13 @@ class Window(NamedTuple):
 
 @dataclass(frozen=True)
 class StandstillAid(ImuDerivedMeasurement):
-    """An aid that observes while a detector says that the body rests.
+    """An aid that observes while a detector finds the body stationary.
 
-    The detector sees the samples of the `window` that ends at an epoch, and no later ones.
+    The detector uses the samples of the `window` that ends at an epoch, and no later ones.
 
-    A vehicle that glides over a smooth road looks like one that rests. So nothing is observed
-    while the computed velocity is not near zero: above `largest_speed` by more than `gate` standard
-    deviations of what is computed along its direction.
+    A vehicle that glides over a smooth road looks like a stationary one. So there is no
+    observation while the computed velocity is not near zero: above `largest_speed` by more than
+    `gate` standard deviations of the computed velocity along its direction.
 
     Attributes
     ----------
@@ -91,21 +91,22 @@ class StandstillAid(ImuDerivedMeasurement):
     threshold : float
         The statistic of a rest is below it: one, if the noise is as stated.
     threshold_rule : str
-        One of `STANDSTILL_THRESHOLDS`: what becomes of it while it goes.
+        One of `STANDSTILL_THRESHOLDS`: adaptation of the threshold during a run.
     threshold_time : float, s
         For so long a rule remembers, or is patient.
     rate_sd_deg_per_s, force_sd : float, deg/s and m/s²
         Of the noise of one sample at rest, an idling engine included.
     gravity : float, m/s²
-        Of the place, for detectors that use it.
+        At the site, for detectors that use it.
     interval : float, s
         Between observations; zero: at every sample.
     largest_speed : float, m/s
         Infinite: the detector alone decides, as on a foot.
     gate : float
     gate_time : float, s
-        After so long without any observation a rest is taken at any speed: a filter that is wrong
-        by more than it knows would take none any more. Zero: never, as for what glides for longer.
+        After this time without an observation a rest is accepted at any speed: a filter with an
+        error beyond its covariance would never accept one again. Zero: never, as for vehicles
+        that glide for longer.
     """
 
     detector: str = "force_variance"
@@ -146,12 +147,12 @@ class StandstillAid(ImuDerivedMeasurement):
             check_number(self, "largest_speed", low=0.0)
 
     def begin(self) -> Window:
-        """Return nothing seen."""
+        """Return an empty window."""
         rule = STANDSTILL_THRESHOLDS[self.threshold_rule]
         return Window(np.empty((0, 8)), math.nan, rule.begin(self.threshold, self.threshold_time))
 
     def watch(self, memory: Window, time: Array, rows: Array) -> tuple[Window, Epochs]:
-        """Return epochs where the window that ends there is of a rest."""
+        """Return an epoch for each end of a stationary window."""
         if not len(time):
             return memory, Epochs(np.empty(0), np.empty((0, 10)))
         new = len(memory.samples)
@@ -176,7 +177,7 @@ class StandstillAid(ImuDerivedMeasurement):
         return after, Epochs(np.array(at), np.array(values).reshape(-1, 10))
 
     def near_rest(self, view: View) -> bool:
-        """Whether what is computed may be a rest."""
+        """Whether the computed velocity is compatible with rest."""
         speed = float(np.linalg.norm(view.velocity))
         if speed <= self.largest_speed or 0.0 < self.gate_time <= view.unobserved:
             return True
@@ -189,7 +190,7 @@ class StandstillAid(ImuDerivedMeasurement):
         return np.floor(time / self.interval + SLACK) if self.interval else np.zeros(len(time))
 
     def _ends(self, seen: Array, new: int, number: float) -> NDArray[np.int64]:
-        """Samples with which an interval ends."""
+        """Indices of the samples that end an interval."""
         if not self.interval:
             return np.arange(new, len(seen))
         numbers = self._number(seen[new:, TIME])
@@ -197,13 +198,13 @@ class StandstillAid(ImuDerivedMeasurement):
         return new + np.flatnonzero(numbers > before)
 
     def _first(self, seen: Array, i: int) -> int:
-        """First sample of the window that ends with one."""
+        """Index of the first sample of the window that ends with a sample."""
         begin = seen[i, TIME] - self.window * (1.0 - SLACK)
-        # Ends of steps: the first that is after the begin of the window.
+        # Ends of steps: the first after the begin of the window.
         return int(seen[: i + 1, TIME].searchsorted(begin, side="right"))
 
     def _look(self, seen: Array, i: int) -> tuple[float, Array] | None:
-        """Statistic of a window that is whole, and what it tells where it is of a rest."""
+        """Statistic of a complete window, and the observation if it is stationary."""
         first = self._first(seen, i)
         count = i + 1 - first
         within = np.ascontiguousarray(seen[first : i + 1])
@@ -218,12 +219,12 @@ class StandstillAid(ImuDerivedMeasurement):
         return statistic, np.concatenate(told)
 
 
-# The one table of detectors of a standstill: what each makes of a window of samples.
+# Standstill detectors by name: the statistic of a window of samples.
 #
 # Skog, Händel, Nilsson and Rantakokko, Zero-velocity detection - an algorithm evaluation, IEEE
-# Trans. Biomedical Engineering 57 (2010) 2657: a generalised likelihood ratio test of rest
-# against any motion, and what becomes of it where less is known of the signals. Theirs are sums
-# of squares T, to be below a threshold; here each is divided by the number of squares whose
+# Trans. Biomedical Engineering 57 (2010) 2657: a generalized likelihood ratio test of rest
+# against any motion, and its variants for less knowledge of the signals. Theirs are sums of
+# squares T, to be below a threshold; here each is divided by the number of squares whose
 # expectation is one at a quiet rest, and its root taken, so that it is one there and a threshold
 # is a number of standard deviations: ``gamma = n threshold²``, n as in
 # `StandstillDetector.squares`.
@@ -241,7 +242,7 @@ class StandstillDetector:
         Squares a sample with an expectation of one at rest.
     of : callable
         ``of(rate, force, gravity)`` with rates (w, 3) and forces (w, 3), each over the standard
-        deviation of its noise, and gravity over that of the force: the mean square a sample.
+        deviation of its noise, and gravity over that of the force: the mean square per sample.
     """
 
     summary: str
@@ -340,42 +341,41 @@ STANDSTILL_DETECTORS: dict[str, StandstillDetector] = {
 }
 
 
-# The one table of rules that say below which statistic a body stands.
+# Threshold rules by name: the statistic below which a body counts as stationary.
 #
-# A statistic (`standstill_detectors`) is in standard deviations of the noise that is stated of a
-# rest. What is stated fits a vehicle whose engine was measured. On a shoe, how still a stance is
-# depends on the gait, the sole and the ground; then a rule finds the threshold while it goes. Each
-# sees statistics one by one and none that is later, so that pieces of a record give the same as the
-# whole.
+# A statistic (`standstill_detectors`) is in standard deviations of the stated noise at rest. A
+# stated threshold fits a vehicle whose engine was measured. On a shoe, the motion in stance depends
+# on gait, sole and ground; there a rule adapts the threshold. Each rule sees statistics one by one,
+# never a later one, so that the chunks of a record give the same as the whole.
 
 
-# Of the histogram of the logarithm of a statistic: first edge, width of a bin, number of bins.
+# Histogram of the logarithm of a statistic: first edge, width of a bin, number of bins.
 LOWEST, WIDTH, BINS = math.log(1e-3), 0.1, 200
-# A class has at least this share, and of two that are apart at least this part of the variance is
-# between them: 0.64 of one normal class cut in two, 0.75 of a uniform one.
+# Least share of a class, and least part of the variance between two separate classes: 0.64 for one
+# normal class cut in two, 0.75 for a uniform one.
 LEAST_SHARE, LEAST_BETWEEN = 0.1, 0.65
-# A motion is so many times a rest.
+# Least ratio of the statistics of motion and rest.
 LEAST_RATIO = 5.0
-# So much must have been seen, s, and after so much the split is made anew.
+# Time before the first split, s, and between splits.
 SEEN, ANEW = 2.0, 0.25
 
 
 class StandstillThreshold(ABC):
-    """A rule for a threshold; what it remembers is a value that is never changed in place."""
+    """A rule for a threshold; its state is a value that is never changed in place."""
 
     summary: ClassVar[str]
     source: ClassVar[str]
 
     @abstractmethod
     def begin(self, stated: float, scale: float) -> NamedTuple:
-        """Return what is remembered before the first statistic.
+        """Return the state before the first statistic.
 
         Parameters
         ----------
         stated : float
             Threshold that is stated.
         scale : float, s
-            Time of the rule: how long it remembers, or how long it is patient.
+            Time scale of the rule: its memory, or its patience.
         """
 
     @abstractmethod
@@ -397,28 +397,28 @@ class StandstillThreshold(ABC):
 
 
 class Told(NamedTuple):
-    """What is stated, and nothing else."""
+    """The stated threshold, constant."""
 
     stated: float
 
 
 class Stated(StandstillThreshold):
-    """The threshold that is stated."""
+    """Constant stated threshold."""
 
     summary: ClassVar[str] = "the threshold that is stated"
     source: ClassVar[str] = "Skog et al. (2010)"
 
     def begin(self, stated: float, scale: float) -> Told:
-        """Return what is stated."""
+        """Return the stated threshold."""
         return Told(stated)
 
     def next(self, memory: Told, time: float, statistic: float) -> tuple[Told, float]:  # type: ignore[override]
-        """Return what is stated."""
+        """Return the stated threshold."""
         return memory, memory.stated
 
 
 class Split(NamedTuple):
-    """A histogram that fades.
+    """A histogram with fading memory.
 
     Attributes
     ----------
@@ -428,7 +428,7 @@ class Split(NamedTuple):
     counts : ndarray, (BINS,), s
         Time spent in each bin of the logarithm of the statistic.
     time, made : float, s
-        Of the newest statistic, and when the split was made; NaN before the first.
+        Of the newest statistic, and of the last split; NaN before the first.
     """
 
     now: float
@@ -439,7 +439,7 @@ class Split(NamedTuple):
 
 
 class Otsu(StandstillThreshold):
-    """Between the two classes of the statistics so far: stances and swings."""
+    """Threshold between the two classes of the statistics so far: stances and swings."""
 
     summary: ClassVar[str] = (
         "between the two classes of the statistics so far; until there are two, as stated"
@@ -451,7 +451,7 @@ class Otsu(StandstillThreshold):
         return Split(stated, scale, np.zeros(BINS), math.nan, math.nan)
 
     def next(self, memory: Split, time: float, statistic: float) -> tuple[Split, float]:  # type: ignore[override]
-        """Return the threshold of the newest split, this statistic taken in first."""
+        """Return the threshold of the newest split, this statistic included."""
         now, scale, counts, before, made = memory
         if math.isnan(before):
             return Split(now, scale, counts, time, time), now
@@ -467,7 +467,7 @@ class Otsu(StandstillThreshold):
 
 
 class Waiting(NamedTuple):
-    """Since when no rest was seen; NaN before the first statistic."""
+    """Time since the last rest; NaN before the first statistic."""
 
     stated: float
     scale: float
@@ -475,12 +475,12 @@ class Waiting(NamedTuple):
 
 
 class Patience(StandstillThreshold):
-    """A missed rest costs the more, the longer ago the last one was: so the threshold grows.
+    """The cost of a missed rest grows with the time since the last one, and so does the threshold.
 
-    The likelihood ratio of rest against any motion is ``exp(-n w s²/2)`` of a statistic s (n
-    squares, w samples), and Bayes' rule takes a rest where it is above the cost of a false alarm
-    over that of a missed one, times the odds. With a cost of a missed rest that grows with the
-    time since the last as ``exp(theta t)``, the bound of s² grows with t: here
+    The likelihood ratio of rest against any motion is ``exp(-n w s²/2)`` for a statistic s (n
+    squares, w samples), and Bayes' rule decides for rest where it is above the cost of a false
+    alarm over that of a missed one, times the odds. With a cost of a missed rest that grows with
+    the time since the last as ``exp(theta t)``, the bound of s² grows with t: here
     ``threshold² = stated² (1 + t / scale)``, ``theta = n w stated²/(2 scale)``.
     """
 
@@ -488,11 +488,11 @@ class Patience(StandstillThreshold):
     source: ClassVar[str] = "Wahlström et al. (2019), exponential cost of a missed rest"
 
     def begin(self, stated: float, scale: float) -> Waiting:
-        """Return nothing seen."""
+        """Return empty statistics."""
         return Waiting(stated, scale, math.nan)
 
     def next(self, memory: Waiting, time: float, statistic: float) -> tuple[Waiting, float]:  # type: ignore[override]
-        """Return the threshold, and count from here on, if this is a rest."""
+        """Return the threshold; restart the time if this is a rest."""
         since = time if math.isnan(memory.since) else memory.since
         now = memory.stated * math.sqrt(1.0 + max(time - since, 0.0) / memory.scale)
         if statistic < now:
@@ -501,7 +501,7 @@ class Patience(StandstillThreshold):
 
 
 def otsu(counts: Array) -> float | None:
-    """Return where two classes of a histogram part, in bins from its first edge.
+    """Return the threshold between two classes of a histogram, in bins from its first edge.
 
     Parameters
     ----------
@@ -511,10 +511,10 @@ def otsu(counts: Array) -> float | None:
     Returns
     -------
     float or None
-        The edge for which the variance between the classes is the most; the middle of such edges,
-        where bins between the classes are empty. None where there are no two classes: one has
-        less than a tenth, their means are less than a factor of five apart, or what is between
-        them is less than 0.65 of the variance.
+        The edge of the largest variance between the classes; the middle of such edges, if bins
+        between the classes are empty. None without two classes: one has less than a tenth, their
+        means are less than a factor of five apart, or the variance between them is less than 0.65
+        of the total.
 
     Notes
     -----
@@ -547,26 +547,26 @@ STANDSTILL_THRESHOLDS: dict[str, StandstillThreshold] = {
 }
 
 
-# A body that stands: its velocity is zero.
+# Zero velocity of a stationary body (ZUPT).
 
 
 @dataclass(frozen=True)
 class ZeroVelocity(StandstillAid):
-    """Zero velocity relative to the Earth, where a detector says so.
+    """Zero velocity relative to the Earth while a detector finds rest (ZUPT, zero-velocity update).
 
     Attributes
     ----------
     sd : float, m/s
-        Of the velocity of what is called a standstill, each component. What sways about a place
-        has a velocity whose mean soon is nothing, so that subsequent observations are no worse than
-        independent.
+        Of the velocity in a detected standstill, each component. The velocity of a body that
+        sways about a position soon has zero mean, so that subsequent observations are at least
+        as good as independent ones.
     pivot : float, m
-        From the sensors to the point about which the body rolls while it is called still, as the
-        sole of a shoe does over the ground: the mean rate of the window times this is a velocity,
+        From the sensors to the point about which the body rolls in a detected standstill, as the
+        sole of a shoe over the ground: the mean rate of the window times this is a velocity,
         and its square adds to that of `sd`.
     correlation_time : float, s
-        For so long the velocity of what is called a standstill lasts: its variance is more by
-        `correlated.longer_by`. A shoe that rolls over its sole does so all through a stance.
+        Correlation time of the velocity in a detected standstill: its variance is increased by
+        `correlated.longer_by`. A shoe that rolls over its sole moves all through a stance.
     """
 
     sd: float = field(default=0.02, metadata={"unit": "m_per_s"})
@@ -585,7 +585,7 @@ class ZeroVelocity(StandstillAid):
 
     @property
     def lasts(self) -> bool:
-        """As `Aid.lasts`: where a correlation time is stated."""
+        """As `Aid.lasts`: with a stated correlation time."""
         return self.correlation_time > 0.0
 
     def observe(self, view: View, values: Array) -> list[Observation]:
@@ -604,20 +604,21 @@ class ZeroVelocity(StandstillAid):
 LABELS = ("VN, m/s", "VE, m/s", "VD, m/s")
 
 
-# A body that stands does not turn: what the gyros read is the Earth's rate and their errors.
+# Zero rate of a stationary body (ZARU): the gyros read the Earth's rate and their errors.
 
 
 @dataclass(frozen=True)
 class ZeroRate(StandstillAid):
-    """No turn relative to the Earth, where a detector says so: the mean rate over the window.
+    """Zero rate relative to the Earth while a detector finds rest (ZARU, zero angular rate update).
 
-    Its variance is that of the samples in the window over their number, and `sd_deg_per_s` squared
-    beside it; where windows overlap, as much more as each sample is used more than once.
+    The observation is the mean rate over the window. Its variance is that of the samples in the
+    window over their number, plus `sd_deg_per_s` squared; where windows overlap, it is increased
+    by the number of uses of each sample.
 
     Attributes
     ----------
     sd_deg_per_s : float, deg/s
-        Of the mean rate of what is called a standstill, beyond the noise: a body that sways.
+        Of the mean rate in a detected standstill, beyond the noise: a body that sways.
     """
 
     sd_deg_per_s: float = 0.005
@@ -631,13 +632,13 @@ class ZeroRate(StandstillAid):
         check_number(self, "sd_deg_per_s", low=0.0, above=True)
 
     def observe(self, view: View, values: Array) -> list[Observation]:
-        """Return the rate less the Earth's, body axes, unless the velocity is far from zero."""
+        """Return the rate minus the Earth's, body axes, unless the velocity is far from zero."""
         if not self.near_rest(view):
             return []
         earth = view.ellipsoid.rotation_rate * view.level[AXIS : AXIS + 3]
         C_bl = view.C_lb.T
-        # A scale factor is of the true rate, which at a rest is the Earth's: of what is read, that
-        # of an axis would be found to go with its bias.
+        # A scale factor acts on the true rate, at rest the Earth's: with the reading, that of an
+        # axis would be correlated with its bias.
         readings = np.concatenate([values[MEAN_RATE], values[MEAN_FORCE]])
         H = rate_columns(view, C_bl @ earth, view.without_errors(readings)[3:])
         z = values[MEAN_RATE] - H[:, PHYSICAL:] @ view.sensors - C_bl @ earth

@@ -1,4 +1,4 @@
-"""Wheels that roll where they point: no velocity to the side, none up or down."""
+"""Measurements of a wheeled vehicle: NHC, odometer, and velocity along instrument axes."""
 
 from __future__ import annotations
 
@@ -48,62 +48,62 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-# Place of the rotation about the vertical among the physical errors.
+# Index of the rotation about the vertical among the physical errors.
 HEADING = 8
 
 
 @dataclass(frozen=True)
 class NoSlip(ImuDerivedMeasurement):
-    """A vehicle on wheels: a point of an axle that is not steered moves along the vehicle.
+    """Non-holonomic constraint (NHC): a point of the unsteered axle moves along the vehicle.
 
-    Lateral and vertical velocity of the point, in axes of the vehicle, are zero but for
+    Lateral and vertical velocity of the point, in axes of the vehicle, are zero except for
 
-    * what road and suspension do, `lateral_sd` and `vertical_sd`;
-    * the slip angle of the tyres, which grows with the force to the side that they bear, by
-      `slip_deg_per_g`: a lateral velocity of ``slip v f_y``;
-    * the pitch of the body on its springs, which grows with the force along it, by
-      `dive_deg_per_g`: a vertical one of ``dive v f_x``.
+    * the effect of road and suspension, `lateral_sd` and `vertical_sd`;
+    * the slip angle of the tires, which grows with their lateral force, by `slip_deg_per_g`:
+      a lateral velocity of ``slip v f_y``;
+    * the pitch of the body on its springs, which grows with the longitudinal force, by
+      `dive_deg_per_g`: a vertical velocity of ``dive v f_x``.
 
-    These last over `correlation_time`, and to a filter every observation is new: its variance is
-    that of the errors times ``(1 + rho) / (1 - rho)``, ``rho = exp(-interval / correlation_time)``,
-    so that a mean over many is as good as it is, whatever the `interval`.
+    These errors are correlated over `correlation_time`, but the filter takes observations as
+    independent. So their variance is multiplied by ``(1 + rho) / (1 - rho)``,
+    ``rho = exp(-interval / correlation_time)``, which makes the variance of a mean over many
+    observations right, whatever the `interval`.
 
-    Slip and dive are mostly no noise: tyres and springs yield by so much a g as long as load and
-    tyres are the same. With `compliance_sd_deg_per_g` that constant is estimated, and
-    `slip_deg_per_g` and `dive_deg_per_g` are of what is left.
+    Slip and dive are mostly systematic: tires and springs yield by a constant angle per g as long
+    as load and tires are the same. With `compliance_sd_deg_per_g` that constant is estimated, and
+    `slip_deg_per_g` and `dive_deg_per_g` refer to the remainder.
 
-    At rest it holds as well as on the move, and backwards as well as forwards.
+    Valid at rest and in motion, forward and backward.
 
     Attributes
     ----------
     lever_arm : tuple of float, m
         From the inertial sensors to the middle of the rear axle, at the height of the sensors,
-        body axes. An error of x m is a lateral velocity of x times the rate of turn.
+        body axes. An error of x m is a lateral velocity of x times the yaw rate.
     roll_deg, pitch_deg, yaw_deg : float, deg
         Of the inertial sensors in the vehicle (`VehicleAxes`).
     mounting_sd_deg : tuple of float, deg
-        Of pitch and of yaw: more than zero adds the states ``NAME.mounting``, which are seen while
-        the vehicle moves and GNSS tells where to.
+        Of pitch and of yaw: more than zero adds the states ``NAME.mounting``, which are
+        observable in motion with GNSS.
     lateral_sd, vertical_sd : float, m/s
         Of the velocities at an instant, straight on. A body that rises and falls by 15 mm at
         1.5 Hz on its springs has a vertical one of 0.1 m/s.
     slip_deg_per_g : float, deg/g
-        Slip angle of the rear tyres by lateral force.
+        Slip angle of the rear tires by lateral force.
     dive_deg_per_g : float, deg/g
         Pitch of the body by longitudinal force.
     compliance_sd_deg_per_g : tuple of float, deg/g
-        Of constants of the vehicle: above zero adds the states ``NAME.compliance``, by how much
-        the direction of travel turns to the right by force to the right (`slip`: below zero by
-        tyres alone; an arm that is x m too far forward adds ``x g / v²``), and down by force
+        Of constants of the vehicle: above zero adds the states ``NAME.compliance``, the rotation
+        of the direction of travel to the right by force to the right (`slip`: below zero by
+        tires alone; an arm that is x m too far forward adds ``x g / v²``), and down by force
         forward (`dive`).
     correlation_time : float, s
     interval : float, s
         Between observations: they are at its multiples, or the first sample after.
     largest_rate_deg_per_s : float, deg/s
-        While the vehicle turns faster about its vertical, as it does when it skids, nothing is
-        observed.
+        No observation while the vehicle turns faster about its vertical, as it does in a skid.
     largest_heading_sd_deg : float, deg
-        Nor while the heading is less known than so: a wrong one by so much has no linear errors.
+        No observation at a larger standard deviation of the heading: its effect is not linear.
     """
 
     lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -145,7 +145,7 @@ class NoSlip(ImuDerivedMeasurement):
         return VehicleAxes(angles, (0.0, *self.mounting_sd_deg))
 
     def states(self) -> tuple[SensorStates, ...]:
-        """Return the states of mounting and compliance, where they have standard deviations."""
+        """Return the states of mounting and compliance that have standard deviations."""
         mounting = self.axes.states(self.name)
         sds = dict(zip(YIELDING, self.compliance_sd_deg_per_g, strict=True))
         if not any(sds.values()):
@@ -155,11 +155,11 @@ class NoSlip(ImuDerivedMeasurement):
         return (*mounting, unseen(block, labels, "rad/g", [math.radians(sds[x]) for x in labels]))
 
     def begin(self) -> Array:
-        """Return nothing seen."""
+        """Return an empty window."""
         return np.concatenate([[np.nan], np.zeros(MEMORY - 1)])
 
     def watch(self, memory: Array, time: Array, rows: Array) -> tuple[Array, Epochs]:
-        """Return an epoch an interval, with the mean rate and force over it."""
+        """Return an epoch per interval, with the mean rate and force over it."""
         memory = memory.copy()
         at, means = np.empty(len(time), dtype=np.int64), np.empty((len(time), 6))
         count = interval_sums(time, rows, self.interval, memory, at, means)
@@ -167,11 +167,11 @@ class NoSlip(ImuDerivedMeasurement):
 
     @property
     def lasts(self) -> bool:
-        """As `Aid.lasts`: where a correlation time is stated."""
+        """As `Aid.lasts`: with a stated correlation time."""
         return self.correlation_time > 0.0
 
     def observe(self, view: View, values: Array) -> list[Observation]:
-        """Return the lateral and the vertical velocity, or nothing, as the limits say."""
+        """Return the lateral and the vertical velocity, if within the limits."""
         # About the third level axis, which is vertical.
         heading_sd = math.sqrt(view.covariance[HEADING, HEADING])
         if heading_sd > math.radians(self.largest_heading_sd_deg):
@@ -183,7 +183,7 @@ class NoSlip(ImuDerivedMeasurement):
         force, of_force = axes.of_vehicle(view, self.name, values[3:6], np.zeros_like(H))
         if abs(rate[2]) > math.radians(self.largest_rate_deg_per_s):
             return []
-        # Slip goes with the force to the side, dive with that along.
+        # Slip is proportional to the lateral force, dive to the longitudinal one.
         load = force[[1, 0]] / STANDARD_GRAVITY
         of_load = of_force[[1, 0]] / STANDARD_GRAVITY
         yields = velocity[0] * load
@@ -202,17 +202,17 @@ class NoSlip(ImuDerivedMeasurement):
         return [Observation(f"{self.name}.velocity", z, dz, R, LABELS)]
 
 
-#: What yields: tyres to the side, springs along.
+#: Compliant parts: tires sideways, springs along.
 YIELDING = ("slip", "dive")
 LABELS = ("lateral, m/s", "vertical, m/s")
 
 
-# A wheel that rolls: how fast a point of the vehicle goes forward.
+# Odometer: forward speed of a point of the vehicle.
 
 
 @dataclass(frozen=True)
 class Odometer(TabulatedMeasurement):
-    """Speed of a wheel that is not steered: ``reading = (1 + scale) v_forward + noise``.
+    """Speed of an unsteered wheel: ``reading = (1 + scale) v_forward + noise``.
 
     Attributes
     ----------
@@ -220,15 +220,15 @@ class Odometer(TabulatedMeasurement):
         From the inertial sensors to the wheel, or to the middle of the axle whose two wheels are
         averaged; body axes.
     roll_deg, pitch_deg, yaw_deg : float, deg
-        Of the inertial sensors in the vehicle (`VehicleAxes`). What is wrong with them is hardly
-        seen along the wheel.
+        Of the inertial sensors in the vehicle (`VehicleAxes`). Their error is hardly observable
+        along the wheel.
     mounting_of : str
         Name of another aid, as one of kind no_slip, whose estimated mounting is used.
     scale_sd : float
-        Of the scale factor, as by wear, pressure and load of a tyre; more than zero adds the state
-        ``NAME.scale``.
+        Of the scale factor, as by wear, pressure and load of a tire; more than zero adds the
+        state ``NAME.scale``.
     least_speed : float, m/s
-        Slower readings are not used: many sensors read zero where they do not see a wheel turn.
+        Slower readings are not used: many sensors read zero for a slow wheel.
     """
 
     lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -259,14 +259,14 @@ class Odometer(TabulatedMeasurement):
         return (unseen(f"{self.name}.scale", ("scale",), "1", self.scale_sd),)
 
     def epochs(self, table: pd.DataFrame) -> Epochs:
-        """Return an epoch for each speed that was measured; see `TabulatedMeasurement.epochs`."""
+        """Return an epoch for each measured speed; see `TabulatedMeasurement.epochs`."""
         check_odometer(table)
         values = values_of(table, ODOMETER)
         told = np.isfinite(values[:, 1]) & (np.abs(values[:, 0]) >= self.least_speed)
         return Epochs(index_of(table)[told], values[told])
 
     def observe(self, view: View, values: Array) -> list[Observation]:
-        """Return the forward velocity less the speed."""
+        """Return the forward velocity minus the speed."""
         if self.mounting_of:
             check_block(view, f"{self.mounting_of}.mounting")
         velocity, H = point_velocity(view, self.lever_arm)
@@ -288,7 +288,7 @@ class Odometer(TabulatedMeasurement):
 
 @dataclass(frozen=True)
 class BodyVelocity(TabulatedMeasurement):
-    """Velocity relative to the Earth by an instrument: ``(1 + scale) C_ib v_b + noise``.
+    """Velocity relative to the Earth from an instrument: ``(1 + scale) C_ib v_b + noise``.
 
     Attributes
     ----------
@@ -345,7 +345,7 @@ class BodyVelocity(TabulatedMeasurement):
         return Epochs(index_of(table)[told], values[told])
 
     def observe(self, view: View, values: Array) -> list[Observation]:
-        """Return the velocity along the axes that were measured, less what was measured."""
+        """Return the innovation of the velocity along the measured axes: computed − measured."""
         if self.mounting_of:
             check_block(view, f"{self.mounting_of}.mounting")
         velocity, H = point_velocity(view, self.lever_arm)
@@ -367,7 +367,7 @@ class BodyVelocity(TabulatedMeasurement):
 BODY_VELOCITY_LABELS = ("forward, m/s", "right, m/s", "down, m/s")
 
 
-# How the inertial sensors stand in a vehicle or an instrument: assumed, and what may be wrong.
+# Mounting of the inertial sensors in a vehicle or an instrument: assumed angles, and their error.
 
 
 ANGLES = ("roll", "pitch", "yaw")
@@ -375,19 +375,19 @@ ANGLES = ("roll", "pitch", "yaw")
 
 @dataclass(frozen=True)
 class VehicleAxes:
-    """Axes of a vehicle, forward, right, down, in which its wheels roll; or of an instrument.
+    """Axes of a vehicle, forward, right, down, along which its wheels roll; or of an instrument.
 
     Attributes
     ----------
     angles_deg : tuple of float, deg
         Roll, pitch, yaw of the inertial sensors in the vehicle, 3-2-1, as `Mounting.angles_deg`:
         with a level vehicle that drives north they are roll, pitch and heading of the sensors.
-        ``C_vb`` turns the axes of the sensors into those of the vehicle.
+        ``C_vb`` rotates the axes of the sensors to those of the vehicle.
     sd_deg : tuple of float, deg
-        Of three angles by which that is wrong, about the axes of the vehicle:
-        ``C_vb true = R_z(-yaw) R_y(-pitch) R_x(-roll) C_vb assumed``. Where zero is assumed they
-        are the assumed angles less the true ones, and else nearly. An angle with no standard
-        deviation is known, and no state. A turn about the direction of travel is not seen by a
+        Of three angular errors, about the axes of the vehicle:
+        ``C_vb true = R_z(-yaw) R_y(-pitch) R_x(-roll) C_vb assumed``. For assumed angles of zero
+        they are assumed − true, and otherwise nearly. An angle with zero standard deviation is
+        exact and has no state. A rotation about the direction of travel is not observable by a
         velocity along it.
     """
 
@@ -395,7 +395,7 @@ class VehicleAxes:
     sd_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def states(self, name: str) -> tuple[SensorStates, ...]:
-        """Return the states, if any, of an aid: what is wrong with the angles, rad."""
+        """Return the mounting states of an aid, if any: errors of the angles, rad."""
         labels = [label for label, sd in zip(ANGLES, self.sd_deg, strict=True) if sd > 0.0]
         if not labels:
             return ()
@@ -403,12 +403,12 @@ class VehicleAxes:
         return (unseen(f"{name}.mounting", labels, "rad", sds),)
 
     def now(self, view: View, name: str) -> Array:
-        """Return ``C_vb``, (3, 3), without what is estimated of its errors."""
-        # What is estimated comes off the roll, then the pitch, then the yaw.
+        """Return ``C_vb``, (3, 3), with its estimated errors subtracted."""
+        # Estimates are subtracted from the roll, then the pitch, then the yaw.
         return self._back(view, name)[0] @ rotation.dcm_from_euler(self.angles_deg)
 
     def of_vehicle(self, view: View, name: str, velocity: Array, H: Array) -> tuple[Array, Array]:
-        """Turn a velocity in body axes, and what errors do to it, into axes of the vehicle.
+        """Rotate a velocity in body axes, and its error sensitivities, into axes of the vehicle.
 
         Parameters
         ----------
@@ -432,7 +432,7 @@ class VehicleAxes:
         return out, H
 
     def _back(self, view: View, name: str) -> tuple[Array, Array, tuple[str, ...]]:
-        """What takes the estimates off, the axes about which the angles then turn, their names."""
+        """Rotation that subtracts the estimates, the axes of the remaining angles, their names."""
         if not view.has(f"{name}.mounting"):
             return np.eye(3), np.eye(3), ()
         labels = view.labels(f"{name}.mounting")
@@ -445,17 +445,17 @@ class VehicleAxes:
         return back, axes, labels
 
 
-# How a point of the body moves, as it is computed, and what the errors do to it.
+# Computed motion of a point of the body, and its sensitivity to the errors.
 
 
 def rate_columns(view: View, rate: Array, force: Array) -> Array:
-    """Return what the errors of the gyros do to a rate that they measure.
+    """Return the sensitivity of a measured rate to the errors of the gyros.
 
     Parameters
     ----------
     view : View
     rate, force : ndarray, (3,), rad/s and m/s²
-        What is measured.
+        Measured values.
 
     Returns
     -------
@@ -481,7 +481,7 @@ def turn_of_body(view: View) -> tuple[Array, Array]:
     rate : ndarray, (3,), rad/s
         Body axes: ``w_ib - C_bl w_ie``.
     H : ndarray, (3, columns)
-        Of the errors of the gyros, and of the attitude that turns the Earth's rate:
+        Of the errors of the gyros, and of the attitude that rotates the Earth's rate:
         ``-C_bl [w_ie x] psi``.
     """
     earth = view.ellipsoid.rotation_rate * view.level[AXIS : AXIS + 3]
@@ -492,7 +492,7 @@ def turn_of_body(view: View) -> tuple[Array, Array]:
 
 
 def point_velocity(view: View, arm: ArrayLike) -> tuple[Array, Array]:
-    """Return the velocity relative to the Earth of a point that is fixed to the body.
+    """Return the velocity relative to the Earth of a point fixed to the body.
 
     Parameters
     ----------

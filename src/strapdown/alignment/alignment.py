@@ -1,4 +1,4 @@
-"""What every alignment returns: an attitude at an instant, with its uncertainty."""
+"""Result of an alignment: attitude at an instant, with its uncertainty."""
 
 from __future__ import annotations
 
@@ -22,40 +22,40 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Alignment:
-    """Attitude of a body at one instant, and how well it is known.
+    """Attitude of a body at one instant, with its covariance.
 
     Attributes
     ----------
     method : str
-        Which one found it.
+        Name of the alignment method.
     time : float, s
-        The instant at which it holds.
+        Time of validity.
     q_nb : ndarray, (4,)
         Body forward-right-down to north-east-down, scalar first.
     covariance : ndarray, (3, 3), rad²
         Of the rotation vector ``phi`` in north-east-down axes with
         ``C_estimated = exp([phi x]) C_true``: the components north and east are tilts, down is
-        the error of the heading with its sign: a heading that is too large has a positive one.
+        the heading error, positive where the heading is too large.
     gyro_bias, accel_bias : ndarray, (3,), rad/s and m/s², optional
-        Where the method tells them, body axes: reading less truth.
+        If the method estimates them, body axes: reading minus truth.
     gyro_bias_sd, accel_bias_sd : ndarray, (3,), optional
     heading_given : bool
-        Whether the heading owes nothing to the gyros: it was stated, or is that of a course.
+        Whether the heading is independent of the gyros: stated, or from the course.
     measured_latitude_deg, measured_latitude_sd_deg : float, deg, optional
-        Where the method tells it without the site's: from gravity and the Earth's rate.
+        If the method estimates the latitude without the site's: from gravity and Earth rate.
     velocity : ndarray, (3,), m/s, optional
-        North, east, down, where the method tells it.
+        North, east, down, if the method estimates it.
     joint : ndarray, (39, 39), optional
         Covariance of the errors of velocity, of the rotation as above, of gyros and accelerometers,
-        SI, and of `by_input`, where the method tells how they go together: with a bias that is not
-        known an attitude errs the way the bias turned it. Errors are computed less true, those of
-        the sensors what they still read too much: bias less estimate.
+        SI, and of `by_input`, if the method estimates their correlations: an unknown bias is
+        correlated with the attitude error that it causes. Error = computed − true; those of the
+        sensors are the residual excess of the readings: bias − estimate.
     by_input : ndarray, (27,), optional
-        Where the method tells it, errors in proportion to what is sensed above the means of the
-        record, at which the biases are: elements (i, j) of what axis i reads too much by input j,
+        If the method estimates them, errors in proportion to the input above the means of the
+        record, at which the biases hold: elements (i, j) are the excess of axis i by input j,
         nine of gyros by rates, nine of gyros by forces, nine of accelerometers by forces.
     findings : tuple of Finding
-        Assumptions that do not hold, and what the sensors cannot tell.
+        Assumptions that do not hold, and quantities that the sensors cannot determine.
     """
 
     method: str
@@ -88,7 +88,7 @@ class Alignment:
         return euler_sd(self.roll_pitch_heading, self.covariance)
 
     def sd_deg_after(self, seconds: float) -> Array:
-        """Standard deviations of roll, pitch and heading when the gyros have carried them on.
+        """Standard deviations of roll, pitch and heading after propagation by the gyros.
 
         Parameters
         ----------
@@ -97,8 +97,8 @@ class Alignment:
         Returns
         -------
         ndarray, (3,), deg
-            With what an unknown bias of the gyros turns meanwhile, where the method tells of it;
-            else those of now.
+            Including the rotation by an unknown gyro bias meanwhile, if the method estimates one;
+            else the present ones.
         """
         if self.joint is None:
             return self.sd_deg
@@ -108,12 +108,12 @@ class Alignment:
         return euler_sd(self.roll_pitch_heading, carry @ self.joint @ carry.T)
 
 
-# Where a body stands while it is aligned.
+# Site of an alignment.
 
 
 @dataclass(frozen=True)
 class Site:
-    """A place on the Earth.
+    """A position on the Earth.
 
     Attributes
     ----------
@@ -126,7 +126,7 @@ class Site:
     Raises
     ------
     DataError
-        A latitude beyond 90 deg, a longitude of more than a turn, or no finite number.
+        A latitude beyond 90 deg, a longitude beyond a full turn, or not a finite number.
     """
 
     lat_deg: float
@@ -148,12 +148,12 @@ class Site:
         return earth_rate(self.lat_deg, ellipsoid=self.ellipsoid)
 
 
-# What every coarse alignment is: a method with options that makes an attitude of a record.
+# Interface of every coarse alignment: a method with options that aligns a record.
 
 
 @dataclass(frozen=True)
 class CoarseAlignment(ABC):
-    """A way to find the attitude from the sensors' outputs; it holds no state of its own."""
+    """A method that finds the attitude from the sensor outputs; stateless."""
 
     name: ClassVar[str]
     summary: ClassVar[str]
@@ -186,5 +186,5 @@ class CoarseAlignment(ABC):
         Raises
         ------
         DataError
-            The record cannot give the attitude: the message says what is in the way.
+            The record does not allow an alignment; the message gives the reason.
         """

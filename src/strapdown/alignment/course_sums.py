@@ -1,4 +1,4 @@
-"""What errors of gyros and accelerometers do to the attitude and velocity of a drive, backward."""
+"""Effect of gyro and accelerometer errors on attitude and velocity of a drive, backward."""
 
 from __future__ import annotations
 
@@ -53,37 +53,37 @@ __all__ = [
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-#: Over so much before and after it the rate at an instant is a mean, s.
+#: The rate at an instant is a mean over so much before and after it, s.
 STEADY = 0.1
 
 
 @dataclass(frozen=True, eq=False)
 class DriveSums:
-    """A record summed from the instants of fixes to its end, k fixes, m nodes, s stretches.
+    """A record integrated from the fixes to its end: k fixes, m nodes, s stretches.
 
     Attributes
     ----------
     until_end : ndarray, (k,), s
         From the fixes to the end of the record.
     turned : ndarray, (k, 3, 3)
-        From the body's axes at a fix to those at the end, held still in inertial space.
+        From the body axes at a fix to those at the end, in inertial space.
     gained : ndarray, (k, 3), m/s
         Integral of the specific force from a fix to the end, in the axes at the end.
     rate : ndarray, (k, 3), rad/s
-        Of the body at the fixes, without its shaking; body axes.
+        Of the body at the fixes, without vibration; body axes.
     stretch : ndarray, (s,), s
         Lengths of the stretches.
     by_gyro : ndarray, (k, 3, 21 + 3 s)
-        What errors of the gyros add to that of the attitude at a fix, in the axes at the end, rad:
-        a bias of each axis, the nine elements (i, j) of an error of axis i in proportion to what
-        axis j has above its mean rate, nine in proportion to the specific force above its mean,
-        and a bias of each axis in each stretch alone. Signs: bias is reading less truth, what is
-        added is truth less computed.
+        Attitude error at a fix by errors of the gyros, in the axes at the end, rad:
+        a bias of each axis, the nine elements (i, j) of an error of axis i in proportion to the
+        rate of axis j above its mean, nine in proportion to the specific force above its mean,
+        and a bias of each axis in each stretch alone. Signs: bias is reading − truth, the
+        attitude error is true − computed.
     by_turn : ndarray, (k, 3, 21 + 3 s)
-        What they add to the velocity at a fix, in the axes at the end, m/s.
+        Velocity error at a fix by the same errors, in the axes at the end, m/s.
     by_accel : ndarray, (k, 3, 12 + 3 s)
-        What errors of the accelerometers add to the velocity: likewise, nine in proportion to the
-        specific force.
+        Velocity error at a fix by errors of the accelerometers: likewise, nine in proportion to
+        the specific force.
     """
 
     until_end: Array
@@ -97,7 +97,7 @@ class DriveSums:
 
 
 def drive_sums(imu: pd.DataFrame, time: Array, means: Array, errors: Array) -> DriveSums:
-    """Sum a record between fixes and its end.
+    """Integrate a record from its fixes to its end.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def drive_sums(imu: pd.DataFrame, time: Array, means: Array, errors: Array) -> D
     means : ndarray, (6,)
         Of rate and force, about which errors in proportion to the input are counted.
     errors : ndarray
-        The columns `course_unknowns.OF_SENSORS`, which are taken off.
+        The columns `course_unknowns.OF_SENSORS`, which are subtracted.
 
     Returns
     -------
@@ -115,7 +115,7 @@ def drive_sums(imu: pd.DataFrame, time: Array, means: Array, errors: Array) -> D
 
     Notes
     -----
-    With theta the rotation by which the true attitude is off the computed one,
+    With theta the rotation from the computed attitude to the true one,
     ``C_true = exp([theta x]) C``, and the true rate and force less by db and da than taken, it is
     ``theta(t) = theta_e + int_t^e C db`` and
     ``v(t) = v_e - int_t^e (C f + theta x C f - C da)``.
@@ -158,12 +158,12 @@ def drive_sums(imu: pd.DataFrame, time: Array, means: Array, errors: Array) -> D
 
 
 def _stretch_of(since: Array, length: float) -> Indices:
-    """Stretch in which instants after the beginning lie."""
+    """Index of the stretch that contains each instant; times from the beginning."""
     return np.clip((since / length * STRETCHES).astype(np.int64), 0, STRETCHES - 1)
 
 
 def _mended(values: Array, stamps: Array, means: Array, errors: Array) -> Array:
-    """Rates and forces without errors."""
+    """Rates and forces with the errors subtracted."""
     x = np.concatenate([np.zeros(OF_SENSORS.start), errors])
     matrix, by_force = x[GYRO_MATRIX].reshape(3, 3), x[GYRO_BY_FORCE].reshape(3, 3)
     before = np.diff(stamps, prepend=stamps[0] - (stamps[1] - stamps[0]))
@@ -179,7 +179,7 @@ def _mended(values: Array, stamps: Array, means: Array, errors: Array) -> Array:
 def _partials(
     sums: InertialSums, end: Array, gained: Array, means: Array
 ) -> tuple[Array, Array, Array, Array]:
-    """Lengths of the stretches, and what errors add at the beginning of each node."""
+    """Lengths of the stretches, and the contribution of errors at the beginning of each node."""
     m = len(sums.node_length)
     times = end @ sums.times
     middle = sums.middles
@@ -202,7 +202,7 @@ def _partials(
 
 
 def _from_end(nodes: Array) -> Array:
-    """Sums of nodes from the beginning of each to the end, and nothing at the end."""
+    """Sums of nodes from the beginning of each to the end, zero at the end."""
     nothing = np.zeros((1, *nodes.shape[1:]))
     return np.concatenate([np.cumsum(nodes[::-1], axis=0)[::-1], nothing])
 
@@ -217,16 +217,16 @@ def _rate(turned: Array, stamps: Array, time: Array) -> Array:
     return np.asarray(rotation.rotation_vector_from_quaternion(turn) / length)
 
 
-# Velocities of the fixes of a drive, and which of them have a course.
+# Velocities of the fixes of a drive, and the fixes with a valid course.
 
 
-#: No receiver knows a velocity better, m/s.
+#: Lower bound of the standard deviation of a velocity, m/s.
 LEAST_SD = 1e-6
 
 
 @dataclass(frozen=True)
 class Antenna:
-    """Where a receiver measures, and when.
+    """Lever arm and clock of a receiver.
 
     Attributes
     ----------
@@ -269,7 +269,7 @@ class CourseFixes:
     source: str | None
 
     def only(self, rows: NDArray[np.bool_]) -> CourseFixes:
-        """Some of them."""
+        """Select fixes."""
         return CourseFixes(
             self.time[rows],
             self.velocity[rows],
@@ -287,7 +287,7 @@ def course_fixes(
     largest_sd: float,
     velocity_delay: float = 0.0,
 ) -> CourseFixes:
-    """Take the fixes with a velocity of a record that ends while it drives.
+    """Select the fixes with a velocity of a record that ends in motion.
 
     Parameters
     ----------
@@ -305,8 +305,8 @@ def course_fixes(
     Raises
     ------
     DataError
-        There is no Gnss table, fewer than two fixes with a velocity during the record, or the
-        last two of them are too slow.
+        The Gnss table is missing, it has fewer than two fixes with a velocity during the
+        record, or the last two are too slow.
     """
     if gnss is None:
         raise DataError("alignment.no-fixes-for-course", file=source_of(imu), quantity="gnss")
@@ -351,12 +351,12 @@ def course_fixes(
     return CourseFixes(time, velocity, sd, fast, rows + 1, source)
 
 
-# What the gyros read while the fixes of a drive say that the vehicle stood.
+# Gyro means while the fixes of a drive show the vehicle stationary.
 
 
-#: A velocity within so many standard deviations is none, nor one below what no one drives at.
+#: A velocity within so many standard deviations counts as zero, or one below any driving speed.
 CLEAR, CREEP = 4.0, 0.1
-#: A shorter rest, s, tells less than the fixes of the drive do.
+#: A shorter rest, s, determines the bias less well than the fixes of the drive.
 LEAST = 1.0
 
 
@@ -367,10 +367,10 @@ class RestRate:
     Attributes
     ----------
     time : float, s
-        Its middle.
+        Middle of the rest.
     rate, sd : ndarray, (3,), rad/s
-        The mean, and how well it tells the bias at the end of the record: what scatters within the
-        rest, and what the bias drifts since.
+        The mean, and its standard deviation as a measure of the bias at the end of the record:
+        scatter within the rest, and bias drift since.
     """
 
     time: float
@@ -381,9 +381,9 @@ class RestRate:
 def rest_rates(
     imu: pd.DataFrame, fixes: CourseFixes, sensors: ImuUncertainty
 ) -> tuple[RestRate, ...]:
-    """Find the rests of a record in which the receiver stood, too.
+    """Find the rests of a record in which the receiver was stationary, too.
 
-    A gyro cannot tell a parked vehicle from one on a straight road; the fixes do.
+    A gyro cannot distinguish a stationary vehicle from one on a straight road; the fixes can.
 
     Parameters
     ----------
@@ -394,13 +394,13 @@ def rest_rates(
     Returns
     -------
     tuple of RestRate
-        Nothing where no fix lies in a rest.
+        Empty if no fix lies in a rest.
     """
     speed = np.hypot(fixes.velocity[:, 0], fixes.velocity[:, 1])
     slow = speed <= np.maximum(CLEAR * fixes.sd[:, :2].max(axis=1), CREEP)
     if not slow.any():
         return ()
-    # One fix that is wrong neither ends a rest nor makes one.
+    # A single outlier neither ends a rest nor makes one.
     near = np.clip(np.arange(len(slow))[:, None] + np.arange(-1, 2), 0, len(slow) - 1)
     slow = slow[near].sum(axis=1) >= 2
     drift, out = sensors.gyro_drift, []
@@ -421,7 +421,7 @@ def rest_rates(
 def _while_slow(
     imu: pd.DataFrame, rest: RestStretch, time: Array, slow: NDArray[np.bool_]
 ) -> RestStretch | None:
-    """The longest part of a rest between fixes that stand: gyros rest on a straight road, too."""
+    """The longest part of a rest between stationary fixes: gyros rest on a straight road, too."""
     inside = np.flatnonzero((time >= rest.start) & (time <= rest.end))
     runs = np.split(inside, np.flatnonzero(np.diff(slow[inside].astype(np.int64))) + 1)
     runs = [run for run in runs if len(run) > 1 and slow[run[0]]]
@@ -433,14 +433,14 @@ def _while_slow(
     return rest_between(imu, start, end) if end - start >= LEAST else None
 
 
-# What the least squares of a drive look for, in the order of their columns.
+# Unknowns of the least squares of a drive, in the order of their columns.
 
 
-#: Stretches of a record with a noise of their own: what white noise adds is known at their ends.
+#: Stretches of a record with a noise of their own: the sum of white noise is known at their ends.
 STRETCHES: Final = 24
 
-# At the end of the record: velocity, rotation by which the true attitude is off the computed one,
-# biases of gyros and accelerometers.
+# At the end of the record: velocity, rotation from the computed attitude to the true one, biases of
+# gyros and accelerometers.
 COURSE_UNKNOWNS_VELOCITY, TURN, COURSE_UNKNOWNS_GYRO, COURSE_UNKNOWNS_ACCEL = (
     slice(0, 3),
     slice(3, 6),
@@ -454,7 +454,7 @@ GYRO_MATRIX, GYRO_BY_FORCE = slice(12, 21), slice(21, 30)
 GYRO_NOISE = slice(30, 30 + 3 * STRETCHES)
 ACCEL_MATRIX = slice(GYRO_NOISE.stop, GYRO_NOISE.stop + 9)
 ACCEL_NOISE = slice(ACCEL_MATRIX.stop, ACCEL_MATRIX.stop + 3 * STRETCHES)
-# Of the heading less the course; how far the unit is ahead of the axle; of the stamps of the fixes.
+# Heading minus course; distance of the unit ahead of the axle; offset of the stamps of the fixes.
 YAW: Final = ACCEL_NOISE.stop
 AXLE: Final = YAW + 1
 OFFSET: Final = YAW + 2
@@ -464,5 +464,5 @@ COUNT: Final = YAW + 3
 OF_GYROS = np.r_[COURSE_UNKNOWNS_GYRO, GYRO_MATRIX, GYRO_BY_FORCE, GYRO_NOISE]
 OF_ACCELS = np.r_[COURSE_UNKNOWNS_ACCEL, ACCEL_MATRIX, ACCEL_NOISE]
 OF_SENSORS = slice(COURSE_UNKNOWNS_GYRO.start, ACCEL_NOISE.stop)
-#: What is known beyond the record: all but its own noise, and what is of the vehicle and the fixes.
+#: Known beyond the record: all but its own noise and the unknowns of the vehicle and the fixes.
 HANDED = np.r_[:ASKED, GYRO_MATRIX, GYRO_BY_FORCE, ACCEL_MATRIX]

@@ -1,4 +1,4 @@
-"""Fine alignment: a filter over the errors of a mechanization of a body that stands still."""
+"""Fine alignment: a filter over the errors of a mechanization of a stationary body."""
 
 from __future__ import annotations
 
@@ -51,13 +51,13 @@ __all__ = ["FineAlignment", "heading_floor_deg", "refuse_false_claims", "telling
 
 Array = NDArray[np.float64]
 
-# A body on a floor in a town moves by so much; less is not claimed.
+# Motion of a body on a floor in a town; a smaller one is not assumed.
 LEAST = Standing(
     position=np.full(3, 1e-3),  # m
     velocity=np.full(3, 3e-4),  # m/s
     turn=np.zeros(3),  # rad
 )
-# Fewer epochs tell nothing of how still a body stands.
+# Fewer epochs do not determine the motion of the body.
 LEAST_EPOCHS = 10
 
 Progress = Callable[[float], None]
@@ -67,9 +67,9 @@ Progress = Callable[[float], None]
 class FineAlignment:
     """Attitude, drifts and biases of a body at rest, with what cannot be known of them.
 
-    Chernodarov (2009), Eqs. (16)-(18): the turn that is measured is that of the Earth, the place
-    stays, the velocity is zero. What no rest can tell apart stays apart in the covariance: a tilt
-    from a horizontal accelerometer bias, the heading from an east drift.
+    Chernodarov (2009), Eqs. (16)-(18): the measured rate is that of the Earth, the position is
+    constant, the velocity is zero. Errors that a rest cannot separate stay correlated in the
+    covariance: a tilt and a horizontal accelerometer bias, the heading and an east drift.
 
     Attributes
     ----------
@@ -78,18 +78,18 @@ class FineAlignment:
     model : type of ErrorModel
     form : CovarianceForm
     rule : UpdateRule, optional
-        How far an observation is believed; without one, all of it.
+        Weighting of observations; full weight if not given.
     interval : float, s
         From epoch to epoch.
     observe : tuple of str
         Of ``rate``, ``position``, ``velocity``.
     standing : Standing, optional
-        How still the body stands; found from the record, if not given.
+        Residual motion of the body; estimated from the record, if not given.
 
     Raises
     ------
     ConfigError
-        An option means nothing.
+        An option is invalid.
     """
 
     mechanization: Mechanization = field(default_factory=NorthEastDown)
@@ -136,7 +136,7 @@ class FineAlignment:
         coarse : Alignment
             The attitude at the first or at the last sample, within 20 deg of the truth.
         progress : callable, optional
-            Told the share that is done.
+            Called with the completed fraction.
         increments : DataFrame, optional
             A MotionIncrements table that covers the record, as a pre-filter makes it; formed of
             `imu`, if not given.
@@ -151,7 +151,7 @@ class FineAlignment:
             The record is too short or has gaps, the coarse alignment belongs to another instant or
             does not know the heading, or the sensors' errors are beyond a linear filter.
         DivergenceError
-            The mechanization has left the range in which it means anything.
+            The mechanization has left its range of validity.
         """
         _check_coarse(coarse, imu, site)
         increments = motion_increments(imu) if increments is None else _within(increments, imu)
@@ -233,7 +233,7 @@ class FineAlignment:
     def _start(
         self, increments: pd.DataFrame, site: Site, coarse: Alignment, begin: float
     ) -> NavState:
-        """The state at the first sample; an attitude at the last one is carried back."""
+        """The state at the first sample; an attitude at the last one is propagated back."""
         end = float(increments.index[-1])
         slack = float(increments["dt"].max())
         home = replace(home_of(site, coarse.time), q_nb=coarse.q_nb)
@@ -261,15 +261,15 @@ class FineAlignment:
         last = alignment_of(filter_, state)
         end = filter_.mechanization.nav_state(state.mechanization, state.time)
         back = self._backward(replace(end, v_n=np.zeros(3)), clean)
-        # Drifts that no rest can tell turn the body by as much as the attitude misplaces the rate
-        # of the Earth; what the carrying adds is the noise of the gyros.
+        # The gyro drifts turn the body by as much as the attitude error misplaces the Earth rate: a
+        # rest cannot separate them. The backward propagation adds the noise of the gyros.
         C = rotation.dcm_from_quaternion(back.q_nb)
         noise = C * np.square(filter_.model.gyro_noise) @ C.T * abs(last.time - back.time)
         covariance = np.asarray(last.covariance + noise)
         return replace(last, time=back.time, q_nb=back.q_nb, covariance=covariance)
 
     def _backward(self, end: NavState, increments: pd.DataFrame) -> NavState:
-        """The state before the first increment, of a body that stands after the last."""
+        """The state before the first increment, of a body that is stationary after the last."""
         held = replace(self.mechanization, height="held")
         return run_mechanization(held, end, increments, backward=True).end
 
@@ -328,11 +328,11 @@ def _within(increments: pd.DataFrame, imu: pd.DataFrame) -> pd.DataFrame:
     return part
 
 
-# The epochs of a fine alignment: where it begins, and how it goes from one to the next.
+# Epochs of a fine alignment: start, and propagation from one to the next.
 
 
-# Tilt and heading before the filter: much more than a coarse alignment leaves, for it was made of
-# the same rests, by the same biases, and says nothing that the filter does not find by itself.
+# Tilt and heading before the filter: much more than a coarse alignment leaves, which comes from the
+# same rests and biases and so adds no information to the filter's own.
 WIDER = 10.0
 LEAST_TILT, LEAST_HEADING = math.radians(0.1), math.radians(1.0)
 MOST_TILT, MOST_HEADING = math.radians(5.0), math.radians(20.0)
@@ -348,7 +348,7 @@ def settled_epoch(
     standing: Standing,
     observe: tuple[str, ...],
 ) -> tuple[FilterState, Seen]:
-    """Go over one epoch of a rest: predict, and take what is known at its end."""
+    """Propagate over one epoch of a rest and update with its observations at the end."""
     seen: Seen = {}
     if "rate" in observe:
         made: list[Observation] = []
@@ -377,7 +377,7 @@ def settled(
     standing: Standing,
     observe: tuple[str, ...],
 ) -> Iterator[tuple[FilterState, Seen]]:
-    """Go from epoch to epoch over a rest.
+    """Process the epochs of a rest.
 
     Parameters
     ----------
@@ -390,7 +390,7 @@ def settled(
     ends : ndarray of int
         Number of steps before the end of each epoch.
     home : NavState
-        The place of alignment and the attitude of rest.
+        The position of alignment and the attitude of rest.
     standing : Standing
     observe : tuple of str
 
@@ -441,24 +441,24 @@ def initial_covariance(filter_: ErrorFilter, coarse: Alignment, standing: Standi
     return P
 
 
-# What no rest can tell, and a filter must not claim: where errors are too large for it.
+# Lower bounds of the heading uncertainty of a stationary body, where errors are too large for it.
 
 
-#: Part of the least standard deviation below which a heading is claimed and not found. Rocking, by
-#: which the drifts go through other directions, gains less.
+#: Fraction of the least standard deviation below which a heading is a false claim. Rocking, which
+#: points the drifts in other directions, gains less.
 CLAIMED = 0.7
-#: A body that turns by more than this does not rest at one attitude, and its drifts show.
+#: A body that turns by more than this changes its attitude, and its drifts become observable.
 TURNED_DEG = 30.0
-#: So many standard deviations from what it was before, a heading was wrong before.
+#: A heading that moved by more prior standard deviations was wrong before.
 BEYOND = 4.0
 CLAIMS_DEG_PER_HOUR = math.degrees(3600.0)
 
 
 def heading_floor_deg(result: FineResult, site: Site) -> float:
-    """Least standard deviation of a heading that a rest can give, however long it is.
+    """Least standard deviation of the heading of a stationary body, however long the rest.
 
     A heading and an east drift look alike, ``b_E = omega cos(lat) psi``, and so the information on
-    the heading is what was known before and what is known of the drift:
+    the heading is the prior information plus that on the drift:
     ``1/s^2 = 1/s_0^2 + (omega cos(lat) / s_E)^2``.
 
     Parameters
@@ -479,10 +479,10 @@ def heading_floor_deg(result: FineResult, site: Site) -> float:
 
 
 def refuse_false_claims(result: FineResult, site: Site) -> None:
-    """Refuse a heading that is stated to be better known than the sensors can tell.
+    """Refuse a heading that is stated to be more accurate than the sensors allow.
 
-    A filter is linear: where biases are so large that the second order of tilt, heading and bias
-    is beyond the noise, it takes that for knowledge.
+    A filter is linear: with biases so large that the second order of tilt, heading and bias
+    exceeds the noise, it takes that for information.
 
     Parameters
     ----------
@@ -520,7 +520,7 @@ def refuse_false_claims(result: FineResult, site: Site) -> None:
     )
 
 
-# What is said of the record of a fine alignment that cannot be carried through.
+# Error messages on the record of a fine alignment that fails.
 
 
 GAPS = ("mechanization.gap-before-body-did-not", "mechanization.gap-body-did-not-known")
@@ -528,7 +528,7 @@ GAPS = ("mechanization.gap-before-body-did-not", "mechanization.gap-body-did-not
 
 @contextmanager
 def telling_record(imu: pd.DataFrame) -> Iterator[None]:
-    """Say of a gap what can be done at a command; of a divergence, what the gyros read.
+    """Add the remedy at a command to a gap error, and the gyro readings to a divergence.
 
     Parameters
     ----------
@@ -539,7 +539,7 @@ def telling_record(imu: pd.DataFrame) -> Iterator[None]:
         yield
     except DataError as error:
         f = error.finding
-        # The remedy of the mechanization is an argument that an alignment does not have.
+        # The remedy of the mechanization is an argument that an alignment lacks.
         if f.code not in GAPS:
             raise
         raise DataError(
@@ -558,28 +558,28 @@ def telling_record(imu: pd.DataFrame) -> Iterator[None]:
         ) from None
 
 
-# What a person should know of a fine alignment.
+# Findings of a fine alignment.
 
 
-#: Code of the finding of a body that rocks: no fault, where a coarse alignment lets it.
+#: Code of the finding of a rocking body: harmless, if the coarse alignment allows it.
 ROCKS = "alignment.body-rocks"
-#: Code of the finding of a bias that is beyond what the data sheet allows; data `sensor`.
+#: Code of the finding of a bias beyond the data sheet; data `sensor`.
 BIASED = "alignment.bias-beyond-data-sheet"
-# A heading less sure than this is no north.
+# A heading with a larger standard deviation does not find north.
 NO_NORTH = 5.0  # deg
-# Of what it was before, where a filter has found nothing.
+# Ratio to the prior standard deviation above which a quantity is not observable.
 UNCHANGED = 0.5
-# What people, wind and an engine do to a parked vehicle stays below.
+# Upper bounds of the motion of a parked vehicle by people, wind and engine.
 MOST_VELOCITY = 0.05  # m/s
 MOST_TURN = 0.5  # deg from epoch to epoch
-# Over what the noise of the sensors makes of a body that stands still.
+# Ratio to the motion that sensor noise shows for a stationary body.
 OVER_NOISE = 3.0
-# Mean square of the innovations over what was expected; by epochs that are not all independent.
+# Mean square of the normalized innovations; the epochs are not all independent.
 INCONSISTENT = 3.0
 
 
 def fine_findings(result: FineResult, site: Site) -> tuple[Finding, ...]:
-    """Say what does not hold, and what the sensors could not tell.
+    """Report assumptions that do not hold, and quantities that the sensors could not determine.
 
     Parameters
     ----------
@@ -641,7 +641,7 @@ def _stands(result: FineResult) -> Iterator[Finding]:
 
 def _fits(result: FineResult) -> Iterator[Finding]:
     for name, table in result.innovations.items():
-        # The first tenth is where the filter settles.
+        # The filter settles in the first tenth.
         late = table.iloc[len(table) // 10 :]
         parts = len(table.columns) // 3
         nu, s = late.iloc[:, :parts].to_numpy(), late.iloc[:, parts : 2 * parts].to_numpy()

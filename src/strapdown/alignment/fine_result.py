@@ -1,4 +1,4 @@
-"""What a fine alignment found, epoch by epoch."""
+"""Result of a fine alignment, epoch by epoch."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ FINE_COLUMNS = (*EULER, *BIASES, *(f"{name}_sd" for name in (*EULER, *BIASES)))
 
 @dataclass(frozen=True, eq=False)
 class FineResult:
-    """What a fine alignment found.
+    """Result of a fine alignment.
 
     Attributes
     ----------
@@ -43,16 +43,16 @@ class FineResult:
         By name of the observation, by time: ``nu``, ``s`` and ``weight`` of each component, as
         ``nu x, m/s``.
     standing : Standing
-        How still the body stood.
+        Residual motion of the body.
     interval : float, s
         From epoch to epoch.
     heading_given : bool
-        Whether the heading before it owes nothing to the gyros.
+        Whether the heading before it is independent of the gyros.
     prior_heading_sd_deg : float, deg
-        How well the heading was taken to be known before the first epoch.
+        Assumed standard deviation of the heading before the first epoch.
     filter : ErrorFilter
     state : FilterState
-        At the last epoch: navigation goes on from here.
+        At the last epoch, for navigation to continue from.
     findings : tuple of Finding
     source : str, optional
     """
@@ -72,10 +72,10 @@ class FineResult:
 
 
 def alignment_of(filter_: ErrorFilter, state: FilterState) -> Alignment:
-    """Read a state of a filter as an alignment.
+    """Convert a filter state to an alignment.
 
-    The turn of the level with the place, 1.6e-7 rad a metre, is nothing beside the attitude's
-    own uncertainty and left out.
+    The rotation of the local level with position, 1.6e-7 rad per meter, is negligible beside
+    the attitude's own uncertainty and left out.
     """
     here = filter_.mechanization.nav_state(state.mechanization, state.time)
     P = filter_.physical_covariance(state)
@@ -94,7 +94,7 @@ def alignment_of(filter_: ErrorFilter, state: FilterState) -> Alignment:
 
 
 class Epochs:
-    """Collects the epochs of a run.
+    """Epochs of a run.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ class Epochs:
         self._seen: dict[str, list[tuple[float, Observation, Innovations]]] = {}
 
     def add(self, state: FilterState, seen: Mapping[str, tuple[Observation, Innovations]]) -> None:
-        """Take an epoch."""
+        """Append an epoch."""
         alignment = alignment_of(self._filter, state)
         assert alignment.gyro_bias is not None and alignment.accel_bias is not None
         assert alignment.gyro_bias_sd is not None and alignment.accel_bias_sd is not None
@@ -131,7 +131,7 @@ class Epochs:
     def history(self) -> pd.DataFrame:
         """Estimates and their standard deviations, by time."""
         rows = np.array(self._rows)
-        # Heading goes on through north: a plot of it has no leap.
+        # Heading is unwrapped through north: a plot has no jump.
         rows[:, 2] = np.degrees(np.unwrap(np.radians(rows[:, 2])))
         return pd.DataFrame(
             rows, index=pd.Index(self._time, name="time"), columns=list(FINE_COLUMNS)

@@ -1,4 +1,4 @@
-"""Alignment of a vehicle that drives, from its course and its accelerations by GNSS."""
+"""Alignment of a moving vehicle from its GNSS course and accelerations."""
 
 from __future__ import annotations
 
@@ -69,23 +69,23 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-#: What the level may err by, rad: beyond it errors of attitude are no longer small.
+#: Largest allowed tilt error, rad: beyond it attitude errors are no longer small.
 LARGEST_TILT_SD = 0.35
-#: Part of a sideslip that changes from second to second, beside what stays.
+#: Sideslip that varies from second to second, relative to the constant part (standard deviations).
 SLIP_SHARE = 0.5
 
 
 @dataclass(frozen=True)
 class GnssCourse(CoarseAlignment):
-    """A vehicle points where it goes; its specific force less its acceleration is up.
+    """A vehicle points along its course; its specific force minus its acceleration is up.
 
     Attributes
     ----------
     mounting_yaw_deg : float, deg
-        Heading of the unit's forward axis less that of the vehicle's.
+        Heading of the unit's forward axis minus that of the vehicle's.
     mounting_yaw_sd_deg, sideslip_sd_deg : float, deg
-        How well that is known, and by how much the vehicle slips sideways: 1 deg for a car that
-        does not turn hard; an aircraft or a ship drifts with wind and current by more.
+        Standard deviation of that angle, and of the sideslip: 1 deg for a car that does not
+        turn hard; an aircraft or a ship drifts more with wind and current.
     least_speed : float, m/s
         Below it no course is taken.
     largest_sd_deg : float, deg
@@ -93,8 +93,8 @@ class GnssCourse(CoarseAlignment):
     reverse : bool
         It drives backward.
     axle_sd : float, m
-        How far the unit may be ahead of the axle that is not steered, or behind it: what is off it
-        goes aside while the vehicle turns.
+        Distance of the unit ahead of or behind the unsteered axle: a unit off the axle moves
+        sideways while the vehicle turns.
 
     Raises
     ------
@@ -151,8 +151,9 @@ class GnssCourse(CoarseAlignment):
         Raises
         ------
         DataError
-            There is no Gnss table, no two fixes with a velocity within the record, the vehicle
-            is too slow, or what is known of the accelerations leaves no level.
+            The Gnss table is missing or has fewer than two fixes with a velocity within the
+            record, the vehicle is too slow, or the uncertainty of the accelerometers is too large
+            for a level.
         """
         findings = check_record(imu)
         slowest, widest = self.least_speed, math.radians(self.largest_sd_deg)
@@ -195,36 +196,36 @@ class GnssCourse(CoarseAlignment):
 # Attitude, velocity and biases at the end of a drive, by least squares over its fixes.
 
 
-# Errors of velocity and attitude are estimate less truth, of sensors truth less estimate.
+# Errors of velocity and attitude are estimate − truth, of sensors truth − estimate.
 SIGN = np.where(OF_SENSORS.start > HANDED, 1.0, -1.0)
-# Nothing is known of a velocity, m/s, or of an attitude, rad.
+# Prior standard deviations of an unknown velocity, m/s, and of an unknown attitude, rad.
 UNKNOWN = (100.0, 3.0)
-# The scatter of the fixes is judged by so many velocities more than what is asked for takes.
+# The scatter of the fixes is judged from so many velocities beyond the number of unknowns.
 LEAST_FREE = 12.0
-# Weights and scale are found anew so many times with one linearization.
+# Number of updates of weights and scale with one linearization.
 SWEEPS = 3
-# A course that is off by more, rad, is that of a vehicle that backs.
+# A course error beyond this, rad, is that of a reversing vehicle.
 GROSS = 0.8
-# Courses nearer to one another, s, slip alike.
+# Courses closer than this, s, have the same sideslip.
 APART = 1.0
-# No number is known better: a slip, rad, a mean rate, rad/s.
+# Lower bounds of standard deviations: of a slip, rad, of a mean rate, rad/s.
 LEAST_SLIP, LEAST_RATE_SD = 1e-6, 1e-10
 
 
 @dataclass(frozen=True)
 class CourseModel:
-    """What is known of a vehicle beside its fixes.
+    """Prior uncertainty of a vehicle's motion and of its fixes.
 
     Attributes
     ----------
     reverse : bool
         It drives backward.
     yaw : float, rad
-        Heading of the unit's forward axis less the course.
+        Heading of the unit's forward axis minus the course.
     yaw_sd, slip_sd : float, rad
-        What of it stays over a drive, and what changes from second to second.
+        The part that stays over a drive, and the part that changes from second to second.
     axle_sd : float, m
-        How far the unit may be ahead of the axle that goes where it points, or behind it.
+        Uncertainty of the distance of the unit from the unsteered axle, ahead or behind.
     antenna : Antenna
     """
 
@@ -238,7 +239,7 @@ class CourseModel:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Where the least squares stand.
+    """Current estimates of the least squares.
 
     Attributes
     ----------
@@ -247,17 +248,17 @@ class Found:
     velocity : ndarray, (3,), m/s
         At the end.
     errors : ndarray, rad/s, m/s² and relative
-        Of the sensors, the columns `course_unknowns.OF_SENSORS`; reading less truth.
+        Of the sensors, the columns `course_unknowns.OF_SENSORS`; reading − truth.
     covariance : ndarray, (39, 39)
         As `Alignment.joint`.
     fitted : ndarray, (k, 3), m/s
         Velocities at the fixes, north, east, down, near which courses are linear.
     weight : ndarray, (k,)
-        Share of each fix that counts.
+        Weight of each fix.
     scale : float
-        By which the velocities of the fixes scatter more than they state; at least 1.
+        Factor of the scatter of the velocities over their stated one; at least 1.
     onward : float
-        Share of the courses that are those of a vehicle that drives as taken.
+        Share of the courses that agree with the assumed direction of driving.
     """
 
     C: Array
@@ -271,12 +272,12 @@ class Found:
 
     @property
     def bias(self) -> Array:
-        """Of gyros and accelerometers, (6,), rad/s and m/s²."""
+        """Biases of gyros and accelerometers, (6,), rad/s and m/s²."""
         return self.errors[:6]
 
     @property
     def by_input(self) -> Array:
-        """Errors in proportion to what is sensed, (27,), as `Alignment.by_input`."""
+        """Errors in proportion to the input, (27,), as `Alignment.by_input`."""
         return np.asarray(self.errors[HANDED[ASKED:] - OF_SENSORS.start])
 
 
@@ -289,7 +290,7 @@ class CourseFit:
     imu : DataFrame
         Of that part.
     means : ndarray, (6,)
-        Of rate and force, at which the biases are asked for.
+        Means of rate and force, at which the biases are estimated.
     fixes : CourseFixes
         In that part, two at least.
     rests : tuple of RestRate
@@ -307,12 +308,12 @@ class CourseFit:
     model: CourseModel
 
     def step(self, found: Found, influence: Influence) -> Found:
-        """Solve once, about what was found before, with weights by its residuals.
+        """Solve once, about the last estimates, with weights by the residuals.
 
         Parameters
         ----------
         found : Found
-            Its covariance does not count.
+            Its covariance is not used.
         influence : Influence
             Of the velocities of fixes, by the largest residual of the three.
 
@@ -397,9 +398,9 @@ class CourseFit:
         return sd
 
     def _velocities(self, found: Found, sums: DriveSums, rate: Array) -> tuple[Array, Array]:
-        """Velocities at the fixes, in the level at the end held still, and by the unknowns.
+        """Velocities at the fixes, in the level axes of the end, and their derivatives.
 
-        The level turns by w: ``v = v_e - C int f - g T + w x g T²/2 + w_ie x int v``.
+        The level rotates with w: ``v = v_e - C int f - g T + w x g T²/2 + w_ie x int v``.
         """
         T, g = sums.until_end[:, None], self.site.gravity
         gained = sums.gained @ found.C.T
@@ -429,7 +430,7 @@ class CourseFit:
         by: Array,
         turns: Array,
     ) -> tuple[Array, Array, Array]:
-        """Headings less courses at fixes a second apart: gaps, by the unknowns, weights."""
+        """Heading minus course at fixes a second apart: residuals, derivatives, weights."""
         fixes, model = self.fixes, self.model
         rows, newest = [], math.inf
         for k in range(len(fixes.time) - 1, -1, -1):
@@ -455,10 +456,10 @@ class CourseFit:
         return gap, A, 1.0 / (model.slip_sd**2 + LEAST_SLIP**2 + turned + pushed / square)
 
     def _within(self, sums: DriveSums) -> tuple[float, float]:
-        """Variances of attitude and velocity within a stretch, whose noise is taken as a bias.
+        """Variances of attitude and velocity within a stretch, whose noise is modeled as a bias.
 
-        Of a random walk between two instants L apart at which it is known at most ``N² L/4`` is
-        left, and of its integral less than ``N² L³/48``.
+        A random walk between two instants L apart at which it is known has a variance of at most
+        ``N² L/4``, and its integral less than ``N² L³/48``.
         """
         length = float(sums.stretch.max())
         turning = max(self.sensors.gyro.axis("noise_density")) ** 2 * length / 4.0
@@ -482,10 +483,10 @@ class CourseFit:
 def _solve(
     parts: list[tuple[Array, Array, Array]], sd: Array, errors: Array
 ) -> tuple[Array, Array, float]:
-    """Least squares of gaps, rows and weights: unknowns, their covariance, how many are spent.
+    """Least squares of residuals, rows and weights: unknowns, covariance, parameters spent.
 
-    In units of their standard deviations the unknowns are known to one before; of errors of the
-    sensors what was taken off already counts.
+    In units of their standard deviations the unknowns have a prior of unit variance; for sensor
+    errors it applies to the total, including the part already subtracted.
     """
     normal = np.zeros((len(sd), len(sd)))
     right = np.zeros(len(sd))
@@ -509,31 +510,31 @@ def _level_rate(velocity: Array, site: Site) -> Array:
     return np.asarray(site.earth_rate + moving)
 
 
-# From nothing known to the attitude of a drive: over a short end of it, and then over more.
+# Initial attitude of a drive: over a short end of the record first, then over more.
 
 Indices = NDArray[np.int64]
 
-# A bias turns the attitude by so much over the part that is solved, rad, one standard deviation:
-# what is left to second order is a hundredth of it.
+# Attitude error by a bias over the part that is solved, rad, one standard deviation: the second
+# order is a hundredth.
 LINEAR = 0.2
-# Fixes, and their length in s, that are solved at first, and how the length grows at least.
+# Number of fixes and their duration, s, of the first part, and least factor of its growth.
 LEAST_FIXES, LEAST_LENGTH, GROWTH = 4, 1.0, 1.5
-# Steps of Gauss and Newton over each part: it ends when one moves nothing by more than a part of
-# its standard deviation.
+# Gauss-Newton steps over each part: iteration ends when the largest step is below a part of its
+# standard deviation.
 STEPS, SMALL = 8, 0.02
-# Errors that are of a stretch of one part, and of no other.
+# Errors that belong to a stretch of one part alone.
 NOISE = np.r_[GYRO_NOISE, ACCEL_NOISE] - OF_SENSORS.start
-# A velocity stands out by so many of its standard deviations, or of those that are usual.
+# A velocity is an outlier beyond so many of its standard deviations, or of the usual ones.
 CLEAR = 6.0
-# So many courses point where the vehicle drives.
+# Number of courses that determine the direction of the drive.
 MOST = 0.5
-# The heading is that of the middle of the courses of so long, s.
+# The heading is the median of the courses over this duration, s.
 HEADING_SPAN = 5.0
 
 
 @dataclass(frozen=True, eq=False)
 class CourseSearch:
-    """What `course_fit.CourseFit` needs, over a whole record.
+    """Search of the initial values for `course_fit.CourseFit`, over a whole record.
 
     Attributes
     ----------
@@ -553,12 +554,12 @@ class CourseSearch:
     model: CourseModel
 
     def over(self) -> Found:
-        """Solve over ever longer parts that reach to the end, to the whole.
+        """Solve over increasing parts that end with the record, up to the whole.
 
         Returns
         -------
         Found
-            Gross errors among the fixes do not count.
+            Gross errors among the fixes are excluded.
         """
         fixes = self.fixes
         end, begin = float(self.imu.index[-1]), float(fixes.time[0])
@@ -600,7 +601,7 @@ class CourseSearch:
         return found
 
     def _bias_of_rests(self) -> tuple[Array, float]:
-        """Bias of the gyros by the rests, and the worst standard deviation."""
+        """Bias of the gyros from the rests, and the largest standard deviation."""
         gyro, rate = self.sensors.gyro, np.zeros(3)
         known = np.hypot(gyro.axis("bias"), self.sensors.gyro_drift.triad)
         if self.rests:
@@ -621,7 +622,7 @@ class CourseSearch:
         return part, CourseFit(part, means, fixes, self.rests, self.site, self.sensors, self.model)
 
     def _guess(self, imu: pd.DataFrame, fixes: CourseFixes, bias: Array) -> Found:
-        """Level by the mean force less what the velocities gain, heading by the middle course."""
+        """Level by mean force minus acceleration from the velocities, heading by median course."""
         sums = drive_sums(imu, fixes.time, bias[:6], bias)
         check_forward(imu, fixes, sums, self.model.reverse)
         first, last = _ends(fixes)
@@ -643,7 +644,7 @@ class CourseSearch:
 
 
 def left_out(fixes: CourseFixes, found: Found) -> tuple[Finding, ...]:
-    """Tell of the fixes that were left out because they are off."""
+    """Report the outliers among the fixes."""
     out = np.flatnonzero(found.weight == 0.0)
     if not len(out):
         return ()
@@ -662,7 +663,7 @@ def left_out(fixes: CourseFixes, found: Found) -> tuple[Finding, ...]:
 
 
 def _converged(fit: CourseFit, found: Found, influence: Influence) -> Found:
-    """Step until nothing moves."""
+    """Iterate to convergence."""
     for _ in range(STEPS):
         before, found = found, fit.step(found, influence)
         sd = np.sqrt(np.diagonal(found.covariance)[:ASKED])
@@ -674,22 +675,22 @@ def _converged(fit: CourseFit, found: Found, influence: Influence) -> Found:
 
 
 def _ends(fixes: CourseFixes) -> tuple[Indices, Indices]:
-    """The first and the last third of fixes, without one between them."""
+    """Indices of the first and of the last third of the fixes."""
     count = len(fixes.time)
     third = max(1, count // 3)
     return np.arange(third), np.arange(count - third, count)
 
 
 def _smooth(fixes: CourseFixes) -> Array:
-    """Of each velocity and its neighbours the middle one: without what stands out."""
+    """Median of each velocity and its neighbors: without outliers."""
     k = np.arange(len(fixes.time))[:, None] + np.arange(-2, 3)
     return np.asarray(np.median(fixes.velocity[np.clip(k, 0, len(k) - 1)], axis=1))
 
 
 def _near_neighbours(fixes: CourseFixes) -> Array:
-    """One for a velocity that is near those about it, zero for one that stands out at first sight.
+    """One for a velocity close to its neighbors, zero for an evident outlier.
 
-    Whatever it is, its residual decides later.
+    Its residual decides later in any case.
     """
     off = np.abs(fixes.velocity - _smooth(fixes))
     told = np.isfinite(fixes.sd)
@@ -698,14 +699,14 @@ def _near_neighbours(fixes: CourseFixes) -> Array:
 
 
 def _middle_turn(off_deg: Array) -> float:
-    """Middle of angles, about the one that is nearest to all others; deg."""
+    """Median of angles, about the angle nearest to all others; deg."""
     apart = rotation.within_half_turn(off_deg[:, None] - off_deg)
     nearest = off_deg[int(np.argmin(np.abs(apart).sum(axis=1)))]
     return float(nearest + np.median(rotation.within_half_turn(off_deg - nearest)))
 
 
 def _attitude(force_b: Array, force_n: Array, heading: float) -> Array:
-    """``C_nb`` of a heading (rad) that lays the one force along the other."""
+    """``C_nb`` of a heading (rad) that maps the one force onto the other."""
     c, s = math.cos(heading), math.sin(heading)
     size = float(np.linalg.norm(force_b) / np.linalg.norm(force_n))
     x, y, z = size * np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) @ force_n
@@ -715,10 +716,10 @@ def _attitude(force_b: Array, force_n: Array, heading: float) -> Array:
     return rotation.dcm_from_euler(np.degrees([roll, pitch, heading]))
 
 
-# Whether a vehicle drives the way its forward axis points.
+# Check that a vehicle drives along its forward axis.
 
 
-#: A slope so many standard deviations from zero is no chance.
+#: A slope of more standard deviations is significant.
 FORWARD_SIGN_CLEAR = 5.0
 LEAST_STEPS = 6
 
@@ -734,13 +735,13 @@ def check_forward(imu: pd.DataFrame, fixes: CourseFixes, sums: DriveSums, revers
     sums : DriveSums
         At the fixes.
     reverse : bool
-        What was taken.
+        Whether the drive was taken for a reverse one.
 
     Raises
     ------
     DataError
-        The force falls while the vehicle gains speed. Without six steps from fix to fix, or
-        without changes of speed, nothing can be said.
+        The force falls while the vehicle gains speed. Fewer than six steps from fix to fix, or
+        no changes of speed, allow no check.
     """
     fast = fixes.fast
     if fast.sum() <= LEAST_STEPS:
@@ -750,7 +751,7 @@ def check_forward(imu: pd.DataFrame, fixes: CourseFixes, sums: DriveSums, revers
     speed = np.hypot(fixes.velocity[:, 0], fixes.velocity[:, 1])
     gain = np.diff(speed) / steps * (-1.0 if reverse else 1.0)
     force = -np.diff(gained, axis=0) / steps[:, None]
-    # Body axes at the end of each step, near enough to those within it for a sign.
+    # Body axes at the end of each step, accurate enough for a sign.
     forward = np.einsum("ki,ki->k", turned[1:, :, 0], force)
     x, y = gain - gain.mean(), forward - forward.mean()
     power = float(x @ x)

@@ -1,4 +1,4 @@
-"""Alignment in the inertial frame: for a body that rocks and sways about a place."""
+"""Alignment in the inertial frame: for a body that rocks and sways about a position."""
 
 from __future__ import annotations
 
@@ -55,12 +55,12 @@ EPOCHS = ("end", "start")
 
 @dataclass(frozen=True)
 class InertialFrame(CoarseAlignment):
-    """Gravity turns with the Earth, and is seen to, from axes that the gyros hold still.
+    """The direction of gravity turns with the Earth, observed in inertial axes held by the gyros.
 
     Attributes
     ----------
     at : {'end', 'start'}
-        The sample at which the attitude is wanted.
+        The sample of the resulting attitude.
 
     Raises
     ------
@@ -100,8 +100,8 @@ class InertialFrame(CoarseAlignment):
         ------
         DataError
             The record has no accelerometer, a dead channel, a value that is not finite or too
-            few samples; its force is not gravity; the body travelled; or the heading is not
-            known to 1 rad.
+            few samples; its force is not gravity; the body traveled; or the standard deviation of
+            the heading exceeds 1 rad.
         """
         source = source_of(imu)
         findings = [*check_record(imu)]
@@ -148,14 +148,14 @@ def _mean_force(sums: InertialSums) -> Array:
 def _own_covariance(
     sums: InertialSums, fit: InertialFit, sensors: ImuUncertainty, level: Array | None = None
 ) -> Array:
-    """What the sensors alone make: of attitude at the start, latitude and gravity (5, 5).
+    """Covariance by the sensors alone: of attitude at the start, latitude and gravity (5, 5).
 
-    With `level`, which turns the local level at the start into that at the end, of the attitude
+    With `level`, which rotates the local level at the start to that at the end, of the attitude
     at the end (3, 3).
     """
     turn, push = fit.response.turn, fit.response.push
     if level is not None:
-        # The gyros carry the attitude to the end, with every error of theirs.
+        # The gyros propagate the attitude to the end, with all their errors.
         turn = level @ (turn[:, :3] + fit.C_nb)
         push = level @ push[:, :3]
     return sensor_covariance(sums, turn, push, sensors) + sensor_noise(sums, turn, push, sensors)
@@ -164,12 +164,12 @@ def _own_covariance(
 def _refuse_travel(
     noise: ResidualNoise, sd: Array, imu: pd.DataFrame, site: Site, findings: list[Finding]
 ) -> None:
-    """Refuse a record whose leftovers drown north."""
+    """Refuse a record whose residuals are too large to find north."""
     if not (noise.significant and sd[2] > LARGEST_SD):
         return
     rate = imu[GYRO].to_numpy(dtype=np.float64).mean(axis=0)
     length = float(imu.index[-1] - imu.index[0])
-    # A burst of outliers or a gap explains it better than a drive.
+    # A burst of outliers or a gap is a likelier cause than a drive.
     known = [f for f in findings if f.row is not None]
     if known:
         raise DataError(
@@ -205,22 +205,22 @@ def _left_over(noise: ResidualNoise, sd: float, length: float, source: str | Non
     )
 
 
-# The attitude that lays the specific force of a record on the gravity of its place.
+# Attitude that aligns the specific force of a record with gravity at its position.
 #
-# In the axes of the body at the first instant, held still in inertial space, the second integral of
-# the specific force is ``S(t) = s0 + v0 t + C_bn W(t) + e(t)``, and in those of the local level at
-# that instant, held still likewise, that of minus gravity is known:
-# ``W(t) = -∫∫ exp([ω t x]) g``. Both are expanded in Legendre polynomials of the time; what is of
-# degree zero and one is place and velocity, which nobody asks for. The others make Wahba's problem.
+# In the body axes of the first instant, fixed in inertial space, the second integral of the
+# specific force is ``S(t) = s0 + v0 t + C_bn W(t) + e(t)``. In the local-level axes of that
+# instant, fixed likewise, the second integral of minus gravity is known:
+# ``W(t) = -∫∫ exp([ω t x]) g``. Both are expanded in Legendre polynomials of time; degrees zero
+# and one are position and velocity, which are not needed. The others form Wahba's problem.
 #
-# A body that rocks and sways stays near its place, so that ``e`` is bounded by its excursion and
+# A body that rocks and sways stays near its position, so that ``e`` is bounded by its excursion and
 # does not grow, while ``W`` grows as ``g t²/2``: for the mean force the fit is a weight
 # ``30 t² (T - t)²/T⁵`` that vanishes at both ends with its slope. On white noise of the
 # accelerometers it costs a fifth of the standard deviation against the plain mean.
 
 
-# Degrees 0 and 1 are nuisance and 2 and 3 hold the attitude; the noise is judged by those above,
-# ten periods over the record at the most.
+# Degrees 0 and 1 are nuisance, 2 and 3 hold the attitude; those above, at most ten periods over the
+# record, determine the noise.
 DEGREES = 21
 FIRST_FREE = 4
 _STEP = 1e-4  # rad of latitude, for a derivative that is a sine
@@ -228,10 +228,10 @@ _STEP = 1e-4  # rad of latitude, for a derivative that is a sine
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """What an error in a node does to the answer, (m, 5, 3) each.
+    """Sensitivity of the estimates to an error in a node, (m, 5, 3) each.
 
-    The answer is: error of the attitude at the first instant (3, north-east-down, rad), that of
-    the latitude (rad) and of the size of gravity (relative). An error is a vector in the body's
+    The estimates are: error of the attitude at the first instant (3, north-east-down, rad), of the
+    latitude (rad) and of the magnitude of gravity (relative). An error is a vector in the body
     axes at the first instant.
 
     Attributes
@@ -251,18 +251,18 @@ class Response:
 
 @dataclass(frozen=True, eq=False)
 class InertialFit:
-    """The attitude at the first instant, and what is left over.
+    """The attitude at the first instant, and the residuals.
 
     Attributes
     ----------
     C_nb : ndarray, (3, 3)
         Body to local level at the first instant.
     measured, known : ndarray, (DEGREES, 3), m
-        Coefficients of S in north-east-down by that attitude, and of W.
+        Coefficients of S in north-east-down by the fitted attitude, and of W.
     latitude_change : float, rad
-        Measured latitude less the site's: from the Earth's rate across the vertical.
+        Measured latitude minus the site's: from the Earth's rate across the vertical.
     gravity_change : float
-        Measured gravity less the site's, relative.
+        Measured gravity minus the site's, relative.
     response : Response
     """
 
@@ -275,7 +275,7 @@ class InertialFit:
 
     @property
     def residual(self) -> Array:
-        """Measured less known, (DEGREES, 3), m; degrees 0 and 1 mean nothing."""
+        """Measured minus known, (DEGREES, 3), m; degrees 0 and 1 are not used."""
         return self.measured - self.known
 
 
@@ -321,7 +321,7 @@ def fit_inertially(sums: InertialSums, site: Site) -> InertialFit:
     Notes
     -----
     Wahba's problem by the singular value decomposition (Markley, J. Astronaut. Sci. 36 (1988)
-    245): north, east and down are told by ``g`` and by ``ω x g``, which the second and third
+    245): north, east and down are determined by ``g`` and by ``ω x g``, which the second and third
     powers of the time carry.
     """
     gravity, rate = site.gravity, site.earth_rate
@@ -342,7 +342,7 @@ def fit_inertially(sums: InertialSums, site: Site) -> InertialFit:
     cross = np.array([rotation.cross_matrix(x) for x in known])
     design = np.concatenate([-cross, by_latitude[:, :, None], known[:, :, None]], axis=2)
     normal = np.einsum("d,dik,dil->kl", weights, design, design)
-    # The estimate turns so as to undo an error: C d + phi x W = 0. Latitude and gravity tell it.
+    # The estimate rotates to cancel an error: C d + phi x W = 0, coupled to latitude and gravity.
     gain3 = -np.linalg.solve(normal[:3, :3], _rows(design[:, :, :3], weights))
     gain5 = _solve(normal, _rows(design, weights))
     gain = np.concatenate([gain3, gain5[3:]]).reshape(5, DEGREES, 3)
@@ -370,7 +370,7 @@ def _rows(design: Array, weights: Array) -> Array:
 
 
 def _solve(normal: Array, rows: Array) -> Array:
-    """Solve where a direction may be unseen, as the latitude at the equator: it gets nothing."""
+    """Solve where a direction may be unobservable (latitude at the equator): it is set to zero."""
     scale = np.sqrt(np.diagonal(normal))
     scale = np.where(scale > 0.0, scale, 1.0)
     inner = np.linalg.pinv(normal / np.outer(scale, scale), rcond=1e-12)
@@ -387,7 +387,7 @@ def functionals(sums: InertialSums) -> tuple[Array, Array]:
     Returns
     -------
     place, push : ndarray, (DEGREES, m)
-        Exact for what is constant within a node: by integrals of the polynomials from the end.
+        Exact for a constant within a node: by integrals of the polynomials from the end.
     """
     from numpy.polynomial import legendre
 
@@ -405,18 +405,18 @@ def functionals(sums: InertialSums) -> tuple[Array, Array]:
 
 def _response(sums: InertialSums, gain: Array, C_nb: Array) -> Response:
     place, push = functionals(sums)
-    # Errors come in the body's first axes; the gain wants north, east, down.
+    # Errors are in the initial body axes; the gain is for north, east, down.
     gain_b = gain @ C_nb
     of_place = np.einsum("kdi,dm->mki", gain_b, place)
     of_push = np.einsum("kdi,dm->mki", gain_b, push)
-    # An angle error d turns what comes after it: d x dv = -[dv x] d; half of its own node.
+    # An angle error d rotates all that follows: d x dv = -[dv x] d; half of its own node.
     crosses = np.array([rotation.cross_matrix(v) for v in sums.node_velocity])
     turned = -of_push @ crosses
     after = np.cumsum(turned[::-1], axis=0)[::-1]
     return Response(after - 0.5 * turned, of_push, of_place)
 
 
-# Whether a body turned against the local level, or the gyros' vertical and the latitude differ.
+# Rotation of a body against the local level, or mismatch of the gyros' vertical and the latitude.
 
 
 BLOCKS = 10
@@ -425,7 +425,7 @@ BLOCKS = 10
 def heading_rate(
     sums: InertialSums, C_nb: Array, site: Site, sensors: ImuUncertainty
 ) -> tuple[float, float]:
-    """Rate at which the body turns about the vertical against the local level.
+    """Rate of the body about the vertical against the local level.
 
     Parameters
     ----------
@@ -438,8 +438,8 @@ def heading_rate(
     Returns
     -------
     rate, sd : float, rad/s
-        Slope of the line through the turn. To the sensors' errors it adds the scatter of the
-        turn about the line, ``12 s²/(m T²)`` with s that of the means of m = 10 parts.
+        Slope of the line through the angle. The variance adds to the sensor errors the scatter of
+        the angle about the line, ``12 s²/(m T²)`` with s that of the means of m = 10 parts.
     """
     picked = np.unique(np.linspace(0, len(sums.stamps) - 1, 50 * BLOCKS).astype(np.int64))
     time = sums.stamps[picked]
@@ -453,7 +453,7 @@ def heading_rate(
     means = np.array([part.mean() for part in np.array_split(left, BLOCKS)])
     scatter = 12.0 * means.var(ddof=2) / (BLOCKS * sums.length**2)
     gyro = sensors.gyro
-    # A line through a walk is known to 6/5 of what its end tells.
+    # The slope of a line through a random walk has 6/5 of the variance of its end point.
     noise = 1.2 * np.square(gyro.axis("noise_density")) / sums.length
     own = np.square(gyro.axis("bias")) + mean_of_drift(sensors.gyro_drift, sums.length) + noise
     across = np.square(gyro.axis("misalignment")) + np.square(gyro.axis("scale"))
@@ -465,13 +465,13 @@ def heading_rate(
 def turn_findings(
     sums: InertialSums, C_nb: Array, site: Site, sensors: ImuUncertainty, source: str | None
 ) -> tuple[Finding, ...]:
-    """Say where a body turned about the vertical; parameters as of `heading_rate`.
+    """Report a rotation about the vertical; parameters as of `heading_rate`.
 
     Returns
     -------
     tuple of Finding
-        One, where the rate is more than five standard deviations from zero. It does no harm to
-        an inertial-frame alignment of a body that turned; it does where the body stood.
+        One, if the rate is more than five standard deviations from zero. It does no harm to
+        an inertial-frame alignment of a body that turned; it does if the body was stationary.
     """
     rate, sd = heading_rate(sums, C_nb, site, sensors)
     if not abs(rate) > CONTRADICTION * sd:
@@ -479,7 +479,7 @@ def turn_findings(
     vertical = -float(site.earth_rate[2])
     size = float(np.sqrt(site.earth_rate @ site.earth_rate))
     mirrored = abs(rate + 2.0 * -vertical) < abs(rate) / 10.0
-    # Against the level of a latitude, a body that stands turns by what that has too much.
+    # Relative to the level of a latitude, a stationary body turns by the excess of that rate.
     sine = (vertical - rate) / size
     measured = float(np.degrees(np.arcsin(np.clip(sine, -1.0, 1.0))))
     if mirrored:
@@ -501,28 +501,28 @@ def turn_findings(
     )
 
 
-# Slow noise in a record that its sensors do not explain, from what an inertial fit leaves over.
+# Slow noise that the sensors do not explain, from the residuals of an inertial fit.
 #
-# The fit lives on the Legendre degrees 2 and 3 of the second integral of the specific force. The
-# degrees above hold noise alone: from 4 to 20, two horizontal axes each, their energies tell how
-# much there is and how it falls with the frequency, and so what it is at degrees 2 and 3.
+# The fit uses the Legendre degrees 2 and 3 of the second integral of the specific force. The
+# degrees above hold noise alone: from 4 to 20, two horizontal axes each, their energies give the
+# level of the noise and its slope with frequency, and so its level at degrees 2 and 3.
 
 
-#: White in the place, in the velocity, in the force, and in the force's derivative.
+#: White in position, in velocity, in specific force, and in its derivative.
 KINDS = ("place", "velocity", "force", "walk")
 _ROUNDS = 300
 
 
 @dataclass(frozen=True, eq=False)
 class ResidualNoise:
-    """Excess over the noise of the sensors.
+    """Excess noise over the noise of the sensors.
 
     Attributes
     ----------
     ratio : float
-        Root of the mean ratio of energies: measured over what the sensors explain.
+        Root of the mean ratio of energies: measured over predicted by the sensors.
     significant : bool
-        Whether chance gives so much less often than one time in a million.
+        Whether chance gives this with a probability below one in a million.
     excess : ndarray, (4,)
         Spectral densities of `KINDS`: m²/Hz, (m/s)²/Hz, (m/s²)²/Hz, (m/s³)²/Hz; zero where it
         is not significant.
@@ -536,7 +536,7 @@ class ResidualNoise:
     sway: float
 
     def covariance(self, sums: InertialSums, push: Array, place: Array) -> Array:
-        """Covariance of an answer to errors of velocity gain and place; as `Response`.
+        """Covariance of an estimate to errors of velocity gain and position; as `Response`.
 
         Parameters
         ----------
@@ -560,12 +560,12 @@ class ResidualNoise:
 
 
 def _onward(response: Array) -> Array:
-    """Sum over all later nodes, and half of the own."""
+    """Sum over all later nodes, and half of the node itself."""
     return np.asarray(np.cumsum(response[::-1], axis=0)[::-1] - 0.5 * response)
 
 
 def residual_noise(sums: InertialSums, fit: InertialFit, sensors: ImuUncertainty) -> ResidualNoise:
-    """Judge what a fit leaves over.
+    """Test and estimate the noise in the residuals of a fit.
 
     Parameters
     ----------
@@ -579,8 +579,8 @@ def residual_noise(sums: InertialSums, fit: InertialFit, sensors: ImuUncertainty
 
     Notes
     -----
-    The energies of a degree are exponentially distributed about the sum of what each kind of
-    noise makes of it; densities of the greatest likelihood are found by steps that keep them
+    The energies of a degree are exponentially distributed about the sum of the contributions of
+    each kind of noise; maximum-likelihood densities are found by steps that keep them
     positive and never lose likelihood (Févotte and Idier 2011, doi:10.1162/NECO_a_00168, the
     Itakura-Saito divergence with exponent 1/2).
     """
@@ -592,7 +592,7 @@ def residual_noise(sums: InertialSums, fit: InertialFit, sensors: ImuUncertainty
     walk += 2.0 * max(drift.triad) ** 2 / drift.correlation_time
     known = known + walk * shapes[3]
     energy = np.square(fit.residual[FIRST_FREE:, :2]).sum(axis=1)
-    # What rounding leaves of a second integral of some 1e6 m.
+    # Rounding error of a second integral of some 1e6 m.
     known = known + (1e-14 * float(np.abs(sums.fallen[-1]).max())) ** 2
     axes = 2 * len(energy)
     statistic = float((energy / known).sum())

@@ -1,4 +1,4 @@
-"""A record summed in the body's axes at its first instant, as alignments need it."""
+"""Integrals of a record in the body axes of its first instant, for alignments."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ Indices = NDArray[np.int64]
 
 __all__ = ["InertialSums", "moments", "sum_inertially"]
 
-# Pieces over which sensor errors are taken for constant: alignment sees what changes over a
-# fifth of the record and more, and knows a piece of a 240th to 1e-4 of its weight.
+# Nodes over which sensor errors are taken as constant: alignment depends on changes over a fifth of
+# the record and more, and the weight of a node of a 240th is accurate to 1e-4.
 NODES = 240
 
 
 @dataclass(frozen=True, eq=False)
 class InertialSums:
-    """Integrals of turn and specific force, in the body's axes at the first sample, m nodes.
+    """Integrals of rotation and specific force, in body axes of the first sample, m nodes.
 
-    These axes are held still in inertial space; ``C`` turns from the body into them.
+    These axes are fixed in inertial space; ``C`` rotates from the body to them.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class InertialSums:
 
 
 def sum_inertially(imu: pd.DataFrame, ends: Indices | None = None) -> InertialSums:
-    """Sum an Imu table with specific force.
+    """Integrate an Imu table with specific force.
 
     Parameters
     ----------

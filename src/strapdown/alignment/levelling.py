@@ -70,16 +70,16 @@ def level(accel_mean: ArrayLike) -> tuple[float, float]:
     return roll, pitch
 
 
-# Roll and pitch alone: the heading stays open.
+# Roll and pitch alone: the heading is undetermined.
 
 
-#: Standard deviation of a heading of which nothing is known: uniform over a turn, rad.
+#: Standard deviation of an unknown heading: uniform over a turn, rad.
 UNKNOWN_HEADING = math.pi / math.sqrt(3.0)
 
 
 @dataclass(frozen=True)
 class Levelling(CoarseAlignment):
-    """Mean specific force at rest is up; of the heading nothing is known."""
+    """Mean specific force at rest is up; the heading is unknown."""
 
     name: ClassVar[str] = "levelling"
     summary: ClassVar[str] = "roll and pitch from the mean specific force at rest; no heading"
@@ -92,7 +92,7 @@ class Levelling(CoarseAlignment):
         sensors: ImuUncertainty,
         gnss: pd.DataFrame | None = None,
     ) -> Alignment:
-        """As `CoarseAlignment.align`; heading 0 stands for any.
+        """As `CoarseAlignment.align`; heading 0 is a placeholder.
 
         Raises
         ------
@@ -109,7 +109,7 @@ class Levelling(CoarseAlignment):
         return replace(found, findings=(*found.findings, unknown))
 
 
-# Levelling with a heading that somebody knows.
+# Levelling with a stated heading.
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ class KnownHeading(CoarseAlignment):
     Raises
     ------
     ConfigError
-        The heading is not a number, or its standard deviation not one above zero and below 104.
+        The heading is not a number, or its standard deviation is not between 0 and 104.
     """
 
     name: ClassVar[str] = "known_heading"
@@ -166,7 +166,7 @@ class KnownHeading(CoarseAlignment):
         return replace(found, heading_given=True)
 
 
-# Roll and pitch of a body at rest with what is known of them, for a heading that is stated.
+# Roll and pitch of a stationary body with their uncertainty, for a stated heading.
 
 
 Array = NDArray[np.float64]
@@ -182,7 +182,7 @@ def level_at_rest(
     heading_deg: float,
     heading_sd: float,
 ) -> Alignment:
-    """Level a record of rest.
+    """Level a stationary record.
 
     Parameters
     ----------
@@ -197,13 +197,13 @@ def level_at_rest(
     Returns
     -------
     Alignment
-        At the last sample. Where the force scatters more than by noise, that scatter and the
-        angles by which the body swings are in the covariance, and a finding says so.
+        At the last sample. Scatter of the force beyond noise, and the angles by which the body
+        swings, are included in the covariance, with a finding.
 
     Notes
     -----
-    `levelling.level` takes gravity for vertical; above the ellipsoid its north component is
-    ``8e-9 alt sin(2 lat)`` m/s², a microradian of tilt at 1200 m, which is not taken off.
+    `levelling.level` takes gravity as vertical; above the ellipsoid its north component is
+    ``8e-9 alt sin(2 lat)`` m/s², a microradian of tilt at 1200 m, which is neglected.
 
     Raises
     ------
@@ -233,7 +233,7 @@ def level_at_rest(
     change = gravity_change(means.whole_force, force, site.gravity)
     findings += gravity_findings(*change, source)
     by_force, by_heading = error_of_force_and_heading(-site.gravity, pitch, heading_deg, source)
-    # A stated heading is that of the last sample: a swing about the vertical is not in it.
+    # A stated heading is that of the last sample: a swing about the vertical does not affect it.
     by_swing = by_force @ rotation.cross_matrix(site.gravity) @ C_nb
     to_ned = by_force @ C_nb
     covariance = to_ned @ force @ to_ned.T + by_swing @ swing @ by_swing.T
@@ -257,22 +257,22 @@ def _disturbed(
     )
 
 
-# Attitude errors where a force is known in both frames, and the heading is stated.
+# Attitude errors for a force known in both frames and a stated heading.
 
 
-#: Beyond this pitch, deg, heading and roll turn about one axis to within a minute of arc.
+#: Beyond this pitch, deg, heading and roll axes coincide to within a minute of arc.
 STEEPEST = 89.9
 
 
 def error_of_force_and_heading(
     force: Array, pitch_deg: float, heading_deg: float, source: str | None = None
 ) -> tuple[Array, Array]:
-    """Sensitivities of an attitude that lays a force on a force and has a stated heading.
+    """Sensitivities of an attitude from a force in both frames and a stated heading.
 
     Parameters
     ----------
     force : ndarray, (3,), m/s²
-        North-east-down, as known: minus gravity at rest.
+        North-east-down, known: minus gravity at rest.
     pitch_deg, heading_deg : float, deg
     source : str, optional
         For messages.
@@ -280,7 +280,7 @@ def error_of_force_and_heading(
     Returns
     -------
     by_force : ndarray, (3, 3), rad per m/s²
-        Of ``phi`` per error of the known force less that of the measured one, north-east-down.
+        Of ``phi`` per error of the known force minus that of the measured one, north-east-down.
     by_heading : ndarray, (3,), rad/rad
 
     Raises
@@ -290,9 +290,9 @@ def error_of_force_and_heading(
 
     Notes
     -----
-    ``phi x F = e`` leaves the turn about F free: ``phi = F x e/F² + l F``. The heading turns by
-    ``phi_D + tan(pitch) (cos(heading) phi_N + sin(heading) phi_E)``, which gives l. At rest this
-    is ``phi_N = -df_E/g``, ``phi_E = df_N/g``.
+    ``phi x F = e`` leaves the rotation about F free: ``phi = F x e/F² + l F``. The heading
+    changes by ``phi_D + tan(pitch) (cos(heading) phi_N + sin(heading) phi_E)``, which gives l. At
+    rest this is ``phi_N = -df_E/g``, ``phi_E = df_N/g``.
     """
     if not abs(pitch_deg) <= STEEPEST:
         raise DataError(

@@ -1,4 +1,4 @@
-"""How well the means of rate and specific force of a body at rest are known."""
+"""Uncertainty of the mean rate and specific force of a stationary body."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def force_covariance(sensors: ImuUncertainty, length: float, force: Array) -> Ar
 
 
 def gravity_change(force: Array, covariance: Array, gravity: Array) -> tuple[float, float]:
-    """Size of a mean specific force against gravity, relative, and its standard deviation.
+    """Magnitude of a mean specific force against gravity, relative, and its standard deviation.
 
     Parameters
     ----------
@@ -98,10 +98,10 @@ def _own(bias: Triad, density: Triad, drift: BiasDrift, length: float) -> Array:
     return np.asarray(np.square(bias) + noise + mean_of_drift(drift, length))
 
 
-# Means over parts of a record, and whether the noise of the sensors explains their scatter.
+# Means over parts of a record, and a test of their scatter against the noise of the sensors.
 
 
-#: A scatter that noise gives less often than this is not noise.
+#: Scatter less probable than this is not noise.
 CHANCE = 1e-6
 
 
@@ -137,7 +137,7 @@ def block_means(imu: pd.DataFrame, blocks: int) -> BlockMeans:
     Returns
     -------
     BlockMeans
-        Each sample counts for the time that it stands for.
+        Each sample is weighted by its time interval.
     """
     time = imu.index.to_numpy(dtype=np.float64)
     values = imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64)
@@ -155,13 +155,13 @@ def block_means(imu: pd.DataFrame, blocks: int) -> BlockMeans:
 def _stands_for(time: Array, mean: bool) -> Array:
     steps = np.diff(time)
     if mean:
-        # The first mean belongs to an interval before the record, whose length it does not tell.
+        # The first mean belongs to an interval before the record, of unknown length.
         return np.asarray(np.r_[0.0, steps])
     return np.asarray(0.5 * (np.r_[steps, 0.0] + np.r_[0.0, steps]))
 
 
 def unexplained(means: Array, length: float, density: Triad, drift: BiasDrift) -> float:
-    """Scatter of block means over what noise gives, where it is more than chance; else 1.
+    """Scatter of block means over that of the noise, if significant; else 1.
 
     Parameters
     ----------
@@ -207,8 +207,8 @@ def of_mean(means: Array) -> Array:
     Returns
     -------
     ndarray, (k, k)
-        As if the parts were independent: too large for what swings to and fro, whose parts
-        take back from one another.
+        As if the parts were independent: too large for an oscillation, whose parts are
+        negatively correlated.
     """
     off = means - means.mean(axis=0)
     count = len(means)
@@ -216,18 +216,18 @@ def of_mean(means: Array) -> Array:
 
 
 def excursion(imu: pd.DataFrame, density: Triad) -> Array:
-    """Covariance of the small angles by which a body swings about its mean attitude.
+    """Covariance of the small angles of a body's swing about its mean attitude.
 
     Parameters
     ----------
     imu : DataFrame
     density : triad, rad/s/√Hz
-        What the noise of the gyros would make of it is taken off.
+        The effect of the gyro noise is subtracted.
 
     Returns
     -------
     ndarray, (3, 3), rad²
-        Body axes: of the integral of the rate less its line of regression. A walk of the noise
+        Body axes: of the integral of the rate minus its regression line. A walk of the noise
         keeps a fifteenth of its variance at the end on average.
     """
     time = imu.index.to_numpy(dtype=np.float64)
@@ -241,11 +241,11 @@ def excursion(imu: pd.DataFrame, density: Triad) -> Array:
     return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T)
 
 
-# What the errors of the sensors do to an answer that is linear in them.
+# Effect of sensor errors on an estimate that is linear in them.
 
 
 def sensor_noise(sums: InertialSums, turn: Array, push: Array, sensors: ImuUncertainty) -> Array:
-    """Covariance that white noise alone makes; arguments and result as `sensor_covariance`."""
+    """Covariance by white noise alone; arguments and result as `sensor_covariance`."""
     gyro = _noise(turn, sums, sensors.gyro.axis("noise_density"))
     return gyro + _noise(push, sums, sensors.accel.axis("noise_density"))
 
@@ -253,14 +253,14 @@ def sensor_noise(sums: InertialSums, turn: Array, push: Array, sensors: ImuUncer
 def sensor_covariance(
     sums: InertialSums, turn: Array, push: Array, sensors: ImuUncertainty
 ) -> Array:
-    """Covariance of an answer of k numbers from everything that stays or drifts in the sensors.
+    """Covariance of an estimate of k numbers by all constant or drifting errors of the sensors.
 
     Parameters
     ----------
     sums : InertialSums
     turn, push : ndarray, (m, k, 3)
-        What an error of the angle, and one of the velocity gained, within a node do to it; the
-        error in the body's axes at the first instant.
+        Sensitivities of the estimate to an error of the angle and of the velocity gained within
+        a node; the error in the body axes at the first instant.
     sensors : ImuUncertainty
         Biases, their drift, scale, misalignment and g-sensitivity; nonlinearity and the
         rectification of vibration are not in it.

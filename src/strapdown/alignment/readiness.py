@@ -1,4 +1,4 @@
-"""How good an alignment is after how long."""
+"""Accuracy of an alignment by its duration."""
 
 from __future__ import annotations
 
@@ -56,17 +56,17 @@ class Readiness:
     ----------
     method : str
     table : DataFrame
-        Index ``duration``, s. Columns: ``time``, s, at which the attitude holds; ``roll pitch
-        heading``, deg; ``*_sd``, deg, as stated; ``*_error``, deg, estimate less reference, NaN
-        without one; ``findings``, how many there are; ``refused``, the `Finding` of a record
-        that gives no attitude, whose numbers are NaN, else None.
+        Index ``duration``, s. Columns: ``time``, s, of validity; ``roll pitch heading``, deg;
+        ``*_sd``, deg, as stated; ``*_error``, deg, estimate − reference, NaN without one;
+        ``findings``, their number; ``refused``, the `Finding` of a record without an attitude,
+        whose numbers are NaN, else None.
     """
 
     method: str
     table: pd.DataFrame
 
     def ready(self, heading_sd_deg: float) -> float:
-        """Shortest duration from which on the heading is stated at least so well.
+        """Shortest duration from which on the stated heading is at least so accurate.
 
         Parameters
         ----------
@@ -95,12 +95,12 @@ def durations_of(imu: pd.DataFrame, count: int = 10) -> Array:
     Returns
     -------
     ndarray, (count,), s
-        From 5 s, or a hundredth of the record where that is more, to all of it.
+        From 5 s, or a hundredth of the record if longer, to the whole record.
 
     Raises
     ------
     ConfigError
-        Fewer than two are asked for.
+        Fewer than two are requested.
     DataError
         The record is shorter than 10 s.
     """
@@ -126,26 +126,26 @@ def readiness(
     durations: Sequence[float] | Array | None = None,
     reference: pd.DataFrame | None = None,
 ) -> Readiness:
-    """Align over ever longer stretches from the start of a record.
+    """Align over increasing durations from the start of a record.
 
     Parameters
     ----------
     method : str
         Its name.
     align : callable
-        Makes an alignment of an Imu table: coarse, fine, or the one after the other.
+        Returns an alignment of an Imu table: coarse, fine, or both in sequence.
     imu : DataFrame
         Imu table.
     durations : sequence of float, s, optional
-        Rising, within the record; ten of `durations_of` where left out.
+        Rising, within the record; ten of `durations_of` if not given.
     reference : DataFrame, optional
-        Attitude table with the truth, or something better: the row nearest to the time of an
-        alignment counts.
+        Attitude table of the truth, or of a better instrument: the row nearest to the time of
+        an alignment is compared.
 
     Returns
     -------
     Readiness
-        A stretch that is refused has a row that says why.
+        A duration that is refused has a row with the reason.
 
     Raises
     ------
@@ -211,12 +211,12 @@ def _row(
     return [*numbers, len(found.findings), None]
 
 
-# What a rest cannot tell, and which turn of the body would tell it.
+# Unobservable errors of a stationary body, and rotations of the body that make them observable.
 
 
-# A turn by hand or by a vehicle, and the length of a step of the forecast.
+# Duration of a turn by hand or by a vehicle, and step of the prediction.
 TURN_TIME, STEP = 20.0, 0.1  # s
-#: What a body can be asked to do: a rotation vector in its own axes, deg.
+#: Possible rotations of the body: a rotation vector in its own axes, deg.
 TURNS: dict[str, tuple[float, float, float]] = {
     "turn it by 90° about the vertical": (0.0, 0.0, 90.0),
     "turn it by 180° about the vertical": (0.0, 0.0, 180.0),
@@ -228,14 +228,14 @@ STAY = "leave it as it stands"
 
 @dataclass(frozen=True, eq=False)
 class Manoeuvre:
-    """What would be known after a turn and a further rest.
+    """Predicted accuracy after a rotation and a further rest.
 
     Attributes
     ----------
     name : str
-        What to do.
+        Description of the rotation.
     rest : float, s
-        How long it rests afterwards.
+        Duration of the rest afterwards.
     sd_deg : ndarray, (3,), deg
         Of the tilts about north and east and of the heading.
     gyro_bias_sd, accel_bias_sd : ndarray, (3,), rad/s and m/s²
@@ -249,11 +249,11 @@ class Manoeuvre:
 
 
 def null_space(lat_deg: float, q_nb: Array, gravity: float, earth_rate: float) -> Array:
-    """Return the errors that leave no trace in any observation of a rest.
+    """Return the errors that no observation of a rest reveals.
 
     Any constant rotation psi of the computed attitude, with ``C_nb b_a = f x psi`` and
-    ``C_nb b_g = omega_ie x psi``: velocity and attitude relative to the Earth then stay at rest. So
-    a horizontal bias cannot be told from a tilt, nor an east drift from the heading.
+    ``C_nb b_g = omega_ie x psi``, leaves velocity and attitude relative to the Earth constant. So
+    a horizontal bias cannot be separated from a tilt, nor an east drift from the heading.
 
     Parameters
     ----------
@@ -284,12 +284,12 @@ def null_space(lat_deg: float, q_nb: Array, gravity: float, earth_rate: float) -
 def manoeuvres_after(
     result: FineResult, site: Site, rest: float | None = None
 ) -> tuple[Manoeuvre, ...]:
-    """Forecast what a turn of the body and a further rest would make known.
+    """Predict what a rotation of the body and a further rest make observable.
 
-    The filter's covariance goes on over the increments that error-free sensors would give, with the
-    observations of the same rest; nothing else of the result is used. Scale factors and
-    misalignments are a part of the biases here, and stay so; as a turn out of the level changes
-    what they do, the forecast of such a turn is the best that could come of it.
+    The filter's covariance is propagated over the increments of error-free sensors, with the
+    observations of the same rest; no other part of the result is used. Scale factors and
+    misalignments are treated as constant parts of the biases; a rotation out of the level changes
+    their effect, so that the prediction for such a rotation is the best case.
 
     Parameters
     ----------
@@ -301,7 +301,7 @@ def manoeuvres_after(
     Returns
     -------
     tuple of Manoeuvre
-        The best heading first; to stay as it stands is among them.
+        The most accurate heading first; includes no rotation.
     """
     history = result.history
     length = float(history.index[-1] - history.index[0]) if rest is None else rest
@@ -314,7 +314,7 @@ def manoeuvres_after(
 
 def _forecast(result: FineResult, site: Site, name: str, turn: Array, rest: float) -> Manoeuvre:
     filter_ = result.filter
-    # A body at rest without errors: only the covariance is wanted.
+    # A body at rest without errors: only the covariance is needed.
     home = home_of(site, result.state.time)
     used = filter_.mechanization
     here = used.nav_state(result.state.mechanization, result.state.time)
@@ -362,7 +362,7 @@ def _forecast(result: FineResult, site: Site, name: str, turn: Array, rest: floa
 
 
 def _resting(site: Site, q_nb: Array) -> Array:
-    """Motion increments of one step of a body that stands, (10,)."""
+    """Motion increments of one step of a stationary body, (10,)."""
     C = rotation.dcm_from_quaternion(q_nb)
     rate, force = C.T @ site.earth_rate, -(C.T @ site.gravity)
     return np.concatenate([[STEP], rate * STEP, force * STEP, 0.5 * force * STEP**2])
@@ -373,7 +373,7 @@ def _turning(site: Site, q_nb: Array, turn: Array, steps: int) -> tuple[Array, A
     rows = np.empty((steps, 10))
     step = rotation.quaternion_from_rotation_vector(turn / steps)
     for i in range(steps):
-        # Force is constant in level: over the step it is met from halfway.
+        # Force is constant in level axes: over the step it is rotated halfway.
         half = rotation.quaternion_from_rotation_vector(0.5 * turn / steps)
         rows[i] = _resting(site, rotation.compose(q_nb, half))
         rows[i, 4:10] = np.concatenate(
@@ -384,7 +384,7 @@ def _turning(site: Site, q_nb: Array, turn: Array, steps: int) -> tuple[Array, A
     return rows, q_nb
 
 
-# An alignment taken to another instant, or over its whole record, by the gyros.
+# Propagation of an alignment to another instant, or over its whole record, by the gyros.
 
 
 def carry(
@@ -394,7 +394,7 @@ def carry(
     site: Site,
     sensors: ImuUncertainty | None = None,
 ) -> Alignment:
-    """Carry an attitude forward or backward in time.
+    """Propagate an attitude forward or backward in time.
 
     Parameters
     ----------
@@ -402,15 +402,15 @@ def carry(
         Imu table with specific force that holds both instants; the samples nearest to them
         count.
     alignment : Alignment
-        A gyro bias that it tells is taken off.
+        Its gyro bias, if any, is subtracted.
     to : float, s
     site : Site
-        The local level turns with the Earth here; a vehicle that goes at 10 m/s turns it by
-        another 0.3 deg/h, which is not in it.
+        The local level rotates with the Earth; motion at 10 m/s rotates it by another
+        0.3 deg/h, which is neglected.
     sensors : ImuUncertainty, optional
-        What the gyros add to the covariance; without it nothing. It is taken as independent of
-        what is in the covariance already: of `InertialFrame`, which has used the same gyros,
-        ask for the attitude at the start or the end directly.
+        Gyro errors to be added to the covariance; none if not given. They are taken as
+        independent of the covariance so far: of `InertialFrame`, which has used the same gyros,
+        request the attitude at the start or the end directly.
 
     Returns
     -------
@@ -439,7 +439,7 @@ def carry(
     C_there = level @ C_here @ (turned if forward else turned.T)
     covariance = level @ alignment.covariance @ level.T
     if sensors is not None:
-        # Angle errors come in the axes at the first sample of the piece.
+        # Angle errors are in the axes at the first sample of the segment.
         axes = level @ C_here if forward else C_there
         turn = np.tile(axes, (len(sums.node_length), 1, 1))
         none = np.zeros_like(turn)
@@ -454,22 +454,22 @@ def carry(
 
 
 def carried_attitude(alignment: Alignment, imu: pd.DataFrame, site: Site) -> pd.DataFrame:
-    """Carry an attitude over the record that it was found in.
+    """Propagate an attitude over its own record.
 
     Parameters
     ----------
     alignment : Alignment
-        At an instant of the record; its gyro bias, where it has one, is taken off.
+        At an instant of the record; its gyro bias, if any, is subtracted.
     imu : DataFrame
-        Imu table of a body that stays at its place.
+        Imu table of a body that stays at its position.
     site : Site
 
     Returns
     -------
     DataFrame
-        Attitude table: ``q_nb(t) = q_n(t)n(T) q_nb(T) q_b(T)b(t)``, the body's turn in inertial
-        space by the gyros and that of the level by the Earth's rate. One sample of a mean rate
-        has no step before it and is that of the first whole interval's start.
+        Attitude table: ``q_nb(t) = q_n(t)n(T) q_nb(T) q_b(T)b(t)``, the body's rotation in
+        inertial space by the gyros and that of the level by the Earth's rate. One sample of a
+        mean rate has no step before it and takes the start of the first whole interval.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What a record must be before any attitude is sought in it."""
+"""Checks of a record before alignment."""
 
 from __future__ import annotations
 
@@ -32,16 +32,16 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-# As levelling has it: what no bias, scale or rocking makes of gravity.
+# As in levelling: deviation from gravity beyond any bias, scale or rocking.
 NEAR_GRAVITY = 0.2
-#: Fewer tell no scatter.
+#: Fewer samples do not determine the scatter.
 LEAST_SAMPLES = 20
-# rad/s or m/s²; no sensor is as quiet, and no simulation without errors as loud.
+# rad/s or m/s²; below any sensor's noise, above the rounding of an error-free simulation.
 ROUNDING = 1e-12
 
 
 def check_record(imu: pd.DataFrame) -> tuple[Finding, ...]:
-    """Check an Imu table that is to be aligned.
+    """Check an Imu table before alignment.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def check_record(imu: pd.DataFrame) -> tuple[Finding, ...]:
     Raises
     ------
     DataError
-        As `tables.check_imu`; there is no accelerometer, there are fewer than 20 samples, or a
+        As `tables.check_imu`; accelerometers are missing, there are fewer than 20 samples, or a
         channel does not change at all while others do.
     """
     check_imu(imu)
@@ -89,7 +89,7 @@ def check_gravity(force: Array, source: str | None) -> tuple[Finding, ...]:
     Returns
     -------
     tuple of Finding
-        Where the body stands on its head.
+        If the body is upside down.
 
     Raises
     ------
@@ -120,20 +120,20 @@ def check_gravity(force: Array, source: str | None) -> tuple[Finding, ...]:
 
 
 def gravity_findings(change: float, sd: float, source: str | None) -> tuple[Finding, ...]:
-    """Compare the size of a mean specific force with the gravity of the site.
+    """Compare the magnitude of a mean specific force with the gravity of the site.
 
     Parameters
     ----------
     change : float
-        Measured less the site's, relative.
+        Measured minus the site's, relative.
     sd : float
-        Of it.
+        Its standard deviation.
     source : str, optional
 
     Returns
     -------
     tuple of Finding
-        One, where it is more than five standard deviations.
+        One, if it is more than five standard deviations.
     """
     if not abs(change) > CONTRADICTION * sd:
         return ()
@@ -149,8 +149,8 @@ def gravity_findings(change: float, sd: float, source: str | None) -> tuple[Find
 
 
 def _check_alive(values: Array, source: str | None) -> None:
-    """Refuse a channel that stands still while its neighbours do not."""
-    # An ideal sensor at rest is constant on all channels to rounding, and nothing is said of it.
+    """Refuse a channel that is constant while its neighbors are not."""
+    # An ideal sensor at rest is constant on all channels to rounding, which is accepted.
     spread = np.ptp(values, axis=0)
     for name, columns in (("gyro", slice(0, 3)), ("accel", slice(3, 6))):
         still = spread[columns] == 0.0
@@ -188,17 +188,18 @@ def _gaps(time: Array, source: str | None) -> tuple[Finding, ...]:
     )
 
 
-# Samples that stand out of a record that is to be aligned.
+# Outliers in a record to be aligned.
 
 
-#: Share of the steps from sample to sample that are taken for usual, and how many times as large
-#: a step stands out: 36 standard deviations of white noise, 10 times the steepest of a swing.
+#: Share of the steps from sample to sample that are taken as usual, and the factor on them from
+#: which a step is an outlier: 36 standard deviations of white noise, 10 times the steepest of a
+#: swing.
 USUAL = 0.99
 FACTOR = 10.0
 
 
 def outlier_findings(values: Array, columns: list[str], source: str | None) -> tuple[Finding, ...]:
-    """Find jumps that neither noise nor rocking makes.
+    """Find jumps beyond noise and rocking.
 
     Parameters
     ----------
@@ -236,38 +237,38 @@ def outlier_findings(values: Array, columns: list[str], source: str | None) -> t
     )
 
 
-# Whether a satellite receiver says that a vehicle stood.
+# Check against GNSS that a vehicle was stationary.
 
 
-#: A velocity that errs by more than this many standard deviations is a velocity.
+#: A velocity of more standard deviations is significant.
 CLEAR = 5.0
 
 
 def still_by_gnss(
     gnss: pd.DataFrame | None, imu: pd.DataFrame, site: Site, heading_sd: float
 ) -> tuple[Finding, ...]:
-    """Refuse a steady motion, which inertial sensors cannot tell from rest.
+    """Refuse a steady motion, which inertial sensors cannot distinguish from rest.
 
     Parameters
     ----------
     gnss : DataFrame, optional
-        Gnss table; without one nothing is said.
+        Gnss table; no check if not given.
     imu : DataFrame
     site : Site
     heading_sd : float, rad
-        What is stated; an error that is small against it is borne.
+        Stated standard deviation; an error that is small against it is accepted.
 
     Returns
     -------
     tuple of Finding
-        One, where the vehicle moves and the heading bears it.
+        One, if the vehicle moves and the heading uncertainty covers the error.
 
     Raises
     ------
     DataError
-        The vehicle moves, and the heading found as if it stood errs by more than its standard
-        deviation: the level of a vehicle that goes north turns like one on an Earth that turns
-        faster about east, by ``v_N/(R w cos(lat))``.
+        The vehicle moves, and the error of the heading found as if stationary exceeds its
+        standard deviation: the level of a vehicle that goes north rotates like one on an Earth
+        that rotates faster about east, by ``v_N/(R w cos(lat))``.
     """
     if gnss is None:
         return ()
@@ -280,7 +281,7 @@ def still_by_gnss(
     told = np.isfinite(sd).all(axis=1)
     if not told.any():
         return ()
-    # Errors of fixes are not independent: the mean is taken for no better than one of them.
+    # Errors of fixes are correlated: the mean is taken as no more accurate than one fix.
     mean, spread = velocity[told].mean(axis=0), float(sd[told].mean())
     speed = float(np.hypot(*mean))
     if not speed > CLEAR * max(spread, 1e-3):
@@ -302,21 +303,21 @@ def still_by_gnss(
     return (moves,)
 
 
-# Whether gyros can find north, and what they say of the latitude.
+# Check that the gyros can find north, and compare their latitude with the site's.
 
 
-#: A heading that is less well known than this, in rad, is no heading: a uniform one has 1.81.
+#: A heading with a larger standard deviation, rad, counts as unknown: a uniform one has 1.81.
 LARGEST_SD = 1.0
 #: Beyond this latitude, in deg, less than a third of the Earth's rate is horizontal.
 HIGH_LATITUDE = 70.0
-#: So many standard deviations are no chance: one in two million.
+#: A difference of more standard deviations is significant: probability one in two million.
 CONTRADICTION = 5.0
 
 
 def north_findings(
     site: Site, sd: float, sensors: ImuUncertainty, source: str | None
 ) -> tuple[Finding, ...]:
-    """Say how well north is known.
+    """Report the standard deviation of north.
 
     Parameters
     ----------
@@ -335,8 +336,8 @@ def north_findings(
     Raises
     ------
     DataError
-        The standard deviation exceeds 1 rad, or the place is so near to a pole that it is not a
-        number.
+        The standard deviation exceeds 1 rad, or the position is so close to a pole that it is
+        not finite.
     """
     rate = site.earth_rate
     size, across = float(np.sqrt(rate @ rate)), float(abs(rate[0]))
@@ -386,14 +387,14 @@ def seems_in_deg_per_s(rate: Array, site: Site) -> bool:
 
 
 def _rounded(rate: float) -> str:
-    """A rate in deg/h; what rounding leaves of none is none."""
+    """A rate in deg/h; a rounding error counts as zero."""
     return f"{rate:.3g}" if rate > 1e-9 else "0"
 
 
 def latitude_findings(
     site: Site, measured_deg: float, sd_deg: float, source: str | None
 ) -> tuple[Finding, ...]:
-    """Compare the latitude that the sensors tell with the site's.
+    """Compare the latitude measured by the sensors with the site's.
 
     Parameters
     ----------
@@ -405,7 +406,7 @@ def latitude_findings(
     Returns
     -------
     tuple of Finding
-        One, where they differ by more than five standard deviations.
+        One, if they differ by more than five standard deviations.
     """
     off = measured_deg - site.lat_deg
     if not abs(off) > CONTRADICTION * sd_deg:

@@ -1,6 +1,6 @@
-"""What is known of a body that stands still, as observations of a filter.
+"""Known motion of a stationary body as filter observations: ZUPT, position and Earth rate.
 
-Chernodarov (2009), Eqs. (16)-(18): the rate of the Earth, the place, no velocity.
+Chernodarov (2009), Eqs. (16)-(18): Earth rate, constant position, zero velocity.
 """
 
 from __future__ import annotations
@@ -29,28 +29,28 @@ from strapdown.sensors.triad_errors import Triad
 Array = NDArray[np.float64]
 
 AXES = ("x", "y", "z")
-#: What a rest tells: the Earth's rate, the place, no velocity.
+#: Observations of a rest: Earth rate, constant position, zero velocity.
 OBSERVATIONS = ("rate", "position", "velocity")
-# Fewer say little of how much they vary.
+# Fewer do not determine the variance.
 LEAST_STRETCHES = 8
-# The largest of several variances of as few numbers, over the one that is expected: of eight
+# The largest of several variances of few samples, over the expected one: of eight
 # chi-square with 8 degrees of freedom one in a thousand is beyond 3.9.
 BY_CHANCE = 4.0
-# What a body is taken to turn by where nothing is found, as a part of the noise of its gyros.
+# Assumed rotation of the body where none is found, as a fraction of the noise of its gyros.
 LEAST_TURN = 0.3
 
 
 @dataclass(frozen=True, eq=False)
 class Standing:
-    """How still a body stands, as standard deviations in level axes.
+    """Residual motion of a stationary body, as standard deviations in level axes.
 
     Attributes
     ----------
     position : ndarray, (3,), m
-        Of the place at an epoch about its mean.
+        Position at an epoch about its mean.
     velocity : ndarray, (3,), m/s
     turn : ndarray, (3,), rad
-        Of the turn relative to the Earth from one epoch to the next.
+        Rotation relative to the Earth from one epoch to the next.
     """
 
     position: Array
@@ -65,7 +65,7 @@ def still_observations(
     standing: Standing,
     names: Sequence[str],
 ) -> list[Observation]:
-    """Make the observations of the end of an epoch: (17) and (18).
+    """Return the observations at the end of an epoch: (17) and (18).
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def still_observations(
     state : FilterState
         At the end of the epoch.
     home : NavState
-        The place of alignment.
+        The position of alignment.
     standing : Standing
     names : sequence of str
         Of `OBSERVATIONS`.
@@ -93,9 +93,9 @@ def still_observations(
 def position_observation(
     filter_: ErrorFilter, state: FilterState, home: NavState, standing: Standing
 ) -> Observation:
-    """The computed place less that of alignment: (17), as a displacement in level axes.
+    """The computed position minus that of alignment: (17), as a displacement in level axes.
 
-    In height, too, where the mechanization's is free.
+    Includes the height, if the mechanization's is free.
     """
     used = filter_.mechanization
     here = used.nav_state(state.mechanization, state.time)
@@ -129,18 +129,18 @@ def velocity_observation(
 def rate_observation(
     filter_: ErrorFilter, segment: Segment, home: NavState, standing: Standing
 ) -> Observation:
-    """The turn that the gyros have measured less that of the Earth: (16).
+    """The rotation measured by the gyros minus that of the Earth: (16).
 
-    As printed it is an integral of rates turned into axes that stand still. Of a body that rocks
-    about two axes at once such an integral grows by the area of the cone, while the body stays
-    where it is: 1 deg at 0.3 Hz make 66 deg/h. So the turns are composed to attitudes, and what
-    counts is how the rotation vector from the attitude of rest changes: from epoch to epoch, and
-    nothing is left over, because of the next epoch it is taken off again.
+    As printed it is an integral of rates rotated into fixed axes. For a body that rocks about two
+    axes at once such an integral grows by the area of the cone although the body does not turn:
+    66 deg/h for 1 deg at 0.3 Hz. So the rotations are composed to attitudes, and the observation
+    is the change of the rotation vector from the attitude of rest between epochs; it does not
+    accumulate, because the next epoch subtracts it again.
 
-    Of the errors at the start of the segment. They count by the turn of the Earth alone: what the
-    body turns by is noise, and by the measured turn one axis' rocking would be told from another's
-    as if an error of the attitude had mixed them. The noise of the gyros, which is in the attitude
-    too, is not in R.
+    The design refers to the errors at the start of the segment and contains the Earth's rotation
+    alone: the body's own rotation is noise, and with the measured rotation in it the rocking of
+    one axis would be separated from another's as if an attitude error had mixed them. The noise
+    of the gyros, which is in the attitude, too, is not in R.
     """
     model = filter_.model
     levels = segment.mechanization.levels(segment.history)
@@ -187,7 +187,7 @@ def turns_between(used: Mechanization, segment: Segment, home: NavState, every: 
     away = rotation.rotation_vector_from_quaternion(
         rotation.compose(levels[:, Q_LB : Q_LB + 4], rotation.conjugate(rest))
     )
-    # The level turns, too, with the velocity that is computed.
+    # The level rotates with the computed velocity, too.
     turned = used.levels(segment.history[:-1])[:, OMEGA_EL : OMEGA_EL + 3]
     turned = _stretches(turned * segment.increments[:, :1], every).sum(axis=1)
     return np.asarray(np.diff(away, axis=0)[: len(turned)] + turned)
@@ -197,7 +197,7 @@ def attitude_of_rest(segment: Segment) -> Array:
     """Mean attitude of a run, body to north-east-down, (4,)."""
     used = segment.mechanization
     q = used.levels(segment.history)[:, Q_LB : Q_LB + 4]
-    # The sign of a quaternion is not its own.
+    # The sign of a quaternion is arbitrary.
     mean = (q * np.sign(q @ q[0])[:, None]).mean(axis=0)
     mean /= np.sqrt(mean @ mean)
     level = used.level_from_ned(segment.history[0])
@@ -205,10 +205,10 @@ def attitude_of_rest(segment: Segment) -> Array:
 
 
 def without_steady_turn(rows: Array, earth: Array) -> Array:
-    """Motion increments less the mean rate, where that makes the body stay as it stands.
+    """Motion increments minus the mean rate, if that keeps the body's attitude constant.
 
-    A run without observations over gyros with a bias of degrees a minute turns over. Of a body that
-    cones the mean rate is no bias: by its rates as they are it comes back to its attitude.
+    Without observations, gyros with a bias of degrees a minute turn the computed attitude over.
+    For a coning body the mean rate is not a bias: its unchanged rates return to its attitude.
 
     Parameters
     ----------
@@ -243,27 +243,27 @@ def _turned(rows: Array) -> float:
 def measured_standing(
     segment: Segment, home: NavState, every: int, least: Standing, gyro_noise: Triad
 ) -> Standing:
-    """Find from a run without observations how still a body stands.
+    """Estimate the residual motion of a stationary body from a run without observations.
 
-    A filter takes what moves the body as independent from epoch to epoch. What sways slowly, or
-    settles, is not: so the motion is looked at over stretches of 1, 2, 4 ... epochs, and that
-    counts which independent motion would have to be for the stretch where it is largest. The drift
-    of the run itself is smooth, and left out by differences: the third for velocity, the fourth
-    for the place.
+    A filter takes the motion as independent from epoch to epoch. Slow sway or settling is not:
+    so the motion is evaluated over stretches of 1, 2, 4 ... epochs, and the result is the
+    independent motion that is equivalent at the stretch where it is largest. The drift of the
+    run itself is smooth, and removed by differences: the third for velocity, the fourth for the
+    position.
 
     Parameters
     ----------
     segment : Segment
         Of the whole record.
     home : NavState
-        The place of alignment and the attitude of rest.
+        The position of alignment and the attitude of rest.
     every : int
         Steps from epoch to epoch.
     least : Standing
-        No body is taken to stand more still than this.
+        Lower bounds of the result.
     gyro_noise : triad, rad/√s
-        It turns the level, too, and is not the body's motion: where no more is found than chance
-        makes of it, the body is taken to turn by a part of it.
+        It rotates the level, too, and is not motion of the body: where no significant rotation
+        is found, a fraction of this noise is assumed.
 
     Returns
     -------
@@ -276,8 +276,8 @@ def measured_standing(
     turns = turns_between(used, segment, home, every)
     found = _as_independent(turns, 1) ** 2
     noise = max(gyro_noise) ** 2 * float(segment.increments[:every, 0].sum())
-    # By a turn of exactly nothing the attitude would count as known to what the second order of its
-    # errors belies.
+    # With a rotation of exactly zero the attitude would count as known beyond the second order of
+    # its errors.
     turn = np.sqrt(np.where(found > BY_CHANCE * noise, found - noise, LEAST_TURN**2 * noise))
     return Standing(
         position=np.maximum(_as_independent(place, 4), least.position),
@@ -287,8 +287,8 @@ def measured_standing(
 
 
 def _as_independent(values: Array, order: int) -> Array:
-    """Deviation of independent epochs whose means over stretches would vary as much, (3,)."""
-    # Of a difference of independent numbers: the sum of the squares of its binomials.
+    """Standard deviation of independent epochs with the same variance of stretch means, (3,)."""
+    # For a difference of independent numbers: the sum of the squares of its binomials.
     gain = math.sqrt(math.comb(2 * order, order))
     found = np.zeros(3)
     length = 1
@@ -302,7 +302,7 @@ def _as_independent(values: Array, order: int) -> Array:
 
 
 def velocity_of_noise(gyro: Triad, accel: Triad, interval: float, epochs: int) -> float:
-    """Velocity that `measured_standing` finds where a body stands still, by the noise of sensors.
+    """Velocity that `measured_standing` finds for a stationary body, by the noise of sensors.
 
     Parameters
     ----------
@@ -310,7 +310,7 @@ def velocity_of_noise(gyro: Triad, accel: Triad, interval: float, epochs: int) -
     interval : float, s
         From epoch to epoch.
     epochs : int
-        How many there are.
+        Number of epochs.
 
     Returns
     -------
@@ -320,7 +320,7 @@ def velocity_of_noise(gyro: Triad, accel: Triad, interval: float, epochs: int) -
     order, length, most = 3, 1, 0.0
     signs = [(-1) ** k * math.comb(order, k) for k in range(order + 1)]
     while epochs // length >= order + LEAST_STRETCHES:
-        # What an impulse at each epoch does to the difference: on velocity, and through tilt.
+        # Effect of an impulse at each epoch on the difference: on velocity, and through tilt.
         weights = np.repeat(signs, length) / length
         velocity = np.cumsum(weights[::-1])[::-1]
         tilt = np.cumsum(velocity[::-1])[::-1] * interval * STANDARD_GRAVITY
@@ -332,13 +332,13 @@ def velocity_of_noise(gyro: Triad, accel: Triad, interval: float, epochs: int) -
 
 
 def _stretches(values: Array, length: int) -> Array:
-    """Cut into stretches, (m, length, 3); what is left over at the end is left out."""
+    """Cut into stretches, (m, length, 3); the incomplete stretch at the end is left out."""
     count = len(values) // length
     return values[: count * length].reshape(count, length, values.shape[1])
 
 
 def home_of(site: Site, time: float) -> NavState:
-    """The place of alignment as a state."""
+    """The position of alignment as a state."""
     return NavState.from_degrees(site.lat_deg, site.lon_deg, site.alt, time=time)
 
 

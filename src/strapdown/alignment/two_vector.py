@@ -1,4 +1,4 @@
-"""Gyrocompassing: the attitude that lays two measured vectors on two known ones."""
+"""Gyrocompassing: the attitude that aligns two measured vectors with two known ones (TRIAD)."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ __all__ = ["TwoVector", "triad_attitude"]
 
 @dataclass(frozen=True)
 class TwoVector(CoarseAlignment):
-    """Mean specific force is up, and the mean rate is the Earth's: for a body that stands still.
+    """Mean specific force is up, the mean rate is the Earth's: for a stationary body.
 
     Attributes
     ----------
     blocks : int
-        Equal parts of the record, 2 to 1000, whose scatter tells what disturbs the means.
+        Equal parts of the record, 2 to 1000, whose scatter measures the disturbance of the means.
 
     Raises
     ------
@@ -82,8 +82,8 @@ class TwoVector(CoarseAlignment):
         ------
         DataError
             The record has no accelerometer, a dead channel, a value that is not finite or too
-            few samples; its force is not gravity, or its rate not the Earth's; or the heading
-            is not known to 1 rad.
+            few samples; its force is not gravity, or its rate not the Earth's; or the standard
+            deviation of the heading exceeds 1 rad.
         """
         findings = [*check_record(imu)]
         source = source_of(imu)
@@ -131,7 +131,7 @@ class TwoVector(CoarseAlignment):
 
 
 def triad_attitude(force: Array, rate: Array, site: Site) -> Array:
-    """``C_nb`` that lays minus the force on gravity, and the rate into the plane of the Earth's.
+    """``C_nb`` that aligns minus the force with gravity, and the rate with the Earth's meridian.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def sensitivities(site: Site) -> tuple[Array, Array]:
 def _check_rate(
     means: BlockMeans, site: Site, covariance: Array, sensors: ImuUncertainty, source: str | None
 ) -> tuple[Finding, ...]:
-    """Compare the length of the mean rate with the Earth's; refuse a turn, or another unit."""
+    """Compare the magnitude of the mean rate with the Earth's; refuse a turn, or another unit."""
     rate, earth = means.whole_rate, float(np.sqrt(site.earth_rate @ site.earth_rate))
     size, sd = float(np.sqrt(rate @ rate)), float(np.sqrt(np.trace(covariance)))
     if not abs(size - earth) > CONTRADICTION * sd:
@@ -196,7 +196,7 @@ def _check_rate(
 
 
 def _refuse_motion(disturbed: Finding, heading_sd: float, source: str | None) -> None:
-    """Refuse where it is the motion that hides north."""
+    """Refuse motion that makes north unobservable."""
     if heading_sd > LARGEST_SD:
         raise DataError(
             "alignment.heading-lost",
@@ -213,7 +213,7 @@ def _latitude(means: BlockMeans, site: Site, rate: Array, force: Array) -> tuple
     sine = float(f @ w / np.sqrt((f @ f) * (w @ w)))
     lat = np.radians(site.lat_deg)
     size, g = float(np.sqrt(w @ w)), float(np.sqrt(f @ f))
-    # Across the rate in the plane of the meridian: what turns it against the vertical.
+    # Across the rate in the plane of the meridian: its rotation against the vertical.
     across = np.array([-np.sin(lat), 0.0, -np.cos(lat)])
     variance = float(across @ rate @ across) / size**2 + float(force[0, 0]) / g**2
     return float(np.degrees(np.arcsin(np.clip(sine, -1.0, 1.0)))), float(

@@ -1,4 +1,4 @@
-"""Attitude algorithms: one file each, and the one table of them."""
+"""Attitude algorithms: one file each, and the table of all."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def make_algorithm(text: str) -> AttitudeAlgorithm:
     Raises
     ------
     ConfigError
-        The name, an option or a value is not known; the message names the nearest.
+        The name, an option or a value is unknown; the message gives the nearest one.
     """
     name, _, rest = text.strip().lower().partition(":")
     cls = ALGORITHMS.get(name) or plugin("attitude", name, AttitudeAlgorithm)
@@ -117,7 +117,7 @@ def _option(name: str, key: str, value: str, default: object) -> object:
 
 
 def _refuse_overflow(algorithm: AttitudeAlgorithm, history: NDArray[np.float64]) -> None:
-    """Say where a truncated series grew beyond what can be squared."""
+    """Raise the error of a truncated series that overflows."""
     bad = np.flatnonzero(~(np.abs(history) < LARGEST).all(axis=1))
     if bad.size:
         raise DivergenceError(
@@ -183,13 +183,13 @@ def run_attitude(
     Returns
     -------
     AttitudeRun
-        Attitude at the start and at the end of each step, and what the algorithm says of
-        its own condition.
+        Attitude at the start and at the end of each step, and the diagnostics of the
+        algorithm.
 
     Raises
     ------
     DataError
-        `q_nb` is no rotation.
+        `q_nb` is not a rotation.
     DivergenceError
         The algorithm left the range of floating point.
     """

@@ -1,4 +1,4 @@
-"""What every attitude algorithm is: a state, a way to advance it, and an attitude read from it."""
+"""Interface of every attitude algorithm: state, propagation, and attitude output."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def unit_quaternions(history: Array) -> Array:
 
 @dataclass(frozen=True)
 class Steps:
-    """Increments as the kernels take them: (n,) s, (n, 3) rad, (n, 3) rad."""
+    """Increments for the kernels: (n,) s, (n, 3) rad, (n, 3) rad."""
 
     dt: Array
     theta: Array
@@ -40,7 +40,7 @@ class Steps:
 
 
 def steps_of(increments: pd.DataFrame) -> Steps:
-    """Take the arrays of an Increments table, without its stamps."""
+    """Return the arrays of an Increments table, without its time stamps."""
     return Steps(
         np.ascontiguousarray(increments["dt"].to_numpy(dtype=np.float64)),
         np.ascontiguousarray(increments[THETA].to_numpy(dtype=np.float64)),
@@ -50,7 +50,7 @@ def steps_of(increments: pd.DataFrame) -> Steps:
 
 @dataclass(frozen=True)
 class Accuracy:
-    """Powers of the step with which the attitude error of an algorithm falls; 0: it does not.
+    """Order of an algorithm's attitude error in the step; 0: it does not decrease.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class Accuracy:
 
 @dataclass(frozen=True)
 class AttitudeAlgorithm(ABC):
-    """One attitude algorithm with its options; it holds no state of its own.
+    """One attitude algorithm with its options; stateless.
 
     Attributes
     ----------
@@ -79,11 +79,11 @@ class AttitudeAlgorithm(ABC):
     title : str
         The words for it in a report.
     equations : str
-        Where it stands in its source.
+        Equation numbers in its source.
     source : str
         That source.
     width : int
-        Numbers of the state that are the attitude, the first of it.
+        Number of elements of the state that are the attitude, the first ones.
     advance_kernel, update_kernel : callable
         The compiled loops over many steps and for one sample.
     """
@@ -108,14 +108,14 @@ class AttitudeAlgorithm(ABC):
     @property
     @abstractmethod
     def accuracy(self) -> Accuracy:
-        """Powers of the step with which its error falls."""
+        """Order of its error in the step."""
 
     @abstractmethod
     def kernel_options(self) -> tuple[float, float]:
-        """Return the two options that the kernels take, as numbers; zero where there is none."""
+        """Return the two options for the kernels, as numbers; zero for a missing one."""
 
     def diagnostics(self, state: Array, time: Array) -> dict[str, float]:
-        """Return what the algorithm knows of its own condition after a run.
+        """Return the algorithm's diagnostics after a run.
 
         Parameters
         ----------
@@ -152,7 +152,7 @@ class AttitudeAlgorithm(ABC):
         ----------
         state : ndarray
         steps : Steps
-            From `steps_of`; made once where many algorithms run over the same.
+            From `steps_of`; made once for many algorithms over the same steps.
         """
         history = np.empty((len(steps.dt), self.width))
         after = state.copy()

@@ -1,4 +1,4 @@
-"""What an algorithm costs on a processor: operations a step, and what it must remember."""
+"""Computational cost of an algorithm: operations per step, and memory."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ TURN = 0.01
 
 
 class _State(list[Any]):
-    """A state that notes how far it was used."""
+    """A state that records how much of it was used."""
 
     used = 0
 
@@ -50,7 +50,7 @@ def _counted_run(
     start = algorithm.begin(rotation.quaternion_from_euler([20.0, -35.0, 250.0]))
     state = _State(number(float(v)) for v in start)
     for k, dt in enumerate(lengths):
-        # The axis turns a little from step to step, as it does in every motion.
+        # The axis changes a little from step to step, as in every motion.
         theta = (0.6 * TURN, (0.64 - 0.01 * k) * TURN, (0.48 + 0.01 * k) * TURN)
         dtheta = (0.0, -0.01 * TURN, 0.01 * TURN)
         numbers = [number(v) for v in (dt, *theta, *dtheta)]
@@ -76,8 +76,8 @@ def operation_count(algorithm: AttitudeAlgorithm) -> dict[str, float]:
     -------
     dict
         ``add`` (subtractions, too), ``multiply``, ``divide`` (remainders, too), ``sqrt`` and
-        ``trig``, per step, the mean over 12 steps of 0.01 rad each. From increments of angle:
-        what forms them from rates is the same for every algorithm. A sign, a comparison and
+        ``trig``, per step, the mean over 12 steps of 0.01 rad each. From angle increments:
+        forming them from rates is the same for every algorithm. A sign, a comparison and
         a copy are free.
     """
     count, _ = _counted_run(algorithm)
@@ -85,19 +85,19 @@ def operation_count(algorithm: AttitudeAlgorithm) -> dict[str, float]:
 
 
 def memory(algorithm: AttitudeAlgorithm) -> int:
-    """Return how many numbers an algorithm keeps from one step to the next."""
+    """Return how many numbers an algorithm keeps between steps."""
     return _counted_run(algorithm)[1].used
 
 
 def count_cost(algorithm: AttitudeAlgorithm, dt: ArrayLike | None = None) -> Cost:
-    """Count what one sample costs an algorithm.
+    """Count the operations of one sample of an algorithm.
 
     Parameters
     ----------
     algorithm : AttitudeAlgorithm
     dt : array_like, (n,), s, optional
-        Steps of the log that it is for: where they are unequal an algorithm may take another
-        path. Those in its middle are counted with; equal ones, where none are given.
+        Steps of the log: an algorithm may take another path for unequal steps. Those in its
+        middle are counted; equal steps, if not given.
 
     Returns
     -------
@@ -118,7 +118,7 @@ def count_cost(algorithm: AttitudeAlgorithm, dt: ArrayLike | None = None) -> Cos
     )
 
 
-# How long a sample takes an algorithm on the machine at hand.
+# Execution time of an algorithm's sample on the current machine.
 
 
 COLUMNS = ["algorithm", "float64_ns", "float32_ns"]

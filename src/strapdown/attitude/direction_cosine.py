@@ -18,15 +18,15 @@ class DirectionCosine(AttitudeAlgorithm):
     """The matrix, multiplied at each step by the exponential of the increment.
 
     Exact wherever the direction of the rate is constant within each step; on general motion
-    of order 2, because the increment alone says nothing of how the direction turned.
+    of order 2, because the increment alone has no information on the change of direction.
 
     Parameters
     ----------
     order : int
-        Highest power of the increment that is kept of the exponential, 1 to 20; 0 keeps all
-        of them, which is the closed form (12).
+        Highest power of the increment in the series of the exponential, 1 to 20; 0 for the
+        closed form (12).
     orthogonalise_every : int
-        Steps between re-orthogonalisations, 0 for never. A truncated exponential is no
+        Steps between re-orthogonalizations, 0 for never. A truncated exponential is no
         rotation, and the loss accumulates; the closed form loses only rounding.
     """
 
@@ -52,14 +52,14 @@ class DirectionCosine(AttitudeAlgorithm):
             )
 
     def begin(self, q_nb: Array) -> Array:
-        """Return the matrix row by row and the steps since it was orthogonalised."""
+        """Return the matrix row by row and the steps since its orthogonalization."""
         return np.append(rotation.dcm_from_quaternion(q_nb).ravel(), 0.0)
 
     def quaternions(self, history: Array) -> Array:
         """Read the matrices as rotations; those that have lost orthogonality, as the nearest."""
         rows = history
         if self.order:
-            # The nearest rotation in Frobenius norm; a truncated series is none itself.
+            # The nearest rotation in Frobenius norm; a truncated series is not orthogonal.
             left, _, right = np.linalg.svd(history.reshape(-1, 3, 3))
             rows = (left @ right).reshape(-1, 9)
         q = np.empty((len(rows), 4))
@@ -68,11 +68,11 @@ class DirectionCosine(AttitudeAlgorithm):
 
     @property
     def accuracy(self) -> Accuracy:
-        """Two, whatever the order of the series: what it stretches, it does not turn."""
+        """Two, whatever the order of the series: truncation only scales the matrix."""
         return Accuracy(increments=2, rates=2, coning=2)
 
     def kernel_options(self) -> tuple[float, float]:
-        """Return the order and the steps between re-orthogonalisations."""
+        """Return the order and the steps between re-orthogonalizations."""
         return float(self.order), float(self.orthogonalise_every)
 
     def diagnostics(self, state: Array, time: Array) -> dict[str, float]:

@@ -18,7 +18,7 @@ class EulerKrylov(AttitudeAlgorithm):
     """Rates of roll, pitch and heading, integrated step by step.
 
     Singular at a pitch of ±90°: (8) and (10) divide by cos(pitch). The angles stay finite
-    there, and the run records how near it came and when; an error made near the pole stays.
+    there, and the run records its least distance and when; an error made near the pole stays.
 
     Parameters
     ----------
@@ -48,12 +48,12 @@ class EulerKrylov(AttitudeAlgorithm):
         return np.array([roll, pitch, heading, abs(np.cos(pitch)), 0.0, 0.0])
 
     def quaternions(self, history: Array) -> Array:
-        """Turn the angles into quaternions; pitch beyond ±90° is a legal angle here."""
+        """Convert the angles to quaternions; pitch beyond ±90° is a legal angle here."""
         return quaternions_from_angles(history)
 
     @property
     def accuracy(self) -> Accuracy:
-        """One for the forward step; Runge-Kutta is limited by what is known of the rate."""
+        """One for the forward step; Runge-Kutta is limited by the knowledge of the rate."""
         if self.step == "forward":
             return Accuracy(increments=1, rates=1, coning=2)
         return Accuracy(increments=2, rates=4, coning=2)

@@ -15,9 +15,9 @@ from strapdown.attitude.algorithm import Accuracy, Array, AttitudeAlgorithm, qua
 class Naive(AttitudeAlgorithm):
     """Sum of the increments about each axis, read as roll, pitch and heading.
 
-    Exact for turns about one axis from a level start. Rotations do not commute, and this sum
-    does as if they did: an error of the order of the product of the angles, which no sampling
-    rate removes. Order of accuracy on general motion: 0.
+    Exact for rotation about one axis from a level start. Rotations do not commute, but this sum
+    treats them as if they did: an error of the order of the product of the angles, which no
+    sampling rate removes. Order of accuracy on general motion: 0.
     """
 
     name = "naive"
@@ -38,9 +38,9 @@ class Naive(AttitudeAlgorithm):
 
     @property
     def accuracy(self) -> Accuracy:
-        """Zero: the error is of commutation, and not of the step."""
+        """Zero: a commutation error, independent of the step."""
         return Accuracy(increments=0, rates=0, coning=0)
 
     def kernel_options(self) -> tuple[float, float]:
-        """Return nothing: there are no options."""
+        """Return no options: there are none."""
         return 0.0, 0.0

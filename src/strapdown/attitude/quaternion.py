@@ -21,8 +21,8 @@ class Quaternion(AttitudeAlgorithm):
     Parameters
     ----------
     order : int
-        Highest power of the increment that is kept of the series (21) and (22), 1 to 20;
-        0 keeps all of them, which is the limit: exact sine and cosine.
+        Highest power of the increment in the series (21) and (22), 1 to 20; 0 for the limit:
+        exact sine and cosine.
     normalise : bool
         Scale back to norm 1 after each step.
     """
@@ -56,9 +56,9 @@ class Quaternion(AttitudeAlgorithm):
         return Accuracy(increments=2, rates=2, coning=2)
 
     def kernel_options(self) -> tuple[float, float]:
-        """Return the order and whether to normalise."""
+        """Return the order and whether to normalize."""
         return float(self.order), float(self.normalise)
 
     def diagnostics(self, state: Array, time: Array) -> dict[str, float]:
-        """Return how far the norm is from 1 at the end."""
+        """Return the deviation of the norm from 1 at the end."""
         return {"norm_error": float(np.sqrt(state @ state) - 1.0)}

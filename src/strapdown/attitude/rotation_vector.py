@@ -18,11 +18,11 @@ _COEFFICIENTS = {"auto": kernel.AUTO, "miller": kernel.MILLER, "fit": kernel.FIT
 class RotationVector(AttitudeAlgorithm):
     """The quaternion, multiplied by that of the rotation vector of 1 to 4 increments.
 
-    Increments of one block are compared with each other: what their axis turned is put into
-    the rotation vector (Bortz 1971). Within a block, and at a ragged end, the attitude is
+    Increments of one block are compared with each other: the rotation of their axis is put into
+    the rotation vector (Bortz 1971). Within a block, and at an incomplete end, the attitude is
     that of the increments so far. A block ends when it is full or has turned by 1 rad, or
     before a step that is more than three times longer or shorter than its first, as beside a
-    gap or in a burst: there the increments tell nothing of each other.
+    gap or in a burst: there the increments are not comparable.
 
     Parameters
     ----------
@@ -69,12 +69,12 @@ class RotationVector(AttitudeAlgorithm):
         return state
 
     def quaternions(self, history: Array) -> Array:
-        """Scale each to norm 1, from which rounding alone has taken it."""
+        """Scale each to norm 1, against rounding."""
         return unit_quaternions(history)
 
     @property
     def accuracy(self) -> Accuracy:
-        """By the number of increments; products of three are what general motion needs."""
+        """By the number of increments; general motion needs products of three."""
         if self.samples == 1:
             return Accuracy(increments=2, rates=4, coning=2)
         if self.coefficients == "fit":

@@ -14,9 +14,9 @@ from strapdown.attitude.algorithm import Accuracy, Array, AttitudeAlgorithm, uni
 class RungeKutta(AttitudeAlgorithm):
     """The quaternion, by the fourth-order Runge-Kutta step of its differential equation.
 
-    The rate is taken as linear over the step: from rates at the stamps it knows how the axis
-    of the rate turned, which the exponential of the increment alone does not; from increments
-    it does not know it, and is then of order 2 like that.
+    The rate is taken as linear over the step: rates at the stamps give the change of its axis,
+    which the exponential of the increment alone lacks; with increments alone this change is
+    unknown, and the order is 2 like that.
 
     Parameters
     ----------
@@ -44,13 +44,13 @@ class RungeKutta(AttitudeAlgorithm):
 
     @property
     def accuracy(self) -> Accuracy:
-        """Four where the rate is known to that order, and two from increments alone."""
+        """Four with rates of that order, and two from increments alone."""
         return Accuracy(increments=2, rates=4, coning=2)
 
     def kernel_options(self) -> tuple[float, float]:
-        """Return whether to normalise."""
+        """Return whether to normalize."""
         return float(self.normalise), 0.0
 
     def diagnostics(self, state: Array, time: Array) -> dict[str, float]:
-        """Return how far the norm is from 1 at the end."""
+        """Return the deviation of the norm from 1 at the end."""
         return {"norm_error": float(np.sqrt(state @ state) - 1.0)}

@@ -15,29 +15,29 @@ from strapdown.attitude.algorithm import Array, AttitudeAlgorithm
 from strapdown.errors import ConfigError, DataError
 from strapdown.tables import SAMPLINGS
 
-# Looked up once: at half a microsecond a call, finding a name is a tenth of it.
+# Looked up once: attribute lookup is a tenth of a call of half a microsecond.
 _ndarray = np.ndarray
 
 
 class AttitudeTracker:
-    """Follow an attitude from gyro samples, one call a sample.
+    """Propagate an attitude from gyro samples, one call per sample.
 
-    It gives the same numbers, to the last bit, as a batch over the same samples.
+    Its result equals that of a batch over the same samples to the last bit.
 
     Parameters
     ----------
     algorithm : AttitudeAlgorithm
     q_nb : array_like, (4,), optional
-        Initial attitude, body to local level; identity where none is given.
+        Initial attitude, body to local level; identity if not given.
     sampling : {'instantaneous', 'mean'}
-        What a sample is: the rate at its stamp, or its mean over the interval that ends there.
+        Sample type: the rate at its stamp, or its mean over the interval that ends there.
 
     Raises
     ------
     ConfigError
         `sampling` is unknown.
     DataError
-        `q_nb` is no rotation.
+        `q_nb` is not a rotation.
     """
 
     __slots__ = ("_algorithm", "_record", "_update")
@@ -65,7 +65,7 @@ class AttitudeTracker:
         self._update = type(algorithm).update_kernel
 
     def update(self, time: float, gyro: Array | Sequence[float]) -> None:
-        """Take one sample.
+        """Process one sample.
 
         Parameters
         ----------
@@ -86,7 +86,7 @@ class AttitudeTracker:
             if self._update(self._record, time, gyro) >= 0.0:
                 return
         except (NumbaError, TypeError, ValueError):
-            # Of a kind that cannot be compiled for, or no numbers at all.
+            # Of a type that cannot be compiled for, or not numbers.
             self._refuse(float("nan"), gyro)
         self._refuse(time, gyro)
 

@@ -1,4 +1,4 @@
-"""Error states of a mechanization, their covariance in several forms, and robust updates."""
+"""Error models of a mechanization, forms of their covariance, and robust updates."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every form of a covariance is: begun of P, predicted, updated, read as P."""
+"""Interface of every covariance form: begin from P, predict, update, return P."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Innovations:
-    """What an epoch's observations were beside what was expected, one after the other.
+    """Innovations of an epoch's observations, processed one after the other.
 
     Attributes
     ----------
     nu : ndarray, (l,)
-        Observation less its prediction, after the observations before it, in its unit.
+        Observation minus its prediction, after the observations before it, in its unit.
     s : ndarray, (l,)
-        Variance that was expected of it: ``h P h' + R``.
+        Predicted variance of each: ``h P h' + R``.
     weight : ndarray, (l,)
-        What the update rule gave it, from 0 (not used) to 1.
+        Weight by the update rule, from 0 (not used) to 1.
     """
 
     nu: Array
@@ -39,9 +39,9 @@ class Innovations:
 
 @dataclass(frozen=True)
 class CovarianceForm(ABC):
-    """A way to keep and to change a covariance; it holds no state of its own.
+    """A form in which a covariance is kept and changed; stateless.
 
-    A state is one float64 array (n, n), whose meaning is the form's own: P itself, or U above a
+    A state is one float64 array (n, n), whose meaning depends on the form: P itself, or U above a
     diagonal D.
     """
 
@@ -56,7 +56,7 @@ class CovarianceForm(ABC):
         Parameters
         ----------
         P : ndarray, (n, n)
-            Symmetric, positive semidefinite: a row of zeros is a state that is known.
+            Symmetric, positive semidefinite: a row of zeros is an exactly known state.
 
         Returns
         -------
@@ -90,7 +90,7 @@ class CovarianceForm(ABC):
         R: Array,
         rule: UpdateRule | Sequence[UpdateRule] | None = None,
     ) -> tuple[Array, Array, Innovations]:
-        """Take the observations of an epoch, one after the other.
+        """Update with the observations of an epoch, one after the other.
 
         Parameters
         ----------
@@ -102,8 +102,8 @@ class CovarianceForm(ABC):
         R : ndarray, (l,)
             Variances of observations that are independent of each other.
         rule : UpdateRule, or a sequence of them, optional
-            How much of an observation is believed, one rule for all or one for each; all of
-            each, if not given.
+            Weighting of the observations, one rule for all or one for each; full weight if not
+            given.
 
         Returns
         -------
@@ -123,7 +123,7 @@ class CovarianceForm(ABC):
         R: Array,
         rule: UpdateRule | Sequence[UpdateRule] | None = None,
     ) -> tuple[Array, Array, Innovations]:
-        """Predict, then take the observations: a form may do both together for less.
+        """Predict, then update: a form may combine both at a lower cost.
 
         Parameters
         ----------
@@ -152,14 +152,14 @@ class CovarianceForm(ABC):
         return np.sqrt(np.diagonal(self.matrix(state)))
 
 
-# How an observation changes an estimate: how far, and how much of its variance it takes off.
+# Effect of an observation on an estimate: gain, and reduction of the covariance.
 
 
 class Step(NamedTuple):
     """One scalar update: ``K = P h' / (slope s + r)``, ``x + K moved``.
 
     The covariance becomes ``(1 - slope K h) P (1 - slope K h)' + slope r K K'``. A plain update has
-    ``moved = nu``, ``slope = 1`` and ``r = R``; one that is believed less has a larger r.
+    ``moved = nu``, ``slope = 1`` and ``r = R``; one with a lower weight has a larger r.
 
     Attributes
     ----------
@@ -169,8 +169,8 @@ class Step(NamedTuple):
     r : float
         In the unit of the observation, squared.
     weight : float
-        For the record: 1 where the observation is believed, 0 where it is not used. With a weight
-        of 0 nothing is changed.
+        For the record: 1 for full weight, 0 for a rejected observation, which leaves the state
+        unchanged.
     """
 
     moved: float
@@ -180,7 +180,7 @@ class Step(NamedTuple):
 
 
 class UpdateRule(Protocol):
-    """Says what one observation does."""
+    """Determines the effect of one observation on the filter."""
 
     def step(self, nu: float, s: float, r: float) -> Step:
         """Return the step of one observation.
@@ -188,7 +188,7 @@ class UpdateRule(Protocol):
         Parameters
         ----------
         nu : float
-            Observation less its prediction.
+            Observation minus its prediction.
         s : float
             ``h P h'``, the variance of the prediction.
         r : float
@@ -198,26 +198,26 @@ class UpdateRule(Protocol):
 
 
 class FullUpdate:
-    """Every observation is believed by its stated variance: Kalman's update."""
+    """Kalman's update: every observation is weighted by its stated variance."""
 
     def step(self, nu: float, s: float, r: float) -> Step:
-        """Return the whole step, as `UpdateRule.step`."""
+        """Return the full step, as `UpdateRule.step`."""
         return Step(nu, 1.0, r, 1.0)
 
 
-# What a filter is told, beside what it computed.
+# Observations of a filter.
 
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """Computed less observed, and how it depends on the physical errors.
+    """Computed − observed, with its sensitivity to the physical errors.
 
     Attributes
     ----------
     name : str
-        Of whatever observes; two receivers have two names.
+        Of the source; two receivers have two names.
     z : ndarray, (l,)
-        Computed less observed.
+        Computed − observed.
     H : ndarray, (l, p)
         ``z = H physical + noise``: columns as `ErrorModel` has the physical errors, nine and those
         of the sensors, in level axes.
@@ -234,10 +234,10 @@ class Observation:
     labels: tuple[str, ...]
 
 
-# What is asked of the matrices that a covariance form is given.
+# Checks of the matrices that a covariance form is given.
 
 
-#: How far correlations may be from symmetric, and below zero as eigenvalues, in n roundings.
+#: Tolerance of asymmetry, and of negative eigenvalues, of correlations, in n roundings.
 ROUNDINGS = 1e3
 
 
@@ -292,7 +292,7 @@ def checked_covariance(P: Array) -> Array:
 
 
 def indefinite(row: int) -> DataError:
-    """Return what to raise where a factorisation finds a covariance indefinite."""
+    """Return the error to raise for a covariance that a factorization finds indefinite."""
     return _bad("estimation.covariance-indefinite-in-row", i=row + 1)
 
 
@@ -301,7 +301,7 @@ def _bad(code: str, **data: Any) -> DataError:
 
 
 def check_prediction(state: Array, Phi: Array, Q: Array) -> None:
-    """Raise `DataError` where the shapes of a prediction do not fit."""
+    """Raise `DataError` if the shapes of a prediction do not match."""
     for name, given in (("Phi", Phi), ("Q", Q)):
         if given.shape != state.shape:
             raise DataError(
@@ -314,7 +314,7 @@ def check_prediction(state: Array, Phi: Array, Q: Array) -> None:
 
 
 def bad_prediction(row: int, Phi: Array, Q: Array) -> DataError:
-    """Return what to raise where a predicted variance is no variance."""
+    """Return the error to raise for an invalid predicted variance."""
     for name, given in (("Phi", Phi), ("Q", Q)):
         if not np.isfinite(given).all():
             i, j = np.argwhere(~np.isfinite(given))[0]
@@ -332,7 +332,7 @@ def bad_prediction(row: int, Phi: Array, Q: Array) -> DataError:
 
 
 def check_observations(x: Array, z: Array, H: Array, R: Array) -> None:
-    """Raise `DataError` where the shapes of an epoch's observations do not fit."""
+    """Raise `DataError` if the shapes of an epoch's observations do not match."""
     if H.ndim != 2 or H.shape[1] != len(x) or not H.shape[0] == len(z) == len(R):
         raise DataError(
             "estimation.z-shape-h-r-states",
@@ -345,7 +345,7 @@ def check_observations(x: Array, z: Array, H: Array, R: Array) -> None:
 
 
 def bad_observation(j: int, nu: float, s: float, R: Array) -> DataError:
-    """Return what to raise where observation j cannot be used."""
+    """Return the error to raise for an invalid observation j."""
     if not R[j] >= 0.0 or not np.isfinite(R[j]):
         return DataError("estimation.variance-observation", quantity="R", j=j + 1, r=R[j])
     which, number = (
@@ -354,7 +354,7 @@ def bad_observation(j: int, nu: float, s: float, R: Array) -> DataError:
     return DataError("estimation.observation", quantity="z", which=which, number=number, j=j + 1)
 
 
-# The observations of an epoch, one after the other, under a rule that is asked at each.
+# Sequential update with the observations of an epoch; the rule is evaluated at each.
 
 
 def take_by_rule(
@@ -366,19 +366,19 @@ def take_by_rule(
     rule: UpdateRule | Sequence[UpdateRule],
     work: Array,
 ) -> Innovations:
-    """Change the parts of a covariance and x, in place, by every observation.
+    """Update the factors of a covariance and x, in place, by every observation.
 
     Parameters
     ----------
     expect, take : kernels
-        The two halves of a scalar step; between them the rule is asked.
+        The two halves of a scalar step; the rule is evaluated between them.
     parts : (ndarray, ndarray)
-        What the kernels keep a covariance in.
+        Arrays in which the kernels keep a covariance.
     x : ndarray, (n,)
     observations : (z, H, R)
     rule : UpdateRule, or a sequence of them
     work : ndarray
-        What `expect` leaves to `take`.
+        Passed from `expect` to `take`.
     """
     z, H, R = observations
     matrix, diagonal = parts
@@ -400,7 +400,7 @@ def take_by_rule(
 
 
 def contiguous(*arrays: Array) -> list[Array]:
-    """Return arrays as the kernels want them."""
+    """Return contiguous arrays for the kernels."""
     return [np.ascontiguousarray(a, dtype=np.float64) for a in arrays]
 
 
@@ -409,7 +409,7 @@ def own(array: Array) -> Array:
     return np.array(array, dtype=np.float64, order="C")
 
 
-# The covariance as a matrix: Joseph's update, and the plain one to compare with.
+# The covariance as a matrix: Joseph's update, and the plain one for comparison.
 
 
 @cache
@@ -421,10 +421,10 @@ def _kernels() -> ModuleType:
 
 @dataclass(frozen=True)
 class Plain(CovarianceForm):
-    """``P <- (1 - K h) P``, kept to show where it fails.
+    """``P <- (1 - K h) P``, kept to show its failure.
 
-    A difference of two matrices that may be equal to rounding: with observations much better
-    than what is known before, variances become negative.
+    A difference of two matrices that may be equal to rounding: variances become negative with
+    observations much more accurate than the prediction.
     """
 
     name: ClassVar[str] = "plain"
@@ -455,7 +455,7 @@ class Plain(CovarianceForm):
         R: Array,
         rule: UpdateRule | Sequence[UpdateRule] | None = None,
     ) -> tuple[Array, Array, Innovations]:
-        """Take the observations of an epoch, one after the other; see `CovarianceForm.update`.
+        """Update with the observations of an epoch; see `CovarianceForm.update`.
 
         Raises
         ------
@@ -489,8 +489,8 @@ class Plain(CovarianceForm):
 class Joseph(Plain):
     """``P <- (1 - K h) P (1 - K h)' + r K K'``.
 
-    A sum of two matrices neither of which is negative, whatever the gain is: rounding of the gain
-    counts in second order only. It holds P itself, which costs half of the digits that U-D has.
+    A sum of two positive semidefinite matrices, whatever the gain is: rounding of the gain has a
+    second-order effect only. It holds P itself, which costs half of the digits that U-D has.
     """
 
     name: ClassVar[str] = "joseph"
@@ -513,8 +513,8 @@ def _kernels_ud() -> tuple[ModuleType, ModuleType]:
 class BiermanThornton(CovarianceForm):
     """Unit upper triangular U and diagonal D; a state holds U above its diagonal and D on it.
 
-    No variance is ever computed as a difference: D stays >= 0, and digits are kept as if by
-    square roots, without taking any.
+    A variance is never computed as a difference: D stays >= 0, and digits are kept as in a square
+    root form, without square roots.
     """
 
     name: ClassVar[str] = "ud"
@@ -555,7 +555,7 @@ class BiermanThornton(CovarianceForm):
         R: Array,
         rule: UpdateRule | Sequence[UpdateRule] | None = None,
     ) -> tuple[Array, Array, Innovations]:
-        """Take the observations of an epoch, one after the other; see `CovarianceForm.update`.
+        """Update with the observations of an epoch; see `CovarianceForm.update`.
 
         Raises
         ------
@@ -583,7 +583,7 @@ class BiermanThornton(CovarianceForm):
         return out
 
 
-# The W-D form: columns are appended over an epoch, and orthogonalised once at its end.
+# The W-D form: columns are appended over an epoch, and orthogonalized once at its end.
 
 
 @cache
@@ -598,8 +598,8 @@ class Chernodarov(BiermanThornton):
     """``P = W D W'`` within an epoch, ``U D U'`` between epochs.
 
     W begins as ``[Phi U, G]``; an observation deflates it and appends its gain as a column, so
-    that Joseph's form is met factor by factor. `epoch` orthogonalises once for prediction
-    and observations together, as the source does; `predict` and `update` alone do so once each.
+    that the result is Joseph's form in factors. `epoch` orthogonalizes once for prediction and
+    observations together, as the source does; `predict` and `update` alone do so once each.
     """
 
     name: ClassVar[str] = "wd"
@@ -615,7 +615,7 @@ class Chernodarov(BiermanThornton):
         R: Array,
         rule: UpdateRule | Sequence[UpdateRule] | None = None,
     ) -> tuple[Array, Array, Innovations]:
-        """Take the observations of an epoch, one after the other; see `CovarianceForm.update`."""
+        """Update with the observations of an epoch; see `CovarianceForm.update`."""
         (state,) = contiguous(state)
         return self._observed(state, state, state, False, x, (z, H, R), rule)
 
@@ -630,7 +630,7 @@ class Chernodarov(BiermanThornton):
         R: Array,
         rule: UpdateRule | Sequence[UpdateRule] | None = None,
     ) -> tuple[Array, Array, Innovations]:
-        """Predict and take the observations, with one orthogonalisation (Eqs. 6-15)."""
+        """Predict and update with one orthogonalization (Eqs. 6-15)."""
         state, Phi, Q = contiguous(state, Phi, Q)
         check_prediction(state, Phi, Q)
         return self._observed(state, Phi, Q, True, x, (z, H, R), rule)
@@ -669,7 +669,7 @@ class Chernodarov(BiermanThornton):
         return out, x, innovations
 
 
-# The one table of covariance forms.
+# Covariance forms by name.
 
 
 COVARIANCES: dict[str, type[CovarianceForm]] = {

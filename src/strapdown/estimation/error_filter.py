@@ -1,4 +1,4 @@
-"""A Kalman filter over the errors of a mechanization, fed back at every observation."""
+"""Closed-loop Kalman filter over the errors of a mechanization (error-state EKF)."""
 
 from __future__ import annotations
 
@@ -43,23 +43,23 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-# Part by which noise is larger than what is known of it, so that what is left is no less than zero:
-# of a noise of less than full rank, as that of a quaternion's four numbers, the rounding of the
-# whole, 2e-16, must be nothing beside this part of it (`_kernels.factors.INDEFINITE`).
+# Relative excess of a noise over its known part, so that the difference stays positive
+# semidefinite: for a noise of deficient rank, as that of a quaternion's four numbers, rounding of
+# the whole, 2e-16, must be negligible beside it (`_kernels.factors.INDEFINITE`).
 ROUNDING = 1e-5
-# Place of the rotation among the physical errors.
+# Position of the rotation among the physical errors.
 ROTATION = slice(6, 9)
 
 
 @dataclass(frozen=True)
 class ErrorFilter:
-    """Closed loop: what is estimated is taken off the mechanization and off the sensors at once.
+    """Closed loop: estimates are subtracted at once from the mechanization and the sensors.
 
-    Errors are computed less true, and so those of the sensors are what their readings are still
-    too large by after the estimates have been taken off: true error less estimate. In the
-    covariance, the signs between attitude and biases are those of these errors.
+    Error = computed − true. Those of the sensors are the residual errors of the readings after the
+    estimates have been subtracted: true error − estimate. In the covariance, the signs between
+    attitude and biases are those of these errors.
 
-    It holds no state: `begin` makes one, `predict` and `observe` give a new one.
+    Stateless: `begin` makes a state, `predict` and `observe` return a new one.
 
     Attributes
     ----------
@@ -67,18 +67,18 @@ class ErrorFilter:
     model : ErrorModel
     form : CovarianceForm
     rule : UpdateRule, optional
-        How far an observation is believed; without one, all of it.
+        Weighting of observations; full weight if not given.
     step : float, s
         Longest time over which errors grow by means of attitude and force.
     rests : bool
-        Whether the body is known to stay where it is, so that errors grow by gravity and the
-        attitude, and not by what the sensors read: their noise, and what sways, would be taken for
-        a motion that tells one error from another, although they are what is observed. Errors
-        of the biases then keep their direction in level axes, and not in the body's, where an
-        attitude is corrected: what a rest cannot tell keeps its direction, while otherwise each
-        correction of a heading by degrees makes something of it known (Huang, Mourikis and
-        Roumeliotis, Int. J. Robotics Research 29 (2010) 502, of such filters). The standard
-        deviations of the axes that a correction mixes should be alike.
+        Whether the body is known to be stationary, so that errors grow by gravity and the
+        attitude, not by the sensor readings: sensor noise and sway would act as a motion that
+        separates errors, although they are themselves observed. Errors of the biases then keep
+        their direction in level axes, not in body axes, when an attitude is corrected:
+        unobservable directions stay so, while otherwise each correction of a heading by degrees
+        adds false information on it (Huang, Mourikis and Roumeliotis, Int. J. Robotics Research
+        29 (2010) 502, on such filters). The standard deviations of the axes that a correction
+        mixes should be alike.
     """
 
     mechanization: Mechanization
@@ -122,14 +122,14 @@ class ErrorFilter:
         )
 
     def compensated(self, state: FilterState, rows: Array) -> Array:
-        """Return rows of motion increments without the errors estimated so far, (k, 10)."""
+        """Return rows of motion increments with the estimated errors subtracted, (k, 10)."""
         out = np.empty_like(rows)
         of_gyros, of_accels = self.errors_of_sensors(state)
         compensate(rows, of_gyros, of_accels, out)
         return out
 
     def errors_of_sensors(self, state: FilterState) -> Array:
-        """Return what the estimates say of the readings, (2, 7, 3): gyros, accelerometers.
+        """Return the estimated errors of the readings, (2, 7, 3): gyros, accelerometers.
 
         A constant part, and parts per rate x, y, z and per force x, y, z.
         """
@@ -141,7 +141,7 @@ class ErrorFilter:
     def advance_compensated(
         self, mechanization: Array, time: Array, rows: Array, history: Array
     ) -> None:
-        """Advance a state of the mechanization, in place, over increments without errors.
+        """Advance a state of the mechanization, in place, over compensated increments.
 
         Parameters
         ----------
@@ -157,7 +157,7 @@ class ErrorFilter:
         Raises
         ------
         DivergenceError
-            The state left what the mechanization can do; the sample is named.
+            The state is outside the validity of the mechanization; the sample is named.
         """
         made, why = self.mechanization.advance_rows(
             mechanization, rows, np.empty(0), self.earth, history
@@ -168,7 +168,7 @@ class ErrorFilter:
     def follow(
         self, state: FilterState, time: Array, history: Array, rows: Array, mechanization: Array
     ) -> tuple[FilterState, Array]:
-        """Take estimates and covariance over steps that the mechanization has made.
+        """Propagate estimates and covariance over steps that the mechanization has made.
 
         Parameters
         ----------
@@ -200,7 +200,7 @@ class ErrorFilter:
         return after, Phi
 
     def predict(self, state: FilterState, time: Array, rows: Array) -> tuple[FilterState, Segment]:
-        """Go on over motion increments.
+        """Propagate over motion increments.
 
         Parameters
         ----------
@@ -219,7 +219,7 @@ class ErrorFilter:
         Raises
         ------
         DivergenceError
-            The mechanization has left the range in which it means anything.
+            The mechanization has left its range of validity.
         """
         after, segment = self._run(state, time, rows)
         Phi, Q = self._transition(segment)
@@ -232,13 +232,13 @@ class ErrorFilter:
         rows: Array,
         observe: Callable[[Segment], Observation],
     ) -> tuple[FilterState, Segment, Innovations]:
-        """Go on over motion increments that are themselves observed, and take off what that tells.
+        """Predict over motion increments that are themselves observed, and correct by them.
 
-        The noise of such an observation is in the state, too: that of gyros whose turn is compared
-        with the Earth's turns the attitude as well. It is met by taking the observation before the
-        prediction, from which then comes off what is known of the noise: with the noise v of the
-        observation, ``M = cov(w, v)`` and ``S = M R^-1``, the transition is ``Phi - S H`` and the
-        covariance of the noise ``Q - S M'`` (Simon, Optimal State Estimation, 2006, sec. 7.1).
+        The noise of such an observation is in the state, too: the noise of gyros whose rotation is
+        compared with the Earth's also rotates the attitude. So the observation is processed before
+        the prediction, from which the known part of the noise is subtracted: with the noise v of
+        the observation, ``M = cov(w, v)`` and ``S = M R^-1``, the transition is ``Phi - S H`` and
+        the covariance of the noise ``Q - S M'`` (Simon, Optimal State Estimation, 2006, sec. 7.1).
 
         Parameters
         ----------
@@ -246,7 +246,7 @@ class ErrorFilter:
         time, rows : ndarray
             As `predict`.
         observe : callable
-            Makes the observation of a segment: of the errors at its start, R without the noise
+            Returns the observation of a segment: of the errors at its start, R without the noise
             that is in the rotation of the state.
 
         Returns
@@ -263,7 +263,7 @@ class ErrorFilter:
         to_physical = self.model.to_physical(used, after.time, after.row)
         M = Q @ to_physical[ROTATION].T
         shared = to_physical[ROTATION] @ M
-        # As independent components, each with no less than its part.
+        # As independent components, each with at least its part.
         R = observation.R + (1.0 + ROUNDING) * np.abs(shared).sum(axis=1)
         covariance, x, seen = self.form.update(
             state.covariance, np.zeros(len(Q)), observation.z, H, R, self.rule
@@ -280,7 +280,7 @@ class ErrorFilter:
         observations: Sequence[Observation],
         rules: Sequence[Rules] | None = None,
     ) -> tuple[FilterState, Array, list[Innovations]]:
-        """Take the observations of an epoch, and take off what they tell of the errors.
+        """Update with the observations of an epoch, and correct the state (closed loop).
 
         Parameters
         ----------
@@ -288,14 +288,14 @@ class ErrorFilter:
         observations : sequence of Observation
             Of this state, independent of each other.
         rules : sequence of UpdateRule, of a sequence of them, or of None, optional
-            How far each is believed, all of its components alike or each by its own rule; the
-            filter's own for all, if not given.
+            Weighting of each, one rule for all of its components or one for each; the filter's
+            own for all, if not given.
 
         Returns
         -------
         state : FilterState
         taken : ndarray, (p,)
-            The physical errors that were taken off.
+            The physical errors that were corrected.
         innovations : list of Innovations
             Of each observation.
         """
@@ -311,13 +311,13 @@ class ErrorFilter:
         observations: Sequence[Observation],
         rules: Sequence[Rules] | None = None,
     ) -> tuple[FilterState, Array, list[Innovations]]:
-        """Take the observations of an epoch, and take nothing off.
+        """Update with the observations of an epoch without correcting the state.
 
         Parameters
         ----------
         state : FilterState
         x : ndarray, (n,)
-            States as they are estimated before.
+            Estimated states before it.
         observations, rules
             As `observe`.
 
@@ -340,7 +340,7 @@ class ErrorFilter:
         return replace(state, covariance=covariance), x, split_innovations(seen, observations)
 
     def widened(self, state: FilterState, Q: Array) -> FilterState:
-        """Return a state of which less is known by a covariance of the states, (n, n)."""
+        """Return a state with its covariance inflated by a covariance of the states, (n, n)."""
         nothing_moves = np.eye(len(Q))
         return replace(state, covariance=self.form.predict(state.covariance, nothing_moves, Q))
 
@@ -353,11 +353,11 @@ class ErrorFilter:
         return symmetric(T @ P @ T.T)
 
     def _transition(self, segment: Segment) -> tuple[Array, Array]:
-        """How errors go over a segment."""
+        """Transition of the errors over a segment, with its noise."""
         return self.model.transition(resting(segment) if self.rests else segment, self.step)
 
     def _run(self, state: FilterState, time: Array, rows: Array) -> tuple[FilterState, Segment]:
-        """The mechanization over increments without estimated errors; the covariance as it was."""
+        """Run the mechanization over compensated increments; the covariance is unchanged."""
         used = self.mechanization
         rows = self.compensated(state, rows)
         history = np.empty((len(rows) + 1, used.row))
@@ -373,15 +373,15 @@ class ErrorFilter:
         return state.sensors * np.exp(-self.model.stacked.decay * (time - state.time))
 
     def _fed_back(self, state: FilterState, to_physical: Array, x: Array) -> FilterState:
-        """Take an estimate off the mechanization and off the sensors."""
+        """Subtract an estimate from the mechanization and from the sensors."""
         used = self.mechanization
         physical = to_physical @ x
         corrected = used.correct(state.mechanization, physical[:PHYSICAL])
         row = used.history_row(corrected)
         covariance = state.covariance
         if not self.model.states_are_physical:
-            # States that are components of what has just been corrected are meant of it from now
-            # on: the norm of a quaternion is along the new one.
+            # States defined by the corrected quantity refer to the new one from now on: the norm
+            # error of a quaternion is along the new quaternion.
             carried = self.model.from_physical(used, state.time, row) @ to_physical
             covariance = self.form.predict(covariance, carried, np.zeros_like(covariance))
         if self.rests:
@@ -397,7 +397,7 @@ class ErrorFilter:
 
 
 def diverged(time: float) -> DivergenceError:
-    """A state left what its mechanization can do, with the sample at this time."""
+    """Error for a state outside the mechanization's validity, at the sample of this time."""
     return DivergenceError("estimation.state-diverged-sample", quantity="state", time=time)
 
 
@@ -406,18 +406,18 @@ def symmetric(P: Array) -> Array:
     return 0.5 * (P + P.T)
 
 
-# What a filter remembers from one step to the next.
+# State of a filter between steps.
 
 
 @dataclass(frozen=True, eq=False)
 class FilterState:
-    """Everything that a filter remembers: from here it goes on.
+    """State of a filter between steps.
 
     Attributes
     ----------
     time : float, s
     mechanization : ndarray
-        State of the mechanization, errors taken off.
+        State of the mechanization, corrected.
     row : ndarray
         Its row of a history.
     sensors : ndarray, (k,)
@@ -433,17 +433,17 @@ class FilterState:
     covariance: Array
 
 
-# Observations of one epoch as one update: whose rule each component has, and what each told.
+# Observations of one epoch as one update: the rule and the innovation of each component.
 
 
-#: What an observation is believed by: one rule, one for each of its components, or none.
+#: Weighting of an observation: one rule, one for each of its components, or none.
 Rules = UpdateRule | Sequence[UpdateRule] | None
 
 
 def rules_of_components(
     rules: Sequence[Rules], observations: Sequence[Observation]
 ) -> list[UpdateRule] | None:
-    """Return one rule for each component; none at all where nothing has one.
+    """Return one rule for each component, or None if no component has one.
 
     Parameters
     ----------
@@ -460,7 +460,7 @@ def rules_of_components(
 
 
 def split_innovations(seen: Innovations, observations: Sequence[Observation]) -> list[Innovations]:
-    """Return of each observation what all of them told together.
+    """Split the innovations of a joint update by observation.
 
     Parameters
     ----------
@@ -473,17 +473,17 @@ def split_innovations(seen: Innovations, observations: Sequence[Observation]) ->
     return [Innovations(*one) for one in zip(*parts, strict=True)]
 
 
-# How errors go where the body is known to stay where it is (`ErrorFilter.rests`).
+# Error propagation for a body known to be stationary (`ErrorFilter.rests`).
 
 
-# Place of the attitude in a level row.
+# Position of the attitude in a level row.
 ATTITUDE = slice(Q_LB, Q_LB + 4)
-# Blocks of states that are vectors of the body.
+# Blocks of states that are vectors in body axes.
 BIASES = ("gyro_bias", "accel_bias")
 
 
 def resting(segment: Segment) -> Segment:
-    """Return a segment whose forces are gravity in the attitude that it has.
+    """Return a segment whose specific forces are gravity at its attitude.
 
     Parameters
     ----------
@@ -506,7 +506,7 @@ def resting(segment: Segment) -> Segment:
 def biases_in_level(
     mechanization: Mechanization, layout: StateLayout, before: Array, after: Array
 ) -> Array:
-    """Return how states go on where a correction leaves the errors of biases in level axes.
+    """Return the transition by a correction that keeps bias errors constant in level axes.
 
     Parameters
     ----------
@@ -538,15 +538,15 @@ def _gravity(mechanization: Mechanization, level: Array) -> float:
     return float(np.linalg.norm(found))
 
 
-# What a tilt that is corrected leaves unknown of the vertical force, which is of second order.
+# Second-order uncertainty of the vertical force after the correction of a tilt.
 
 
-# Root of the summed variances of both tilts, rad, below which all this is no more than
-# 1 mm/s², as an accelerometer of the cheapest class drifts.
+# Root of the summed variances of both tilts, rad, below which the effect is at most 1 mm/s², the
+# drift of an accelerometer of the cheapest class.
 LARGE = math.radians(0.8)
-# Places of both tilts among the physical errors.
+# Positions of both tilts among the physical errors.
 TILTS = slice(6, 8)
-# Blocks of states that read as a bias of the accelerometers, the one that is asked first.
+# Blocks of states that act as a bias of the accelerometers, in order of preference.
 LARGE_TILT_BIASES = ("accel_bias", "accel_drift")
 
 
@@ -568,16 +568,16 @@ def is_large(P: Array) -> bool:
 def unlearnt_force(
     filter_: ErrorFilter, state: FilterState, before: Array, after: Array
 ) -> Array | None:
-    """Return the variance by which less is known of the accelerometers after a correction of tilt.
+    """Return the added variance of the accelerometer bias after a correction of tilt.
 
-    While a vehicle goes straight on, fixes tell the sum of a tilt and of the accelerometers' bias
-    that hides it, and of the vertical bias all, about the attitude that was computed then. Once the
-    tilt is told by something else, a turn mostly, and corrected by x and y, gravity along the body
-    is another by ``g (x² + y²)/2``, of which a linear filter knows nothing. Its variance is
-    ``g² tr(T²)/2`` with the covariance T of the tilts that are tied to the bias; of an update it is
-    that before less that after, so that it does not count by how many updates a tilt was told.
+    While a vehicle goes straight on, fixes determine the sum of a tilt and of the accelerometer
+    bias that hides it, and the whole vertical bias, about the computed attitude. Once the tilt is
+    observed otherwise, mostly by a turn, and corrected by x and y, gravity along the body changes
+    by ``g (x² + y²)/2``, which a linear filter neglects. Its variance is ``g² tr(T²)/2`` with the
+    covariance T of the tilts that are tied to the bias; an update inflates by the decrease of this
+    variance, so that the sum does not depend on the number of updates.
 
-    Its mean is left out: taken off, it changed nothing of how far bounds held in 60 drives.
+    Its mean is neglected: subtracting it did not change how far bounds held in 60 drives.
 
     Parameters
     ----------
@@ -590,15 +590,16 @@ def unlearnt_force(
     Returns
     -------
     ndarray, (n, n), or None
-        For the states of the model. None where the tilt is not large, nothing of it is tied, or
-        the model has no bias of the accelerometers.
+        For the states of the model. None where the tilt is not large, no part is tied to a
+        bias, or the model has no bias of the accelerometers.
 
     Notes
     -----
-    Tied is what the bias goes with the tilt: ``T = M P M'/g²`` with the regression M of the force
-    that the accelerometers read too much, level axes, on the tilts. Of an accelerometer that is
-    known M is zero, and so is all of this. Jazwinski, Stochastic Processes and Filtering Theory
-    (1970), sec. 9.3, has the variance of a second order; when it comes in is derived here.
+    Tied is the part of the bias that is correlated with the tilt: ``T = M P M'/g²`` with the
+    regression M of the accelerometers' error, level axes, on the tilts. For an exactly known
+    accelerometer M is zero, and so is the inflation. Jazwinski, Stochastic Processes and
+    Filtering Theory (1970), sec. 9.3, has the variance of a second order; when it applies is
+    derived here.
     """
     layout = filter_.model.layout
     names = [name for name in LARGE_TILT_BIASES if name in layout]

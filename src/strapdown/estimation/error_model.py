@@ -1,4 +1,4 @@
-"""What every error model is: states, how they go on over a segment, and what they mean."""
+"""Interface of every error model: states, propagation over a segment, physical meaning."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ PHYSICAL = 9
 
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """A piece of a run of a mechanization.
+    """A segment of a run of a mechanization.
 
     Attributes
     ----------
@@ -50,11 +50,11 @@ class Segment:
 
 @dataclass(frozen=True)
 class ErrorModel(ABC):
-    """How the errors of a mechanization and of its sensors go on; it holds no state of its own.
+    """Propagation of the errors of a mechanization and of its sensors; stateless.
 
-    Errors are what is computed or measured less the truth. Whatever its own states are, a model
-    tells the same physical errors: of the state of navigation the nine of
-    `mechanization.state_error.state_error`, in level axes of the mechanization, and then those of
+    Error = computed or measured − truth. Whatever its own states are, a model gives the same
+    physical errors: first the nine of the navigation state as in
+    `mechanization.state_error.state_error`, in level axes of the mechanization, then those of
     the sensors, in the order of `sensors`.
 
     Attributes
@@ -74,7 +74,7 @@ class ErrorModel(ABC):
     core: ClassVar[tuple[StateBlock, ...]]
     #: Whether the states are the physical errors themselves.
     states_are_physical: ClassVar[bool] = False
-    #: Whether it has a state of the height.
+    #: Whether the height error is a state.
     has_height: ClassVar[bool] = True
 
     @cached_property
@@ -94,7 +94,7 @@ class ErrorModel(ABC):
 
     @cached_property
     def columns_of(self) -> dict[str, slice]:
-        """Place of each block of the sensors among the physical errors, by name."""
+        """Position of each block of the sensors among the physical errors, by name."""
         out: dict[str, slice] = {}
         at = PHYSICAL
         for one in self.sensors:
@@ -104,7 +104,7 @@ class ErrorModel(ABC):
 
     @abstractmethod
     def transition(self, segment: Segment, step: float) -> tuple[Array, Array]:
-        """Return how errors go from the start of a segment to its end.
+        """Return the transition of the errors from the start of a segment to its end.
 
         Parameters
         ----------
@@ -126,15 +126,15 @@ class ErrorModel(ABC):
 
     @abstractmethod
     def from_physical(self, mechanization: Mechanization, time: float, row: Array) -> Array:
-        """Return E of ``x = E physical``, (n, `physical_size`): ``T E = 1`` on what x can tell.
+        """Return E of ``x = E physical``, (n, `physical_size`): ``T E = 1`` on the states' range.
 
-        What the model does not hold, such as a height that is kept, is lost; what is nothing
-        physical, such as the norm of a quaternion, is zero.
+        Errors without a state in the model, such as that of a held height, are lost; states without
+        physical meaning, such as the norm of a quaternion, are zero.
         """
 
 
 def refuse_damped_height(mechanization: Mechanization) -> None:
-    """Refuse a mechanization whose height has a loop of its own.
+    """Refuse a mechanization with a height loop of its own.
 
     Parameters
     ----------
@@ -159,11 +159,11 @@ AXES = ("x", "y", "z")
 class RotationVectorModel(ErrorModel):
     """Errors as vectors relative to the Earth: the psi-angle model, in level axes.
 
-    Its nine core states are the physical errors themselves, whatever mechanization they are of:
-    those of `mechanization.state_error.state_error`. With gyro and accelerometer biases it has 15
-    states. Regular everywhere, the poles included, where the mechanization is.
+    Its nine core states are the physical errors themselves, for any mechanization: those of
+    `mechanization.state_error.state_error`. With gyro and accelerometer biases it has 15
+    states. Regular wherever the mechanization is, including the poles.
 
-    To first order in the errors; over a step of attitude and force by their means.
+    To first order in the errors; a step uses mean attitude and force.
 
     Attributes
     ----------
@@ -182,7 +182,7 @@ class RotationVectorModel(ErrorModel):
     )
 
     def transition(self, segment: Segment, step: float) -> tuple[Array, Array]:
-        """Return how errors go over a segment, as `ErrorModel.transition`.
+        """Return the transition of the errors over a segment, as `ErrorModel.transition`.
 
         Raises
         ------
@@ -238,22 +238,22 @@ STATES = states.STATES
 
 @dataclass(frozen=True)
 class QuaternionModel(ErrorModel):
-    """Errors of what a wander-azimuth mechanization reckons, component by component.
+    """Errors of a wander-azimuth mechanization, component by component.
 
     The states of Chernodarov (2009), (3): the errors of the three components of velocity in the
     axes xi, eta, zeta, of the four of the quaternion body to inertial, and of the four of the
     quaternion level to Earth; with gyro and accelerometer biases 17. ``A = dF/dY`` of (1), (2),
-    (4), with the standard skew-symmetric matrix in (1), whose print is not. There is no state of
-    the height: with a height that is held the vertical velocity has no error; with a free one it
-    has, and what gravity gives away with height is left out.
+    (4), with the standard skew-symmetric matrix in (1), where the printed one is not. The height
+    has no state: with a height that is held the vertical velocity has no error; with a free one it
+    has, and the change of gravity with height is neglected.
 
-    Three directions are nothing physical: the norms of the two quaternions, and a turn of the level
-    axes about zeta together with the velocity's components. `from_physical` gives them zero, and
-    they stay zero: norms are kept by the equations, and at the end of every segment the level axes
-    of the truth are taken to be those without a turn about zeta.
+    Three directions have no physical meaning: the norms of the two quaternions, and a turn of the
+    level axes about zeta together with the velocity's components. `from_physical` gives them zero,
+    and they stay zero: norms are kept by the equations, and at the end of every segment the level
+    axes of the truth are taken to be those without a turn about zeta.
 
-    Inertial axes are those of the Earth at time zero. To first order in the errors; over a step of
-    attitude and force by their means. Regular at the poles.
+    Inertial axes are those of the Earth at time zero. To first order in the errors; a step uses
+    mean attitude and force. Regular at the poles.
 
     Attributes
     ----------
@@ -275,7 +275,7 @@ class QuaternionModel(ErrorModel):
     )
 
     def transition(self, segment: Segment, step: float) -> tuple[Array, Array]:
-        """Return how errors go over a segment, as `ErrorModel.transition`.
+        """Return the transition of the errors over a segment, as `ErrorModel.transition`.
 
         Parameters
         ----------
@@ -371,7 +371,7 @@ class QuaternionModel(ErrorModel):
         return out
 
     def null_directions(self, mechanization: Mechanization, time: float, row: Array) -> Array:
-        """Return what is nothing physical.
+        """Return the directions without physical meaning.
 
         Parameters
         ----------
@@ -420,7 +420,7 @@ def _checked(mechanization: Mechanization) -> Mechanization:
     return mechanization
 
 
-# The one table of error models.
+# Error models by name.
 
 
 ERROR_MODELS: dict[str, type[ErrorModel]] = {

@@ -1,4 +1,4 @@
-"""The robust update: an observation weighs what its residual after the fit deserves."""
+"""Robust measurement updates: M-estimators of the residual after the fit."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from strapdown.estimation.covariance import Innovations, Step
 __all__ = ["AdaptiveRule", "Scales"]
 
 
-# What every influence function is: how much a residual counts, the larger it is.
+# Interface of every influence function: the influence of a residual by its size.
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Influence(ABC):
     @property
     @abstractmethod
     def linear(self) -> float:
-        """Residual up to which it is least squares: ``psi(u) = u``."""
+        """Residual up to which psi is linear: ``psi(u) = u``."""
 
     @property
     @abstractmethod
@@ -56,7 +56,7 @@ class Influence(ABC):
         """Slope of psi; at a bend, that of the side nearer to zero."""
 
     def weight(self, u: float) -> float:
-        """Share of a residual that counts, ``psi(u) / u``, from 1 at zero downwards to 0."""
+        """Weight of a residual, ``psi(u) / u``, from 1 at zero down to 0."""
         return self.psi(u) / u if u else 1.0
 
 
@@ -80,7 +80,7 @@ def check_rising(name: str, **values: float) -> None:
         before, known = value, quantity
 
 
-# Least squares as an influence function: every residual counts in full.
+# Least squares as an influence function: every residual has full weight.
 
 
 @dataclass(frozen=True)
@@ -114,15 +114,15 @@ class LeastSquares(Influence):
         return 1.0
 
 
-# Huber's influence function: a residual counts no more than k standard deviations.
+# Huber's influence function: the influence of a residual is limited to k standard deviations.
 
 
 @dataclass(frozen=True)
 class Huber(Influence):
     """``psi(u) = u`` up to k, and k beyond.
 
-    Convex: there is one minimiser, and nothing is ever rejected outright, so that an estimate that
-    is wrong is always pulled back. A gross error goes on pulling with k standard deviations.
+    Convex: the minimizer is unique, and no observation is rejected outright, so that a wrong
+    estimate is always pulled back. A gross error keeps the influence of k standard deviations.
 
     Attributes
     ----------
@@ -155,7 +155,7 @@ class Huber(Influence):
         return 0.5 * u * u if u <= self.k else self.k * (u - 0.5 * self.k)
 
     def psi(self, u: float) -> float:
-        """The residual, at most k of it."""
+        """The residual, limited to k."""
         return u if abs(u) <= self.k else math.copysign(self.k, u)
 
     def psi_prime(self, u: float) -> float:
@@ -163,23 +163,23 @@ class Huber(Influence):
         return 1.0 if abs(u) <= self.k else 0.0
 
 
-#: A weight below it is none: the variance R / w of the observation must stay a number.
+#: A smaller weight counts as zero: the variance R / w of the observation must stay finite.
 NO_WEIGHT = 1e-30
 
 
 @dataclass(frozen=True)
 class RobustUpdate:
-    """The minimiser of ``(x - m)' P^-1 (x - m) / 2 + rho(residual)``, and a Kalman step to it.
+    """The minimizer of ``(x - m)' P^-1 (x - m) / 2 + rho(residual)``, and a Kalman step to it.
 
-    With the weight ``w = psi(beta) / beta`` of the residual beta that the minimiser leaves, the
-    Kalman update with the variance R / w goes to that minimiser. The covariance is that
-    of the update, so that it is never negative, whatever the influence function is.
+    With the weight ``w = psi(beta) / beta`` of the residual beta at the minimizer, the Kalman
+    update with the variance R / w goes to that minimizer. The covariance is that of the update,
+    so that it is never negative, whatever the influence function is.
 
     Attributes
     ----------
     influence : Influence
     scale : float
-        Standard deviation of a good observation over that of its stated variance.
+        Standard deviation of a good observation relative to the stated one.
     """
 
     influence: Influence = field(default_factory=Huber)
@@ -196,8 +196,8 @@ class RobustUpdate:
         """Return the step to the minimiser; see `UpdateRule.step`."""
         r *= self.scale * self.scale
         linear = self.influence.linear
-        # Where the loss of least squares is below rho(linear), so is the minimiser's: its residual
-        # is in the linear range. Written so that an infinite range has no infinity times zero.
+        # Where the loss of least squares is below rho(linear), the minimizer's residual is in the
+        # linear range. Written so that an infinite range does not give infinity times zero.
         if abs(nu) <= linear * math.sqrt(s + r) or r == 0.0:
             return Step(nu, 1.0, r, 1.0)
         beta = post_fit(self.influence, abs(nu) / math.sqrt(r), s / r)
@@ -208,12 +208,12 @@ class RobustUpdate:
 
 
 def check_scale(scale: float) -> None:
-    """Raise `ConfigError` where a scale is not finite and positive."""
+    """Raise `ConfigError` for a scale that is not finite and positive."""
     if not (math.isfinite(scale) and scale > 0.0):
         raise ConfigError("estimation.scale-update", quantity="scale", scale=scale)
 
 
-# Hampel's influence function: in three parts, and nothing beyond c.
+# Hampel's influence function: in three parts, zero beyond c.
 
 
 @dataclass(frozen=True)
@@ -252,7 +252,7 @@ class Hampel(Influence):
         return (self.a, self.b, self.c)
 
     def rho(self, u: float) -> float:
-        """Half the square, a straight line, a parabola, and then the same for all."""
+        """Half the square, a straight line, a parabola, and then a constant."""
         u, a, b, c = abs(u), self.a, self.b, self.c
         if u <= a:
             return 0.5 * u * u
@@ -262,7 +262,7 @@ class Hampel(Influence):
         return a * (b - 0.5 * a) + 0.5 * a * ((c - b) - left * left / (c - b))
 
     def psi(self, u: float) -> float:
-        """The residual, then a, then less, then nothing."""
+        """The residual, then a, then decreasing, then zero."""
         size = abs(u)
         if size <= self.a:
             return u
@@ -278,14 +278,14 @@ class Hampel(Influence):
         return -self.a / (self.c - self.b) if self.b < size <= self.c else 0.0
 
 
-# Tukey's biweight: a smooth influence function that comes down to nothing at c.
+# Tukey's biweight: a smooth influence function that falls to zero at c.
 
 
 @dataclass(frozen=True)
 class Tukey(Influence):
-    """``psi(u) = u (1 - (u / c)^2)^2`` up to c, nothing beyond.
+    """``psi(u) = u (1 - (u / c)^2)^2`` up to c, zero beyond.
 
-    There is no linear range: even a good observation counts a little less than in full.
+    Without a linear range: even a good observation has slightly less than full weight.
 
     Attributes
     ----------
@@ -335,12 +335,12 @@ class Tukey(Influence):
         return (1.0 - t) ** 2 if t < 1.0 else 0.0
 
 
-# IGG-III: in full, then less and less, then nothing; used for positions from satellites.
+# IGG-III: full weight, then decreasing, then zero; used for GNSS positions.
 
 
 @dataclass(frozen=True)
 class Igg3(Influence):
-    """Weight 1 up to k0, ``(k0 / u) ((k1 - u) / (k1 - k0))^2`` up to k1, nothing beyond.
+    """Weight 1 up to k0, ``(k0 / u) ((k1 - u) / (k1 - k0))^2`` up to k1, zero beyond.
 
     Attributes
     ----------
@@ -370,7 +370,7 @@ class Igg3(Influence):
         return (self.k0, self.k1)
 
     def rho(self, u: float) -> float:
-        """Half the square, a cubic, and then the same for all."""
+        """Half the square, a cubic, and then a constant."""
         u = abs(u)
         if u <= self.k0:
             return 0.5 * u * u
@@ -379,7 +379,7 @@ class Igg3(Influence):
         return 0.5 * self.k0 * self.k0 + self.k0 * width / 3.0 * (1.0 - left**3)
 
     def psi(self, u: float) -> float:
-        """The residual, then ``k0 ((k1 - u) / (k1 - k0))^2``, then nothing."""
+        """The residual, then ``k0 ((k1 - u) / (k1 - k0))^2``, then zero."""
         size = abs(u)
         if size <= self.k0:
             return u
@@ -394,7 +394,7 @@ class Igg3(Influence):
         return -2.0 * self.k0 * max(0.0, self.k1 - size) / (self.k1 - self.k0) ** 2
 
 
-# The one table of influence functions.
+# Influence functions by name.
 
 
 INFLUENCES: dict[str, type[Influence]] = {
@@ -406,10 +406,10 @@ INFLUENCES: dict[str, type[Influence]] = {
 }
 
 
-# The residual that an observation leaves where its loss and the prior's are least together.
+# The residual at the minimum of the sum of an observation's loss and the prior's.
 
 
-#: Newton's steps go to the root from one side; they stop where they no longer change it.
+#: Newton's steps approach the root from one side; they stop when they no longer change it.
 STEPS = 200
 
 
@@ -417,14 +417,14 @@ def post_fit(influence: Influence, b: float, kappa: float) -> float:
     """Return the residual after the fit, in standard deviations of the observation.
 
     Along ``P h'`` the loss ``(x - m)' P^-1 (x - m) / 2 + rho`` is, as a function of the residual
-    beta that it leaves, ``(b - beta)^2 / (2 kappa) + rho(beta)``. It is stationary where
-    ``F(beta) = beta + kappa psi(beta) = b``; a minimum is where F rises. With a psi that comes
-    down again there are several of them, and the lowest is taken.
+    beta after the fit, ``(b - beta)^2 / (2 kappa) + rho(beta)``. It is stationary where
+    ``F(beta) = beta + kappa psi(beta) = b``; a minimum is where F rises. A redescending psi has
+    several minima; the lowest is taken.
 
     Between two knots F is convex or concave, and has one rising root at most. Newton's method
-    finds it from the left of a concave piece and from the right of a convex one: the tangent then
-    lies on the far side of F, no step goes past the root, and a slope that is not positive means
-    that there is none.
+    finds it from the left of a concave interval and from the right of a convex one: the tangent
+    then lies on the far side of F, no step goes past the root, and a slope that is not positive
+    means that there is none.
 
     Parameters
     ----------
@@ -458,7 +458,7 @@ def post_fit(influence: Influence, b: float, kappa: float) -> float:
 def _rising_root(
     influence: Influence, lo: float, hi: float, b: float, kappa: float
 ) -> float | None:
-    """Return where F rises through b between two neighbouring knots, if it does."""
+    """Return where F rises through b between two neighboring knots, or None."""
     psi, psi_prime = influence.psi, influence.psi_prime
     inside = math.nextafter(lo, math.inf)
     concave = psi_prime(inside) >= psi_prime(hi)
@@ -473,11 +473,11 @@ def _rising_root(
             return None
         after = u - excess / slope
         if after > hi:
-            # By rounding alone, or because there is no root before the knot.
+            # By rounding alone, or because F has no root before the knot.
             return hi if after <= hi * (1.0 + 1e-12) else None
         if after < lo:
             return lo if after >= lo * (1.0 - 1e-12) else None
-        # All steps go the same way, until rounding turns one back.
+        # All steps have the same direction, until rounding reverses one.
         if (after <= u) if concave else (after >= u):
             return u
         u = slope_at = after
@@ -485,23 +485,24 @@ def _rising_root(
     return u
 
 
-# The robust update as Chernodarov prints it: one Newton step, kept to show what it does.
+# The robust update as Chernodarov prints it: one Newton step, kept for comparison.
 
 
 @dataclass(frozen=True)
 class PaperUpdate:
     """One Newton step on ``(x - m)' P^-1 (x - m) / 2 + rho(nu / alpha)`` from the prediction.
 
-    It looks at the residual before the fit. Where the prediction is much less certain than the
-    observation that residual is large although nothing is wrong: Huber's psi' is then 0,
-    the step goes far past the minimum and takes nothing off the covariance. Where psi comes
-    down, psi' < 0 adds to it, or makes it negative. For comparison only; `RobustUpdate` is safe.
+    Uses the residual before the fit. Where the prediction is much less certain than the
+    observation that residual is large even without an error: Huber's psi' is then 0, the
+    step goes far past the minimum, and the covariance is not reduced. Where psi redescends,
+    psi' < 0 increases the covariance, or makes it negative. For comparison only; `RobustUpdate`
+    is safe.
 
     Attributes
     ----------
     influence : Influence
     scale : float
-        alpha over the standard deviation that is stated.
+        alpha over the stated standard deviation.
     """
 
     influence: Influence = field(default_factory=Huber)
@@ -525,23 +526,23 @@ class PaperUpdate:
         return Step(alpha * psi, slope, r, self.influence.weight(beta))
 
 
-# The scale of an observation's errors, learnt from its innovations.
+# The scale of an observation's errors, learned from its innovations.
 
 
 HUBER = Huber()
 
 
 class ScaleState(NamedTuple):
-    """What has been learnt of one kind of observation: numbers to keep with the filter.
+    """Learned scale of one kind of observation: numbers to keep with the filter.
 
     Attributes
     ----------
     log_square : float
         Logarithm of the square of the factor.
     information : float
-        Number of observations that it rests on, as far as they told of it.
+        Effective number of observations behind it.
     rejected : int
-        How many of the last observations, one after the other, were given no weight.
+        Number of latest observations in a row that were rejected.
     """
 
     log_square: float
@@ -550,26 +551,26 @@ class ScaleState(NamedTuple):
 
     @property
     def factor(self) -> float:
-        """Standard deviation of a good observation over that of its stated variance."""
+        """Standard deviation of a good observation relative to the stated one."""
         return math.exp(0.5 * self.log_square)
 
 
 @dataclass(frozen=True)
 class AdaptiveScale:
-    """How the factor of a stated standard deviation follows the innovations.
+    """Adaptation of the factor of a stated standard deviation to the innovations.
 
-    An innovation nu has the variance ``s + c^2 r``. The factor c is moved until the clipped
+    An innovation nu has the variance ``s + c^2 r``. The factor c is adjusted until the clipped
     squares ``min(nu^2 / (s + c^2 r), clip^2)`` have the mean that they have with normal errors
-    (Huber's second proposal, as a recursion with fading memory): a gross error counts no
-    more than clip standard deviations. Each counts by the share of its variance that is the
-    observation's own: after an outage, where ``s >> r``, next to nothing is learnt, or forgotten.
+    (Huber's second proposal, as a recursion with fading memory): a gross error counts at most as
+    clip standard deviations. Each observation is weighted by the share of its own variance: after
+    an outage, where ``s >> r``, almost no scale is learned or forgotten.
 
-    An estimate that is wrong by more than it says would make a function that comes down to nothing
-    reject every observation after it: after an outage in which the error grew to three of its
-    standard deviations, Tukey's does, one by one, though together they leave no doubt. After
-    `patience` rejections in a row `rule` therefore gives Huber's function, which rejects nothing.
+    An estimate with an error far beyond its covariance would make a redescending function reject
+    every later observation: after an outage in which the error grew to three of its standard
+    deviations, Tukey's does, one by one, though together they leave no doubt. After `patience`
+    rejections in a row `rule` therefore gives Huber's function, which never rejects.
 
-    The object has no state: what is learnt is a `ScaleState` that its user keeps.
+    The object is stateless: its user keeps the learned `ScaleState`.
 
     Attributes
     ----------
@@ -582,7 +583,7 @@ class AdaptiveScale:
         to a variance with which everything that follows is rejected. At the upper one the
         variance is 10^4 times the stated one, and it is time to look for a failure.
     clip : float
-        In standard deviations. With 1 the factor rises by 15 % where a tenth of the observations
+        In standard deviations. With 1 the factor rises by 15 % if a tenth of the observations
         are gross errors.
     patience : int
         Rejections in a row after which one observation is taken by Huber's function.
@@ -622,7 +623,7 @@ class AdaptiveScale:
         return within + k * k * (1.0 - inside), within
 
     def begin(self) -> ScaleState:
-        """Return the state in which the stated variance holds."""
+        """Return the initial state: the stated variance."""
         bounded = min(max(1.0, self.lowest), self.highest)
         return ScaleState(2.0 * math.log(bounded), self.prior, 0)
 
@@ -634,7 +635,7 @@ class AdaptiveScale:
     def after(
         self, state: ScaleState, nu: float, s: float, r: float, weight: float = 1.0
     ) -> ScaleState:
-        """Return what is known after an observation.
+        """Return the scale state after an observation.
 
         Parameters
         ----------
@@ -647,7 +648,7 @@ class AdaptiveScale:
         r : float
             Variance of the observation as stated, without the factor.
         weight : float
-            What the rule gave it; 0 is a rejection.
+            Weight by the rule; 0 is a rejection.
 
         Returns
         -------
@@ -671,7 +672,7 @@ class AdaptiveScale:
 # A robust rule that learns the scale of each component of an observation.
 
 
-#: What has been learnt of each component of an observation.
+#: Learned scale of each component of an observation.
 Scales = tuple[ScaleState, ...]
 
 
@@ -679,8 +680,8 @@ Scales = tuple[ScaleState, ...]
 class AdaptiveRule:
     """`RobustUpdate` with the scale that `AdaptiveScale` learns, component by component.
 
-    It has no state: who observes keeps the `Scales` of each observation, by its name. Where nobody
-    does, `step` is that of the stated variances.
+    Stateless: the caller keeps the `Scales` of each observation, by its name. Without them `step`
+    uses the stated variances.
 
     Attributes
     ----------
@@ -696,11 +697,11 @@ class AdaptiveRule:
     source: ClassVar[str] = "Huber 1981, Sections 6.4 (second proposal) and 7.8; recursion: here"
 
     def step(self, nu: float, s: float, r: float) -> Step:
-        """Return the step before anything has been learnt; see `UpdateRule.step`."""
+        """Return the step with the initial scale; see `UpdateRule.step`."""
         return RobustUpdate(self.influence).step(nu, s, r)
 
     def begin(self, size: int) -> Scales:
-        """Return what is known of so many components at the start."""
+        """Return the initial scale state of so many components."""
         return (self.scale.begin(),) * size
 
     def rules(self, scales: Scales) -> list[RobustUpdate]:
@@ -708,14 +709,14 @@ class AdaptiveRule:
         return [self.scale.rule(one, self.influence) for one in scales]
 
     def after(self, scales: Scales, seen: Innovations, R: NDArray[np.float64]) -> Scales:
-        """Return what is known after an observation.
+        """Return the scale state after an observation.
 
         Parameters
         ----------
         scales : tuple of ScaleState
             Before it.
         seen : Innovations
-            What came of it.
+            Innovations of the observation.
         R : ndarray, (l,)
             Its stated variances.
 
@@ -736,7 +737,7 @@ class AdaptiveRule:
         )
 
 
-# The one table of update rules.
+# Update rules by name.
 
 
 UPDATE_RULES: dict[str, type[RobustUpdate] | type[PaperUpdate] | type[AdaptiveRule]] = {

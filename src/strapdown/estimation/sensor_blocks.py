@@ -1,9 +1,10 @@
-"""The errors of sensors that a filter may have as states, each made of its standard deviations.
+"""Sensor errors that a filter may have as states, each made from its standard deviations.
 
-`ERRORS_OF_SENSORS` lists them. What acts within the sensors is coupled to rate and force as in
-`sensors.error_chain`, to first order: the errors are reading less truth, and the rates and forces
-that they multiply are the measured ones. What only measurements see (`lever_arm`, `time_offset`,
-`mounting`) is coupled to nothing here: the model of a measurement looks for its place by its name.
+`ERRORS_OF_SENSORS` lists them. Errors within the sensors are coupled to rate and force as in
+`sensors.error_chain`, to first order: the errors are reading − truth, and the rates and forces
+that they multiply are the measured ones. Errors that only measurements see (`lever_arm`,
+`time_offset`, `mounting`) are not coupled here: the model of a measurement finds their position in
+the state vector by name.
 """
 
 from __future__ import annotations
@@ -53,15 +54,15 @@ __all__ = [
 Array = NDArray[np.float64]
 
 XYZ = ("x", "y", "z")
-#: Places of the rates and of the forces in a coupling.
+#: Indices of the rates and of the forces in a coupling.
 RATE, FORCE = 1, 4
-#: ``xy`` is the part of the input along y that the sensor of x feels.
+#: ``xy`` is the sensitivity of the sensor of x to the input along y.
 CROSS_TERMS = ("xy", "xz", "yx", "yz", "zx", "zy")
 ALL_TERMS = tuple(i + j for i in XYZ for j in XYZ)
 
 
 def gyro_bias(sd: TriadLike) -> SensorStates:
-    """Return what the gyros read at rest, constant: three states.
+    """Return the constant bias of the gyros: three states.
 
     Parameters
     ----------
@@ -81,12 +82,12 @@ def gyro_bias(sd: TriadLike) -> SensorStates:
 
 
 def accel_bias(sd: TriadLike) -> SensorStates:
-    """Return what the accelerometers read without force, constant; `sd` in m/s²."""
+    """Return the constant bias of the accelerometers; `sd` in m/s²."""
     return _bias("accel_bias", "m/s²", sd)
 
 
 def gyro_drift(sd: TriadLike, correlation_time: float) -> SensorStates:
-    """Return what of a bias of gyros changes within a record: stationary Gauss-Markov.
+    """Return the varying part of the gyro bias within a record: stationary Gauss-Markov.
 
     Parameters
     ----------
@@ -101,7 +102,7 @@ def gyro_drift(sd: TriadLike, correlation_time: float) -> SensorStates:
 
 
 def accel_drift(sd: TriadLike, correlation_time: float) -> SensorStates:
-    """Return what of a bias of accelerometers changes within a record; `sd` in m/s²."""
+    """Return the varying part of the accelerometer bias within a record; `sd` in m/s²."""
     return gauss_markov(_bias("accel_drift", "m/s²", sd), correlation_time)
 
 
@@ -116,7 +117,7 @@ def accel_scale(sd: TriadLike) -> SensorStates:
 
 
 def gyro_misalignment(sd: TriadLike, terms: Sequence[str] = CROSS_TERMS) -> SensorStates:
-    """Return the directions of gyros.
+    """Return the misalignments of gyros.
 
     Parameters
     ----------
@@ -134,18 +135,18 @@ def gyro_misalignment(sd: TriadLike, terms: Sequence[str] = CROSS_TERMS) -> Sens
     Raises
     ------
     ConfigError
-        A standard deviation is negative or not finite, or there is no such term.
+        A standard deviation is negative or not finite, or the term does not exist.
     """
     return _by_terms("gyro_misalignment", "rad", sd, _known(terms), RATE)
 
 
 def accel_misalignment(sd: TriadLike, terms: Sequence[str] = CROSS_TERMS) -> SensorStates:
-    """Return the directions of accelerometers, as `gyro_misalignment`; `sd` in rad."""
+    """Return the misalignments of accelerometers, as `gyro_misalignment`; `sd` in rad."""
     return _by_terms("accel_misalignment", "rad", sd, _known(terms), FORCE)
 
 
 def g_sensitivity(sd: TriadLike) -> SensorStates:
-    """Return what force does to gyros: nine states, ``xy`` of the gyro of x by the force along y.
+    """Return the g-sensitivity of gyros: nine states, ``xy`` of gyro x by the force along y.
 
     Parameters
     ----------
@@ -160,12 +161,12 @@ def g_sensitivity(sd: TriadLike) -> SensorStates:
 
 
 def lever_arm(sd: TriadLike) -> SensorStates:
-    """Return the assumed place of an antenna in body axes less the true one; `sd` in m."""
+    """Return the error of an antenna's lever arm, body axes, assumed − true; `sd` in m."""
     return unseen("lever_arm", XYZ, "m", _numbers(sd, "lever_arm"))
 
 
 def time_offset(sd: float) -> SensorStates:
-    """Return the stamps of an aid less the time of the inertial sensors; `sd` in s."""
+    """Return the time stamps of an aid minus the time of the inertial sensors; `sd` in s."""
     if not is_number(sd):
         raise ConfigError("estimation.time-offset-sd-no-number", quantity="time_offset", sd=str(sd))
     return unseen("time_offset", ("t",), "s", _numbers(sd, "time_offset")[:1])
@@ -174,13 +175,13 @@ def time_offset(sd: float) -> SensorStates:
 def mounting(sd: TriadLike) -> SensorStates:
     """Return the rotation vector m of a mounting, ``C_assumed = exp([m x]) C_true``; `sd` in rad.
 
-    In the axes into which C turns.
+    In the axes that C maps to.
     """
     return unseen("mounting", XYZ, "rad", _numbers(sd, "mounting"))
 
 
 def unseen(name: str, labels: Sequence[str], unit: str, sd: Any) -> SensorStates:
-    """Return constants that act on no inertial sensor, as those of an aid.
+    """Return constants without effect on the inertial sensors, as those of an aid.
 
     Parameters
     ----------
@@ -214,7 +215,7 @@ def unseen(name: str, labels: Sequence[str], unit: str, sd: Any) -> SensorStates
 
 
 def random_walk(states: SensorStates, drive: TriadLike) -> SensorStates:
-    """Return states that walk from where they are at the start.
+    """Return random walks.
 
     Parameters
     ----------
@@ -233,7 +234,7 @@ def random_walk(states: SensorStates, drive: TriadLike) -> SensorStates:
 
 
 def gauss_markov(states: SensorStates, correlation_time: float) -> SensorStates:
-    """Return states that change as stationary Gauss-Markov processes.
+    """Return stationary Gauss-Markov processes.
 
     Parameters
     ----------
@@ -250,7 +251,7 @@ def gauss_markov(states: SensorStates, correlation_time: float) -> SensorStates:
     Raises
     ------
     ConfigError
-        The time is no number of seconds above zero.
+        The time is not a positive number of seconds.
     """
     if not is_number(correlation_time) or not 0.0 < correlation_time < math.inf:
         raise ConfigError(
@@ -263,8 +264,8 @@ def gauss_markov(states: SensorStates, correlation_time: float) -> SensorStates:
     return replace(states, correlation_time=time, drive=states.sd * math.sqrt(2.0 / time))
 
 
-#: Errors of sensors by the names of their blocks. Each is made of standard deviations; those that
-#: drift of a correlation time, too.
+#: Sensor errors by the names of their blocks. Each factory takes standard deviations; a drift
+#: also takes a correlation time.
 ERRORS_OF_SENSORS: dict[str, Callable[..., SensorStates]] = {
     "gyro_bias": gyro_bias,
     "accel_bias": accel_bias,
@@ -335,14 +336,14 @@ def _as_many(given: Any, k: int, name: str) -> Array:
     return np.array([float(x) for x in numbers])
 
 
-# What the sensors of a body at rest may be off by, as states of a filter.
+# Sensor errors of a stationary body as states of a filter.
 
 
 def resting_sd(sensors: ImuUncertainty, rate: ArrayLike, force: ArrayLike) -> tuple[Array, Array]:
-    """Return what gyros and accelerometers may read too much while rate and force stay the same.
+    """Return the errors of gyros and accelerometers at constant rate and force.
 
-    Scale factors, misalignments and g-sensitivities are then a part of the bias: no rest can tell
-    them from it.
+    Scale factors, misalignments and g-sensitivities are then a part of the bias: a rest cannot
+    separate them.
 
     Parameters
     ----------
@@ -367,7 +368,7 @@ def resting_sd(sensors: ImuUncertainty, rate: ArrayLike, force: ArrayLike) -> tu
 def resting_states(
     sensors: ImuUncertainty, rate: ArrayLike, force: ArrayLike
 ) -> tuple[SensorStates, SensorStates]:
-    """Return the biases of a body that stays as it stands, as states.
+    """Return the biases of a stationary body as states.
 
     Parameters
     ----------
@@ -377,8 +378,8 @@ def resting_states(
     Returns
     -------
     gyro_bias, accel_bias : SensorStates
-        Random walks: over a time that is short beside its correlation time a Gauss-Markov process
-        of deviation s is one, with the drive ``s sqrt(2 / correlation time)``.
+        Random walks: over a time that is short against its correlation time a Gauss-Markov
+        process of deviation s is one, with the drive ``s sqrt(2 / correlation time)``.
     """
     gyro, accel = resting_sd(sensors, rate, force)
     return (
@@ -402,8 +403,8 @@ def _walk(drift: BiasDrift) -> tuple[float, float, float]:
 # Errors of sensors as states by their names, with the sizes that a data sheet states.
 
 
-#: By name of the block: triad, attribute of its uncertainty, what makes the block of it, and the
-#: key of [sensors.gyro] or [sensors.accel] that states it.
+#: By name of the block: triad, attribute of its uncertainty, factory of the block, and the key of
+#: [sensors.gyro] or [sensors.accel] that states it.
 STATED_STATES: dict[str, tuple[str, str, Callable[..., SensorStates], str]] = {
     "gyro_bias": ("gyro", "bias", gyro_bias, "bias_sd_deg_per_h"),
     "accel_bias": ("accel", "bias", accel_bias, "bias_sd_ug"),
@@ -417,7 +418,7 @@ STATED_STATES: dict[str, tuple[str, str, Callable[..., SensorStates], str]] = {
 }
 
 
-#: Errors that go with rate and force: nothing at rest, and most of all on the move.
+#: Errors in proportion to rate and force: negligible at rest, largest in motion.
 MOVING = ("gyro_scale", "accel_scale", "gyro_misalignment", "accel_misalignment")
 
 
@@ -429,11 +430,11 @@ def stated_states(
     Parameters
     ----------
     sensors : ImuUncertainty
-        How large each may be.
+        Standard deviation of each.
     names : sequence of str, optional
-        Of `STATED_STATES`; if not given, biases and drifts as `standard_states`, and of scale
-        factors and misalignments those whose size is stated: without them the bounds of a body that
-        turns and accelerates are too narrow. A bias that is named without its drift is a random
+        Of `STATED_STATES`; if not given, biases and drifts as `standard_states`, and the scale
+        factors and misalignments with a stated size: without them the covariance of a body that
+        turns and accelerates is too small. A bias that is named without its drift is a random
         walk that bounds both.
 
     Returns
@@ -443,7 +444,7 @@ def stated_states(
     Raises
     ------
     ConfigError
-        There is no such block, one is named twice, or nothing states its size.
+        A block does not exist, one is named twice, or its size is not stated.
     """
     if names is None:
         known = [n for n in MOVING if any(_size(n, sensors))]
@@ -466,7 +467,7 @@ def stated_states(
 
 
 def states_that_are_stated(sensors: ImuUncertainty) -> tuple[str, ...]:
-    """Return those of `STATED_STATES` whose size is stated: all that can be estimated.
+    """Return those of `STATED_STATES` with a stated size: all that can be estimated.
 
     Parameters
     ----------
@@ -524,25 +525,25 @@ def _size(name: str, sensors: ImuUncertainty) -> Triad:
     return stated.axis(attribute)
 
 
-# The biases of a sensor as states, of what its data sheet leaves unknown.
+# The biases of a sensor as states, by its data sheet's uncertainty.
 
 
 def standard_states(sensors: ImuUncertainty, *, separate: bool = True) -> tuple[SensorStates, ...]:
     """Return the biases of gyros and accelerometers as states.
 
-    A bias is a constant of the record and a Gauss-Markov process within it, which is more than
-    three states can hold: their sum is not Markov.
+    A bias is the sum of a constant of the record and a Gauss-Markov process within it. Three states
+    cannot represent it: the sum is not Markov.
 
     Parameters
     ----------
     sensors : ImuUncertainty
     separate : bool
         True: the two as they are, ``gyro_bias gyro_drift accel_bias accel_drift``, twelve states
-        where both triads drift (a triad that does not has no drift block). False: their sum as a
+        if both triads drift (a triad without drift has no drift block). False: their sum as a
         random walk, ``gyro_bias accel_bias``, six states as in the papers' models; with
         ``sd² = bias² + 2 drift²`` and ``drive² = 2 drift² / correlation_time`` its covariance
         over any instants exceeds the true one by a positive semidefinite matrix, and with less
-        of either it does not, so that a filter's P is a bound for what its estimates do.
+        of either it does not, so that a filter's P bounds the covariance of its estimates.
 
     Returns
     -------
@@ -570,7 +571,7 @@ def _of_triad(
 ) -> list[SensorStates]:
     sd, time = constant.axis("bias"), drift.correlation_time
     if math.isinf(time) or not any(drift.triad):
-        # A drift without end is a constant, too.
+        # A drift of infinite correlation time is a constant, too.
         return [bias_block(_both(sd, drift.triad))]
     if separate:
         return [bias_block(sd), drift_block(drift.triad, time)]
@@ -584,12 +585,12 @@ def _both(a: Triad, b: Triad) -> Triad:
     return triad_of(math.hypot(x, y) for x, y in zip(a, b, strict=True))
 
 
-# How an error of a sensor changes in time, as a person states it: constant, fading or walking.
+# Process of a sensor error as stated by a user: constant, fading (Gauss-Markov) or random walk.
 
 
 @dataclass(frozen=True)
 class StateProcess:
-    """What is stated of a block of states; what is not stays as it was.
+    """Stated process of a block of states; values not stated stay unchanged.
 
     Attributes
     ----------
@@ -617,14 +618,14 @@ class StateProcess:
             )
 
     def of(self, name: str, block: SensorStates | None) -> SensorStates:
-        """Return a block with what is stated.
+        """Return a block with the stated values.
 
         Parameters
         ----------
         name : str
             Of `ERRORS_OF_SENSORS`.
         block : SensorStates, optional
-            As it was; None where only this states it.
+            Block to be changed; None if only this process states it.
 
         Returns
         -------
@@ -633,7 +634,7 @@ class StateProcess:
         Raises
         ------
         ConfigError
-            Nothing states how large it is.
+            The size is not stated.
         """
         if self.sd is not None:
             drifts = name.endswith("_drift")
@@ -668,7 +669,7 @@ class StateProcess:
 def with_processes(
     states: tuple[SensorStates, ...], processes: Mapping[str, StateProcess]
 ) -> tuple[SensorStates, ...]:
-    """Return states with what is stated of some of them; those that are not there come last.
+    """Return states with the stated values of some; additional ones come last.
 
     Parameters
     ----------

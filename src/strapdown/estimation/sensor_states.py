@@ -1,4 +1,4 @@
-"""Errors of the sensors as states: what each does to rate and force, and how it changes."""
+"""Sensor errors as filter states: coupling to rate and force, and their process models."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class SensorStates:
     sd : ndarray, (k,)
         At the start, in the unit of the block.
     gyro, accel : ndarray, (7, 3, k)
-        What they add to the measured rate and specific force in body axes, linear in both:
+        Added to the measured rate and specific force in body axes, linear in both:
         ``(gyro[0] + sum rate_i gyro[1 + i] + sum force_i gyro[4 + i]) @ states``. Zero for states
         that only measurements see, such as a lever arm.
     correlation_time : float, s
@@ -52,7 +52,7 @@ class SensorStates:
         return 0.0 if math.isinf(self.correlation_time) else 1.0 / self.correlation_time
 
     def named(self, name: str) -> SensorStates:
-        """Return the same states under another name, as where two receivers have a lever arm."""
+        """Return the same states under another name, as for two receivers with a lever arm each."""
         return replace(self, block=replace(self.block, name=name))
 
 
@@ -63,7 +63,7 @@ class Stacked(NamedTuple):
     ----------
     gyro, accel : ndarray, (7, 3, k)
     gyro_terms, accel_terms : ndarray, (l, 4)
-        What of them is not zero: first, second and third index, and value.
+        Non-zero elements: first, second and third index, and value.
     decay : ndarray, (k,), 1/s
     drive : ndarray, (k,)
     sd : ndarray, (k,)
@@ -79,7 +79,7 @@ class Stacked(NamedTuple):
 
 
 def stack(blocks: tuple[SensorStates, ...]) -> Stacked:
-    """Put blocks side by side, as kernels take them.
+    """Stack blocks, as kernels take them.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def _terms(coupling: Array) -> Array:
     return np.column_stack([places.astype(np.float64), values]).reshape(-1, 4)
 
 
-# Names, units and places of the states of a filter.
+# Names, units and positions of the states of a filter.
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ class StateBlock:
     labels : tuple of str
         One a state: ``("x", "y", "z")``.
     unit : str
-        ``rad/s``; of all of them.
+        Unit of all states of the block, e.g. ``rad/s``.
     """
 
     name: str
@@ -134,7 +134,7 @@ class StateBlock:
 
 @dataclass(frozen=True)
 class StateLayout:
-    """Where each block stands in a state vector.
+    """Position of each block in a state vector.
 
     Attributes
     ----------
@@ -158,7 +158,7 @@ class StateLayout:
 
     @cached_property
     def places(self) -> dict[str, slice]:
-        """Place of each block, by name."""
+        """Position of each block, by name."""
         out: dict[str, slice] = {}
         at = 0
         for block in self.blocks:
@@ -175,7 +175,7 @@ class StateLayout:
         return name in self.places
 
     def __getitem__(self, name: str) -> slice:
-        """Place of a block; a `ConfigError` names those that there are."""
+        """Position of a block; a `ConfigError` lists the existing ones."""
         if name not in self.places:
             raise ConfigError(
                 "estimation.no-state", quantity="states", name=name, word=name, known=self.places
@@ -183,7 +183,7 @@ class StateLayout:
         return self.places[name]
 
     def labels(self) -> Iterator[str]:
-        """One name a state: ``gyro_bias_x``."""
+        """One name per state: ``gyro_bias_x``."""
         for block in self.blocks:
             for label in block.labels:
                 yield f"{block.name}_{label}"

@@ -1,4 +1,4 @@
-"""A signal as a level and a slope that wander, by a robust Kalman filter, and smoothed."""
+"""Robust Kalman filter and smoother for a signal modeled as a randomly walking level and slope."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 __all__ = ["SignalEpochs", "SignalFilter", "SignalState"]
 
-# What is left of a change that many time constants of the smoother away.
+# Remainder of a change after so many time constants of the smoother.
 FORGOTTEN = 1e-4
 # Integral of 1/(1 + x^4)² from zero to infinity.
 MEAN_SQUARE_GAIN = 3.0 * math.pi / (8.0 * math.sqrt(2.0))
@@ -24,7 +24,7 @@ MEAN_SQUARE_GAIN = 3.0 * math.pi / (8.0 * math.sqrt(2.0))
 
 @dataclass(frozen=True, eq=False)
 class SignalState:
-    """What is remembered of one channel between epochs.
+    """State of one channel between epochs.
 
     Attributes
     ----------
@@ -46,14 +46,14 @@ class SignalState:
 
 @dataclass(frozen=True, eq=False)
 class SignalEpochs:
-    """What came out.
+    """Filtered epochs.
 
     Attributes
     ----------
     level : ndarray, (m,)
         Of the epochs that are final.
     weight, expected : ndarray, (k, l)
-        Of every new sample: what the rule gave it, and what it should have been.
+        Of every new sample: weight by the rule, and the predicted value.
     """
 
     level: Array
@@ -63,10 +63,10 @@ class SignalEpochs:
 
 @dataclass(frozen=True)
 class SignalFilter:
-    """Level and slope of a channel, from several samples an epoch.
+    """Level and slope of a channel, from several samples per epoch.
 
     The slope is a random walk. Its intensity is chosen by `bandwidth`, and so are all gains: they
-    are the same for channels of any noise, and between them no phase arises. The
+    are the same for channels of any noise, so that their phases are equal. The
     smoother's gain is ``1/(1 + (f/bandwidth)^4)`` (Wiener's, of a doubly integrated white noise
     in white noise), its phase is zero; that of the filter alone is not.
 
@@ -77,12 +77,12 @@ class SignalFilter:
     form : CovarianceForm
     rule : UpdateRule
     smooth : bool
-        Whether later samples count; else the filter alone.
+        Whether to use later samples; else the filter alone.
 
     Notes
     -----
     Each epoch is Eqs. (6) to (15) of Chernodarov (2009) with its samples as observations: of the
-    level less the slope times their age. What the slope wanders within an epoch is added to
+    level minus the slope times their age. The change of the slope within an epoch is added to
     their variance.
     """
 
@@ -103,13 +103,13 @@ class SignalFilter:
         return 2.0 * math.pi * self.bandwidth
 
     def lag(self, epoch: float) -> int:
-        """Epochs of so many seconds that the smoother waits for."""
+        """Delay of the smoother in epochs of so many seconds."""
         if not self.smooth:
             return 0
         return math.ceil(-math.log(FORGOTTEN) * math.sqrt(2.0) / (self.pole * epoch))
 
     def noise_factor(self, step: float) -> float:
-        """Standard deviation of the level per that of white noise of samples `step` s apart.
+        """Standard deviation of the level relative to that of white samples `step` s apart.
 
         The root mean square of the gain over the samples' band; the filter's is twice the
         smoother's.
@@ -147,7 +147,7 @@ class SignalFilter:
     def advance(
         self, state: SignalState, samples: Array, ages: Array, noise: float, step: float, last: bool
     ) -> tuple[SignalState, SignalEpochs]:
-        """Take whole epochs.
+        """Process whole epochs.
 
         Parameters
         ----------
@@ -155,13 +155,13 @@ class SignalFilter:
         samples : ndarray, (k, l)
             Of k epochs.
         ages : ndarray, (l,), s
-            How long before the end of its epoch a sample belongs.
+            Age of each sample at the end of its epoch.
         noise : float
             Standard deviation of a sample.
         step : float, s
             Of the samples; an epoch has l.
         last : bool
-            Whether what waits for later epochs is given without them.
+            Whether to return the remaining epochs without the later ones.
         """
         from strapdown._kernels.signal_smoother import smooth_fixed_lag
 

@@ -1,4 +1,4 @@
-"""How good a result is: against truth, against reference points, against each other."""
+"""Evaluation of results: against truth, reference points, and each other."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
-"""A path beside control points, after the one origin and heading that fit best.
+"""Compare a path with control points after the best-fitting shift and rotation.
 
-Who reckons from a start of his own finds a path up to a shift and a turn: no scale, no bend. So
-much is taken off, and what is left is the error. Of N points it takes three numbers of 2N.
+Dead reckoning from an arbitrary start finds a path up to a shift and a rotation, but with its
+scale and bends. The fit removes the shift and rotation; the residual is the error. It spends
+three of the 2N numbers of N points.
 """
 
 from __future__ import annotations
@@ -24,27 +25,27 @@ __all__ = ["ControlPointScore", "rigid_fit", "score_control_points"]
 
 Array = NDArray[np.float64]
 
-#: From point to point so far at least, m: what is nearer has no direction.
+#: Least distance from point to point, m: closer points define no direction.
 NO_WAY = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class ControlPointScore:
-    """A path at its control points.
+    """Errors of a path at its control points.
 
     Attributes
     ----------
     time : ndarray, (n,), s
     points : ndarray, (n, 2), m
-        Control points, turned and shifted onto the path: north and east of the path's start.
+        Control points, rotated and shifted onto the path: north and east of the path's start.
     error : ndarray, (n, 2), m
-        Computed less these.
+        Computed − control points.
     turn_deg : float, deg
-        Heading of the run less that of the points' own north, -180 to 180.
+        Heading of the run minus that of the points' own north, -180 to 180.
     way : float, m
         From point to point in all.
     given : int
-        Points that there are, those before and after the run counted, too.
+        Number of points, including those before and after the run.
     """
 
     time: Array
@@ -76,12 +77,12 @@ class ControlPointScore:
 
     @property
     def largest_at(self) -> float:
-        """When it is, s."""
+        """Time of the largest distance, s."""
         return float(self.time[int(np.argmax(self.distance))])
 
 
 def rigid_fit(points: ArrayLike, onto: ArrayLike) -> tuple[float, Array]:
-    """Return the turn and the shift that bring points of a plane nearest to others.
+    """Return the rotation and the shift that best fit points of a plane to others.
 
     Parameters
     ----------
@@ -93,7 +94,7 @@ def rigid_fit(points: ArrayLike, onto: ArrayLike) -> tuple[float, Array]:
     turn : float, rad
         From north to east.
     placed : ndarray, (n, 2)
-        The points, turned and shifted: the sum of squared distances to `onto` is least.
+        The points, rotated and shifted: the sum of squared distances to `onto` is least.
 
     Notes
     -----
@@ -118,8 +119,8 @@ def score_control_points(
     trajectory : DataFrame
         Trajectory table.
     points : DataFrame
-        By time in s on its clock, ``north`` and ``east`` in m (`read_control_points`). Those
-        before its begin and after its end are left out.
+        By time in s on its clock, ``north`` and ``east`` in m (`read_control_points`). Points
+        outside its time span are left out.
     ellipsoid : Ellipsoid
 
     Returns
@@ -129,7 +130,7 @@ def score_control_points(
     Raises
     ------
     DataError
-        Fewer than two are within its time, or all are at one place.
+        Fewer than two are within its time, or all are at one position.
     """
     time, own = index_of(points), index_of(trajectory)
     within = (time >= own[0]) & (time <= own[-1])

@@ -33,8 +33,8 @@ def attitude_at(attitude: pd.DataFrame, time: ArrayLike) -> Array:
     Returns
     -------
     ndarray, (n, 4)
-        The rows themselves where the stamps are in the table; between them, turned at a
-        constant rate from one to the next.
+        The rows themselves at their time stamps; between them, rotated at a constant rate from
+        one to the next.
     """
     stamps = attitude.index.to_numpy(dtype=np.float64)
     q = attitude[QUATERNION].to_numpy(dtype=np.float64)
@@ -84,7 +84,7 @@ def largest_differences(runs: tuple[AttitudeRun, ...]) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        Square, symmetric, in deg; labelled by algorithm.
+        Square, symmetric, in deg; labeled by algorithm.
     """
     names = [run.algorithm for run in runs]
     table = pd.DataFrame(0.0, index=names, columns=names)
@@ -96,7 +96,7 @@ def largest_differences(runs: tuple[AttitudeRun, ...]) -> pd.DataFrame:
     return table
 
 
-# What is known of the attitude at the samples of a log.
+# Known attitude at the samples of a log.
 
 Mask = NDArray[np.bool_]
 
@@ -111,7 +111,7 @@ class Known:
     Attributes
     ----------
     q_nb : ndarray, (n, 4)
-        At every sample; without meaning where it does not count.
+        At every sample; not valid where `counts` is False.
     counts : ndarray of bool, (n,)
     """
 
@@ -119,11 +119,11 @@ class Known:
     counts: Mask
 
     def at(self, samples: NDArray[np.int64]) -> Known:
-        """Return what is known at some of the samples."""
+        """Return the known attitude at some of the samples."""
         return Known(self.q_nb[samples], self.counts[samples])
 
     def errors(self, q_nb: Array) -> Errors | None:
-        """Compare an attitude at every sample with what is known there.
+        """Compare an attitude at every sample with the known one.
 
         Parameters
         ----------
@@ -132,7 +132,7 @@ class Known:
         Returns
         -------
         tuple of float, or None
-            Final, RMS and largest rotation angle in deg; None where nothing is known.
+            Final, RMS and largest rotation angle in deg; None where the truth is unknown.
         """
         if self.counts.all():
             return angles_to_errors(unit_rotation_angle(q_nb, self.q_nb))
@@ -148,22 +148,22 @@ def angles_to_errors(angles: Array) -> Errors:
 
 
 def known_at(truth: pd.DataFrame, scored: Mask, stamps: Array) -> Known:
-    """Lay a truth over the samples of a log.
+    """Interpolate a truth at the samples of a log.
 
     Parameters
     ----------
     truth : DataFrame
         An Attitude table, on stamps of its own or on (some of) the log's.
     scored : ndarray of bool
-        Which of its rows count.
+        Rows of the truth to be used.
     stamps : ndarray, (n,), s
         Of the log.
 
     Returns
     -------
     Known
-        A sample counts where a counting row of the truth stands at its stamp, or one on each
-        side of it no further apart than three of the truth's usual steps.
+        A sample counts if a counting row of the truth has its time stamp, or if counting rows
+        on both sides are no further apart than three of the truth's usual steps.
     """
     rows = truth[scored]
     if rows.empty:

@@ -1,8 +1,8 @@
-"""Fixes withheld from a navigator, and how far it then is from them.
+"""GNSS outage test: position error of a navigator at withheld fixes.
 
-A reference is not needed where a receiver is good: some seconds of its fixes are kept back, and the
-navigator, which goes on without them, is scored against them. What it says of its own error is
-scored at the same fixes.
+A good receiver replaces a reference: some seconds of its fixes are withheld, and the navigator,
+which continues without them, is scored against them. Its stated error is tested on the same
+fixes.
 """
 
 from __future__ import annotations
@@ -42,16 +42,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Withholding:
-    """The rule of an aid whose observations are looked at and not used."""
+    """Update rule with zero weight: innovations are computed but not used."""
 
     def step(self, nu: float, s: float, r: float) -> Step:
-        """Return a step that changes nothing."""
+        """Return a step of zero corrections."""
         return Step(0.0, 1.0, r, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class WithheldScore:
-    """A navigator over one span without fixes.
+    """Errors of a navigator over one span without fixes.
 
     Attributes
     ----------
@@ -59,9 +59,9 @@ class WithheldScore:
     time : ndarray, (n,), s
         Of the fixes that were withheld, on the clock of the inertial sensors.
     error : ndarray, (n, 3), m
-        Computed place of the antenna less the fix, north, east, down.
+        Computed position of the antenna minus the fix, north, east, down.
     variance : ndarray, (n, 3), m²
-        Expected of it, the noise of the fix with it.
+        Predicted variance of the error, including the noise of the fix.
     covariance : ndarray, (n, 2, 2), m²
         Of its horizontal part, the noise of the fix with it.
     """
@@ -84,45 +84,45 @@ class WithheldScore:
 
     @property
     def bound(self) -> Array:
-        """Distance that 95 of 100 errors are within, in the direction of the error, (n,), m.
+        """95 % bound of the error, in the direction of the error, (n,), m.
 
-        Where the ray through the error leaves the ellipse of 95 %: `horizontal` is below it if and
-        only if the error is within the ellipse.
+        Distance at which the ray through the error leaves the 95 % ellipse: `horizontal` is below
+        it if and only if the error is inside.
         """
         return plane_reach(self.horizontal, self.distance, self.covariance)
 
     @property
     def distance(self) -> Array:
-        """Mahalanobis distance of the horizontal error, (n,): 2.45 is the bound of 95 %."""
+        """Mahalanobis distance of the horizontal error, (n,): 2.45 is the 95 % bound."""
         e = self.error[:, :2]
         weighed = np.linalg.solve(self.covariance, e[:, :, None])[..., 0]
         return np.asarray(np.sqrt((e * weighed).sum(axis=1)))
 
     @property
     def inside(self) -> bool:
-        """Whether the largest horizontal error is within the ellipse of 95 % of its instant."""
+        """Whether the largest horizontal error is within the 95 % ellipse of its instant."""
         return bool(self.distance[int(np.argmax(self.horizontal))] <= PLANE_95)
 
 
 def spans_to_withhold(begin: float, end: float, length: float, places: int = 5) -> tuple[Span, ...]:
-    """Return spans of one length, spread evenly: the first at the begin, the last at the end.
+    """Return evenly spread spans of one length: the first at the begin, the last at the end.
 
     Parameters
     ----------
     begin, end : float, s
-        Between which there are fixes and the filter has settled.
+        Interval with fixes in which the filter has settled.
     length : float, s
     places : int
 
     Returns
     -------
     tuple of Span
-        They overlap where there is not room for them side by side; each is tried by itself.
+        They overlap if the interval is too short; each is tested by itself.
 
     Raises
     ------
     ConfigError
-        There is no room for one.
+        The record is too short for one span.
     """
     room = end - begin - length
     if room < 0.0 or places < 1 or not length > 0.0:
@@ -138,7 +138,7 @@ def spans_to_withhold(begin: float, end: float, length: float, places: int = 5) 
 
 
 def without_spans(table: pd.DataFrame, spans: Sequence[Span]) -> pd.DataFrame:
-    """Return the rows of a table whose stamps are in no span.
+    """Return the rows of a table outside all spans.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def without_spans(table: pd.DataFrame, spans: Sequence[Span]) -> pd.DataFrame:
     Raises
     ------
     ConfigError
-        Nothing is left, or a span has no row in it.
+        All rows are in spans, or a span has no row.
     """
     time = index_of(table)
     kept = np.ones(len(time), dtype=np.bool_)
@@ -189,23 +189,23 @@ def score_withheld(
     table: pd.DataFrame,
     spans: Sequence[Span],
 ) -> tuple[WithheldScore, ...]:
-    """Navigate with every fix up to each span, and through it with none.
+    """Navigate with all fixes up to each span, and without fixes through it.
 
-    The aid stays in the navigator and its observations are computed, but not used. Each span is by
-    itself: the run that goes on from its end has had the fixes.
+    The aid stays in the navigator and its innovations are computed, but not used. Spans are
+    independent: the run continued after a span has used its fixes.
 
     Parameters
     ----------
     navigator : Navigator
     state : NavigatorState
-        At the start; the tables of the other aids have been told.
+        At the start; the tables of the other aids have been given.
     time : ndarray, (n,), s
     rows : ndarray, (n, 10)
         As `Navigator.advance`, from the state on.
     name : str
         Of the aid; its observation ``NAME.position`` is scored.
     table : DataFrame
-        Of the aid, not told yet.
+        Of the aid, not given yet.
     spans : sequence of Span
         On the clock of the inertial sensors.
 
@@ -217,7 +217,7 @@ def score_withheld(
     Raises
     ------
     ConfigError
-        There is no such aid, or a span has no fixes or is not within the record.
+        The aid does not exist, or a span has no fixes or is not within the record.
     """
     blind = blinded(navigator, name)
     state = navigator.tell(state, name, table)
@@ -274,7 +274,7 @@ def scores_table(scores: Sequence[WithheldScore]) -> pd.DataFrame:
 
 
 def blinded(navigator: Navigator, name: str) -> Navigator:
-    """Return a navigator that looks at what an aid observes, and does not use it.
+    """Return a navigator that computes an aid's innovations without using them.
 
     Parameters
     ----------
@@ -285,7 +285,7 @@ def blinded(navigator: Navigator, name: str) -> Navigator:
     Raises
     ------
     ConfigError
-        There is no such aid with a table.
+        No such aid with a table exists.
     """
     aid = navigator.by_name.get(name)
     if not isinstance(aid, TabulatedMeasurement):
@@ -309,7 +309,7 @@ def _score(
 
 
 def score_of(pieces: Sequence[NavigationChunk], name: str, span: Span) -> WithheldScore:
-    """Score what a navigator gave over a span, in which an aid was looked at and not used.
+    """Score a navigator over a span in which an aid's innovations were computed but not used.
 
     Parameters
     ----------
@@ -337,7 +337,7 @@ def score_of(pieces: Sequence[NavigationChunk], name: str, span: Span) -> Withhe
 
 
 def seen_of(pieces: Sequence[NavigationChunk], name: str, span: Span) -> list[InnovationRecord]:
-    """Return what was seen of the fixes of a span.
+    """Return the innovations of the fixes of a span.
 
     Parameters
     ----------
@@ -350,7 +350,7 @@ def seen_of(pieces: Sequence[NavigationChunk], name: str, span: Span) -> list[In
     Raises
     ------
     ConfigError
-        There is nothing.
+        The span has no innovations.
     """
     seen = [one for piece in pieces for one in piece.seen if one.name == f"{name}.position"]
     if not seen:
@@ -361,25 +361,25 @@ def seen_of(pieces: Sequence[NavigationChunk], name: str, span: Span) -> list[In
 
 
 def _beyond_place(s: Array, P: Array) -> Array:
-    """Return the variance that is expected of a fix beyond that of the place, (n, 2, 2).
+    """Return the predicted variance of a fix beyond that of the position, (n, 2, 2).
 
-    What is expected along north and east is P, what the arm adds, and the fix's own noise: the
-    part beyond P is independent from axis to axis but for the arm's share.
+    The predicted variance along north and east is P, the part of the lever arm, and the fix's own
+    noise: the part beyond P is independent from axis to axis except for the lever arm.
     """
     beyond = np.maximum(s[:, :2] - np.diagonal(P, axis1=1, axis2=2), 0.0)
     return np.asarray(np.eye(2) * beyond[:, None, :])
 
 
-# Fixes withheld from a navigator, and how far its smoother then is from them.
+# GNSS outage test of a smoother: its error at withheld fixes.
 
 
-#: A smoother is given so many lengths of the stretch after it, and no less than so many seconds:
-#: what comes later tells nothing of the stretch that this does not.
+#: A smoother gets so many lengths of the stretch after it, and at least so many seconds: later
+#: fixes add no information on the stretch.
 AFTER, LEAST_AFTER = 2.0, 60.0
 
 
 def end_of_what_tells(span: Span) -> float:
-    """Return the time up to which a smoother is given what follows a stretch, s."""
+    """Return the time up to which a smoother gets data after a span, s."""
     return span.end + max(AFTER * (span.end - span.begin), LEAST_AFTER)
 
 
@@ -391,14 +391,14 @@ def score_withheld_smoothed(
     name: str,
     spans: Sequence[Span],
 ) -> tuple[WithheldScore, ...]:
-    """Score a navigator's smoother by each of some spans without fixes, by itself.
+    """Score a navigator's smoother over spans without fixes, each by itself.
 
     Parameters
     ----------
     navigator : Navigator
         With a smoother.
     state : NavigatorState
-        At the start, told of the fixes.
+        At the start, with the fixes.
     time : ndarray, (n,), s
     rows : ndarray, (n, 10)
         As `Navigator.advance`, from the state on.
@@ -414,7 +414,7 @@ def score_withheld_smoothed(
     Raises
     ------
     ConfigError
-        There is no such aid, or a span has no fixes.
+        The aid does not exist, or a span has no fixes.
     """
     blind = blinded(navigator, name)
     found, at = [], 0
@@ -436,17 +436,17 @@ def score_of_smoothed(
     name: str,
     span: Span,
 ) -> WithheldScore:
-    """Score what a smoother makes of a span by what came before and after it.
+    """Score the smoothed solution over a span.
 
-    The place of the antenna is that of the smoothed state with the smoothed arm and the smoothed
-    offset of its clock, where these are estimated, and so is its covariance.
+    The antenna position and its covariance follow from the smoothed state with the smoothed lever
+    arm and the smoothed clock offset, where these are estimated.
 
     Parameters
     ----------
     navigator : Navigator
         With a smoother.
     pieces : sequence of NavigationChunk
-        Of the span, in which the aid was looked at and not used.
+        Of the span, in which the aid's innovations were computed but not used.
     later : sequence of NavigationChunk
         That follow, with the aid.
     name : str
@@ -468,7 +468,7 @@ def score_of_smoothed(
     for piece in (*pieces, *later):
         smoothing.take(piece)
     time = np.array([one.time for one in seen])
-    # Looked at by a rule of its own, it is no lone receiver of a compiled loop.
+    # With a rule of its own it does not take the compiled loop of a single receiver.
     observations = [one.observation for one in seen if one.observation is not None]
     error, covariance = smoothing.seen(time, observations)
     variance = np.einsum("kii->ki", covariance)

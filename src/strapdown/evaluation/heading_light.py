@@ -1,10 +1,10 @@
-"""Whether a heading can be trusted, second by second: a traffic light.
+"""Heading integrity, second by second: trusted, unverified or rejected (green, amber, red).
 
-Green is a promise: the heading is within the limit that was asked for. It is given where two
-reckonings say so that do not share what was assumed at the start: the run by its own bound, and a
-witness by its own. That is a reckoning by fixes that began with no heading at all
-(`systems.sins.heading_witness`), what the gyros found of north at rest and carried on
-(`systems.sins.carried_heading`), or two sources that share nothing
+Green is a promise: the heading error is within the requested limit. It requires two solutions that
+do not share the assumptions made at the start: the run by its own bound, and an independent heading
+check by its own. The check is a solution by fixes that began without a heading
+(`systems.sins.heading_witness`), gyrocompassing at rest carried on by the gyros
+(`systems.sins.carried_heading`), or two independent sources of heading
 (`systems.sins.heading_sources`).
 """
 
@@ -40,7 +40,7 @@ Array = NDArray[np.float64]
 
 COLOURS = ("green", "amber", "red")
 GREEN, AMBER, RED = range(3)
-#: Why it is not green, by its code.
+#: Reason of a status other than green, by its code.
 REASONS: dict[str, str] = {
     "": "two reckonings agree that it is within the limit",
     "assumed": "its own bound is good, but rests on what it began with or on one aid alone",
@@ -50,31 +50,31 @@ REASONS: dict[str, str] = {
     "apart": "a reckoning that began without a heading says otherwise",
     "unknown": "it is hardly known",
 }
-#: Who bears a heading out, by kind.
+#: Independent heading checks, by kind.
 WITNESSES: dict[str, str] = {
     "motion": "a second reckoning by fixes",
     "gyrocompass": "north as the gyros found it at rest",
     "sources": "two sources of a heading that share nothing",
 }
-#: Two-sided quantile of 99 of 100 normal numbers: beyond it nothing is by chance, and within it a
-#: witness bounds an error.
+#: Two-sided 99 % quantile of the normal distribution: a larger difference is significant, and
+#: so many standard deviations bound the error of an independent check.
 SURE = 2.5758293035489004
-#: Scatter of innovations over the last seconds, by what was expected: beyond the first nothing is
-#: green, beyond the second everything is red.
+#: Scatter of the innovations over the last seconds, relative to the predicted one: beyond the first
+#: limit the status is not green, beyond the second it is red.
 FAR_OFF, REFUTED = 2.0, 3.0
-#: What a witness told holds for so long, s; the run's own growth since counts so many times.
+#: Validity of the result of a check, s, and the factor on the run's own growth since then.
 CARRIED, GROWS = 60.0, 2.0
-#: Over which it is judged, s, and fewest components that tell.
+#: Window of the scatter, s, and fewest components in it.
 RECENT, FEWEST = 30.0, 8
-#: Labels of components that tell nothing of a heading.
+#: Labels of components without information on the heading.
 VERTICAL = ("down", "VD", "height")
-#: One innovation counts no more than so many of its standard deviations, and so many if it was
-#: rejected: half of them are as much as what refutes a run.
+#: Limit of one normalized innovation, and its value if it was rejected: half of them are as much as
+#: refutes a run.
 CLIP, REJECTED = 4.0, 3.0
 
 
 class Heard(Protocol):
-    """What a witness said: see `systems.sins.heading_witness.Evidence`.
+    """Result of an independent heading check: see `systems.sins.heading_witness.Evidence`.
 
     Its `kind` is one of `WITNESSES`.
     """
@@ -93,7 +93,7 @@ class Heard(Protocol):
 
 @dataclass(frozen=True)
 class LightSpan:
-    """Seconds in a row of one colour for one reason.
+    """Consecutive seconds of one status for one reason.
 
     Attributes
     ----------
@@ -111,17 +111,18 @@ class LightSpan:
 
 @dataclass(frozen=True, eq=False)
 class HeadingIntegrity:
-    """A light for each second.
+    """Heading integrity of each second of a run.
 
     Attributes
     ----------
     table : DataFrame
         By time in s, the seconds of the run: ``light`` (0 green, 1 amber, 2 red), ``reason`` (a key
         of `REASONS`), ``bound`` (1.96 standard deviations of the run, deg), ``difference`` (run
-        less witness, deg), ``witness_sd`` (deg), ``witnessed`` (`SURE` standard deviations of the
-        witness and the difference, deg), ``carried`` (that, or an earlier one with what was added
-        since, deg: what green goes by), ``witness_since`` (s), ``witness`` (a key of `WITNESSES`,
-        or empty), ``scatter`` (of the innovations, by what was expected).
+        minus check, deg), ``witness_sd`` (standard deviation of the check, deg), ``witnessed``
+        (`SURE` standard deviations of the check plus the difference, deg), ``carried`` (that, or an
+        earlier one plus the growth since, deg: the value that decides on green), ``witness_since``
+        (s), ``witness`` (a key of `WITNESSES`, or empty), ``scatter`` (of the innovations, relative
+        to the predicted one).
     green, red : float, deg
         Limits.
     """
@@ -131,13 +132,13 @@ class HeadingIntegrity:
     red: float
 
     def share(self, colour: str) -> float:
-        """Share of the seconds that are of a colour."""
+        """Share of the seconds with a status."""
         light = self.table["light"].to_numpy()
         return float(np.mean(light == COLOURS.index(colour))) if len(light) else 0.0
 
     @property
     def spans(self) -> tuple[LightSpan, ...]:
-        """Seconds in a row of one colour for one reason, in the order of time."""
+        """Consecutive seconds of one status for one reason, in order of time."""
         time = self.table.index.to_numpy(dtype=np.float64)
         if not len(time):
             return ()
@@ -158,13 +159,13 @@ def heading_light(
     green: float = 3.0,
     red: float = 10.0,
 ) -> HeadingIntegrity:
-    """Return the light of each second of a run.
+    """Return the heading integrity of each second of a run.
 
     Parameters
     ----------
     record : NavigationRecord
     evidence : sequence of Heard
-        What witnesses said; none where nothing can tell a heading by itself.
+        Results of the independent checks; empty without a check.
     scatter : ndarray, (n,), optional
         Of `recent_scatter` at the seconds of the run.
     green, red : float, deg
@@ -177,16 +178,15 @@ def heading_light(
     Raises
     ------
     ConfigError
-        The limits are none.
+        The limits are invalid.
 
     Notes
     -----
-    The error e of the run is its difference d from a witness, which is known, and the error of the
-    witness: ``|e| < |d| + 2.58 sd`` but for one of a hundred cases at most. That rests on nothing
-    that the run was told of its heading. Where a witness told it a while ago, what was added since
-    goes on top, for a minute at most: twice 2.58 times the root of all growth of the run's own
-    variance since then, of which no update takes anything off. The run is contradicted where d is
-    beyond 2.58 standard deviations of both, and beyond half of the limit.
+    The error e of the run is its known difference d from an independent check plus the error of the
+    check: ``|e| < |d| + 2.58 sd`` in 99 % of all cases. This bound does not depend on the heading
+    given to the run. For up to a minute after a check the growth since then is added: twice 2.58
+    times the root of the total growth of the run's own variance, not reduced by updates. The run is
+    contradicted where d is beyond 2.58 standard deviations of both, and beyond half of the limit.
     """
     if not 0.0 < green <= red:
         raise ConfigError(
@@ -245,7 +245,7 @@ def seconds_of(record: NavigationRecord) -> Array:
 
 
 def recent_scatter(record: NavigationRecord) -> Array:
-    """How much more than expected observations scattered lately, at each second of a run.
+    """Recent scatter of the innovations over the predicted one, at each second of a run.
 
     Parameters
     ----------
@@ -254,8 +254,8 @@ def recent_scatter(record: NavigationRecord) -> Array:
     Returns
     -------
     ndarray, (n,)
-        Of the worst observation: root mean square of the normalised innovations of the last half
-        minute, each no more than four; 1 is expected, and stands where nothing was observed.
+        Of the worst observation: root mean square of the normalized innovations of the last half
+        minute, each limited to four; 1 is expected, and is the value without observations.
     """
     seconds = seconds_of(record)
     worst = np.ones(len(seconds))
@@ -270,7 +270,7 @@ def recent_scatter(record: NavigationRecord) -> Array:
             u = np.where(s > 0.0, nu / np.sqrt(s), np.nan)
         weight = table[[f"weight {str(c)[3:]}" for c in labels]].to_numpy(dtype=np.float64)
         told = np.isfinite(u)
-        # What was rejected did no harm, unless it is much.
+        # Rejected measurements did no harm, unless there are many.
         lost = told & (weight <= 0.0)
         u = np.where(lost, REJECTED, np.clip(u, -CLIP, CLIP))
         square = np.where(told, np.where(told, u, 0.0) ** 2, 0.0)
@@ -286,13 +286,13 @@ def recent_scatter(record: NavigationRecord) -> Array:
 
 
 def doubted(record: NavigationRecord, evidence: Sequence[Heard], upto: float, green: float) -> bool:
-    """Whether a run was contradicted, or scattered more than it should, until an instant.
+    """Whether a run was contradicted, or its innovations scattered too much, until an instant.
 
     Parameters
     ----------
     record : NavigationRecord
     evidence : sequence of Heard
-        What witnesses said.
+        Results of the independent checks.
     upto : float, s
     green : float, deg
         As of `heading_light`.
@@ -311,7 +311,7 @@ def _own_sd(record: NavigationRecord, seconds: Array) -> Array:
     """Standard deviation of the heading of a run at each second, deg."""
     marks = record.sd.index.to_numpy(dtype=np.float64)
     sd = record.sd["heading"].to_numpy(dtype=np.float64)
-    # A bound grows to the next mark: the larger one of those beside a second.
+    # A standard deviation grows to the next mark: the larger of the two marks around a second.
     after = np.clip(np.searchsorted(marks, seconds - 1e-6), 0, len(marks) - 1)
     before = np.clip(after - 1, 0, None)
     return np.where(marks[after] <= seconds + 1e-6, sd[after], np.maximum(sd[before], sd[after]))
@@ -320,7 +320,7 @@ def _own_sd(record: NavigationRecord, seconds: Array) -> Array:
 def _best(
     seconds: Array, evidence: Sequence[Heard]
 ) -> tuple[Array, Array, Array, NDArray[np.object_]]:
-    """Difference, deviation, begin and kind of the witness that bounds each second best."""
+    """Difference, standard deviation, start and kind of the tightest check of each second."""
     difference, sd, since = (np.full(len(seconds), np.nan) for _ in range(3))
     who = np.full(len(seconds), "", dtype=object)
     least = np.full(len(seconds), np.inf)
@@ -337,7 +337,7 @@ def _best(
 
 
 def _carried(seconds: Array, witnessed: Array, own: Array, apart: NDArray[np.bool_]) -> Array:
-    """What witnesses bound now, or did a while ago with what was added since."""
+    """Bound by the checks now, or by an earlier check plus the growth since."""
     out = np.where(np.isfinite(witnessed), witnessed, np.inf)
     grown = np.maximum(np.diff(own**2, prepend=own[:1] ** 2), 0.0)
     told, added, since = math.inf, 0.0, -math.inf
@@ -357,7 +357,7 @@ def _carried(seconds: Array, witnessed: Array, own: Array, apart: NDArray[np.boo
 def _contradicted(
     seconds: Array, evidence: Sequence[Heard], own: Array, green: float
 ) -> NDArray[np.bool_]:
-    """Seconds at which any witness that knows its heading contradicts the run."""
+    """Seconds at which any check with a known heading contradicts the run."""
     out = np.zeros(len(seconds), dtype=np.bool_)
     for one in evidence:
         at = np.searchsorted(seconds, one.time - 1e-6)

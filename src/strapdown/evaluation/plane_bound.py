@@ -1,4 +1,4 @@
-"""The area that an error in a plane is within with 95 %."""
+"""95 % bounds of an error in a plane."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ __all__ = ["PLANE_95", "plane_bound", "plane_reach"]
 
 Array = NDArray[np.float64]
 
-#: Half axes of the ellipse that holds 95 % of a normal error in a plane, over the standard
-#: deviations along them: the root of the chi-square of two degrees of freedom, -2 ln 0.05.
+#: Half axes of the 95 % ellipse of a normal error in a plane, over the standard deviations along
+#: them: the root of the chi-square of two degrees of freedom, -2 ln 0.05.
 PLANE_95 = math.sqrt(-2.0 * math.log(0.05))
 
 
 def plane_bound(covariance: Array) -> Array:
-    """Return the longer half axis of the ellipse of 95 % of each covariance.
+    """Return the longer half axis of the 95 % ellipse of each covariance.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def plane_bound(covariance: Array) -> Array:
 
 
 def plane_reach(size: Array, distance: Array, covariance: Array) -> Array:
-    """Return how far the ellipse of 95 % reaches in the direction of each error.
+    """Return the radius of the 95 % ellipse in the direction of each error.
 
     Parameters
     ----------

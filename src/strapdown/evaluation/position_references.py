@@ -1,4 +1,4 @@
-"""Reference points of position, in words: where the sensor was at rest, and what is known of it.
+"""Position references as text: known displacements between two rests.
 
 ::
 
@@ -6,8 +6,8 @@
     end same place as start sd 0.01
     12.5 moved 0.30 0 0 m since 3.0
 
-Both instants lie within rests. A displacement is along the axes of the run's local level: ahead
-in the direction that the run calls north, to the right of it, and down.
+Both instants lie within rests. A displacement is along the axes of the run's local level:
+forward along the run's north, right of it, and down.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ _HOW = "write '12.5 same place as 3.0', or '12.5 moved 0.30 0 0 m since 3.0 sd 0
 
 @dataclass(frozen=True)
 class PlaceReference:
-    """What is known of a displacement.
+    """A known displacement between two rests.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class PlaceReference:
     moved : tuple of float, m
         Along the axes of the run's local level (north, east, down by its own heading).
     sd : float or None, m
-        How well it is known, root mean square of the length.
+        Its standard deviation, root mean square of the length.
     """
 
     time: float
@@ -81,7 +81,7 @@ class PlaceReference:
 
 
 def is_place(text: str) -> bool:
-    """Tell whether a sentence speaks of a place and not of an attitude.
+    """Return whether a sentence is a position reference, not an attitude reference.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def is_place(text: str) -> bool:
 
 
 def parse_place(text: str, start: float, end: float) -> PlaceReference:
-    """Read one reference point of position.
+    """Parse one position reference.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def parse_place(text: str, start: float, end: float) -> PlaceReference:
         As in the module's text; ``same-place-as``, commas, colons and equals signs are
         understood, too.
     start, end : float, s
-        What these words stand for, and the span in which instants must lie.
+        Times that these words mean, and the span in which instants must lie.
 
     Returns
     -------
@@ -139,30 +139,30 @@ def parse_place(text: str, start: float, end: float) -> PlaceReference:
     return PlaceReference(at, since, (x, y, z), sd)
 
 
-# Reference points of position compared with what a run dead-reckons between rests.
+# Comparison of position references with the run dead-reckoned between rests.
 
 
 Array = NDArray[np.float64]
 
-# A word that is rounded to a tenth, or said at the edge of a window, still means the rest.
+# A time that is rounded to a tenth, or given at the edge of a window, still means the rest.
 NEAR_REST = 0.5  # s
 
 
 @dataclass(frozen=True)
 class SensorErrors:
-    """What is assumed of the sensors and the start, for the sd of a position.
+    """Assumed errors of the sensors and of the start, for the standard deviation of the position.
 
     Attributes
     ----------
     accel_bias_sd : float, m/s²
         Of each accelerometer, constant in the body (`rest_references.ACCEL_BIAS_SD`).
     gyro_bias_sd : float, rad/s
-        What is left of the bias of each gyro, constant over the log.
+        Residual bias of each gyro, constant over the log.
     tilt_sd_deg : float, deg
-        Of the initial attitude about each horizontal axis, over and above what levelling with
-        biased accelerometers does.
+        Of the initial attitude about each horizontal axis, in addition to the tilt by
+        levelling with biased accelerometers.
     accel_noise : float or None, m/s²/√Hz
-        White noise of each accelerometer; from the scatter at the rests where it is None.
+        White noise of each accelerometer; if None, from the scatter at the rests.
     levelled : bool
         The run was levelled with these accelerometers where it begins: their biases then tilt
         the start, so that they cancel as long as the body keeps that pose.
@@ -184,7 +184,7 @@ def score_places(
     errors: SensorErrors | None = None,
     gravity: float | None = None,
 ) -> tuple[PositionScore, ...]:
-    """Compare the displacements of a run with what is known of them.
+    """Compare the displacements of a run with known ones.
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ def score_places(
     rests : sequence of RestStretch
         In order of time; every instant of `places` lies in one or within half a second of it.
     errors : SensorErrors, optional
-        For the sd of the position; a consumer sensor if not given.
+        For the standard deviation of the position; a consumer sensor if not given.
     gravity : float, m/s², optional
         As in `dead_reckon`.
 
@@ -313,13 +313,13 @@ def _triple(values: Array) -> tuple[float, float, float]:
     return float(values[0]), float(values[1]), float(values[2])
 
 
-# Position between rests by dead reckoning, as a measure of an attitude.
+# Position between rests by dead reckoning, as a measure of attitude errors.
 #
-# Between two rests the specific force, turned by the attitude of a run and freed of gravity, is
-# integrated twice. At the second rest the velocity should be zero: what is left of it is an error
-# that needs no reference at all. A wrong tilt ``delta`` leaks ``g sin(delta)`` of gravity into the
-# horizontal, so that position reacts to attitude with the square of time, and to a gyro's bias with
-# the cube.
+# Between two rests the specific force, rotated by the attitude of a run and freed of gravity, is
+# integrated twice. At the second rest the velocity should be zero; the remaining velocity is an
+# error known without a reference. A tilt error ``delta`` leaks ``g sin(delta)`` of gravity into the
+# horizontal, so that the position error grows with the square of time, and with the cube for a gyro
+# bias.
 
 
 @dataclass(frozen=True)
@@ -333,8 +333,8 @@ class Leg:
     velocity, position : ndarray, (n, 3), m/s and m
         From zero, along the axes of the run's local level.
     velocity_corrected, position_corrected : ndarray, (n, 3)
-        With a velocity taken off that grows in proportion to time and makes the last one zero:
-        right for an error of acceleration that is constant in the local level.
+        With a velocity subtracted that grows in proportion to time and makes the last one zero:
+        exact for an error of acceleration that is constant in the local level.
     gravity : float, m/s²
     velocity_by_bias, position_by_bias : ndarray, (3, 6)
         Change at the end, for each unit of the biases of accelerometers (m/s²) and gyros
@@ -369,7 +369,7 @@ def dead_reckon(
     gravity: float | None = None,
     levelled: bool = True,
 ) -> Leg:
-    """Reckon velocity and position from one rest to the next.
+    """Dead-reckon velocity and position from one rest to the next.
 
     Parameters
     ----------
@@ -379,8 +379,8 @@ def dead_reckon(
     first, second : RestStretch
         One after the other.
     gravity : float, m/s², optional
-        What is taken off along the vertical; the length of the mean specific force at the
-        first rest if not given, which takes a part of the accelerometers' bias with it.
+        Subtracted along the vertical; the length of the mean specific force at the first rest
+        if not given, which removes a part of the accelerometers' bias with it.
     levelled : bool
         The run was levelled with these accelerometers where it begins: their biases then tilt
         the start, so that they cancel as long as the body keeps that pose.
@@ -388,15 +388,15 @@ def dead_reckon(
     Returns
     -------
     Leg
-        Specific force at the stamp is taken to change in proportion to time between two
-        samples, after it was turned; a mean is turned by the mean of the matrices at both ends
-        of its interval. Both are right to the second order of the step.
+        Specific force at the stamp is interpolated linearly between two samples, after its
+        rotation; a mean is rotated by the mean of the matrices at both ends of its interval.
+        Both are accurate to the second order of the step.
 
     Raises
     ------
     DataError
-        There is no acceleration, the second rest does not follow the first, or the run does
-        not cover them.
+        The table has no acceleration, the second rest does not follow the first, or the run
+        does not cover them.
     """
     if not set(ACCEL) <= set(imu.columns):
         raise DataError(
@@ -459,7 +459,7 @@ class _Steps:
             self.force_n = np.stack([through[:-1], through[1:]])
 
     def once(self, rate: Array) -> Array:
-        """Integral of what has these values at both ends of each step, from zero."""
+        """Trapezoidal integral from zero of the values at both ends of each step."""
         steps = 0.5 * (rate[0] + rate[1]) * self.dt
         return np.vstack([np.zeros(steps.shape[1]), np.cumsum(steps, axis=0)])
 
@@ -473,10 +473,10 @@ class _Steps:
 def _sensitivities(
     run: AttitudeRun, time: Array, steps: _Steps, g: float, gravity_of_rest: bool, levelled: bool
 ) -> tuple[Array, Array, Array, Array]:
-    """First order: velocity and position at the end by the biases, and by an initial tilt.
+    """Velocity and position at the end by the biases and by an initial tilt, to first order.
 
-    With ``C_est = (1 + [psi x]) C`` the acceleration is off by ``C b_a + psi x f_n``, and psi
-    is what the start was off plus the integral of ``C b_g``.
+    With ``C_est = (1 + [psi x]) C`` the acceleration error is ``C b_a + psi x f_n``, where psi
+    is the initial attitude error plus the integral of ``C b_g``.
     """
     n, seconds = len(time) - 1, float(time[-1] - time[0])
     by_psi = -rotation.cross_matrix(steps.force_n)  # (2, n, 3, 3): acceleration by psi
@@ -484,7 +484,7 @@ def _sensitivities(
     velocity_a, position_a = (v[-1].reshape(3, 3) for v in steps.twice(steps.turn.reshape(2, n, 9)))
     if levelled:
         start = rotation.dcm_from_quaternion(run.attitude[QUATERNION].to_numpy()[0])
-        # psi x (0, 0, -g) takes back the horizontal part of C b_a.
+        # psi x (0, 0, -g) cancels the horizontal part of C b_a.
         tilt = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]) @ start / g
         velocity_a = velocity_a + velocity_psi @ tilt
         position_a = position_a + position_psi @ tilt
@@ -507,7 +507,7 @@ def _sensitivities(
 
 
 def _turned(attitude: pd.DataFrame, until: float) -> Array:
-    """Integral of ``C_nb`` from the start of a run: what a gyro's bias has turned by then."""
+    """Integral of ``C_nb`` from the start of a run: the attitude error per unit of gyro bias."""
     stamps = attitude.index.to_numpy(dtype=np.float64)
     inside = stamps < until
     time = np.append(stamps[inside], until)
@@ -521,7 +521,7 @@ def _turned(attitude: pd.DataFrame, until: float) -> Array:
 def growth_laws(
     seconds: float, *, accel_error: float, tilt_rate: float, gravity: float = STANDARD_GRAVITY
 ) -> tuple[float, float]:
-    """How far constant errors carry a position that is not corrected at the end.
+    """Position error by constant errors, without correction at the end.
 
     Parameters
     ----------
@@ -536,7 +536,7 @@ def growth_laws(
     -------
     by_accel, by_tilt : float, m
         ``accel_error t²/2`` and ``g tilt_rate t³/6`` (Alexiev 2021, who leaves out g). Where
-        the velocity is brought to zero in proportion to time, nothing is left of the first,
-        and of the second half, with the other sign: ``g tilt_rate (t³/6 - t³/4)``.
+        the velocity is brought to zero in proportion to time, the first vanishes, and half of
+        the second remains with the other sign: ``g tilt_rate (t³/6 - t³/4)``.
     """
     return 0.5 * accel_error * seconds**2, gravity * tilt_rate * seconds**3 / 6.0

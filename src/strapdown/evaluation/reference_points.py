@@ -1,6 +1,6 @@
-"""Reference points: instants at which something about the attitude is known.
+"""Reference points: instants with known attitude, tilt or rotation.
 
-In words, on the command line or one to a line in a file::
+As text, on the command line or one per line in a file::
 
     end same as start
     9.0 same as 5.0 sd 0.5
@@ -80,14 +80,14 @@ _HOW = (
 
 
 def parse_reference(text: str, start: float, end: float) -> dict[str, object]:
-    """Read one reference point.
+    """Parse one reference point.
 
     Parameters
     ----------
     text : str
         As in the module's text; ``same-as``, colons and equals signs are understood, too.
     start, end : float, s
-        What these words stand for, and the span in which instants must lie.
+        Times that these words mean, and the span in which instants must lie.
 
     Returns
     -------
@@ -117,7 +117,7 @@ def parse_reference(text: str, start: float, end: float) -> dict[str, object]:
         row["since"] = instant(said["since"], start, end, text)
         since, at = row["since"], row["time"]
         assert isinstance(since, float) and isinstance(at, float)
-        # An interval whose ends are words is as long as the log, which is not known here yet.
+        # An interval whose ends are words is as long as the log; its length is unknown here.
         if since >= at and np.isfinite([since, at]).all():
             raise ConfigError(
                 "evaluation.compares-not-before",
@@ -140,14 +140,14 @@ def parse_reference(text: str, start: float, end: float) -> dict[str, object]:
 
 
 def instant(word: str, start: float, end: float, text: str) -> float:
-    """Read an instant of a sentence.
+    """Parse an instant.
 
     Parameters
     ----------
     word : str
         ``start``, ``end``, or seconds.
     start, end : float, s
-        What the words stand for, and the span in which it must lie.
+        Times that the words mean, and the span in which it must lie.
     text : str
         The sentence, for messages.
 
@@ -163,7 +163,7 @@ def instant(word: str, start: float, end: float, text: str) -> float:
     if word.lower() in ("start", "end"):
         return start if word.lower() == "start" else end
     value = float(word.lower().rstrip("s "))
-    # Stamps are printed to a millisecond; one that is meant as the last sample counts as it.
+    # Stamps are printed to a millisecond; one that means the last sample counts as that sample.
     slack = 1e-3
     if not start - slack <= value <= end + slack:
         raise DataError(
@@ -192,7 +192,7 @@ def _axis(word: str, text: str) -> tuple[str, float]:
 
 
 def in_words(row: pd.Series) -> str:
-    """Say a row of a References table as a sentence.
+    """Return a row of a References table as text.
 
     Parameters
     ----------
@@ -225,12 +225,12 @@ def score_references(
     references : DataFrame
         A References table.
     imu : DataFrame
-        The Imu table that the run used, for the angle turned about an axis.
+        The Imu table that the run used, for the rotation angle about an axis.
 
     Returns
     -------
     tuple of Score
-        One a reference point: the rotation angle between computed and known attitude
+        One per reference point: the rotation angle between computed and known attitude
         (``|log(C_est^T C_ref)|``); for a tilt the angle between computed and known direction
         of gravity.
 
@@ -286,7 +286,7 @@ def reference_errors(attitude: pd.DataFrame, references: pd.DataFrame) -> list[f
 
 
 def _compare(attitude: pd.DataFrame, row: pd.Series, number: int) -> tuple[list[float], float]:
-    """The instants that a reference point speaks of, and the error there in deg."""
+    """The instants of a reference point, and the error there in deg."""
     begin = float(attitude.index[0])
     alone = row["kind"] in ("known", "tilt")
     instants = [float(row["time"])] + ([] if alone else [float(row["since"])])
@@ -312,7 +312,7 @@ def _compare(attitude: pd.DataFrame, row: pd.Series, number: int) -> tuple[list[
 
 
 def with_tilt(q_nb: ArrayLike, roll: float, pitch: float) -> NDArray[np.float64]:
-    """Turn an attitude the shortest way to a roll and a pitch.
+    """Rotate an attitude by the smallest angle to a roll and a pitch.
 
     Parameters
     ----------
@@ -324,7 +324,7 @@ def with_tilt(q_nb: ArrayLike, roll: float, pitch: float) -> NDArray[np.float64]
     ndarray, (4,)
         The attitude nearest to `q_nb` among those of this roll and pitch. The angle between
         the two is the angle between their directions of gravity in the body, because the
-        least rotation that leads from one direction to another is about an axis square to
+        least rotation that leads from one direction to another is about an axis perpendicular to
         both.
     """
     down = np.array([0.0, 0.0, 1.0])
@@ -334,7 +334,7 @@ def with_tilt(q_nb: ArrayLike, roll: float, pitch: float) -> NDArray[np.float64]
     across, along = np.cross(there, here), float(there @ here)
     size = float(np.sqrt(across @ across))
     if size < 1e-12 and along < 0.0:
-        # Upside down: every axis square to gravity will do.
+        # Upside down: every axis perpendicular to gravity is equivalent.
         across = np.cross(there, np.eye(3)[int(np.argmin(np.abs(there)))])
         axis, angle = across / np.sqrt(across @ across), np.pi
     else:
@@ -351,7 +351,7 @@ def _turned(imu: pd.DataFrame, axis: int, since: float, until: float) -> float:
 
 
 def references_from_words(words: list[str], start: float, end: float) -> pd.DataFrame:
-    """Make a References table of sentences.
+    """Make a References table from text.
 
     Parameters
     ----------
@@ -371,19 +371,19 @@ def references_from_words(words: list[str], start: float, end: float) -> pd.Data
     return references_table([parse_reference(text, start, end) for text in words])
 
 
-# Rests as reference points: where a sensor lies still, gravity tells roll and pitch.
+# Rests as reference points: while a sensor is stationary, gravity gives roll and pitch.
 
 
 Array = NDArray[np.float64]
 
-#: Standard deviation that is assumed for the bias of each accelerometer, m/s², by class of
-#: sensor. Consumer: the MPU-6050 may be 50 mg off in x and y and 80 mg in z (data sheet 3.4,
-#: section 6.2), taken as the ends of an even spread, 29 to 46 mg. The others are the usual order
-#: of magnitude, 5 mg, 1 mg and 50 µg: state what your data sheet says instead.
+#: Assumed standard deviation of the bias of each accelerometer, m/s², by class of sensor.
+#: Consumer: the MPU-6050 bias may be 50 mg in x and y and 80 mg in z (data sheet 3.4, section 6.2),
+#: taken as the limits of a uniform distribution, 29 to 46 mg. The others are the usual order of
+#: magnitude, 5 mg, 1 mg and 50 µg: state your data sheet's value instead.
 ACCEL_BIAS_SD = {"consumer": 0.3, "industrial": 0.05, "tactical": 0.01, "navigation": 0.0005}
 
-# Two poses count as one where gravity agrees to so many standard deviations of the noise, and
-# to what nobody can put a thing back to by hand, or feel on a table.
+# Two poses count as one if gravity agrees to so many standard deviations of the noise, or to the
+# repeatability of placing a sensor by hand.
 SAME_SIGMAS = 3.0
 LEAST_APART = 0.1  # deg
 
@@ -391,15 +391,15 @@ LEAST_APART = 0.1  # deg
 def tilt_sd_deg(
     rest: RestStretch, *, bias_sd: float = ACCEL_BIAS_SD["consumer"], gravity: float | None = None
 ) -> float:
-    """How well the direction of gravity at a rest is known.
+    """Standard deviation of the direction of gravity at a rest.
 
     Parameters
     ----------
     rest : RestStretch
         With acceleration.
     bias_sd : float, m/s²
-        Standard deviation that is assumed for the bias of each accelerometer, as it is now in
-        the log. One of `ACCEL_BIAS_SD`, or from a calibration.
+        Assumed standard deviation of the bias of each accelerometer, at present in the log.
+        One of `ACCEL_BIAS_SD`, or from a calibration.
     gravity : float, m/s², optional
         Local gravity; 9.80665 if not given, which is right to 0.03 m/s² everywhere on the
         surface.
@@ -407,16 +407,16 @@ def tilt_sd_deg(
     Returns
     -------
     float
-        Root mean square of the angle by which the direction is off, in deg: two axes square to
-        gravity, each off by ``sqrt(bias² + noise²)/g`` rad. The bias is the larger of what is
-        assumed and of how far the length of the specific force is from gravity: the log may
-        refute an assumption, and it cannot confirm one, since what is square to gravity does
-        not change the length.
+        Root mean square of the angle between computed and true direction, in deg: two axes
+        perpendicular to gravity, each in error by ``sqrt(bias² + noise²)/g`` rad. The bias is the
+        larger of the assumed one and of the deviation of the specific force from gravity: the
+        log may refute an assumption, but cannot confirm it, since an error perpendicular to
+        gravity does not change the length.
 
     Raises
     ------
     DataError
-        The rest has no acceleration, or what it has is no gravity (20 %).
+        The rest has no acceleration, or its specific force differs from gravity by 20 %.
     """
     force, noise = _force(rest)
     g = STANDARD_GRAVITY if gravity is None else gravity
@@ -432,16 +432,16 @@ def tilt_references(
     gravity: float | None = None,
     levelled_from: RestStretch | None = None,
 ) -> pd.DataFrame:
-    """Make a reference point of every rest: its roll and pitch, the heading left open.
+    """Make a reference point of roll and pitch from every rest; the heading stays open.
 
     Parameters
     ----------
     rests : sequence of RestStretch
-        As `sensors.rest.find_rests` finds them; those without acceleration are left out.
+        As returned by `sensors.rest.find_rests`; those without acceleration are left out.
     bias_sd, gravity
         As in `tilt_sd_deg`.
     levelled_from : RestStretch, optional
-        The rest that the run was levelled from. It is left out: the run would be compared with
+        The rest that the run was levelled at. It is left out: the run would be compared with
         its own start.
 
     Returns
@@ -476,7 +476,7 @@ def tilt_references(
 
 
 def same_pose_candidates(rests: Sequence[RestStretch]) -> tuple[SamePose, ...]:
-    """Find rests at which the sensor may have lain as at an earlier one.
+    """Find rests at which the sensor may have the pose of an earlier one.
 
     Parameters
     ----------
@@ -488,8 +488,8 @@ def same_pose_candidates(rests: Sequence[RestStretch]) -> tuple[SamePose, ...]:
     tuple of SamePose
         For each rest the earliest one whose direction of gravity agrees with it, within three
         standard deviations of the noise of both (the biases of the accelerometers are the same
-        in both and cancel) or 0.1 deg, whichever is more. They are offered and never used:
-        gravity does not tell heading, and only who moved the sensor knows that.
+        in both and cancel) or 0.1 deg, whichever is more. They are proposed, never used:
+        gravity does not determine heading; only the operator knows whether the pose is the same.
     """
     found: list[SamePose] = []
     lying = [r for r in rests if r.accel_mean is not None]
@@ -532,7 +532,7 @@ def _force(rest: RestStretch) -> tuple[Array, Array]:
 
 
 def _apart(a: RestStretch, b: RestStretch) -> tuple[float, float]:
-    """Angle between the directions of gravity at two rests, and its sd by the noise, deg."""
+    """Angle between the directions of gravity at two rests, and its standard deviation, deg."""
     (f_a, n_a), (f_b, n_b) = _force(a), _force(b)
     cross = np.cross(f_a, f_b)
     angle = float(np.arctan2(np.sqrt(cross @ cross), f_a @ f_b))
@@ -541,7 +541,7 @@ def _apart(a: RestStretch, b: RestStretch) -> tuple[float, float]:
 
 
 def _across(force: Array, noise: Array) -> float:
-    """Variance of the direction of a force, both axes square to it together, rad²."""
+    """Variance of the direction of a force, sum of both axes perpendicular to it, rad²."""
     up = force / np.sqrt(force @ force)
-    # What of the noise is square to the force: |n|² less the part along it.
+    # Noise perpendicular to the force: |n|² minus the part along it.
     return float(((noise**2).sum() - ((up * noise) ** 2).sum()) / (force @ force))

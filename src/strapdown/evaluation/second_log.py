@@ -1,4 +1,4 @@
-"""The log of a second sensor on the same body: its clock and its mounting, fitted."""
+"""Clock and mounting of a second sensor on the same body, fitted to both logs."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ __all__ = [
 Array = NDArray[np.float64]
 
 ITERATIONS = 30
-# Blocks over which residuals are summed before they count as independent.
+# Blocks over which residuals are summed to be independent.
 BLOCK = 1.0  # s
 LEAST_BLOCKS = 40
-# Windows in which the offset is looked for by itself, to see the clocks drift apart.
+# Windows with an offset of their own, to find the drift between the clocks.
 WINDOW = 20.0  # s
-# Crystals are good to 100 ppm, and stamps of a phone or a host to some hundreds.
+# Crystals are accurate to 100 ppm, and time stamps of a phone or a host to some hundreds.
 MAX_DRIFT = 2e-3
-# The second axis of the motion must stand above the noise by this much in power, and fix the
+# The second axis of the motion must exceed the noise by this ratio in power, and determine the
 # mounting about the first to this.
 ABOVE_NOISE = 10.0
 MAX_MOUNTING_SD = 2.0  # deg
@@ -65,7 +65,7 @@ class _State:
 def align_second_log(
     first: pd.DataFrame, second: pd.DataFrame, *, offset: float | None = None
 ) -> SecondLog:
-    """Find how a second sensor's clock and axes lie to the first one's.
+    """Find the clock offset and mounting of a second sensor relative to the first.
 
     Parameters
     ----------
@@ -73,8 +73,7 @@ def align_second_log(
         Imu tables of two sensors on one rigid body; only their gyros are used. Clocks,
         axes, rates and kinds of sampling may differ.
     offset : float, s, optional
-        Second clock less first clock, to half a second, where it is known: it is then not
-        looked for.
+        Second clock minus first clock, to half a second, if known: it is then not searched.
 
     Returns
     -------
@@ -83,7 +82,7 @@ def align_second_log(
     Raises
     ------
     DataError
-        There is too little motion, too little in common, or the offset is ambiguous.
+        There is too little motion, too little overlap, or the offset is ambiguous.
 
     Notes
     -----
@@ -91,8 +90,8 @@ def align_second_log(
     offsets in windows of 20 s. Then all nine figures (offset, drift, three of mounting, three
     of bias, scale) are fitted to the smoothed rates together, by Gauss-Newton. Their covariance
     is that of the residuals summed over blocks of a second (a sandwich), so that neither the
-    smoothing nor what the model leaves out makes it too small. A difference of the delays of the
-    sensors' filters is part of the offset. What noise the second log has shrinks its scale
+    smoothing nor model errors make it too small. A difference of the delays of the
+    sensors' filters is part of the offset. Noise of the second log reduces its scale
     by its share in the power of the smoothed rates.
     """
     check_imu(first)
@@ -119,7 +118,7 @@ class _Fit:
     def __init__(self, a: EvenRates, b: EvenRates, offset: float) -> None:
         from scipy.interpolate import CubicSpline
 
-        # From the second log's own start, so that stamps of an epoch keep their digits.
+        # From the second log's own start, so that time stamps since an epoch keep their digits.
         self.origin = b.start
         self.spline: CubicSpline[np.float64] = CubicSpline(b.time - b.start, b.rate)
         self.slope = self.spline.derivative()
@@ -127,7 +126,7 @@ class _Fit:
         self.step = a.step
         time = a.time
         inside = a.known & (time + offset > b.start) & (time + offset < b.time[-1])
-        # One more cell than the drift can take away at either end.
+        # One more cell than the drift can consume at either end.
         margin = 0.5 + MAX_DRIFT * float(time[-1] - time[0])
         inside &= (time + offset > b.start + margin) & (time + offset < b.time[-1] - margin)
         cell = np.clip(np.round((time + offset - b.start) / b.step), 0, len(b.rate) - 1)
@@ -150,7 +149,7 @@ class _Fit:
         return self.spline(u), self.slope(u)
 
     def solve(self) -> tuple[_State, Array | None]:
-        """Gauss-Newton from the coarse offset and the drift that windows show."""
+        """Gauss-Newton from the coarse offset and the drift of the windows."""
         offset, drift = self._by_windows()
         state = self._mounted(offset, drift)
         axis = self._single_axis(state)
@@ -170,7 +169,7 @@ class _Fit:
         return state, axis
 
     def _by_windows(self) -> tuple[float, float]:
-        """Offset and drift from windows, each aligned by itself with one mounting for all."""
+        """Offset and drift from windows, each aligned by itself with one common mounting."""
         offset, drift = self.coarse, 0.0
         for _ in range(5):
             offset = self._shift(self._mounted(offset, drift), slice(None))
@@ -196,7 +195,7 @@ class _Fit:
         return offset, drift
 
     def _shift(self, state: _State, keep: slice) -> float:
-        """Offset that does best within a window, by Newton's steps of at most a tenth second."""
+        """Best offset within a window, by Newton steps of at most a tenth of a second."""
         offset = state.offset
         for _ in range(6):
             rate, slope = self.second(offset, state.drift, keep)
@@ -218,7 +217,7 @@ class _Fit:
         return _State(offset, drift, turn, mean_1 - scale * turn @ mean_2, scale)
 
     def _residuals(self, state: _State) -> tuple[Array, Array]:
-        """What is left, (n, 3), and what each figure changes of the model, (n, 3, 9)."""
+        """Residuals, (n, 3), and their derivatives by each parameter, (n, 3, 9)."""
         rate, slope = self.second(state.offset, state.drift)
         turned = rate @ state.turn.T
         left = self.rate - (state.scale * turned + state.bias)
@@ -233,7 +232,7 @@ class _Fit:
         return left, jacobian
 
     def _single_axis(self, state: _State) -> Array | None:
-        """The axis, where the body turned about one only, in the first sensor's axes."""
+        """The axis in the first sensor's axes, if the body turned about one only."""
         left, _ = self._residuals(state)
         noise = float((left**2).mean())
         power, axes = np.linalg.eigh(np.cov(self.rate.T))
@@ -245,7 +244,7 @@ class _Fit:
         return np.asarray(axes[:, 2])
 
     def _least_turn(self, state: _State, axis: Array) -> _State:
-        """The same alignment of the axis, with the least turn about it."""
+        """The same alignment of the axis, with the least rotation about it."""
         there = state.turn.T @ axis
         across = np.cross(there, axis)
         size, along = float(np.sqrt(across @ across)), float(there @ axis)
@@ -261,7 +260,7 @@ class _Fit:
         return _State(state.offset, state.drift, turn, bias, state.scale)
 
     def _free(self, axis: Array | None) -> Array:
-        """Directions in which the figures may move: not about a single axis."""
+        """Free directions of the parameters: not about a single axis."""
         free = np.eye(9)
         if axis is None:
             return free
@@ -273,7 +272,7 @@ class _Fit:
         return out
 
     def spread(self, state: _State, axis: Array | None) -> tuple[Array, float, float]:
-        """Covariance of the figures, root mean square of the residuals, share explained."""
+        """Covariance of the parameters, root mean square of the residuals, share explained."""
         left, jacobian = self._residuals(state)
         free = self._free(axis)
         design = jacobian @ free
@@ -314,7 +313,7 @@ def _result(
     mounting = rotation.quaternion_from_dcm(state.turn)
     mounting_sd = np.degrees(sd[TURN])
     if axis is not None:
-        # About an axis of the sensor that has a part of the single axis nothing is known.
+        # About a sensor axis that is partly along the single axis the result is undetermined.
         mounting_sd = np.where(np.abs(axis) > 1e-3, np.inf, mounting_sd)
     return SecondLog(
         start=float(fit.time[0]),
@@ -348,14 +347,14 @@ def _triple(values: ArrayLike) -> tuple[float, float, float]:
 # Two logs of one motion: their rates on even grids, and the coarse offset of their clocks.
 
 
-# A Gaussian of two cells leaves 3e-9 of what is at the end of the band, so that interpolating
+# A Gaussian of two cells attenuates to 3e-9 at the end of the band, so that interpolating
 # between cells changes neither the signal nor the power of its noise.
 SMOOTH_CELLS = 2.0
-# What both logs must share for an offset to be looked at.
+# Least overlap of both logs for the search of an offset.
 LEAST_OVERLAP = 5.0  # s
 COARSE_STEP = 0.02  # s
 PEAKS = 8
-# A pause of rates below this says nothing about time.
+# A pause of rates below this has no timing information.
 LEAST_RATE = 0.02  # rad/s, root mean square
 LEAST_CORRELATION = 0.7
 
@@ -414,8 +413,8 @@ def even_rates(imu: pd.DataFrame, step: float) -> EvenRates:
     Returns
     -------
     EvenRates
-        From the integral of the rates, so that stamps that come in bursts count by their
-        length; then a Gaussian of two cells.
+        From the integral of the rates, so that time stamps in bursts are weighted by their
+        interval; then a Gaussian of two cells.
     """
     from scipy.interpolate import CubicSpline
     from scipy.ndimage import gaussian_filter1d
@@ -437,7 +436,7 @@ def even_rates(imu: pd.DataFrame, step: float) -> EvenRates:
     if imu.attrs["sampling"] == "instantaneous" and even:
         angle = CubicSpline(time - origin, rate).antiderivative()(edges)
     else:
-        # A spline overshoots where stamps are uneven; what was integrated stays in any case.
+        # A spline overshoots at uneven time stamps; the integral is kept in any case.
         theta = increments_from_imu(imu)[THETA].to_numpy()
         turned = np.vstack([np.zeros(3), np.cumsum(theta, axis=0)])
         if even:
@@ -450,13 +449,13 @@ def even_rates(imu: pd.DataFrame, step: float) -> EvenRates:
     reach = 5.0 * SMOOTH_CELLS * step
     for gap in find_gaps(time):
         known &= ~((middle > gap.start - origin - reach) & (middle < gap.end - origin + reach))
-    # At the ends the filter mirrors what it does not have.
+    # At the ends the filter mirrors the signal.
     known[: int(4 * SMOOTH_CELLS)] = known[-int(4 * SMOOTH_CELLS) :] = False
     return EvenRates(float(origin + 0.5 * step), step, smooth, known)
 
 
 def proper_rotation(product: Array) -> tuple[Array, float]:
-    """Rotation that brings one set of vectors nearest to another (Wahba's problem).
+    """Rotation that best fits one set of vectors to another (Wahba's problem).
 
     Parameters
     ----------
@@ -466,7 +465,7 @@ def proper_rotation(product: Array) -> tuple[Array, float]:
     Returns
     -------
     C_ab : ndarray, (3, 3)
-        What turns b into a with the least sum of squares, by singular values (Markley 1988,
+        Rotation from b to a with the least sum of squares, by singular values (Markley 1988,
         doi:10.1007/BF03546354).
     common : float
         Sum of ``a · C_ab b``.
@@ -477,7 +476,7 @@ def proper_rotation(product: Array) -> tuple[Array, float]:
 
 
 def coarse_offset(first: pd.DataFrame, second: pd.DataFrame) -> CoarseOffset:
-    """Find how far two clocks are apart, from the rates, whatever the mounting.
+    """Find the offset of two clocks from the rates, whatever the mounting.
 
     Parameters
     ----------
@@ -487,13 +486,13 @@ def coarse_offset(first: pd.DataFrame, second: pd.DataFrame) -> CoarseOffset:
     Returns
     -------
     CoarseOffset
-        Peaks of the correlation of the rates' lengths, weighed by how much of the vectors one
-        rotation brings together.
+        Peaks of the correlation of the rates' magnitudes, weighted by the share of the vectors
+        that one rotation explains.
 
     Raises
     ------
     DataError
-        There is too little motion, nothing in common, or two offsets do about as well.
+        There is too little motion, no overlap, or two offsets fit about equally well.
     """
     usual = max(float(np.median(np.diff(t.index.to_numpy()))) for t in (first, second))
     step = max(COARSE_STEP, usual)
@@ -516,7 +515,7 @@ def coarse_offset(first: pd.DataFrame, second: pd.DataFrame) -> CoarseOffset:
         )
     weighed = [(_vector_share(a, b, lag), lag) for lag in lags[top_peaks(score, PEAKS)].astype(int)]
     best, at = max(weighed, default=(0.0, 0))
-    # What is within half a second is the same peak.
+    # Offsets within half a second belong to the same peak.
     apart = int(np.ceil(0.5 / step))
     rest = [share for share, lag in weighed if abs(lag - at) > apart]
     found = CoarseOffset(b.start - a.start - at * step, best, max(rest, default=0.0))
@@ -545,7 +544,7 @@ def _shorter(a: EvenRates, b: EvenRates) -> float:
 
 
 def _vector_share(a: EvenRates, b: EvenRates, lag: int) -> float:
-    """How much of the rates one rotation brings together at a lag, 0 to 1."""
+    """Share of the rates that one rotation explains at a lag, 0 to 1."""
     lo, hi = max(0, lag), min(len(a.rate), len(b.rate) + lag)
     known = a.known[lo:hi] & b.known[lo - lag : hi - lag]
     x, y = a.rate[lo:hi][known], b.rate[lo - lag : hi - lag][known]
@@ -560,7 +559,7 @@ def _vector_share(a: EvenRates, b: EvenRates, lag: int) -> float:
 
 
 def second_clock(aligned: SecondLog, time: ArrayLike) -> Array:
-    """Turn instants of the first clock into those of the second.
+    """Convert instants of the first clock to the second.
 
     Parameters
     ----------
@@ -577,7 +576,7 @@ def second_clock(aligned: SecondLog, time: ArrayLike) -> Array:
 
 
 def first_clock(aligned: SecondLog, time: ArrayLike) -> Array:
-    """Turn instants of the second clock into those of the first: `second_clock` reversed.
+    """Convert instants of the second clock to the first: inverse of `second_clock`.
 
     Parameters
     ----------
@@ -602,7 +601,7 @@ def truth_from_second_log(
     gyro_bias: ArrayLike = (0.0, 0.0, 0.0),
     q_start: ArrayLike = (1.0, 0.0, 0.0, 0.0),
 ) -> pd.DataFrame:
-    """Attitude of the first sensor's axes at its stamps, as the second log tells it.
+    """Attitude of the first sensor's axes at its stamps, by the second log.
 
     Parameters
     ----------
@@ -612,13 +611,13 @@ def truth_from_second_log(
         The two Imu tables.
     attitude : DataFrame, optional
         Attitude table of the second sensor on its own clock. If it has one, it is taken; if
-        not, the second log's rates are integrated, sample by sample as they are.
+        not, the second log's rates are integrated sample by sample.
     gyro_bias : array_like, (3,), rad/s
-        Bias of the second gyro in its own axes, taken off before: what is left of it turns
-        the truth by so much in every second. From a rest, or from its calibration.
+        Bias of the second gyro in its own axes, subtracted beforehand: its residual turns
+        the truth at its rate. From a rest, or from its calibration.
     q_start : array_like, (4,)
-        Attitude of the first sensor at its first stamp that both cover: a gyro tells attitude
-        from there on only. Not used where there is an `attitude`.
+        Attitude of the first sensor at its first stamp that both cover: a gyro gives relative
+        attitude only. Not used if `attitude` is given.
 
     Returns
     -------
@@ -628,14 +627,14 @@ def truth_from_second_log(
     Raises
     ------
     DataError
-        The body turned about one axis only, so that the mounting is not known; or nothing is
-        covered by both.
+        The body turned about one axis only, so that the mounting is unknown; or the logs do
+        not overlap.
 
     Notes
     -----
-    ``C_n1 = C_n2 C_12^T``. A time error ``dt`` shows as ``omega dt`` and a mounting error as
-    itself in an absolute attitude; in one that starts equal, a mounting error ``m`` shows as
-    ``m - C^T m``, at most twice itself.
+    ``C_n1 = C_n2 C_12^T``. A time error ``dt`` causes an error ``omega dt``. A mounting error ``m``
+    enters an absolute attitude in full; in an attitude that starts equal it causes ``m - C^T m``,
+    at most twice its size.
     """
     if aligned.axis is not None:
         raise DataError(
@@ -645,7 +644,7 @@ def truth_from_second_log(
         )
     check_imu(second)
     if attitude is None:
-        # On the first clock: a second clock that runs fast would count every turn too large.
+        # On the first clock: a second clock that runs fast would enlarge every rotation.
         imu = imu_table(
             first_clock(aligned, second.index),
             second[GYRO].to_numpy(dtype=np.float64) - np.asarray(gyro_bias),

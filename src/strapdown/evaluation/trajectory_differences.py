@@ -1,4 +1,4 @@
-"""One trajectory compared with another: metres, metres a second and degrees."""
+"""Compare two trajectories in meters, meters per second and degrees."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ __all__ = [
 Array = NDArray[np.float64]
 
 ROTATION_ERROR = ["phi_N", "phi_E", "phi_D"]
-# Trajectories that begin farther apart than this are asked whether they are of one vehicle.
+# Trajectories that begin farther apart are checked for wrong units and signs.
 FAR = 50_000.0  # m
 
 
@@ -57,7 +57,7 @@ def trajectory_differences(
     estimate, reference : DataFrame
         Trajectory tables of one clock.
     ellipsoid : Ellipsoid
-        To which the places of both refer.
+        Ellipsoid of the positions of both.
 
     Returns
     -------
@@ -66,23 +66,23 @@ def trajectory_differences(
 
         ``north east down``, m
             The straight line from the reference, along north, east and down midway between both
-            places: places of one height differ in no height, however far apart they are, and the
-            length is the distance. Over the ground it is ``d³/24R²`` farther, 1 m at 100 km.
+            positions: positions of equal height have no height difference, however far apart, and
+            the length is the distance. Over the ground it is ``d³/24R²`` farther, 1 m at 100 km.
         ``VN VE VD``, m/s
-            Each velocity along the local level of its own place.
+            Each velocity along the local level of its own position.
         ``roll pitch heading``, deg
             Differences of the angles, within -180 to 180. Near a pitch of 90 deg roll and
-            heading say little one by one.
+            heading are meaningful in combination only.
         ``phi_N phi_E phi_D``, deg
-            Rotation vector of ``C_est C_ref^T`` about north, east and down: the turn that brings
-            the reference's attitude into the estimate's, ``C_est = exp([phi x]) C_ref``, so that
+            Rotation vector of ``C_est C_ref^T`` about north, east and down: the rotation from
+            the reference's attitude to the estimate's, ``C_est = exp([phi x]) C_ref``, so that
             for a level body ``phi_D`` is the error of heading. Free of singularities; its
             length is the angle between the attitudes. Both are relative to the local
-            level of their own place, as a mechanization has them.
+            level of their own position, as in a mechanization.
 
         ``attrs``: ``source``, ``reference``; ``interpolated``, the number of instants at which
-        the reference had no row and was interpolated (`trajectory_at`); ``findings``, a tuple
-        of Finding: what that may cost, and gaps of the reference.
+        the reference had no row and was interpolated (`trajectory_at`); ``findings``, a tuple of
+        Finding: the possible interpolation error, and gaps of the reference.
 
     Raises
     ------
@@ -120,7 +120,7 @@ def trajectory_differences(
 
 
 def _within(estimate: pd.DataFrame, reference: pd.DataFrame) -> pd.DataFrame:
-    """Rows of the estimate in the span of the reference; the ends but for rounding."""
+    """Rows of the estimate in the span of the reference, ends included despite rounding."""
     stamps, known = (t.index.to_numpy(dtype=np.float64) for t in (estimate, reference))
     source = estimate.attrs.get("source")
     for time, name in ((stamps, source), (known, reference.attrs.get("source"))):
@@ -149,7 +149,7 @@ def _far_apart(
     estimate: pd.DataFrame,
     reference: pd.DataFrame,
 ) -> list[Finding]:
-    """Two starts that are far apart: an error if it is explained, or else a finding."""
+    """Check two distant starts: an error if a wrong unit or sign explains them, else a finding."""
 
     def distance(a: Array, b: Array) -> float:
         first, second = (ecef_from_geodetic(p[None], ellipsoid=ellipsoid) for p in (a, b))
@@ -168,7 +168,7 @@ def _far_apart(
     ]
     for a, b, code in tried:
         latitude, longitude = np.abs([a[:2], b[:2]]).max(axis=0)
-        # A hundredth is no accident.
+        # A hundredth of the rows is too many for an accident.
         if latitude <= 90.0 and longitude <= 360.0 and distance(a, b) < 0.01 * apart:
             raise DataError(
                 code,
@@ -189,7 +189,7 @@ def _far_apart(
 
 
 def _interpolated(time: Array, reference: pd.DataFrame, ellipsoid: Ellipsoid) -> list[Finding]:
-    """What interpolating the reference at these instants may cost, and gaps among them."""
+    """Findings on the interpolation error of the reference at these instants, and on gaps."""
     if not time.size:
         return []
     source, stamps = reference.attrs.get("source"), reference.index.to_numpy(dtype=np.float64)
@@ -227,20 +227,20 @@ def _interpolated(time: Array, reference: pd.DataFrame, ellipsoid: Ellipsoid) ->
     ]
 
 
-# A trajectory at instants between its rows, and what interpolation costs.
+# A trajectory at instants between its rows, and the interpolation error.
 #
-# Everything is interpolated along the axes of the Earth, so that neither the date line nor a pole
-# is a special place.
+# Everything is interpolated along the axes of the Earth, so that the date line and the poles need
+# no special case.
 
 
-# Stamps of one beat that were summed up and not multiplied differ by this share of a step at most;
-# interpolating so near to a row costs nothing.
+# Time stamps of one rate that were summed and not multiplied differ by this share of a step at
+# most; interpolating so close to a row has no cost.
 SAME_BEAT = 1e-6
 
 
 @dataclass(frozen=True)
 class InterpolationCost:
-    """What interpolating between the rows of a trajectory may cost at most.
+    """Largest interpolation error between the rows of a trajectory.
 
     Attributes
     ----------
@@ -299,7 +299,7 @@ def _between(
 def same_stamps(
     stamps: Array, time: Array, share: float = 0.0
 ) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Find the nearest stamp of each instant, and whether it is the same but for rounding.
+    """Find the nearest stamp of each instant, and whether it is equal but for rounding.
 
     Parameters
     ----------
@@ -338,17 +338,16 @@ def trajectory_at(
     time : array_like, (n,), s
         Increasing, and within the span of the table, but for a millionth of a step.
     ellipsoid : Ellipsoid
-        To which its places refer.
+        Ellipsoid of its positions.
 
     Returns
     -------
     DataFrame
-        A Trajectory table: the rows themselves where the stamps are the same. Between two rows
-        a step of `h` apart, position is the cubic of Hermite through both positions and
-        velocities, right to ``h⁴/384`` times the largest fourth derivative; velocity changes in
-        proportion to time, right to ``h²/8`` times the largest jerk; attitude turns at a
-        constant rate relative to the Earth, right to ``h²/8`` times the largest angular
-        acceleration.
+        A Trajectory table: the rows themselves at their time stamps. Between two rows a step of
+        `h` apart, position is the cubic of Hermite through both positions and velocities,
+        accurate to ``h⁴/384`` times the largest fourth derivative; velocity is linear,
+        accurate to ``h²/8`` times the largest jerk; attitude rotates at a constant rate relative
+        to the Earth, accurate to ``h²/8`` times the largest angular acceleration.
 
     Raises
     ------
@@ -397,7 +396,7 @@ def trajectory_at(
 def interpolation_cost(
     trajectory: pd.DataFrame, ellipsoid: Ellipsoid = WGS84
 ) -> InterpolationCost | None:
-    """Judge what interpolation costs, by interpolating each row from its two neighbours.
+    """Estimate the interpolation error by interpolating each row from its two neighbors.
 
     Parameters
     ----------
@@ -410,9 +409,9 @@ def interpolation_cost(
     InterpolationCost or None
         None for fewer than three rows. The misfit at a row that lies at the share `s` of the
         double step `H` goes with ``s² (1-s)² H⁴`` for position, and with ``s (1-s) H²`` for
-        velocity and attitude; from it follows what the longer of the two steps costs in its
-        middle. The largest of all rows is given. Noise of the rows is no cost of interpolation
-        and enters undiminished, so that for a noisy trajectory this is too much.
+        velocity and attitude; the error in the middle of the longer of the two steps follows
+        from it. The largest of all rows is given. Noise of the rows is not an interpolation
+        error but enters undiminished, so that the figure is too large for a noisy trajectory.
     """
     if len(trajectory) < 3:
         return None
@@ -434,7 +433,7 @@ def interpolation_cost(
     )
 
 
-# The differences of two trajectories in a few numbers.
+# Summary of the differences of two trajectories.
 
 
 @dataclass(frozen=True)
@@ -444,7 +443,7 @@ class QuantityError:
     Attributes
     ----------
     quantity : str
-        A column, or what is made of several: ``horizontal`` and ``position`` (the lengths in two
+        A column, or a combination: ``horizontal`` and ``position`` (the lengths in two
         and three dimensions), ``horizontal velocity``, ``velocity``, ``rotation`` (the angle
         between the attitudes).
     unit : str
@@ -473,12 +472,12 @@ class DifferenceSummary:
     Attributes
     ----------
     source, reference : str or None
-        What was compared with what.
+        The compared trajectories.
     samples : int
     start, end : float, s
     errors : tuple of QuantityError
     findings : tuple of Finding
-        What a person should know about the comparison.
+        Findings about the comparison.
     """
 
     source: str | None
@@ -495,7 +494,7 @@ class DifferenceSummary:
         Raises
         ------
         DataError
-            There is none of that name.
+            The name does not exist.
         """
         for error in self.errors:
             if error.quantity == quantity:
@@ -508,12 +507,12 @@ class DifferenceSummary:
         )
 
     def to_pandas(self) -> pd.DataFrame:
-        """One row a quantity: ``unit rms largest largest_at final``."""
+        """One row per quantity: ``unit rms largest largest_at final``."""
         return pd.DataFrame([vars(e) for e in self.errors]).set_index("quantity")
 
     @property
     def title(self) -> str:
-        """What was compared, over what."""
+        """The compared trajectories and the time span."""
         named = f"{self.source or 'estimate'} minus {self.reference or 'reference'}"
         span = f"{self.start:.9g} to {self.end:.9g} s, {self.samples} instants"
         return f"{named}, {span}"
@@ -558,7 +557,7 @@ def summarise_differences(differences: pd.DataFrame) -> DifferenceSummary:
     ----------
     differences : DataFrame
         As `trajectory_differences` returns it, or any TrajectoryError table; without
-        ``phi_N phi_E phi_D`` there is no ``rotation``.
+        ``phi_N phi_E phi_D`` the row ``rotation`` is missing.
 
     Returns
     -------

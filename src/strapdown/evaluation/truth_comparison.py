@@ -1,4 +1,4 @@
-"""A run of navigation against the truth: errors beside what the run itself claims of them."""
+"""Compare a navigation run with the truth: errors beside their stated covariance."""
 
 from __future__ import annotations
 
@@ -52,10 +52,10 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-#: Physical errors, as `mechanization.state_error.state_error` has them, and their units.
+#: Physical errors, in the order of `mechanization.state_error.state_error`, and their units.
 COMPONENTS = ("north", "east", "down", "VN", "VE", "VD", "psi_N", "psi_E", "psi_D")
 UNITS = ("m",) * 3 + ("m/s",) * 3 + ("deg",) * 3
-#: What normalised squares are of.
+#: Groups of components of the normalized squares.
 PARTS = {
     "all": tuple(range(9)),
     "position": (0, 1, 2),
@@ -63,40 +63,40 @@ PARTS = {
     "attitude": (6, 7, 8),
     "horizontal": (0, 1),
 }
-# A mark tells of the first row after it, if that is not more steps of the recorder away.
+# A mark belongs to the first row after it, if that is not more steps of the recorder away.
 NEAR = 1.5
 
 
 @dataclass(frozen=True, eq=False)
 class TruthComparison:
-    """Errors of a run, and what the run says of them.
+    """Errors of a run, and their covariance by the run.
 
     Attributes
     ----------
     time : ndarray, (k,), s
-        Of the marks that the truth covers; against places alone, of the places.
+        Of the marks that the truth covers; for positions alone, of the positions.
     errors : ndarray, (k, 9)
-        Computed less true, as `mechanization.state_error.state_error`: m, m/s, rad, in
+        Computed − true, as `mechanization.state_error.state_error`: m, m/s, rad, in
         north-east-down. NaN where the truth has no velocity or attitude.
     covariance : ndarray, (k, 9, 9)
-        Claimed of them.
+        Stated covariance of the errors.
     differences : DataFrame
         TrajectoryError table at `time`: m, m/s, deg of roll, pitch and heading; NaN as above.
     sd : DataFrame
-        TrajectoryError table of the standard deviations claimed.
+        TrajectoryError table of the stated standard deviations.
     nees : DataFrame
-        By time: normalised squares of the `PARTS` that can be told.
+        By time: normalized squares of the `PARTS` that can be computed.
     freedom : dict of str to int
-        Number of components in each of them: what the run has no states of is not in it.
+        Number of components in each; components without a state in the run are left out.
     inside : dict of str to float
         Share of the epochs at which each is below its 95 % bound (chi-square, one-sided);
         ``horizontal``: inside of the 95 % ellipse.
     table : DataFrame
         By component, with rows ``horizontal`` and ``3-D``: ``unit``, ``rms``, ``max`` (of the
-        absolute value), ``sd`` (root mean square of what was claimed), ``inside`` (share within
-        1.96 claimed standard deviations; of the ellipse). Rotations in deg.
+        absolute value), ``sd`` (root mean square of the stated ones), ``inside`` (share within
+        1.96 stated standard deviations; of the ellipse). Rotations in deg.
     findings : tuple of Finding
-        What interpolation of the truth may cost, gaps.
+        Possible interpolation error of the truth; gaps.
     """
 
     time: Array
@@ -121,7 +121,7 @@ def compare_with_truth(
     """Compare a run with the truth at the marks of its covariance.
 
     A mark holds from its instant on: it is compared with the first row of the trajectory that
-    is not before it, where nothing is mixed with what was not yet observed.
+    is not before it, which does not mix in a state before the observation.
 
     Parameters
     ----------
@@ -184,30 +184,30 @@ def compare_with_places(
     antenna: Sequence[float] = (0.0, 0.0, 0.0),
     ellipsoid: Ellipsoid = WGS84,
 ) -> TruthComparison:
-    """Compare a run with places alone, as those of a receiver, at their own instants.
+    """Compare a run with positions alone, as those of a receiver, at their own instants.
 
     Parameters
     ----------
     trajectory, marks, covariance
-        As `compare_with_truth`; at a place the newest covariance is used.
+        As `compare_with_truth`; at a position the newest covariance is used.
     places : DataFrame
         By time in s: ``lat lon`` deg, ``alt`` m, and, if they are not exact, ``north_sd east_sd
-        down_sd`` m, as a Gnss table. What they are wrong by is added to what is claimed, and must
-        not have been used by the run: places that the filter has seen are nearer to it than the
-        two together say.
+        down_sd`` m, as a Gnss table. Their variance is added to the stated one, and they must
+        not have been used by the run: errors of positions that the filter has used are
+        correlated with its own.
     antenna : sequence of float, (3,), m
-        What the places are of, from the point that the trajectory describes, in body axes.
+        Point of the positions, from the point that the trajectory describes, in body axes.
     ellipsoid : Ellipsoid
 
     Returns
     -------
     TruthComparison
-        Of the place alone.
+        Of the position alone.
 
     Raises
     ------
     DataError
-        No place is within the run; a covariance is not positive.
+        No position is within the run; a covariance is not positive.
     """
     stamps = trajectory.index.to_numpy(dtype=np.float64)
     instants = np.asarray(marks, dtype=np.float64)
@@ -227,7 +227,7 @@ def compare_with_places(
     errors = np.full((len(time), 9), np.nan)
     errors[:, :3] = _displacements(places_of(computed), _places(usable), ellipsoid) + arm
     P = np.asarray(covariance)[mark].copy()
-    # The place of the antenna is wrong by dr + psi x arm, too.
+    # The antenna position has the error dr + psi x arm, too.
     J = np.concatenate(
         [np.broadcast_to(np.eye(3), (len(time), 3, 3)), -rotation.cross_matrix(arm)], axis=2
     )
@@ -251,7 +251,7 @@ def state_errors(computed: pd.DataFrame, true: pd.DataFrame, ellipsoid: Ellipsoi
     """
     a, b = (table[TRAJECTORY].to_numpy(dtype=np.float64) for table in (computed, true))
     q_a, q_b = (rotation.quaternion_from_euler(x[:, 6:]) for x in (a, b))
-    # Of the truth's local level to that of the computed state.
+    # From the truth's local level to that of the computed state.
     between = rotation.compose(q_ne(a[:, 0], a[:, 1]), rotation.conjugate(q_ne(b[:, 0], b[:, 1])))
     psi = rotation.rotation_vector_from_quaternion(
         rotation.compose(q_a, rotation.conjugate(rotation.compose(between, q_b)))
@@ -262,7 +262,7 @@ def state_errors(computed: pd.DataFrame, true: pd.DataFrame, ellipsoid: Ellipsoi
 
 
 def _displacements(computed: Array, true: Array, ellipsoid: Ellipsoid) -> Array:
-    """As `displacement_between`, of degrees and metres."""
+    """As `displacement_between`, from degrees and meters."""
     a, e2 = ellipsoid.semi_major_axis, ellipsoid.eccentricity_squared
     pairs = np.hstack([computed, true])
     pairs[:, [0, 1, 3, 4]] = np.radians(pairs[:, [0, 1, 3, 4]])
@@ -279,7 +279,7 @@ def _places(table: pd.DataFrame) -> Array:
 
 
 def _rows_of_marks(stamps: Array, marks: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Rows of a trajectory that marks tell of, and these marks: of several, the last."""
+    """Rows of a trajectory that belong to marks, and these marks: of several, the last."""
     step = float(np.median(np.diff(stamps))) if len(stamps) > 1 else 0.0
     nearest, same = same_stamps(stamps, marks, SAME_BEAT)
     row = np.where(same, nearest, np.searchsorted(stamps, marks))
@@ -307,7 +307,7 @@ def _comparison(
             continue
         squares[part] = normalised_squares(errors[:, kept], P[:, kept][:, :, kept])
         freedom[part] = len(kept)
-        # One-sided: what is nearer than claimed is outside of no ellipse.
+        # One-sided: a smaller error is never outside an ellipse.
         limit = bounds(len(kept), 2.0 * SHARE - 1.0)[1]
         inside[part] = float(np.mean(squares[part] <= limit))
     index = pd.Index(time, name="time")
@@ -364,19 +364,19 @@ def _nothing_in_common(trajectory: pd.DataFrame, span: tuple[float, float]) -> D
     )
 
 
-# Errors against what was claimed of them: normalised squares and their bounds.
+# Errors against their stated covariance: normalized squares and their bounds.
 
 
-#: Of the bounds, where nothing else is said.
+#: Default probability of the bounds.
 SHARE = 0.95
 
 
 def normalised_squares(errors: Array, covariance: Array) -> Array:
-    """Return ``e' P^-1 e`` of each epoch (NEES), chi-square if P is what is claimed of e.
+    """Return ``e' P^-1 e`` of each epoch (NEES), chi-square if P is the covariance of e.
 
     Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001,
-    Eq. (5.4.2-1). Each component counts in units of its own standard deviation, so that metres
-    beside radians cost no digits.
+    Eq. (5.4.2-1). Each component is scaled by its own standard deviation, so that meters beside
+    radians cost no digits.
 
     Parameters
     ----------
@@ -407,13 +407,13 @@ def normalised_squares(errors: Array, covariance: Array) -> Array:
 
 
 def bounds(freedom: int, share: float = SHARE) -> tuple[float, float]:
-    """Return the two-sided bounds within which a share of chi-square numbers is."""
+    """Return the two-sided bounds that hold a share of chi-square numbers."""
     outside = 0.5 - 0.5 * share
     return chi_square_quantile(outside, freedom), chi_square_exceeded(outside, freedom)
 
 
 def band_of_mean(freedom: int, runs: int, share: float = SHARE) -> tuple[float, float]:
-    """Return the bounds of the mean over independent runs of a chi-square number each.
+    """Return the bounds of the mean of chi-square numbers over independent runs.
 
     Bar-Shalom et al. (2001), Eq. (5.4.2-9): ``chi2(runs * freedom) / runs``.
     """
@@ -427,29 +427,29 @@ def _not_positive(at: NDArray[np.int_]) -> DataError:
     )
 
 
-# Whether a filter and its smoother can both be right.
+# Consistency of a filter with its smoother.
 
 
-#: Of a difference, in the standard deviations that are expected of it.
+#: Limit of a difference, in its predicted standard deviations.
 WITHIN = 3.0
-#: A smoother that takes less than this share off a variance has told nothing, and the difference
-#: of the variances is rounding.
+#: A smoother that reduces a variance by less than this share has added no information, and the
+#: difference of the variances is rounding.
 TOLD = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class SmootherConsistency:
-    """Differences of what a filter said and what its smoother says.
+    """Differences between the filtered and the smoothed solution.
 
     Attributes
     ----------
     columns : tuple of str
         Components: those of a TrajectoryError table.
     instants : ndarray of int, (9,)
-        At which the smoother told more than the filter.
+        At which the smoother improves on the filter.
     share : ndarray, (9,)
-        Of these, where the difference is within three of its standard deviations; NaN where there
-        are none.
+        Share of these with a difference within three of its standard deviations; NaN without
+        instants.
     rms : ndarray, (9,)
         Root mean square of the difference in them: about 1 where the model is right.
     """
@@ -463,12 +463,12 @@ class SmootherConsistency:
 def smoother_consistency(
     forward: NavigationRecord, smoothed: NavigationRecord, ellipsoid: Ellipsoid = WGS84
 ) -> SmootherConsistency:
-    """Hold the difference of two estimates against what their covariances say of it.
+    """Test the difference of two estimates against their covariances.
 
     Where the model is right, ``x_filter - x_smoother`` has the covariance ``P_filter -
     P_smoother`` (McReynolds, JOTA 1 (1967); Bryson and Ho, Applied Optimal Control, 1975, sec.
-    13.2), of each component a normal number, correlated over time: three standard deviations hold
-    99.7 % of them. A filter that believes a wrong model is told so by its own later observations.
+    13.2), normally distributed in each component and correlated over time: three standard
+    deviations hold 99.7 %. A filter with a wrong model is contradicted by its later observations.
 
     Parameters
     ----------
@@ -483,7 +483,7 @@ def smoother_consistency(
     columns = list(TRAJECTORY_ERROR)
     apart = trajectory_differences(forward.trajectory, smoothed.trajectory, ellipsoid)
     rows, marks = apart.index.to_numpy(), forward.sd.index.to_numpy()
-    # A mark is of the first row after it; one that a later mark precedes that row is not.
+    # A mark belongs to the first row after it, unless a later mark precedes that row.
     row = np.searchsorted(rows, marks - 1e-7)
     kept = np.append(row[1:] > row[:-1], True) & (row < len(rows))
     values = apart[columns].to_numpy()[row[kept]]

@@ -1,4 +1,4 @@
-"""Strapdown mechanizations: one file each, and the one table of them."""
+"""Strapdown mechanizations: one file each, and the table of all."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every mechanization is: a state, a way to advance it, a trajectory read from it."""
+"""Interface of every mechanization: state, propagation, and trajectory output."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Mechanization(ABC):
-    """A way to navigate by motion increments, with its options; it holds no state of its own.
+    """A method to navigate by motion increments, with its options; stateless.
 
     Attributes
     ----------
     ellipsoid : str
-        One of `ellipsoids.ELLIPSOIDS`; also of the places that go in and come out.
+        One of `ellipsoids.ELLIPSOIDS`; also of the input and output positions.
     height : {'free', 'held', 'damped'}
         The height follows from the sensors, whose errors it multiplies by e every 570 s; or is
         kept where it is, and the vertical velocity at zero; or a loop of the third order draws
@@ -51,11 +51,11 @@ class Mechanization(ABC):
     height_time_constant : float, s
         Of each of the three poles of that loop, 1 to 1000, however often references come.
     latitude_limit_deg : float, deg
-        Where north is no longer used: beyond it a run stops. A wander azimuth has no such limit.
+        North is not used beyond it: a run stops. A wander azimuth has no such limit.
     largest_speed : float, m/s
         Above it the state is taken to have diverged.
     height_limits : tuple of float, m
-        Outside of them, too.
+        A run stops outside of them, too.
 
     Raises
     ------
@@ -75,9 +75,9 @@ class Mechanization(ABC):
     source: ClassVar[str]
     #: Numbers in a row of its history.
     row: ClassVar[int] = ROW
-    #: Third component of up in its level axes: -1 where they are north-east-down.
+    #: Third component of up in its level axes: -1 for north-east-down.
     level_up: ClassVar[float] = -1.0
-    #: Places of the height and of the velocity in a state and in a row.
+    #: Indices of the height and of the velocity in a state and in a row.
     alt_at: ClassVar[int] = ALT
     v_at: ClassVar[int] = V
 
@@ -120,14 +120,14 @@ class Mechanization(ABC):
     def advance_rows(
         self, state: Array, increments: Array, heights: Array, earth: Array, history: Array
     ) -> tuple[int, int]:
-        """Advance `state` over rows of increments; return the steps made, and why no more."""
+        """Advance `state` over rows of increments; return the steps made, and why it stopped."""
 
     def sample_kernel(self) -> Callable[..., int] | None:
-        """Return the compiled function that takes one sample, if there is one."""
+        """Return the compiled function for one sample, if any."""
         return None
 
     def levels(self, history: Array) -> Array:
-        """Return what a filter needs to know of each row of a history.
+        """Return the quantities that a filter needs of each row of a history.
 
         Parameters
         ----------
@@ -148,7 +148,7 @@ class Mechanization(ABC):
         return state[: self.row].copy()
 
     def level_from_ned(self, row: Array) -> Array:
-        """Return the matrix that turns vectors from north-east-down into level axes, (3, 3).
+        """Return the matrix from north-east-down to level axes, (3, 3).
 
         Parameters
         ----------
@@ -158,14 +158,14 @@ class Mechanization(ABC):
         return np.eye(3)
 
     def correct(self, state: Array, error: ArrayLike) -> Array:
-        """Take an error off a state.
+        """Subtract an error from a state.
 
         Parameters
         ----------
         state : ndarray
             It is not changed.
         error : array_like, (9,)
-            State less truth, in level axes of the state: displacement in m, difference of the
+            State − truth, in level axes of the state: displacement in m, difference of the
             velocities as vectors in m/s, and the rotation vector in rad of the attitude relative
             to the Earth, ``C_state = exp([psi x]) C_true``.
 
@@ -179,7 +179,7 @@ class Mechanization(ABC):
         return after
 
     def corrected_history(self, history: Array, errors: Array) -> Array:
-        """Take an error off each row of a history.
+        """Subtract an error from each row of a history.
 
         Parameters
         ----------
@@ -197,7 +197,7 @@ class Mechanization(ABC):
         return after
 
     def nav_state(self, state: Array, time: float) -> NavState:
-        """Return the place, velocity and attitude of a state.
+        """Return the position, velocity and attitude of a state.
 
         Parameters
         ----------
@@ -218,7 +218,7 @@ class Mechanization(ABC):
         )
 
     def kernel_options(self) -> Array:
-        """Options and limits as the kernels take them."""
+        """Options and limits for the kernels."""
         earth = find_ellipsoid(self.ellipsoid)
         return np.array(
             [
@@ -249,7 +249,7 @@ class Mechanization(ABC):
             A MotionIncrements table of any length, one row included.
         heights : array_like, (n,), m, optional
             Reference heights at the ends of the steps (backward: at their starts), for a damped
-            height; NaN where there is none.
+            height; NaN for a missing one.
         backward : bool
             Go from the end of the increments to their start.
 
@@ -265,8 +265,8 @@ class Mechanization(ABC):
         Raises
         ------
         DivergenceError
-            The state has left the range in which this mechanization means anything, or is too
-            near a pole; the first step for which this is so is named.
+            The state has left the validity of this mechanization, or is too near a pole; the first
+            such step is named.
         DataError
             `heights` is missing where the height is damped, given where it is not, infinite, or
             of another length.
@@ -292,8 +292,8 @@ class Mechanization(ABC):
         velocity = slice(self.v_at, self.v_at + 3)
         earth = find_ellipsoid(self.ellipsoid).parameters()
         if backward:
-            # The same motion met backward is a motion with opposite velocity on an Earth that
-            # turns the other way.
+            # Backward, the motion is one with opposite velocity on an Earth that rotates the other
+            # way.
             forward, rows = rows, np.empty_like(rows)
             reverse_increments(forward, rows)
             reference = reference[::-1].copy()
@@ -351,7 +351,7 @@ class Mechanization(ABC):
         return float(row[LAT])
 
     def remarks(self, time: Array, history: Array) -> tuple[Finding, ...]:
-        """Return what a person should know of the states of a run."""
+        """Return findings about the states of a run."""
         return ()
 
     def _speed(self, row: Array) -> float:

@@ -23,9 +23,9 @@ class NorthEastDown(Mechanization):
 
     Velocity and position by Tadic and Vukajlovic (2016), Eqs. (1)-(9), with Earth and transport
     rate and normal gravity with height; attitude by their two-step quaternion, Eqs. (11)-(19).
-    The equations are integrated in axes that are fixed in inertial space over a step, so that its
-    own error is of the fourth order of the step, or too small to matter (1e-9 m/s² for steps of
-    a second at 230 m/s: `_kernels.ned`); what remains is that of the increments.
+    The equations are integrated in axes that are fixed in inertial space over a step, so that the
+    algorithm error is of the fourth order of the step, or negligible (1e-9 m/s² for steps of
+    a second at 230 m/s: `_kernels.ned`); the remaining error is that of the increments.
 
     Valid up to `latitude_limit_deg`, where it stops.
 
@@ -56,11 +56,11 @@ class NorthEastDown(Mechanization):
         return np.array([*place, *start.v_n[:2], down, *start.q_nb, *level, 0.0, 0.0])
 
     def sample_kernel(self) -> Callable[..., int]:
-        """Return the compiled function that takes one sample."""
+        """Return the compiled function for one sample."""
         return ned_update
 
     def correct(self, state: Array, error: ArrayLike) -> Array:
-        """Take an error off a state, as `Mechanization.correct`."""
+        """Subtract an error from a state, as `Mechanization.correct`."""
         after = super().correct(state, error)
         after[kernel.SINE : kernel.PRIME + 1] = self._level(float(after[kernel.LAT]))
         return after
@@ -74,7 +74,7 @@ class NorthEastDown(Mechanization):
     def advance_rows(
         self, state: Array, increments: Array, heights: Array, earth: Array, history: Array
     ) -> tuple[int, int]:
-        """Advance `state` over rows of increments; return the steps made, and why no more."""
+        """Advance `state` over rows of increments; return the steps made, and why it stopped."""
         options = self.kernel_options()
         made, why = kernel.ned_advance(state, increments, heights, earth, options, history)
         return made, why

@@ -1,4 +1,4 @@
-"""Heights that a damped height is drawn to, checked."""
+"""Checks of the reference heights of a damped height."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from strapdown.errors import DataError
 
 Array = NDArray[np.float64]
 
-#: What may become of the height: it follows from the sensors; it is kept; a reference damps it.
+#: Height options: free (by the sensors), held, damped by a reference.
 HEIGHTS = ("free", "held", "damped")
 
 
@@ -19,9 +19,9 @@ def reference_heights(height: str, heights: ArrayLike | None, steps: int) -> Arr
     Parameters
     ----------
     height : {'free', 'held', 'damped'}
-        What becomes of the height.
+        Height option.
     heights : array_like, (n,), m, or None
-        NaN where there is none.
+        NaN for missing ones.
     steps : int
         Steps of the segment.
 

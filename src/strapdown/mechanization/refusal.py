@@ -1,4 +1,4 @@
-"""Why a run stops: the step that leaves the range of a mechanization, in words."""
+"""Errors for a step that leaves the validity of a mechanization."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def refuse_start(
     largest_speed: float,
     source: str | None,
 ) -> None:
-    """Refuse a state that was outside of the limits before any step.
+    """Refuse a start outside of the limits.
 
     Parameters
     ----------
@@ -51,18 +51,18 @@ def refuse_start(
 def refuse_step(
     why: int, step: int, increments: pd.DataFrame, before: Finding | None, latitude_limit_deg: float
 ) -> NoReturn:
-    """Refuse a step that a kernel did not make.
+    """Raise the error of a step that a kernel refused.
 
     Parameters
     ----------
     why : int
-        What the kernel's `verdict` said of it.
+        Code by the kernel's `verdict`.
     step : int
         Row of the increments, from 0.
     increments : DataFrame
         A MotionIncrements table.
     before : Finding or None
-        The state before it; None at the first step.
+        Finding on the state before it; None at the first step.
     latitude_limit_deg : float, deg
 
     Raises

@@ -1,4 +1,4 @@
-"""A whole run, or one in pieces."""
+"""Navigation over a whole log, or over chunks."""
 
 from __future__ import annotations
 
@@ -27,31 +27,30 @@ from strapdown.tables.checks import (
 
 Array = NDArray[np.float64]
 
-# A step that turns by more, in rad, is one that its samples hardly describe.
+# A step with a larger rotation, rad, is poorly described by its samples.
 LARGEST_TURN = 1.0
-# The longest step, in s, over which two samples say what happened between them. Longer holes
-# are for the user to judge.
+# The longest step, s, over which two samples describe the motion between them. The user decides on
+# longer gaps.
 LONGEST_STEP = 1.0
-# Share of a step by which the next may begin later: stamps are rounded, a lost step is a whole one.
+# Allowed delay of the next step as a fraction of a step: stamps are rounded, a lost step is whole.
 LOST = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class NavigationRun:
-    """What a mechanization made of a log.
+    """Result of a mechanization run over a log.
 
     Attributes
     ----------
     mechanization : Mechanization
     start, end : NavState
-        The state that was given, and that at the other end: the last, or of a backward run the
-        first.
+        The given state, and that at the other end: the last, or of a backward run the first.
     time : ndarray, (n,), s
         Stamps of the states: both sides of every step.
     history : ndarray, (n, `mechanization.row`)
         The states as the kernels have them: `Mechanization.advance`.
     findings : tuple of Finding
-        What a person should know of the increments, and of the states.
+        Findings about the increments and the states.
     source : str, optional
         Name of the log.
     """
@@ -66,7 +65,7 @@ class NavigationRun:
 
     @cached_property
     def trajectory(self) -> pd.DataFrame:
-        """Trajectory table, the start included; made when it is first asked for."""
+        """Trajectory table, the start included; made at its first use."""
         return self.mechanization.trajectory(self.time, self.history, self.source)
 
 
@@ -93,7 +92,7 @@ def run_mechanization(
     backward : bool
         From the end of the log to its start.
     longest_step : float, s
-        A step longer than this is a hole over which nothing is known, and refused.
+        A longer step is a gap in the data, and refused.
 
     Returns
     -------
@@ -102,10 +101,10 @@ def run_mechanization(
     Raises
     ------
     DataError
-        The table is not valid, a step is too long, there is a hole between two steps, or `start`
+        The table is not valid, a step is too long, there is a gap between two steps, or `start`
         is not at the time where the increments begin.
     ConfigError
-        `longest_step` is no time.
+        `longest_step` is not a valid time.
     DivergenceError
         As `Mechanization.advance`.
     """
@@ -147,9 +146,9 @@ def navigate_segments(
     *,
     longest_step: float = LONGEST_STEP,
 ) -> Iterator[pd.DataFrame]:
-    """Navigate over a log that comes in pieces, in constant memory.
+    """Navigate over a log in chunks, in constant memory.
 
-    The numbers are those of a run over the whole log, to the last bit.
+    The result equals that of a run over the whole log to the last bit.
 
     Parameters
     ----------
@@ -198,7 +197,7 @@ def navigate_segments(
 
 
 def check_longest_step(longest: float) -> None:
-    """Refuse what is no length of time."""
+    """Refuse an invalid length of time."""
     if not is_number(longest) or not longest > 0.0:
         raise ConfigError(
             "mechanization.longest-step-none", quantity="longest_step", longest=longest
@@ -206,7 +205,7 @@ def check_longest_step(longest: float) -> None:
 
 
 def _check_segment(segment: pd.DataFrame, newest: Array) -> None:
-    """Refuse a piece that is no Imu table, or does not follow the one before."""
+    """Refuse a chunk that is not an Imu table, or does not follow the previous one."""
     source = source_of(segment)
     check_columns(segment, [*GYRO, *ACCEL], source)
     if len(segment) > 1:
@@ -229,7 +228,7 @@ def _check_start(start: NavState, begin: float, increments: pd.DataFrame) -> Non
 
 
 def _check_joints(increments: pd.DataFrame, dt: Array) -> None:
-    """Refuse time between two steps over which there is no increment."""
+    """Refuse a time interval between two steps without an increment."""
     ends = increments.index.to_numpy(dtype=np.float64)
     between = np.diff(ends) - dt[1:]
     if between.size and between.max() > LOST * dt.min():
@@ -269,7 +268,7 @@ def _refuse_holes(increments: pd.DataFrame, longest: float) -> None:
 
 def _wide_steps(increments: pd.DataFrame) -> tuple[Finding, ...]:
     dt = increments["dt"].to_numpy(dtype=np.float64)
-    # The usual step is no shorter than the shortest: with this most logs are done.
+    # The usual step is at least the shortest: this test suffices for most logs.
     if dt.max() <= 3.0 * dt.min():
         return ()
     usual = float(np.median(dt))

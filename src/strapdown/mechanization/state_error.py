@@ -1,4 +1,4 @@
-"""How far one state of navigation is from another."""
+"""Difference of two navigation states."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 def state_error(state: NavState, truth: NavState, ellipsoid: Ellipsoid = WGS84) -> Array:
-    """Return the error of a state, as filters have it.
+    """Return the error of a state, as defined in the filters.
 
     Parameters
     ----------
@@ -29,12 +29,12 @@ def state_error(state: NavState, truth: NavState, ellipsoid: Ellipsoid = WGS84) 
     Returns
     -------
     ndarray, (9,)
-        State less truth, in north-east-down of `state`: displacement in m (to 1e-9 m), difference
+        State − truth, in north-east-down of `state`: displacement in m (to 1e-9 m), difference
         of the velocities as vectors in m/s, and the rotation vector in rad of the attitude relative
-        to the Earth, ``C_state = exp([psi x]) C_true``. `Mechanization.correct` takes it off.
+        to the Earth, ``C_state = exp([psi x]) C_true``. `Mechanization.correct` subtracts it.
     """
     apart = displacement_between(state, truth, ellipsoid)
-    # Of the truth's local level to that of the state.
+    # From the truth's local level to that of the state.
     between = rotation.compose(_q_ne(state), rotation.conjugate(_q_ne(truth)))
     psi = rotation.rotation_vector_from_quaternion(
         rotation.compose(state.q_nb, rotation.conjugate(rotation.compose(between, truth.q_nb)))

@@ -1,4 +1,4 @@
-"""North-east-down with the simplifications of a paper, to see what they cost."""
+"""North-east-down with the simplifications of a paper, to show their cost."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from strapdown.nav_state import NavState
 
 @dataclass(frozen=True)
 class Tadic(Mechanization):
-    """The equations of Tadic and Vukajlovic (2016) with the terms that they leave out.
+    """The equations of Tadic and Vukajlovic (2016), with options for the terms that they neglect.
 
-    Everything slow is taken at the start of a step: of the first order in it. Use `NorthEastDown`
-    to navigate; this one shows what a simplification costs.
+    Slowly varying quantities are taken at the start of a step: first order in the step. Use
+    `NorthEastDown` to navigate; this one shows the cost of a simplification.
 
     Attributes
     ----------
@@ -28,9 +28,9 @@ class Tadic(Mechanization):
     earth_rate : bool
         Eq. (7), which "can be neglected for short navigation".
     transport_rate : bool
-        Eq. (8), the turn of the local level with the place.
+        Eq. (8), the rotation of the local level with position.
     gravity : float, m/s², optional
-        One value, downward, everywhere; normal gravity of each place, if not given.
+        One value, downward, everywhere; normal gravity of each position, if not given.
     as_printed : bool
         Take the third component of Eq. (8) with the sign that it has in print, which is wrong.
     ellipsoid, height, height_time_constant, latitude_limit_deg, largest_speed, height_limits
@@ -63,7 +63,7 @@ class Tadic(Mechanization):
     def advance_rows(
         self, state: Array, increments: Array, heights: Array, earth: Array, history: Array
     ) -> tuple[int, int]:
-        """Advance `state` over rows of increments; return the steps made, and why no more."""
+        """Advance `state` over rows of increments; return the steps made, and why it stopped."""
         switches = (
             float(self.coriolis),
             float(self.earth_rate),

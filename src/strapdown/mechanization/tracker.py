@@ -19,14 +19,14 @@ from strapdown.mechanization.run import LONGEST_STEP, check_longest_step
 from strapdown.nav_state import NavState
 from strapdown.tables import SAMPLINGS
 
-# Looked up once: at a microsecond a call, finding a name is a part of it.
+# Looked up once: attribute lookup is a significant part of a call of a microsecond.
 _ndarray = np.ndarray
 
 
 class NavTracker:
-    """Navigate from samples, one call a sample.
+    """Navigate from samples, one call per sample.
 
-    It gives the same numbers, to the last bit, as a run over the same samples with
+    Its result equals, to the last bit, that of a run over the same samples with
     `increments.motion_increments` at its defaults.
 
     Parameters
@@ -36,15 +36,15 @@ class NavTracker:
     mechanization : NorthEastDown or WanderAzimuth, optional
         North-east-down on WGS 84 with a free height, if not given.
     sampling : {'instantaneous', 'mean'}
-        What a sample is: the value at its stamp, or its mean over the interval that ends there.
+        Sample type: the value at its stamp, or its mean over the interval that ends there.
     longest_step : float, s
-        A longer step is a hole over which nothing is known, and refused; so is a first sample
-        that is farther than this from the time of `start`.
+        A longer step is a gap in the data, and refused; so is a first sample that is farther
+        than this from the time of `start`.
 
     Raises
     ------
     ConfigError
-        `sampling` is unknown, `longest_step` is no time, or the mechanization is another.
+        `sampling` is unknown, `longest_step` is not a valid time, or the mechanization differs.
     """
 
     __slots__ = ("_mechanization", "_record", "_update")
@@ -91,7 +91,7 @@ class NavTracker:
         accel: Array | Sequence[float],
         height: float = float("nan"),
     ) -> None:
-        """Take one sample.
+        """Process one sample.
 
         Parameters
         ----------
@@ -102,7 +102,7 @@ class NavTracker:
         accel : ndarray or sequence of float, (3,), m/s²
             Specific force in the same axes.
         height : float, m
-            Reference height now, for a damped height; NaN where there is none.
+            Reference height now, for a damped height; NaN for a missing one.
 
         Raises
         ------
@@ -113,7 +113,7 @@ class NavTracker:
 
         Notes
         -----
-        A sample that raises is not taken; the state is as before it.
+        A sample that raises an error is ignored; the state is as before it.
         """
         try:
             if gyro.__class__ is not _ndarray:
@@ -122,7 +122,7 @@ class NavTracker:
                 accel = np.asarray(accel, dtype=np.float64)
             why = self._update(self._record, time, gyro, accel, height)
         except (NumbaError, TypeError, ValueError):
-            # Of a kind that cannot be compiled for, or no numbers at all.
+            # Of a type that cannot be compiled for, or not numbers.
             why = kernel.BAD_SAMPLE
         if why:
             self._refuse(why, time, gyro, accel)
@@ -191,6 +191,6 @@ class NavTracker:
 
     @property
     def state(self) -> NavState:
-        """Place, velocity and attitude at the last sample."""
+        """Position, velocity and attitude at the last sample."""
         record = self._record
         return self._mechanization.nav_state(record[kernel.STATE :], float(record[kernel.TIME]))

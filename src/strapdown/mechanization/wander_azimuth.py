@@ -1,4 +1,4 @@
-"""A wander azimuth: level axes that do not turn about the vertical, and so know no pole."""
+"""Wander azimuth: level axes without rotation about the vertical, regular at the poles."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from strapdown.errors import ConfigError, Finding
 from strapdown.mechanization.mechanization import Array, Mechanization
 from strapdown.nav_state import NavState
 
-# Nearer to a pole than this, in m, a metre is more than 0.06 deg of heading.
+# Nearer to a pole than this, m, a meter is more than 0.06 deg of heading.
 NEAR = 1000.0
 
 
@@ -30,24 +30,24 @@ class WanderAzimuth(Mechanization):
 
     Chernodarov (2009), Eqs. (1), (2), (4): a quaternion of the body in inertial axes, one of the
     level axes in the Earth's, and the velocity. Level axes are xi, eta, zeta with zeta up; xi is
-    turned anticlockwise from east by the wander angle A, which is zero at the start and then is
-    whatever keeps the rate of the axes about zeta, relative to the Earth, at zero:
+    turned anticlockwise from east by the wander angle A, which is zero at the start and then
+    keeps the rate of the axes about zeta, relative to the Earth, at zero:
     ``V_E = V_xi cos A - V_eta sin A``, ``V_N = V_xi sin A + V_eta cos A`` (in print a minus).
     Gravity is normal gravity, which is the paper's gravitation and centrifugal term together.
 
     The error of a run is of the fourth order of the step (`_kernels.wander`), at a pole as
-    elsewhere. What comes out is north-east-down: within a distance d of a pole a displacement of x
-    across turns north, and with it longitude, heading and the components of the velocity, by
-    x / d; a centimetre, ten metres from the pole, by 0.06 deg. Ground track and attitude relative
-    to the Earth (`WanderAzimuth.earth_attitude`) are as good there as anywhere. At a pole, to
-    rounding, A is taken to be zero, and longitude tells where xi and eta point.
+    elsewhere. The output is north-east-down: within a distance d of a pole a displacement of x
+    across rotates north, and with it longitude, heading and the components of the velocity, by
+    x / d; 1 cm, ten meters from the pole, by 0.06 deg. Ground track and attitude relative to the
+    Earth (`WanderAzimuth.earth_attitude`) are as accurate there as anywhere. At a pole, to
+    rounding, A is set to zero, and longitude gives the direction of xi and eta.
 
     Attributes
     ----------
     ellipsoid, height, height_time_constant, largest_speed, height_limits
         As `Mechanization`.
     latitude_limit_deg : float, deg
-        There is none: any other value than the default is refused.
+        Not applicable: any value other than the default is refused.
     """
 
     name: ClassVar[str] = "wander_azimuth"
@@ -102,17 +102,17 @@ class WanderAzimuth(Mechanization):
     def advance_rows(
         self, state: Array, increments: Array, heights: Array, earth: Array, history: Array
     ) -> tuple[int, int]:
-        """Advance `state` over rows of increments; return the steps made, and why no more."""
+        """Advance `state` over rows of increments; return the steps made, and why it stopped."""
         options = self.kernel_options()
         made, why = kernel.wander_advance(state, increments, heights, earth, options, history)
         return made, why
 
     def sample_kernel(self) -> Callable[..., int]:
-        """Return the compiled function that takes one sample."""
+        """Return the compiled function for one sample."""
         return wander_update
 
     def levels(self, history: Array) -> Array:
-        """Return what a filter needs to know of each row, as `Mechanization.levels`."""
+        """Return the quantities that a filter needs of each row, as `Mechanization.levels`."""
         out = np.empty((len(history), LEVEL))
         level.wander_levels(history, find_ellipsoid(self.ellipsoid).parameters(), out)
         return out
@@ -124,20 +124,20 @@ class WanderAzimuth(Mechanization):
         return np.array([[s, c, 0.0], [c, -s, 0.0], [0.0, 0.0, -1.0]])
 
     def correct(self, state: Array, error: ArrayLike) -> Array:
-        """Take an error off a state, as `Mechanization.correct`."""
+        """Subtract an error from a state, as `Mechanization.correct`."""
         after = state.copy()
         earth = find_ellipsoid(self.ellipsoid).parameters()
         level.wander_correct(after, np.asarray(error, dtype=np.float64), earth)
         return after
 
     def corrected_history(self, history: Array, errors: Array) -> Array:
-        """Take an error off each row of a history, as `Mechanization.corrected_history`."""
+        """Subtract an error from each row of a history, as `Mechanization.corrected_history`."""
         after = np.array(history)
         level.wander_correct_rows(after, errors, find_ellipsoid(self.ellipsoid).parameters())
         return after
 
     def nav_state(self, state: Array, time: float) -> NavState:
-        """Return the place, velocity and attitude of a state, as `Mechanization.nav_state`."""
+        """Return the position, velocity and attitude of a state, as `Mechanization.nav_state`."""
         place = np.empty((1, 10))
         level.wander_places(state[None, : kernel.ROW], place)
         lat, lon, alt = place[0, :3].tolist()
@@ -152,7 +152,7 @@ class WanderAzimuth(Mechanization):
         return float(level.geodetic_from_wander(*row[: kernel.ALT])[0])
 
     def remarks(self, time: Array, history: Array) -> tuple[Finding, ...]:
-        """Say where a run comes so near to a pole that angles from north mean little."""
+        """Report a run so near to a pole that angles from north mean little."""
         w, x, y, z = history[:, : kernel.ALT].T
         cosine = 2.0 * np.sqrt((x * x + y * y) * (w * w + z * z))
         ellipsoid = find_ellipsoid(self.ellipsoid)
@@ -189,7 +189,7 @@ class WanderAzimuth(Mechanization):
         return np.array([level.geodetic_from_wander(*row[: kernel.ALT])[2] for row in history])
 
     def earth_attitude(self, history: Array) -> Array:
-        """Return the attitude relative to the Earth, which has no pole.
+        """Return the attitude relative to the Earth, regular at the poles.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""The aided navigator: segments between epochs, what it records, how it is watched."""
+"""Aided navigation: filter, engine, recorder, smoother and consistency tests."""
 
 from __future__ import annotations
 

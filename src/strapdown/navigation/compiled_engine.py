@@ -1,4 +1,4 @@
-"""The way of a navigator whose mechanization, error model and form have one compiled loop."""
+"""Compiled engine for mechanizations, error models and forms that have a compiled loop."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ __all__ = ["CompiledEngine", "compiled"]
 
 Array = NDArray[np.float64]
 
-# Exactly these: whatever is made from them may do otherwise.
+# Exactly these types: a subclass may behave differently.
 MECHANIZATIONS: dict[type[Mechanization], int] = {
     NorthEastDown: NED,
     WanderAzimuth: WANDER,
@@ -62,14 +62,14 @@ def compiled(filter_: ErrorFilter) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Fixed:
-    """What came of m fixes.
+    """Results of m fixes.
 
     Attributes
     ----------
     time : ndarray, (m,), s
         When they were taken.
     told : ndarray, (m, 3, 3)
-        Innovation, its expected variance, and weight of each component.
+        Innovation, its predicted variance, and weight of each component.
     covariance : ndarray, (m, 9, 9)
     sensors, sensors_sd : ndarray, (m, k)
         As of a `Mark`, after each.
@@ -83,9 +83,9 @@ class Fixed:
 
 
 class CompiledEngine(Engine):
-    """North-east-down or a wander azimuth, with the errors as vectors, fed back.
+    """North-east-down or wander azimuth, rotation-vector errors, closed loop.
 
-    The numbers are those of `GeneralEngine` but for rounding.
+    Its results equal those of `GeneralEngine` but for rounding.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ class CompiledEngine(Engine):
         self.time, self.row, self.last = state.time, state.row, state.last
 
     def over(self, time: Array, rows: Array, history: Array, note_at: float) -> int:
-        """Go over steps, as `Engine.over`."""
+        """Propagate over steps, as `Engine.over`."""
         made, why = 0, kernel.FULL
         while why == kernel.FULL:
             self.nodes.make_room(1)
@@ -178,14 +178,14 @@ class CompiledEngine(Engine):
         arm: Array,
         fixes: Epochs,
     ) -> tuple[int, Fixed, bool]:
-        """Go over steps and fixes whose errors are their noise alone, to the end of either.
+        """Process steps, and fixes with white errors, to the end of either.
 
         Parameters
         ----------
         time, rows, history
             As `over`; `rows` are changed where a fix cuts a step.
         made : int
-            Steps that are made already.
+            Steps that are already done.
         note_at : float, s
             As `over`.
         interval : float, s
@@ -207,7 +207,7 @@ class CompiledEngine(Engine):
         noted, sensors, sd = np.empty((size, 9, 9)), np.empty((size, k)), np.empty((size, k))
         why, done = kernel.FULL, 0
         while why == kernel.FULL:
-            # Of a fix a growth and an update.
+            # A fix needs a propagation and an update.
             self.nodes.make_room(2)
             why, made, self._count, more, self.nodes.used = fix_kernel.over_fixes(
                 self._kinds,
@@ -244,7 +244,7 @@ class CompiledEngine(Engine):
         return int(made), fixed, why == kernel.NOTE
 
     def close(self) -> None:
-        """Take the covariance to the newest step."""
+        """Propagate the covariance to the newest step."""
         if self._count:
             self.nodes.make_room(1)
             bad, self.nodes.used = kernel.close_group(
@@ -265,7 +265,7 @@ class CompiledEngine(Engine):
     def observe(
         self, observations: Sequence[Observation], rules: Sequence[Rules]
     ) -> list[Innovations]:
-        """Take what is observed now."""
+        """Update with the observations at the current instant."""
         met = self.filter
         self.filter, taken, seen = self.navigation.observe(met, observations, rules)
         self.nodes.updated(met, taken, self.filter)
@@ -277,7 +277,7 @@ class CompiledEngine(Engine):
         return seen
 
     def widen(self, Q: Array) -> None:
-        """Know less of the states."""
+        """Inflate the covariance of the states."""
         self.filter = self.navigation.widened(self.filter, Q)
         self.nodes.widened(self.filter)
         self._covariance[:] = self.filter.covariance
@@ -288,10 +288,10 @@ class CompiledEngine(Engine):
 
     @classmethod
     def going_on(cls, filter_: ErrorFilter, state: EngineState) -> CompiledEngine:
-        """Return an engine at a state: the one that gave it, once, if nothing went on from there.
+        """Return an engine at a state: the one that produced it, if it was not used since.
 
-        What a sample costs is then not the making of an engine. Who goes on from the same state
-        again gets a new one, with the same numbers.
+        This saves the cost of making an engine per sample. Continuing a second time from the same
+        state gives a new engine, with the same result.
         """
         gave = state.__dict__.pop("_gave", None)
         if isinstance(gave, cls) and gave.navigation is filter_:
@@ -299,9 +299,9 @@ class CompiledEngine(Engine):
         return cls(filter_, state)
 
     def state(self) -> EngineState:
-        """Return where it is now; the engine is not to be used any more but by `going_on`."""
+        """Return the current state; afterwards the engine may be used by `going_on` only."""
         state = self._copied()
-        # Beside the fields of the state: it is no part of what it remembers.
+        # Beside the fields of the state: not part of its value.
         state.__dict__["_gave"] = self
         return state
 
@@ -318,7 +318,7 @@ class CompiledEngine(Engine):
         )
 
     def _after(self, why: int, time: Array, made: int) -> None:
-        """Take over what a loop left."""
+        """Copy the results of a loop."""
         if why == kernel.DIVERGED:
             raise diverged(float(time[made]))
         if why == kernel.BAD:
@@ -331,7 +331,7 @@ class CompiledEngine(Engine):
             self.row = self.filter.row
 
     def _note(self) -> None:
-        """Read the state of the filter from the loop's arrays."""
+        """Copy the state of the filter from the loop's arrays."""
         if self.filter.time != self._times[kernel.AT_COVARIANCE] or not self._count:
             self.filter = replace(
                 self.filter,

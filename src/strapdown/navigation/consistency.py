@@ -1,4 +1,4 @@
-"""Whether innovations are what a filter expected of them: how large, without mean, white."""
+"""Consistency tests of filter innovations: scale, bias and whiteness."""
 
 from __future__ import annotations
 
@@ -36,50 +36,50 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-#: Beyond so many standard deviations, of those that are usual in the run, an innovation is a gross
-#: error: one in two million normal ones is.
+#: An innovation beyond so many standard deviations, of those that are usual in the run, is a gross
+#: error: one in two million normal ones.
 GROSS = 5.0
-#: Fewer epochs than these tell of nothing.
+#: Fewer epochs than these allow no test.
 FEWEST = 10
-#: Lags of the test of whiteness, where there are so many epochs for each: with fewer the tail of
-#: its distribution is longer than that of chi-square.
+#: Lags of the whiteness test, if there are so many epochs for each: with fewer the tail of its
+#: distribution is longer than that of chi-square.
 LAGS, EPOCHS_A_LAG = 10, 25
-#: Share within which a bound of 95 % is.
+#: Probability of the 95 % bounds.
 SHARE = 0.95
 
 
 @dataclass(frozen=True, eq=False)
 class ComponentConsistency:
-    """Normalised innovations of one component, gross errors left out but where it is said.
+    """Normalized innovations of one component; gross errors left out unless stated.
 
     Attributes
     ----------
     label : str
         With its unit.
     count, gross : int
-        Epochs; those among them with gross errors, which are in nothing that follows.
+        Epochs; those among them with gross errors, which the following figures leave out.
     inside : float
         Share within 1.96 standard deviations.
     scale : float
-        Root of their mean square: 1 where what was expected is right.
+        Root of their mean square; 1 for a consistent filter.
     scale_bounds : tuple of float
-        Within which it is in 95 % of all runs with as many epochs (chi-square).
+        95 % bounds of the scale for this number of epochs (chi-square).
     bias : float
         Their mean, in standard deviations.
     bias_bound : float
-        Which it is below in 95 % of them: ``1.96 / √n``.
+        95 % bound of the magnitude of the bias: ``1.96 / √n``.
     bias_in_unit : float
         Mean of the innovations themselves.
     autocorrelation : ndarray, (lags,)
         Of lags 1, 2, ... epochs, about their mean.
     autocorrelation_bound : float
-        Of each alone, in 95 % of them: ``1.96 / √n``.
+        95 % bound of each lag alone: ``1.96 / √n``.
     whiteness_p : float
-        Probability of as large a sum of their squares, were they white (`whiteness`).
+        Probability of as large a sum of their squares for white innovations (`whiteness`).
     lag_p : float
         Probability of as large an autocorrelation of lag 1, ``ρ √n`` as a normal number.
     scale_p, bias_p : float
-        Probability of as extreme a scale or bias, were all as expected.
+        Probability of as extreme a scale or bias for a consistent filter.
     """
 
     label: str
@@ -101,29 +101,29 @@ class ComponentConsistency:
 
 @dataclass(frozen=True, eq=False)
 class ObservationConsistency:
-    """What the innovations of one observation say of the filter.
+    """Consistency of the innovations of one observation.
 
     Attributes
     ----------
     name : str
         Of the observation.
     nis : DataFrame
-        By time of the epochs: ``nis``, the sum of the squares of the normalised innovations of an
-        epoch, ``components``, how many they are, and ``lower``, ``upper``, its 95 % bounds
-        (chi-square). Gross errors are in it.
+        By time of the epochs: ``nis``, the sum of the squares of the normalized innovations of an
+        epoch, ``components``, their number, and ``lower``, ``upper``, its 95 % bounds
+        (chi-square). Includes gross errors.
     windows : DataFrame
         By time of the last epoch of each window, one after the other: ``since``, ``epochs``,
         ``nis`` over the components (1 is expected), ``lower``, ``upper``, its 95 % bounds; without
         gross errors.
     inside : float
-        Share of the epochs whose NIS is inside of its two bounds.
+        Share of the epochs whose NIS is inside its two bounds.
     components : tuple of ComponentConsistency
     alarms : tuple of Alarm
-        Where it was no longer as expected (`InnovationMonitor`).
+        Detected changes within the run (`InnovationMonitor`).
     verdicts : tuple of Verdict
-        What is wrong, the most telling first; empty where nothing is.
+        Inconsistencies, the most significant first; empty for a consistent observation.
     false_alarm : float
-        Probability that there is any verdict but of gross errors where all is as expected.
+        Probability of any verdict, other than on gross errors, for a consistent filter.
     """
 
     name: str
@@ -137,18 +137,18 @@ class ObservationConsistency:
 
     @property
     def consistent(self) -> bool:
-        """Whether no verdict says otherwise; gross errors alone are none of the filter's."""
+        """Whether no verdict but on gross errors is left; those are not the filter's fault."""
         return all(one.kind == "gross" for one in self.verdicts)
 
 
 def consistency_of(
     name: str, innovations: pd.DataFrame, *, window: int = 30, false_alarm: float = 0.01
 ) -> ObservationConsistency:
-    """Hold the innovations of an observation against what was expected of them.
+    """Test the innovations of an observation against their predicted covariance.
 
-    Components of one epoch are taken one after the other, each less what those before it told, so
-    that normalised they are independent numbers of mean 0 and variance 1 if the model is right.
-    They are so for Kalman's update; for a robust one as far as gross errors are rare.
+    Components of one epoch are decorrelated one after the other, so that, normalized, they are
+    independent with mean 0 and variance 1 if the model is right. This holds for the Kalman update;
+    for a robust update it holds as far as gross errors are rare.
 
     Parameters
     ----------
@@ -158,9 +158,9 @@ def consistency_of(
     window : int
         Epochs of a window.
     false_alarm : float
-        Probability of any verdict where all is as expected, but for gross errors. It is
-        divided evenly among the tests: scale, bias, lag 1, whiteness and a change within the run,
-        of each component.
+        Probability of any verdict, other than on gross errors, for a consistent filter. It is
+        divided evenly among the tests of each component: scale, bias, lag 1, whiteness and a
+        change within the run.
 
     Returns
     -------
@@ -169,7 +169,7 @@ def consistency_of(
     Raises
     ------
     ConfigError
-        The window has not at least two epochs, or the probability is none.
+        The window has fewer than two epochs, or the probability is invalid.
     """
     if window < 2:
         raise ConfigError("navigation.window-too-short", quantity="window", window=window)
@@ -189,7 +189,7 @@ def consistency_of(
         _component(label, good[:, k], nu[:, k], int(gross[:, k].sum()))
         for k, label in enumerate(labels)
     )
-    # Of five tests each component has; that of a change has three sums over all epochs.
+    # Each component has five tests; the test for a change has three sums over all epochs.
     each = false_alarm / (5.0 * max(len(labels), 1))
     monitor = InnovationMonitor(threshold=math.log(3.0 * max(len(time), 1) / each))
     _, alarms = monitor.advance(monitor.begin(len(labels)), time, good)
@@ -223,7 +223,7 @@ def whiteness(values: Array, lags: int = LAGS) -> tuple[Array, float]:
     Parameters
     ----------
     values : ndarray, (n,)
-        Equally spaced, as far as it matters; NaN where there is none.
+        Approximately equally spaced; NaN for a missing value.
     lags : int
 
     Returns
@@ -248,7 +248,7 @@ def whiteness(values: Array, lags: int = LAGS) -> tuple[Array, float]:
 
 
 def gross_of(u: Array) -> NDArray[np.bool_]:
-    """Innovations far beyond those that are usual, by the median, which they do not move."""
+    """Innovations far beyond the usual ones by the median, which is insensitive to them."""
     out = np.zeros(u.shape, dtype=bool)
     for k, column in enumerate(u.T):
         told = np.abs(column[~np.isnan(column)])
@@ -341,21 +341,21 @@ def _windows(time: Array, u: Array, window: int) -> pd.DataFrame:
     )
 
 
-# What in the innovations of a run speaks against it, in the order of time.
+# Inconsistent innovations of a run, in order of time.
 
 
-#: Kinds that hold of the whole run.
+#: Kinds that apply to the whole run.
 THROUGHOUT = ("understated", "bias", "correlated")
-#: From these on what is no chance matters, too: a scatter, a mean in standard deviations, a
+#: Significant deviations count from these sizes on: a scatter, a mean in standard deviations, a
 #: correlation.
 SCATTERS, LEANS, REMEMBERS = 1.5, 0.5, 0.3
-#: Of errors that are stated to last, what they do beside independent ones of the stated size.
+#: Effect of errors stated as time-correlated, relative to independent ones of the stated size.
 LASTS = 2.0
 
 
 @dataclass(frozen=True, eq=False)
 class Inconsistency:
-    """An observation that is not what a filter expected of it, in a way that matters.
+    """A significant and relevant inconsistency of one observation with the filter's model.
 
     Attributes
     ----------
@@ -368,13 +368,13 @@ class Inconsistency:
     since : float, s
         First epoch for which it is so.
     until : float, s
-        Last one; the end of the run, where it holds throughout.
+        Last one; the end of the run, for a whole run.
     epochs : ndarray, (k,), s
-        Of gross errors, those; else none.
+        Epochs of gross errors; empty for other kinds.
     factor : float
-        By how much larger standard deviations would make it as expected; 1 where that is no remedy.
+        Factor on the standard deviations that makes it consistent; 1 where none does.
     what, meaning : str
-        In words.
+        Description and meaning as text.
     """
 
     name: str
@@ -390,7 +390,7 @@ class Inconsistency:
 
     @property
     def throughout(self) -> bool:
-        """Whether it holds of the whole run."""
+        """Whether it applies to the whole run."""
         return self.kind in THROUGHOUT
 
 
@@ -399,12 +399,12 @@ def inconsistencies(
     innovations: Mapping[str, pd.DataFrame],
     lasting: Collection[str] = (),
 ) -> tuple[Inconsistency, ...]:
-    """Return what is inconsistent in a run, the first in time first.
+    """Return the inconsistencies of a run in order of time.
 
-    What is no chance, and yet too little to matter, is left out: a scatter below 1.5 times what
-    was expected, a mean below half a standard deviation, a correlation below 0.3, and one of what
-    scatters so little that it does no more than independent errors of the stated size. So is
-    an observation that is better than was stated.
+    Significant but small deviations are left out: a scatter below 1.5 times the predicted one, a
+    mean below half a standard deviation, a correlation below 0.3, and a correlation of innovations
+    that scatter so little that it does no more harm than independent errors of the stated size. An
+    observation that is better than stated is left out, too.
 
     Parameters
     ----------
@@ -413,14 +413,14 @@ def inconsistencies(
     innovations : mapping of str to DataFrame
         From which it is.
     lasting : collection of str
-        Names of the aids that state that their errors last: these may do twice as much as
+        Names of the aids with stated time-correlated errors: these may have twice the effect of
         independent ones.
 
     Returns
     -------
     tuple of Inconsistency
-        In the order of time; what begins at one epoch, the least probable first. What holds
-        throughout of an aid with gross errors comes after these.
+        In order of time, for equal epochs the least probable first. Inconsistencies of the whole
+        run of an aid with gross errors come after these.
     """
     found: list[Inconsistency] = []
     chance: dict[int, float] = {}
@@ -432,8 +432,8 @@ def inconsistencies(
                 one = _inconsistency(name, of, verdict, part, innovations[name])
                 found.append(one)
                 chance[id(one)] = verdict.p
-    # What gross errors do to a filter that believes them holds throughout, and has no begin of its
-    # own: it comes after them.
+    # The effect of gross errors on a filter that uses them lasts for the whole run without a begin
+    # of its own: it comes after them.
     gross: dict[str, float] = {}
     for one in found:
         if one.kind == "gross":
@@ -447,7 +447,7 @@ def inconsistencies(
 
 
 def _aid(name: str) -> str:
-    """Of an observation."""
+    """Aid of an observation."""
     return name.rpartition(".")[0] or name
 
 
@@ -465,7 +465,7 @@ def _matters(verdict: Verdict, part: ComponentConsistency, lasts: bool) -> bool:
 
 
 def _lasting(part: ComponentConsistency) -> float:
-    """Scatter of independent errors that would do as much: those of a first-order process."""
+    """Scatter of independent errors of equal effect, for a first-order process."""
     rho = min(max(float(part.autocorrelation[0]), 0.0), 1.0 - 1.0 / max(part.count, 2))
     return part.scale * math.sqrt((1.0 + rho) / (1.0 - rho))
 
@@ -502,7 +502,7 @@ def _inconsistency(
 
 
 def _until(windows: pd.DataFrame, since: float) -> float:
-    """Last epoch of the windows in a row that are beyond their bounds, from a change on."""
+    """Last epoch of the consecutive windows beyond their bounds, from a change on."""
     later = windows[windows.index >= since]
     bad = (later["nis"] > later["upper"]).to_numpy()
     if not bad.any():

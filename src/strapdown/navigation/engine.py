@@ -1,4 +1,4 @@
-"""How a navigator goes on: what every way of it does, and the one for any modules."""
+"""Navigation engines: their interface, and the engine for any modules."""
 
 from __future__ import annotations
 
@@ -42,30 +42,30 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-#: An epoch so near to the end of a step is at it, s: stamps are decimal fractions that were
-#: rounded.
+#: An epoch this close to the end of a step counts as at the end, s: time stamps are rounded decimal
+#: fractions.
 SAME_INSTANT = 1e-7
-#: Most steps between two instants of the covariance.
+#: Largest number of steps between two instants of the covariance.
 LARGEST_GROUP = 1024
 
 
 @dataclass(frozen=True, eq=False)
 class EngineState:
-    """What an engine remembers.
+    """State of an engine.
 
     Attributes
     ----------
     filter : FilterState
-        At the last instant to which the covariance was taken.
+        At the last instant of the covariance.
     errors : ndarray, (n,)
         States that are estimated and not fed back; zeros where all are.
     time : float, s
         Of the newest step.
     mechanization, row : ndarray
-        State and row of a history then, what was fed back taken off.
+        State and row of a history then, with the corrections applied.
     open_history, open_rows : ndarray
-        What followed the last instant of the covariance: rows of the history, the one at that
-        instant first, and increments without the errors that were fed back.
+        Since the last instant of the covariance: rows of the history, the one at that instant
+        first, and compensated increments.
     last : ndarray, (10,)
         The newest of these increments.
     """
@@ -84,7 +84,7 @@ def begun(filter_: ErrorFilter, state: FilterState, feeds_back: bool = True) -> 
     """Return the state of an engine at a state of a filter."""
     errors = np.zeros(filter_.model.layout.size)
     if not feeds_back:
-        # What an alignment found of the sensors is an error like those that are estimated.
+        # Sensor errors from an alignment are treated like estimated ones.
         E = filter_.model.from_physical(filter_.mechanization, state.time, state.row)
         errors = E @ np.concatenate([np.zeros(PHYSICAL), state.sensors])
         state = replace(state, sensors=np.zeros_like(state.sensors))
@@ -101,12 +101,12 @@ def begun(filter_: ErrorFilter, state: FilterState, feeds_back: bool = True) -> 
 
 
 class Engine(ABC):
-    """A mechanization, estimates and a covariance on their way over a piece of a log.
+    """Mechanization, estimates and covariance while a chunk of a log is processed.
 
     Attributes
     ----------
     nodes : NodeRows
-        Takes every growth of the covariance, and every update, where a smoother wants them.
+        Records the propagations and updates of the covariance for a smoother.
     """
 
     navigation: ErrorFilter
@@ -120,7 +120,7 @@ class Engine(ABC):
 
     @abstractmethod
     def over(self, time: Array, rows: Array, history: Array, note_at: float) -> int:
-        """Go over steps in which nothing is observed.
+        """Propagate over steps without observations.
 
         Parameters
         ----------
@@ -135,21 +135,21 @@ class Engine(ABC):
         Returns
         -------
         int
-            Steps made.
+            Number of steps done.
         """
 
     @abstractmethod
     def close(self) -> None:
-        """Take the covariance to the newest step."""
+        """Propagate the covariance to the newest step."""
 
     @abstractmethod
     def observe(
         self, observations: Sequence[Observation], rules: Sequence[Rules]
     ) -> list[Innovations]:
-        """Take what is observed now, after `close`; return what each told."""
+        """Update with the current observations, after `close`; return the innovations."""
 
     def known(self, observation: Observation) -> Observation:
-        """Return an observation of the state as it is estimated, what is kept beside taken off."""
+        """Return an observation of the estimated state, with open-loop estimates subtracted."""
         if not self.errors.any():
             return observation
         used = self.navigation
@@ -158,25 +158,25 @@ class Engine(ABC):
 
     @abstractmethod
     def widen(self, Q: Array) -> None:
-        """Know less of the states by a covariance, (n, n), now."""
+        """Inflate the covariance of the states by a covariance, (n, n), now."""
 
     @abstractmethod
     def shown(self) -> Array:
-        """Return the row of the newest step, estimated errors taken off."""
+        """Return the row of the newest step with the estimated errors subtracted."""
 
     @abstractmethod
     def state(self) -> EngineState:
-        """Return where it is now."""
+        """Return the current state."""
 
     def estimates(self, filter_: ErrorFilter) -> Array:
-        """Return the errors of the sensors as they are estimated, (k,)."""
+        """Return the estimated errors of the sensors, (k,)."""
         T = filter_.model.to_physical(filter_.mechanization, self.filter.time, self.filter.row)
         found: Array = self.filter.sensors + (T @ self.errors)[PHYSICAL:]
         return found
 
 
 class GeneralEngine(Engine):
-    """For any mechanization, error model and form: group by group.
+    """Engine for any mechanization, error model and form: group by group.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ class GeneralEngine(Engine):
         self.nodes = NodeRows(filter_, False)
 
     def over(self, time: Array, rows: Array, history: Array, note_at: float) -> int:
-        """Go over steps, as `Engine.over`."""
+        """Propagate over steps, as `Engine.over`."""
         made = 0
         longest = self.navigation.step * BEYOND
         while made < len(time):
@@ -216,7 +216,7 @@ class GeneralEngine(Engine):
         return made
 
     def close(self) -> None:
-        """Take the covariance to the newest step."""
+        """Propagate the covariance to the newest step."""
         if not self.open_rows:
             return
         ends = self.filter.time + np.cumsum([row[0] for row in self.open_rows])
@@ -237,7 +237,7 @@ class GeneralEngine(Engine):
     def observe(
         self, observations: Sequence[Observation], rules: Sequence[Rules]
     ) -> list[Innovations]:
-        """Take what is observed now."""
+        """Update with the observations at the current instant."""
         used, met = self.navigation, self.filter
         if self.feeds_back:
             self.filter, taken, seen = used.observe(met, observations, rules)
@@ -252,23 +252,23 @@ class GeneralEngine(Engine):
         return seen
 
     def widen(self, Q: Array) -> None:
-        """Know less of the states."""
+        """Inflate the covariance of the states."""
         self.filter = self.navigation.widened(self.filter, Q)
         self.nodes.widened(self.filter)
 
     def shown(self) -> Array:
-        """Return the row of the newest step, estimated errors taken off."""
+        """Return the row of the newest step with the estimated errors subtracted."""
         if self.feeds_back:
             return self.row
         used = self.navigation.mechanization
         T = self.navigation.model.to_physical(used, self.filter.time, self.filter.row)
         error = (T @ self.errors)[:PHYSICAL]
-        # Since the last instant of the covariance the place has gone on with the velocity.
+        # Since the last instant of the covariance the position has moved with the velocity.
         error[:3] += error[3:6] * (self.time - self.filter.time)
         return used.history_row(used.correct(self.mechanization, error))
 
     def state(self) -> EngineState:
-        """Return where it is now."""
+        """Return the current state."""
         return EngineState(
             filter=self.filter,
             errors=self.errors,
@@ -304,7 +304,7 @@ class GeneralEngine(Engine):
         self.open_rows, self.open_history = [], [self.row]
 
 
-# What is raised where a covariance is none any more.
+# Error of an invalid covariance.
 
 
 class LostCovarianceError(DivergenceError):
@@ -313,7 +313,7 @@ class LostCovarianceError(DivergenceError):
     Attributes
     ----------
     place : ndarray, (3,), m²
-        What stood for the variances of the place then.
+        Values of the variances of position then.
     """
 
     def __init__(self, code: str | Finding, *, place: Array | None = None, **values: Any) -> None:
@@ -321,32 +321,32 @@ class LostCovarianceError(DivergenceError):
         self.place = np.zeros(3) if place is None else place
 
 
-# What a filter leaves for a smoother on its way: how its errors grew, and what was observed.
+# Smoother history of a filter: growth of its errors, and its updates.
 
 
-#: Nodes that are noted before a compiled loop asks for more room: half a megabyte.
+#: Number of nodes before a compiled loop asks for more room: half a megabyte.
 BLOCK = 256
-#: Where nothing is noted a sample alone must not pay for it.
+#: Without a smoother a single sample must not cost more.
 NOTHING: Array = np.empty((0, 0))
 
 
 class NodeRows:
-    """Takes the nodes of a piece of a run: instants of its filter, a row each.
+    """Smoother history of a chunk: one row for each node of the filter.
 
-    A node is the begin of a filter, the end of a growth, or an update. Errors are the p physical
-    ones of its model, in level axes of the mechanization; `_kernels.smoothing_rows` has what is
-    where in a row. Compiled loops fill `room` from `used` on; others call `grew` and `updated`.
+    A node is the begin of a filter, a growth of the errors, or an update. Errors are the p physical
+    ones of its model, in level axes of the mechanization; `_kernels.smoothing_rows` has the
+    layout of a row. Compiled loops fill `room` from `used` on; others call `grew` and `updated`.
 
     Parameters
     ----------
     filter_ : ErrorFilter
     wanted : bool
-        Whether nodes are noted at all.
+        Whether nodes are recorded.
 
     Attributes
     ----------
     room : ndarray, (m, width)
-        Rows, of which `used` are filled; without any where nothing is noted.
+        Rows, of which `used` are filled; empty without a smoother.
     used : int
     """
 
@@ -360,26 +360,26 @@ class NodeRows:
 
     @property
     def wanted(self) -> bool:
-        """Whether nodes are noted at all."""
+        """Whether nodes are recorded."""
         return len(self.room) > 0
 
     def make_room(self, count: int) -> None:
-        """Go on with an empty room where there are fewer rows than these left."""
+        """Start a new block if fewer rows than these are free."""
         if self.wanted and self.used + count > len(self.room):
             self._full.append(self.room[: self.used])
             self.room, self.used = np.empty_like(self.room), 0
 
     def blocks(self) -> tuple[Array, ...]:
-        """Return what was noted, some rows each, (k, width)."""
+        """Return the recorded rows, in blocks of (k, width)."""
         return (*self._full, self.room[: self.used].copy()) if self.used else tuple(self._full)
 
     def began(self, state: FilterState) -> None:
-        """Note where a filter begins."""
+        """Record the begin of a filter."""
         if self.wanted:
             self._row(BEGIN, state)
 
     def grew(self, begun: FilterState, Phi: Array, ended: FilterState) -> None:
-        """Note how errors grew from one state of the filter to another.
+        """Record the transition of the errors from one state of the filter to another.
 
         Parameters
         ----------
@@ -396,18 +396,18 @@ class NodeRows:
         self._growth(Phi, ended)
 
     def widened(self, state: FilterState) -> None:
-        """Note a state of which less is known than just before: a growth by noise alone."""
+        """Record an inflation of the covariance: a growth by noise alone."""
         if self.wanted:
             self._growth(np.eye(self._size), state)
 
     def updated(self, before: FilterState, taken: Array, after: FilterState) -> None:
-        """Note what observations did, if they did anything.
+        """Record the effect of observations, if any.
 
         Parameters
         ----------
         before, after : FilterState
         taken : ndarray, (p,)
-            The error that was taken off the estimate: fed back, or kept beside.
+            Correction of the estimate: fed back, or kept separately.
         """
         if not self.wanted:
             return
@@ -419,14 +419,14 @@ class NodeRows:
         row[at : at + self._size] = taken
 
     def _growth(self, Phi: Array, ended: FilterState) -> None:
-        """A row of a growth of the physical errors."""
+        """Row of a growth of the physical errors."""
         move = self._row(GROWTH, ended)[begin_of_move(self._size) :]
         core = CORE * self._size
         move[:core] = Phi[:CORE].ravel()
         move[core : core + self._size - CORE] = np.diagonal(Phi)[CORE:]
 
     def _row(self, kind: int, state: FilterState) -> Array:
-        """A further row, with all that is not of its kind alone."""
+        """Append a row with the values common to all kinds."""
         self.make_room(1)
         row: Array = self.room[self.used]
         self.used += 1

@@ -1,4 +1,4 @@
-"""What can be chosen of the filter of a chain: its error model, covariance, rule and steps."""
+"""Options of the filter of a chain: error model, covariance form, update rule and steps."""
 
 from __future__ import annotations
 
@@ -15,24 +15,23 @@ __all__ = ["DAMPINGS", "ClosedLoop", "Correction", "FilterOptions", "OpenLoop"]
 
 @dataclass(frozen=True)
 class FilterOptions:
-    """Error-state filter, closed loop, covariance at a rate of its own.
+    """Error-state filter, closed loop, with its own covariance step.
 
     Attributes
     ----------
     model : type of ErrorModel
     form : CovarianceForm
     rule : UpdateRule, optional
-        How far an observation is believed where its aid has no rule of its own; without one, all
-        of it.
+        Weighting of observations whose aid has no rule of its own; full weight if not given.
     step : float, s
-        Longest time over which the covariance goes by means of attitude and force.
+        Longest step of the covariance, propagated with mean attitude and force.
     mark_interval : float, s
         Longest time between two records of the covariance.
 
     Raises
     ------
     ConfigError
-        A time is none.
+        A time is invalid.
     """
 
     model: type[ErrorModel] = RotationVectorModel
@@ -45,7 +44,7 @@ class FilterOptions:
     source: ClassVar[str] = "Chernodarov (2009)"
 
     def __post_init__(self) -> None:
-        # Over 10 s attitude and force are no longer means of anything.
+        # Over 10 s means of attitude and force are no longer representative.
         for name, most in (("step", 10.0), ("mark_interval", 3600.0)):
             value = getattr(self, name)
             if not is_number(value) or not 0.0 < value <= most:
@@ -54,23 +53,23 @@ class FilterOptions:
                 )
 
 
-# What becomes of the estimated errors: they are fed back, or taken off what is shown.
+# Correction by the estimated errors: closed-loop (fed back), or open-loop (output only).
 
 
 @dataclass(frozen=True)
 class Correction:
-    """Where estimates go."""
+    """Use of the estimated errors."""
 
     kind: ClassVar[str]
     summary: ClassVar[str]
     source: ClassVar[str]
-    #: Whether mechanization and sensors are corrected by what is estimated.
+    #: Whether mechanization and sensors are corrected by the estimates (closed loop).
     feeds_back: ClassVar[bool]
 
 
 @dataclass(frozen=True)
 class ClosedLoop(Correction):
-    """State and sensors are corrected at every epoch, so that errors stay small: damped."""
+    """State and sensors are corrected at every epoch, so that errors stay small ("damping")."""
 
     kind: ClassVar[str] = "feedback"
     summary: ClassVar[str] = "errors are taken off the state and the sensors at each epoch"
@@ -80,13 +79,13 @@ class ClosedLoop(Correction):
 
 @dataclass(frozen=True)
 class OpenLoop(Correction):
-    """The mechanization runs free, and estimates are taken off what is shown of it.
+    """Open-loop correction: the mechanization runs free, its output is corrected.
 
-    Errors grow as those of an unaided system, and the model of the filter is linear in them: what
-    is said of its errors holds while they are small. Of a hundred drives of four minutes it did
-    with a heading known to 0.2 deg and biases of 2 deg/h and 0.2 mg at the start; with ten times
-    these the mean normalised square of the errors was seven times what was claimed, where feedback
-    kept to it. It is for good sensors, and for comparison.
+    Errors grow as those of an unaided system, and the model of the filter is linear in them: its
+    covariance holds while they are small. Over a hundred drives of four minutes it held with a
+    heading known to 0.2 deg and biases of 2 deg/h and 0.2 mg at the start; with ten times these
+    the mean normalized square of the errors was seven times the stated one, where closed-loop
+    correction was consistent. For good sensors, and for comparison.
     """
 
     kind: ClassVar[str] = "feedforward"

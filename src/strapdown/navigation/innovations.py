@@ -1,4 +1,4 @@
-"""Watches innovations as they come, and tells since when they are not as expected."""
+"""Monitor innovations as they arrive, and detect changes in their statistics."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Alarm:
-    """A change of a sequence of innovations.
+    """A change in a sequence of innovations.
 
     Attributes
     ----------
     component : int
         Which component of the observation.
     what : {'larger', 'high', 'low'}
-        It scatters more than was expected; it is above zero; it is below.
+        Larger scatter than predicted; mean above zero; mean below zero.
     since : float, s
-        First epoch after which it was not as expected, as far as the innovations tell.
+        Estimated first epoch after the change.
     known : float, s
-        Epoch at which there was no doubt of it.
+        Epoch at which the change became significant.
     """
 
     component: int
@@ -43,7 +43,7 @@ class Alarm:
 
 @dataclass(frozen=True, eq=False)
 class MonitorState:
-    """What is remembered of a sequence; never changed in place.
+    """State of the monitor of a sequence; never changed in place.
 
     Attributes
     ----------
@@ -62,19 +62,19 @@ class MonitorState:
 
 @dataclass(frozen=True)
 class InnovationMonitor:
-    """Cumulative sums of likelihood ratios: constant memory, and a rate of false alarms that holds.
+    """CUSUM tests of likelihood ratios: constant memory, bounded false-alarm rate.
 
-    Of a normalised innovation u the logarithm of the likelihood ratio of a standard deviation c is
+    For a normalized innovation u the logarithm of the likelihood ratio of a standard deviation c is
     ``(1 - 1/c²) u²/2 - ln c``, and of a mean d ``d u - d²/2``. Their sum is kept from falling below
-    zero (Page, Biometrika 41 (1954) 100); an alarm is raised where it comes to `threshold`, and
-    where it last was zero the change is thought to have been. If innovations are as expected,
-    a ratio that begins at any one epoch is a martingale of mean 1, and ever comes to exp(threshold)
-    with a probability of exp(-threshold) at most (Ville's inequality): within n epochs a sum of the
-    three raises a false alarm with a probability of ``n exp(-threshold)`` at most, and on average
+    zero (Page, Biometrika 41 (1954) 100); an alarm is raised when it reaches `threshold`, and the
+    estimated time of the change is where it was last zero. For a consistent filter,
+    a ratio that begins at any one epoch is a martingale of mean 1, and ever reaches exp(threshold)
+    with a probability of at most exp(-threshold) (Ville's inequality): within n epochs a sum of the
+    three raises a false alarm with a probability of at most ``n exp(-threshold)``, and on average
     not before exp(threshold) epochs (Lorden, Ann. Math. Statist. 42 (1971) 1897, Theorem 2).
 
-    Innovations need not be normal in their tails for that: one counts no more than `clip` standard
-    deviations, so that a single gross error raises no alarm. It is an object without state.
+    The tails of the innovations need not be normal for that: one is limited to `clip` standard
+    deviations, so that a single gross error raises no alarm. Stateless.
 
     Attributes
     ----------
@@ -105,21 +105,21 @@ class InnovationMonitor:
                 )
 
     def begin(self, components: int) -> MonitorState:
-        """Return what is remembered before the first epoch."""
+        """Return the state before the first epoch."""
         shape = (3, components)
         return MonitorState(np.zeros(shape), np.full(shape, np.nan), np.zeros(shape, dtype=bool))
 
     def advance(
         self, state: MonitorState, time: ArrayLike, normalised: ArrayLike
     ) -> tuple[MonitorState, tuple[Alarm, ...]]:
-        """Go on over epochs; pieces of any length give the same as the whole.
+        """Process epochs; chunks of any length give the same as the whole.
 
         Parameters
         ----------
         state : MonitorState
         time : array_like, (n,), s
         normalised : array_like, (n, k)
-            Innovations over their expected standard deviations. What is NaN says nothing.
+            Innovations over their predicted standard deviations. NaN is ignored.
 
         Returns
         -------
@@ -159,22 +159,22 @@ class InnovationMonitor:
         return MonitorState(sums, since, raised), tuple(alarms)
 
 
-#: What the three sums are of.
+#: Quantities of the three sums.
 WHAT: Sequence[str] = ("larger", "high", "low")
 
 
-# What innovations that are not as expected mean, in words.
+# Meaning of inconsistent innovations, as text.
 
 
-#: What began before this part of the epochs holds of the whole run.
+#: A change before this part of the epochs applies to the whole run.
 EARLY = 0.1
-#: Epochs of which a mean and a scatter are fitted.
+#: Epochs to which a mean and a scatter are fitted.
 FEWEST_AFTER = 5
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """Something that innovations say against a filter.
+    """An inconsistency of the innovations with the filter.
 
     Attributes
     ----------
@@ -184,11 +184,11 @@ class Verdict:
     since : float, s
         First epoch for which it is so.
     what : str
-        In words, with the numbers.
+        As text, with the numbers.
     meaning : str
-        What it would mean, and what to try.
+        Probable cause, and remedy.
     p : float
-        Probability of it by chance; of a change a bound of it.
+        Probability by chance; for a change an upper bound.
     """
 
     kind: str
@@ -200,7 +200,7 @@ class Verdict:
 
 
 class Component(Protocol):
-    """What is asked of the numbers of a component."""
+    """Data of one component for the tests."""
 
     @property
     def label(self) -> str: ...
@@ -233,25 +233,25 @@ def judge(
     level: float,
     fewest: int,
 ) -> tuple[Verdict, ...]:
-    """Say what is wrong.
+    """Return the inconsistencies of an observation.
 
     Parameters
     ----------
     time : ndarray, (n,), s
     normalised : ndarray, (n, k)
-        NaN where there is none, or a gross error.
+        NaN for missing values and gross errors.
     gross : ndarray of bool, (n, k)
     components : sequence of ComponentConsistency
     alarms : sequence of Alarm
     level : float
-        Below this probability something is no chance.
+        Below this probability a deviation is significant.
     fewest : int
-        Fewer epochs tell of nothing.
+        Fewer epochs allow no test.
 
     Returns
     -------
     tuple of Verdict
-        The least probable first; what is said of gross errors and of too few epochs last.
+        The least probable first; gross errors and too few epochs last.
     """
     found: list[Verdict] = []
     for k, one in enumerate(components):
@@ -274,7 +274,7 @@ def _named(one: Component) -> str:
 
 
 def _unit(one: Component) -> str:
-    """Of 'north, m' a blank and the m; nothing where it has none."""
+    """Of 'north, m' a blank and the m; empty without a unit."""
     unit = one.label.partition(", ")[2]
     return f" {unit}" if unit else ""
 
@@ -282,7 +282,7 @@ def _unit(one: Component) -> str:
 def _changes(
     time: Array, u: Array, k: int, one: Component, alarms: Sequence[Alarm], level: float
 ) -> list[Verdict]:
-    """Alarms of what began within the run: before them all was as expected."""
+    """Alarms of changes within the run, consistent before them."""
     own = [alarm for alarm in alarms if alarm.component == k]
     if not own:
         return []
@@ -290,7 +290,7 @@ def _changes(
     since, better = _begun(time, u, alarm.known)
     before, after = u[time < since], u[time >= since]
     before, after = before[~np.isnan(before)], after[~np.isnan(after)]
-    # Among so many instants one is better by chance by no more than this.
+    # Limit of the largest chance improvement among so many instants.
     if len(before) < EARLY * len(u) or better < math.log(len(u) / level):
         return []
     scale = math.sqrt(float(np.mean(after**2)))
@@ -316,11 +316,11 @@ def _changes(
 
 
 def _begun(time: Array, u: Array, known: float) -> tuple[float, float]:
-    """Most likely begin of a change of mean and scatter to values that then hold.
+    """Most likely begin of a change of mean and scatter to constant values.
 
-    Of those not after `known`: where ``n/2 (mean u² - 1 - ln var u)``, the logarithm of the ratio
-    of the likelihoods of the n innovations from there on, is largest; and how much larger it is
-    than with no change at all, but those values from the first epoch on.
+    Among the epochs up to `known`: where ``n/2 (mean u² - 1 - ln var u)``, the logarithm of the
+    likelihood ratio of the n innovations from there on, is largest; and its excess over the case
+    without a change, with those values from the first epoch on.
     """
     told = ~np.isnan(u)
     t, x = time[told], u[told]
@@ -329,25 +329,25 @@ def _begun(time: Array, u: Array, known: float) -> tuple[float, float]:
     second = np.cumsum(x[::-1] ** 2)[::-1] / n
     variance = np.maximum(second - first**2, 1e-12)
     ratio = 0.5 * n * (second - 1.0 - np.log(variance))
-    # What is fitted to a few epochs is always likely.
+    # A fit to a few epochs is always likely.
     ratio[(t > known) | (n < FEWEST_AFTER)] = -np.inf
     at = int(np.argmax(ratio))
     return float(t[at]), float(ratio[at] - ratio[0])
 
 
 def _throughout(one: Component, first: float, level: float) -> list[Verdict]:
-    """What holds of the whole run."""
+    """Inconsistencies of the whole run."""
     out = []
     n = one.count - one.gross
     correlated = min(one.lag_p, one.whiteness_p)
-    # A mean of what scatters more, or follows itself, is farther from zero by chance: by
-    # (1 + rho)/(1 - rho) in variance, as that of a first-order process is.
+    # The mean of innovations with a larger scatter or a correlation deviates more by chance: by
+    # (1 + rho)/(1 - rho) in variance for a first-order process.
     spread = max(1.0, math.sqrt(max(one.scale**2 - one.bias**2, 0.0)))
     rho = float(one.autocorrelation[0])
     if correlated < level and rho > 0.0:
         spread *= math.sqrt((1.0 + rho) / max(1.0 - rho, 1.0 / n))
     bias_p = 2.0 * float(normal_above(abs(one.bias) * math.sqrt(n) / spread))
-    # The mean is no part of the scatter where it is no chance.
+    # A significant mean is not part of the scatter.
     scale, scale_p = one.scale, one.scale_p
     if bias_p < level:
         square = n * (scale**2 - one.bias**2)

@@ -1,4 +1,4 @@
-"""An error-state filter around a mechanization, observing at any instant what its aids tell."""
+"""Error-state navigation filter around a mechanization, with measurements at any instant."""
 
 from __future__ import annotations
 
@@ -56,12 +56,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Navigator:
-    """Navigate by motion increments and by what aids observe.
+    """Navigate by motion increments and measurements of aids.
 
-    The mechanization goes from sample to sample; where an epoch is within a step, the step is cut
-    there. The covariance follows at the filter's own `step` and at every epoch. A log may be given
-    in pieces of any length, and each aid's table at once or bit by bit, as long as an epoch is told
-    before the samples that follow it: the numbers are the same to the last bit.
+    The mechanization goes from sample to sample; a step that contains an epoch is split there.
+    The covariance is propagated at the filter's own `step` and at every epoch. A log may be given
+    in chunks of any length, and each aid's table whole or in parts, as long as an epoch is given
+    before the samples that follow it: the result is the same to the last bit.
 
     Attributes
     ----------
@@ -72,10 +72,10 @@ class Navigator:
     mark_interval : float, s
         Longest time between two marks of the covariance.
     damping : Damping
-        Whether what is estimated is fed back.
+        Whether the estimated errors are fed back (closed-loop correction).
     smoother : Smoother, optional
-        With one, its pieces have what the run is smoothed by, too; the filter's numbers are the
-        same to the last bit.
+        If given, the chunks hold the smoother history, too; the filter's result is the same to
+        the last bit.
 
     Raises
     ------
@@ -101,7 +101,7 @@ class Navigator:
 
     @cached_property
     def lone_receiver(self) -> Gnss | None:
-        """The only aid, where it is a receiver whose errors are noise, believed as it says."""
+        """The only aid, if it is a receiver with white errors, used with its stated accuracy."""
         if len(self.aids) != 1 or type(self.aids[0]) is not Gnss:
             return None
         aid = self.aids[0]
@@ -129,7 +129,7 @@ class Navigator:
         return self.begin_from(self.filter.begin(start, P))
 
     def begin_from(self, state: FilterState) -> NavigatorState:
-        """Return the state at a state of the filter, as where an alignment ended."""
+        """Return the state at a state of the filter, as at the end of an alignment."""
         nothing = Epochs(np.empty(0), np.empty((0, 0)))
         return NavigatorState(
             engine=begun(self.filter, state, self.damping.feeds_back),
@@ -143,7 +143,7 @@ class Navigator:
         )
 
     def tell(self, state: NavigatorState, name: str, table: pd.DataFrame) -> NavigatorState:
-        """Take rows of the table of an aid, later than those before.
+        """Add rows to the table of an aid, later than its earlier rows.
 
         Parameters
         ----------
@@ -168,7 +168,7 @@ class Navigator:
         more = aid.epochs(table)
         queue = state.queues[name]
         if queue.time.size:
-            # An epoch may be before those of an earlier row: a velocity that comes late.
+            # An epoch may be before those of an earlier row: a velocity with a delay.
             both = np.concatenate([queue.time, more.time])
             order = np.argsort(both, kind="stable")
             more = Epochs(both[order], np.concatenate([queue.values, more.values])[order])
@@ -177,7 +177,7 @@ class Navigator:
     def advance(
         self, state: NavigatorState, time: Array, rows: Array
     ) -> tuple[NavigatorState, NavigationChunk]:
-        """Go on over motion increments.
+        """Process motion increments.
 
         Parameters
         ----------
@@ -195,16 +195,16 @@ class Navigator:
         Raises
         ------
         DivergenceError
-            The state has left what the mechanization can do; the sample is named.
+            The state is outside the validity of the mechanization; the sample is named.
         """
         going = EpochLoop(self, state)
-        # What is writeable is one type for compiled code, and what is not another.
+        # Compiled code has one type for writable and another for read-only arrays.
         stamps = np.require(time, np.float64, ["C", "W"])
         going.over(stamps, np.require(rows, np.float64, ["C", "W"]))
         return going.state(), going.piece()
 
     def finish(self, state: NavigatorState) -> NavigationChunk:
-        """Return the mark of the newest sample, which no epoch follows; the state stays.
+        """Return a mark of the newest sample, after the last epoch; the state is unchanged.
 
         Parameters
         ----------
@@ -213,7 +213,7 @@ class Navigator:
         Returns
         -------
         NavigationChunk
-            Without samples; without a mark where there is one already.
+            Without samples; without a mark if there is one already.
         """
         going = EpochLoop(self, state)
         if state.time > state.marked + SAME_INSTANT:
@@ -221,7 +221,7 @@ class Navigator:
         return going.piece()
 
     def engine(self, state: EngineState) -> Engine:
-        """Return what goes on from a state: compiled, where the modules have that."""
+        """Return the engine for a state: compiled, if available for the modules."""
         if self.damping.feeds_back and compiled(self.filter):
             return CompiledEngine.going_on(self.filter, state)
         return GeneralEngine(self.filter, state, self.damping.feeds_back)
@@ -244,31 +244,31 @@ def with_states(filter_: ErrorFilter, aids: tuple[Measurement, ...]) -> ErrorFil
     return replace(filter_, model=model)
 
 
-# What a navigator remembers.
+# State of a navigator between chunks.
 
 
 @dataclass(frozen=True, eq=False)
 class NavigatorState:
-    """Everything that a navigator remembers: from here it goes on.
+    """State of a navigator between chunks.
 
     Attributes
     ----------
     engine : EngineState
         Of mechanization, estimates and covariance.
     queues : mapping of str to Epochs
-        Of each aid, the epochs that are still to come.
+        Of each aid, the epochs that have not been processed yet.
     memories : mapping of str to object
-        Of each aid that watches the sensors.
+        Of each aid that is derived from the inertial sensors.
     marked : float, s
         Time of the last mark.
     observed : float, s
-        When something was observed last; the start, before that.
+        Time of the last observation; the start, before the first.
     scales : mapping of str to tuple of ScaleState
-        By name of an observation whose rule learns: what it has learnt of each component.
+        By name of an observation with an adaptive rule: the scale learned of each component.
     steady : ndarray, (7,)
-        Fading means of rate and force (`_kernels.steady_motion`), where an aid wants them.
+        Fading means of rate and specific force (`_kernels.steady_motion`) for aids that use them.
     tilted : bool
-        Whether the tilt is, since the start, known so badly that its second order counts.
+        Whether the tilt has been so uncertain since the start that its second order counts.
     """
 
     engine: EngineState
@@ -286,23 +286,23 @@ class NavigatorState:
         return self.engine.time
 
 
-# A navigator on its way over a piece of a log.
+# Processing of a chunk.
 
 
-#: Over which shaking is taken out of rates and forces, s: beyond a tenth of a second it is not seen
-#: by receivers, and a vehicle does not change its acceleration by much in it.
+#: Averaging time that removes vibration from rates and forces, s: receivers do not see it beyond a
+#: tenth of a second, and a vehicle hardly changes its acceleration in that time.
 STEADY_TIME = 0.2
-#: Where nothing was observed for so many intervals of marks, there is a mark before the next
-#: observation, too; its stamp is so much earlier, s.
+#: After so many intervals of marks without an observation, a mark is added before the next
+#: observation; its time stamp is so much earlier, s.
 ALONE = 1.5
 JUST_BEFORE = 1e-6
-#: A variance is negative by rounding alone within this part of those of its kind.
+#: Relative size up to which a negative variance is rounding.
 ROUNDING = 1e-12
 PHYSICAL_LABELS = ("place", "velocity", "attitude")
 
 
 class EpochLoop:
-    """A navigator on its way over one piece."""
+    """Processing of one chunk by a navigator."""
 
     def __init__(self, navigator: Navigator, state: NavigatorState) -> None:
         self.navigator = navigator
@@ -326,7 +326,7 @@ class EpochLoop:
         self.history: Array = np.empty((0, navigator.filter.mechanization.row))
 
     def over(self, time: Array, rows: Array) -> None:
-        """Go over steps."""
+        """Process steps."""
         for aid in self.navigator.aids:
             if isinstance(aid, ImuDerivedMeasurement):
                 self.memories[aid.name], self.queues[aid.name] = aid.watch(
@@ -350,7 +350,7 @@ class EpochLoop:
                 continue
             if at == len(time):
                 break
-            # The step at whose end, or within which, something is observed next.
+            # The step that contains the next epoch, or ends at it.
             told = int(time.searchsorted(epoch - SAME_INSTANT))
             if told < len(time) and time[told] > epoch + SAME_INSTANT:
                 at = self._steps(at, told, time, rows)
@@ -363,9 +363,9 @@ class EpochLoop:
                 at = self._steps(at, min(told + 1, len(time)), time, rows)
 
     def _cuts(self, time: Array) -> bool:
-        """Whether an epoch is within a step, which is then cut there."""
+        """Whether an epoch is within a step, which is then split there."""
         for queue in self.queues.values():
-            # Mostly nothing is due: a sample alone must not pay for what it does not meet.
+            # Mostly no epoch is due: processing a single sample must not cost more for that.
             if not queue.time.size or queue.time[0] >= time[-1] - SAME_INSTANT:
                 continue
             due = queue.time[: queue.time.searchsorted(time[-1] - SAME_INSTANT)]
@@ -379,7 +379,7 @@ class EpochLoop:
         self._mark()
 
     def _fixes(self, made: int, time: Array, rows: Array) -> int:
-        """Go as far as the fixes of a lone receiver reach without an outage; return the steps."""
+        """Process the fixes of a single receiver up to an outage; return the steps."""
         aid, engine = self.navigator.lone_receiver, self.engine
         if aid is None or not isinstance(engine, CompiledEngine) or self.tilted:
             return made
@@ -410,7 +410,7 @@ class EpochLoop:
         return made
 
     def _until_outage(self, queue: Epochs) -> Epochs:
-        """Whole epochs that follow each other, and the last observation, without an outage."""
+        """Consecutive whole epochs, and the last observation, before an outage."""
         if not queue.time.size:
             return queue
         longest = ALONE * self.navigator.mark_interval
@@ -420,7 +420,7 @@ class EpochLoop:
         return Epochs(queue.time[:count], queue.values[:count])
 
     def _fixed(self, aid: Gnss, fixes: Epochs, fixed: Fixed) -> None:
-        """Note what came of fixes."""
+        """Record the results of position fixes."""
         count = len(fixed.told)
         codes, times = fixes.values[:count, 0].tolist(), fixed.time.tolist()
         names = {code: aid.names(code) for code in set(codes)}
@@ -437,7 +437,7 @@ class EpochLoop:
             self.observed = times[-1]
 
     def state(self) -> NavigatorState:
-        """Where it is now."""
+        """Current state."""
         return NavigatorState(
             self.engine.state(),
             self.queues,
@@ -450,7 +450,7 @@ class EpochLoop:
         )
 
     def piece(self) -> NavigationChunk:
-        """What came of it."""
+        """Result of the chunk."""
         return NavigationChunk(
             self.time,
             self.history,
@@ -461,7 +461,7 @@ class EpochLoop:
         )
 
     def _steady(self, at: float) -> Array | None:
-        """Rate and force without the shaking, at the last sample before an instant."""
+        """Rate and specific force without vibration, at the last sample before an instant."""
         if self.steadies is None:
             return None
         k = int(self.time.searchsorted(at + SAME_INSTANT, side="right"))
@@ -487,14 +487,14 @@ class EpochLoop:
     def _run(self, time: Array, rows: Array, history: Array) -> None:
         made = 0
         while made < len(time):
-            # The interval is one of a decimal clock.
+            # Rounded to the interval of a decimal clock.
             note_at = self.marked + self.navigator.mark_interval * (1.0 - 1e-9)
             made += self.engine.over(time[made:], rows[made:], history[made:], note_at)
             if made < len(time):
                 self._mark()
 
     def _observe(self, at: float) -> None:
-        """Take everything that is observed at an instant."""
+        """Update with all observations at an instant."""
         engine, filter_ = self.engine, self.navigator.filter
         last = engine.last
         engine.close()
@@ -534,7 +534,7 @@ class EpochLoop:
     def _told(
         self, rules: list[UpdateRule | None], observations: list[Observation]
     ) -> list[Innovations]:
-        """Take observations; what their rules learn of them is kept."""
+        """Process observations; keep what their adaptive rules learn."""
         asked: list[Rules] = []
         for rule, one in zip(rules, observations, strict=True):
             if isinstance(rule, AdaptiveRule):
@@ -551,7 +551,7 @@ class EpochLoop:
         return innovations
 
     def _unlearn(self, met: FilterState) -> None:
-        """Know less of what was learnt about a large tilt, where it was corrected."""
+        """Inflate the covariance after the correction of a large tilt (second-order tilt)."""
         if not self.tilted or not self.navigator.damping.feeds_back:
             return
         filter_, engine = self.navigator.filter, self.engine
@@ -563,7 +563,7 @@ class EpochLoop:
         self.tilted = is_large(after)
 
     def _mark(self, before: float = 0.0) -> None:
-        """Note covariance and estimates, with a stamp that is so much earlier."""
+        """Record covariance and estimates, with a time stamp so much earlier."""
         filter_, state = self.navigator.filter, self.engine.filter
         P = filter_.physical_covariance(state)
         turn = np.kron(np.eye(3), filter_.mechanization.level_from_ned(state.row))
@@ -576,7 +576,7 @@ class EpochLoop:
         self._add_mark(mark)
 
     def _sd(self, time: float, P: Array) -> Array:
-        """Standard deviations of the sensors' errors; refuses what is no covariance."""
+        """Standard deviations of the sensor errors; refuses an invalid covariance."""
         variances, model = np.diagonal(P), self.navigator.filter.model
         kinds = np.concatenate(
             [np.repeat(variances[:9].reshape(3, 3).max(axis=1), 3), np.square(model.stacked.sd)]

@@ -1,4 +1,4 @@
-"""What is known of a run of navigation: the flow of its states, and what was observed."""
+"""Record of a navigation run: its states, covariance and innovations."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened at an instant.
+    """An event at an instant.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class Event:
     kind : str
         ``mode``, ``outage``, ``recovered``, ``rejected``, ``late``, ``gap``, ``command``.
     what : str
-        In words.
+        Description as text.
     """
 
     time: float
@@ -46,7 +46,7 @@ class Event:
 
 @dataclass(frozen=True)
 class Span:
-    """A time over which something was so: a mode, an outage of an aid.
+    """A time interval of a condition: a mode, an outage of an aid.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Span:
 
 @dataclass(frozen=True, eq=False)
 class NavigationRecord:
-    """A run of navigation, as it was recorded.
+    """A recorded run of navigation.
 
     Attributes
     ----------
@@ -78,8 +78,8 @@ class NavigationRecord:
     units : mapping of str to str
         Unit of each of these columns.
     innovations : mapping of str to DataFrame
-        By name of the observation, by time: for each component ``nu LABEL`` (computed less
-        observed, less what was expected of it), ``s LABEL`` (its expected variance),
+        By name of the observation, by time: for each component ``nu LABEL`` (innovation:
+        computed − observed − predicted), ``s LABEL`` (its predicted variance),
         ``weight LABEL``.
     events : tuple of Event
         In the order of time.
@@ -100,7 +100,7 @@ class NavigationRecord:
     outages: Mapping[str, tuple[Span, ...]] = field(default_factory=dict)
 
 
-# What a navigator gives for a piece of a log.
+# Output of a navigator for a chunk of a log.
 
 
 class InnovationRecord(NamedTuple):
@@ -114,10 +114,10 @@ class InnovationRecord(NamedTuple):
     labels : tuple of str
         Of its components, with units.
     innovations : Innovations
-        Computed less observed less what was expected of it; variance that was expected; weight.
+        Innovation: computed − observed − predicted; its predicted variance; weight.
     observation : Observation, optional
-        Of the state before anything of this epoch was taken, estimates that are kept beside taken
-        off; none of a lone receiver in a compiled loop.
+        Of the state before any update of this epoch, with open-loop estimates subtracted; None
+        for a single receiver in a compiled loop.
     """
 
     time: float
@@ -128,10 +128,10 @@ class InnovationRecord(NamedTuple):
 
 
 class CovarianceSnapshot(NamedTuple):
-    """Covariance and estimates at an instant, after what was observed then.
+    """Covariance and estimates at an instant, after the update then.
 
-    Where nothing was observed for a while there is one before the observation, too, with a stamp
-    that is a microsecond earlier: there an outage ends, and what is known is least.
+    After a while without observations there is another one before the update, with a time stamp
+    a microsecond earlier: there an outage ends, and the uncertainty is largest.
 
     Attributes
     ----------
@@ -152,14 +152,14 @@ class CovarianceSnapshot(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class NavigationChunk:
-    """What came of a piece of a log.
+    """Result of a chunk of a log.
 
     Attributes
     ----------
     time : ndarray, (n,), s
         Ends of the steps.
     history : ndarray, (n, row)
-        Rows of the mechanization then, what was estimated taken off.
+        Rows of the mechanization then, with the estimates subtracted.
     seen : tuple of Seen
         In the order in which they were taken.
     marks : tuple of Mark
@@ -168,7 +168,7 @@ class NavigationChunk:
     late : tuple of (str, float)
         Epochs of aids that came when the navigator was beyond their time, and were not used.
     nodes : tuple of ndarray, (k, width)
-        For a smoother, where the navigator is to be smoothed: rows of `NodeRows`.
+        Smoother history, if the navigator has a smoother: rows of `NodeRows`.
     """
 
     time: Array
@@ -179,7 +179,7 @@ class NavigationChunk:
     nodes: tuple[Array, ...] = ()
 
 
-# Rows that are added to, without a copy of those that are there.
+# Rows that grow without copying earlier ones.
 
 
 FIRST_ROOM = 64
@@ -193,9 +193,9 @@ class _Room:
 
 @dataclass(frozen=True, eq=False)
 class GrowingRows:
-    """Rows of numbers: a value that never changes, whose further growth shares its memory.
+    """Rows of numbers: an immutable value; longer values share its memory.
 
-    Adding to the newest value costs as much as what is added; adding to an older one copies it.
+    Appending to the newest value costs only the new rows; appending to an older one copies it.
 
     Attributes
     ----------
@@ -207,16 +207,16 @@ class GrowingRows:
 
     @classmethod
     def of(cls, columns: int) -> GrowingRows:
-        """Return no rows of so many columns."""
+        """Return an empty value of so many columns."""
         return cls(_Room(np.empty((0, columns)), 0))
 
     @property
     def rows(self) -> Array:
-        """All of them, (`count`, columns); not to be written to."""
+        """All rows, (`count`, columns); read-only."""
         return self.room.buffer[: self.count]
 
     def and_then(self, rows: Array) -> GrowingRows:
-        """Return these rows and further ones, (k, columns)."""
+        """Return these rows with further ones, (k, columns), appended."""
         room, count = self.room, self.count + len(rows)
         if room.used != self.count or count > len(room.buffer):
             size = max(FIRST_ROOM, count + count // 2)
@@ -227,6 +227,6 @@ class GrowingRows:
         return GrowingRows(room, count)
 
     def without_first(self, number: int) -> GrowingRows:
-        """Return them without the first ones; the memory of these is given back."""
+        """Return the rows without the first ones, whose memory is freed."""
         left = self.rows[number:].copy()
         return GrowingRows(_Room(left, len(left)), len(left))

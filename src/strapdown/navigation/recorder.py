@@ -1,4 +1,4 @@
-"""Keeps of a run what is wanted of it, at the rate that is wanted."""
+"""Recorders: the output of a run, at the requested rate."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ __all__ = ["RECORDERS", "FullRecorder", "IntervalRecorder", "Recorder", "Tape", 
 
 Array = NDArray[np.float64]
 
-# A stamp is at an instant of the grid within this part of its interval.
+# A time stamp within this fraction of the interval counts as on the grid.
 NEAR = 1e-6
 
 
 @dataclass(frozen=True)
 class Recorder(ABC):
-    """What of a run is kept; it holds no state of its own."""
+    """Selection of a run's output; stateless."""
 
     name: ClassVar[str]
     summary: ClassVar[str]
@@ -47,10 +47,10 @@ class Recorder(ABC):
     @property
     @abstractmethod
     def rate(self) -> float:
-        """Most states and marks a second that are kept; infinite for all of them."""
+        """Highest rate of states and marks that are kept, Hz; infinite for all."""
 
     def begin(self, navigator: Navigator) -> Tape:
-        """Return an empty tape."""
+        """Return an empty record."""
         return Tape(navigator, self.rate)
 
 
@@ -64,7 +64,7 @@ class FullRecorder(Recorder):
 
     @property
     def rate(self) -> float:
-        """All of them."""
+        """Every state and mark."""
         return math.inf
 
 
@@ -79,7 +79,7 @@ class IntervalRecorder(Recorder):
     Raises
     ------
     ConfigError
-        It is no rate.
+        The rate is invalid.
     """
 
     name: ClassVar[str] = "interval"
@@ -96,7 +96,7 @@ class IntervalRecorder(Recorder):
 
     @property
     def rate(self) -> float:
-        """States a second."""
+        """States per second."""
         return float(self.rate_hz)
 
 
@@ -114,9 +114,9 @@ class _Observed:
 
 @dataclass
 class Tape:
-    """What was kept so far of a run.
+    """Recorded output of a run so far.
 
-    Its memory grows with the states and marks that it keeps, and with every observation: three
+    Its memory grows with the recorded states and marks, and with every observation: three
     numbers a component, and its time.
 
     Attributes
@@ -141,7 +141,7 @@ class Tape:
         self._marks = GrowingRows.of(1 + 81 + 2 * count)
 
     def take(self, piece: NavigationChunk) -> None:
-        """Take what came of a further piece."""
+        """Append the result of a chunk."""
         cells = self._cells(piece.time)
         if len(cells) and cells[-1] > self._state_cell:
             first = np.empty(len(cells), dtype=bool)
@@ -162,7 +162,7 @@ class Tape:
         outages: Mapping[str, tuple[Span, ...]] | None = None,
         smoothing: Smoothing | None = None,
     ) -> NavigationRecord:
-        """Return it as tables.
+        """Return the record as tables.
 
         Parameters
         ----------
@@ -171,7 +171,7 @@ class Tape:
         events, modes, outages
             As of `NavigationRecord`.
         smoothing : Smoothing, optional
-            That took the same pieces: states and marks are smoothed; innovations are the filter's.
+            Of the same chunks: states and marks are smoothed; innovations are the filter's.
 
         Returns
         -------
@@ -180,7 +180,7 @@ class Tape:
         Raises
         ------
         DataError
-            Nothing was taken.
+            The record is empty.
         """
         states = self._states.rows
         if not len(states):
@@ -226,7 +226,7 @@ class Tape:
         )
 
     def _cells(self, time: Array) -> Array:
-        """Number of the interval in which each stamp lies."""
+        """Number of the interval of each time stamp."""
         if math.isinf(self.rate):
             return time
         return np.floor(time * self.rate + NEAR)
@@ -236,7 +236,7 @@ class Tape:
             None, :
         ]
         cell = float(self._cells(np.array([mark.time]))[0])
-        # The newest one is kept beside, so that the last of a run is always there.
+        # The newest one is kept separately, so that the last of a run is always recorded.
         if cell > self._mark_cell:
             self._marks = self._marks.and_then(row)
             self._mark_cell, self._newest_mark = cell, None
@@ -258,7 +258,7 @@ class Tape:
 def record_of(
     navigator: Navigator, pieces: Sequence[NavigationChunk], source: str | None = None
 ) -> NavigationRecord:
-    """Put the pieces of a run together, every sample of them.
+    """Join the chunks of a run, every sample included.
 
     Parameters
     ----------

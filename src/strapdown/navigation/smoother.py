@@ -1,4 +1,4 @@
-"""A run seen from its end: what later observations tell of earlier states."""
+"""Rauch-Tung-Striebel (RTS) smoothing of a navigation run."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ __all__ = ["SMOOTHERS", "RauchTungStriebel", "Smoothed", "Smoother", "Smoothing"
 
 Array = NDArray[np.float64]
 
-#: A mark is that of a node within this, s: before an observation it is a microsecond earlier.
+#: Tolerance of the time of a mark, s: before an observation it is a microsecond earlier.
 SAME_MARK = 1.5e-6
 
 
 @dataclass(frozen=True)
 class Smoother(ABC):
-    """How a run is smoothed; it holds no state of its own."""
+    """A smoothing method; stateless."""
 
     name: ClassVar[str]
     summary: ClassVar[str]
@@ -42,32 +42,32 @@ class Smoother(ABC):
 
     @abstractmethod
     def begin(self, navigator: Navigator) -> Smoothing:
-        """Return what takes the pieces of a run of a navigator with this smoother."""
+        """Return an empty smoother history for a navigator with this smoother."""
 
 
 @dataclass(frozen=True)
 class RauchTungStriebel(Smoother):
-    """Fixed-interval smoother over the filter that ran: any error model, form, rule and aid.
+    """Fixed-interval smoother of the filter: for any error model, form, rule and aid.
 
-    Of each growth and each update of the filter its covariance, the transition, and what was taken
-    off are kept; from the end back to the start it then adds what came later. States and
+    The smoother history holds the covariance, the transition and the correction of each
+    propagation and update of the filter; the backward pass adds the later observations. States and
     covariances are those of Rauch, Tung and Striebel (AIAA Journal 3 (1965) 1445, Eqs. 3.28 to
-    3.31); they are reckoned in the adjoint form of Bryson and Frazier, which inverts nothing
-    where errors only grow, so that what is known exactly does no harm.
+    3.31), computed in the adjoint form of Bryson and Frazier. Where errors only grow it needs no
+    inverse, so that exactly known states do no harm.
 
-    It is linear about the filter's own states: where the filter was far from the truth, as with a
-    heading that is off by tens of degrees, the smoothed states of that time are no better than
-    the linear model there. What a rule took for an outlier stays one.
+    It is linear about the filter's own states: where the filter had large errors, as a heading
+    error of tens of degrees, the smoothed states of that time are no better than the linear model
+    there. Outliers rejected by a rule stay rejected.
 
     Attributes
     ----------
     memory : float, MB
-        Beyond it nodes go to the disk (the folder for temporary files).
+        Beyond it the history is written to disk (the folder for temporary files).
 
     Raises
     ------
     ConfigError
-        It is no size.
+        The size is invalid.
     """
 
     name: ClassVar[str] = "rts"
@@ -83,7 +83,7 @@ class RauchTungStriebel(Smoother):
             )
 
     def begin(self, navigator: Navigator) -> Smoothing:
-        """Return what takes the pieces of a run."""
+        """Return an empty smoother history."""
         return Smoothing(navigator, int(self.memory * 1e6))
 
 
@@ -92,7 +92,7 @@ SMOOTHERS: dict[str, type[Smoother]] = {"rts": RauchTungStriebel}
 
 
 class Smoothing:
-    """What a smoother knows of a run so far.
+    """Smoother history of a run so far.
 
     Parameters
     ----------
@@ -105,17 +105,17 @@ class Smoothing:
         self._navigator = navigator
 
     def take(self, piece: NavigationChunk) -> None:
-        """Take what came of a further piece."""
+        """Append the result of a chunk."""
         for rows in piece.nodes:
             self._tape.take(rows)
 
     def smoothed(self, marks: Array) -> Smoothed:
-        """Go back over everything that was taken.
+        """Run the backward pass over the whole history.
 
         Parameters
         ----------
         marks : ndarray, (m,), s
-            Where covariances are wanted: times of marks of the run.
+            Times of the marks of the run for which covariances are computed.
 
         Returns
         -------
@@ -155,7 +155,7 @@ class Smoothing:
         )
 
     def seen(self, times: Array, observations: Sequence[Observation]) -> tuple[Array, Array]:
-        """Return what observations that were not used are off by from the smoothed states.
+        """Return the residuals of unused observations against the smoothed states.
 
         Parameters
         ----------
@@ -167,13 +167,13 @@ class Smoothing:
         Returns
         -------
         error : ndarray, (m, l)
-            Smoothed less observed, to first order in what the smoother takes off: everything that
-            the observation depends on is smoothed, errors of an aid too.
+            Smoothed minus observed, to first order in the smoother's corrections: every quantity of
+            the observation is smoothed, including errors of an aid.
         covariance : ndarray, (m, l, l)
-            Expected of it, noise of the observation and all.
+            Its predicted covariance, including the noise of the observation.
         """
         time = self._tape.times()
-        # The first of an instant is of the state before anything was taken at it.
+        # The first node of an instant is of the state before the updates there.
         nodes = np.clip(np.searchsorted(time, times), 0, len(time) - 1)
         H = np.array([one.H for one in observations])
         errors = np.empty((len(time), self._tape.size))
@@ -184,19 +184,19 @@ class Smoothing:
         return z - (H @ errors[nodes][:, :, None])[:, :, 0], covariance
 
     def _back(self, nodes: NDArray[np.intp], errors: Array) -> Iterator[tuple[slice, Array, Array]]:
-        """Go back over the tape.
+        """Run the backward pass.
 
         Parameters
         ----------
         nodes : ndarray, (m,)
-            Numbers of nodes, rising.
+            Indices of nodes, increasing.
         errors : ndarray, (count, p)
-            Filled with those of the state at each node.
+            Filled with the errors of the state at each node.
 
         Yields
         ------
         met : slice
-            Which of the nodes are in a chunk.
+            The nodes that are in a chunk.
         covariance : ndarray, (k, p, p)
             Of these.
         turn : ndarray, (k, 3, 3)
@@ -216,12 +216,12 @@ class Smoothing:
             end = begin
 
 
-# What a smoother found of a run.
+# Result of a smoother.
 
 
 @dataclass(frozen=True, eq=False)
 class Smoothed:
-    """Errors that a filter's states have, by all observations, and what is left unknown.
+    """Smoothed corrections to a filter's states, with their covariance.
 
     Attributes
     ----------
@@ -235,7 +235,7 @@ class Smoothed:
     covariance : ndarray, (m, 9, 9)
         At the marks, north-east-down.
     sensors : ndarray, (m, s)
-        What the estimates of the sensors then still lack.
+        Smoothed correction of the sensor estimates.
     sensors_sd : ndarray, (m, s)
     """
 
@@ -248,10 +248,10 @@ class Smoothed:
     sensors_sd: Array
 
     def corrected(self, time: Array, history: Array) -> Array:
-        """Return rows of a history without the errors that were found.
+        """Return rows of a history with the smoothed corrections applied.
 
-        Between two nodes an error goes along a line: a tenth of a second apart, what is left is
-        less than a thousandth of what is smoothed.
+        Between two nodes the correction is interpolated linearly: a tenth of a second apart, the
+        error is less than a thousandth of the correction.
 
         Parameters
         ----------
@@ -262,20 +262,20 @@ class Smoothed:
         -------
         ndarray, (n, row)
         """
-        # At an instant with several nodes the last one is of the state that is shown.
+        # At an instant with several nodes the last one is of the output state.
         right = np.searchsorted(self.time, time + SAME_INSTANT, side="right")
         before = np.clip(right - 1, 0, len(self.time) - 1)
         after = np.clip(right, 0, len(self.time) - 1)
         length = self.time[after] - self.time[before]
         part = np.clip(time - self.time[before], 0.0, None)
         share = np.divide(part, length, out=np.zeros_like(part), where=length > 0.0)
-        # Beyond the last node of a filter nothing grows that was noted.
+        # Beyond the last node of a filter no growth is recorded.
         share = np.minimum(share, 1.0)[:, None]
         errors = (1.0 - share) * self.errors[before] + share * self.errors[after]
         return self.mechanization.corrected_history(history, errors)
 
 
-# Nodes of a filter, kept in memory or, where they are many, on disk.
+# Smoother history, in memory or, if large, on disk.
 
 
 #: Nodes of a chunk: some megabytes.
@@ -283,11 +283,11 @@ CHUNK = 1024
 
 
 class SmoothingTape:
-    """Takes nodes, and gives them back from the last to the first.
+    """Smoother history, read from the last node to the first.
 
-    A node takes ``8 (11 + p (p + 1) + p)`` bytes or a little more: 2 kB with 15 errors, 5 kB with
-    24. Beyond the memory that is given, they go to a file without a name, which is gone with the
-    tape or with the process, whichever ends first; their times alone stay.
+    A node needs ``8 (11 + p (p + 1) + p)`` bytes or a little more: 2 kB with 15 errors, 5 kB with
+    24. Beyond the given memory, nodes are written to an unnamed file, which is removed with the
+    tape or with the process, whichever ends first; only their times stay in memory.
 
     Parameters
     ----------
@@ -312,7 +312,7 @@ class SmoothingTape:
         self._written = 0
 
     def take(self, rows: Array) -> None:
-        """Take further nodes.
+        """Append nodes.
 
         Parameters
         ----------
@@ -335,7 +335,7 @@ class SmoothingTape:
         return self._times[0]
 
     def backward(self) -> Iterator[Array]:
-        """Give chunks of rows, the last one first; within each they are in order of time."""
+        """Yield chunks of rows, the last one first; within each they are in order of time."""
         for k in range(len(self._chunks) - 1, -1, -1):
             last = k + 1 == len(self._chunks)
             yield self._chunks[k][: self._used if last else CHUNK]
@@ -380,6 +380,6 @@ class SmoothingTape:
 
 
 def _close(file: IO[bytes]) -> None:
-    """Close a file; where what it holds finds no room any more, it is not missed."""
+    """Close a file; a failure to write its contents does not matter any more."""
     with suppress(OSError):
         file.close()

@@ -2,13 +2,13 @@
 
 Conventions, here and everywhere in strapdown:
 
-* Quaternions are Hamilton's, scalar first, ``(..., 4)``; ``q_ab`` turns a vector from frame
+* Quaternions are Hamilton's, scalar first, ``(..., 4)``; ``q_ab`` rotates a vector from frame
   ``b`` into frame ``a``: ``v_a = rotate(q_ab, v_b)``; ``q`` and ``-q`` are the same rotation.
-* Matrices are ``(..., 3, 3)``: ``v_a = C_ab @ v_b``; neighbouring letters cancel.
+* Matrices are ``(..., 3, 3)``: ``v_a = C_ab @ v_b``; neighboring letters cancel.
 * Euler angles are ``(..., 3)``: roll, pitch, heading in degrees, 3-2-1:
   ``C_nb = Rz(heading) Ry(pitch) Rx(roll)``; heading in [0, 360), clockwise from north seen
   from above (north-east-down axes), roll in (-180, 180], pitch in [-90, 90].
-* A rotation vector is ``(..., 3)`` in rad: the turn by its length about its direction.
+* A rotation vector is ``(..., 3)`` in rad: rotation by its length about its direction.
 
 Alexiev (2021) prints the elementary matrices (4)-(6) as rotations of the *frame*; with them
 Eq. (3) must read ``C_nb = Cz^T Cy^T Cx^T``, which is the product above, and only this reading

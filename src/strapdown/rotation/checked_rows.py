@@ -1,4 +1,4 @@
-"""What every function here takes: checked, and laid out as rows for the kernels."""
+"""Check the arguments of rotation functions, and arrange them as rows for the kernels."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ __all__ = ["apply", "common_shape", "proper_matrices", "rows_of", "unit_quaterni
 
 Array = NDArray[np.float64]
 
-# How far a norm or C^T C may lie from one before an input is refused as no rotation. Hand
-# written quaternions carry three or four digits; a mistaken order of components does not pass.
+# Tolerance of a norm or of C^T C before an input is refused as not a rotation. Handwritten
+# quaternions carry three or four digits; a mistaken order of components does not pass.
 _TOLERANCE = 1e-2
 
 
@@ -29,7 +29,7 @@ def rows_of(values: ArrayLike, shape: tuple[int, ...], name: str) -> tuple[Array
         )
     leading = array.shape[: array.ndim - len(shape)]
     rows = np.ascontiguousarray(array.reshape(-1, int(np.prod(shape))))
-    # A square that overflows is no more use than infinity.
+    # A square that overflows is as useless as infinity.
     bad = np.flatnonzero(~(np.abs(rows) < LARGEST).all(axis=1))
     if bad.size:
         raise DataError(
@@ -43,7 +43,7 @@ def rows_of(values: ArrayLike, shape: tuple[int, ...], name: str) -> tuple[Array
 
 
 def unit_quaternions(q: ArrayLike, name: str) -> tuple[Array, tuple[int, ...]]:
-    """Return quaternions as rows of norm 1 and the leading shape; none may be 1 % from it."""
+    """Return quaternions as rows of norm 1 and the leading shape; norms must be 1 within 1 %."""
     rows, leading = rows_of(q, (4,), name)
     norm = np.sqrt((rows * rows).sum(axis=1))
     bad = np.flatnonzero(np.abs(norm - 1.0) > _TOLERANCE)
@@ -58,7 +58,7 @@ def unit_quaternions(q: ArrayLike, name: str) -> tuple[Array, tuple[int, ...]]:
 
 
 def proper_matrices(dcm: ArrayLike) -> tuple[Array, tuple[int, ...]]:
-    """Return matrices as rows of nine and the leading shape; none may be 1 % from a rotation."""
+    """Return matrices as rows of nine and the leading shape; rotations within 1 %."""
     rows, leading = rows_of(dcm, (3, 3), "direction cosine matrix")
     matrices = rows.reshape(-1, 3, 3)
     loss = np.abs(np.swapaxes(matrices, 1, 2) @ matrices - np.eye(3)).max(axis=(1, 2), initial=0.0)
@@ -75,7 +75,7 @@ def proper_matrices(dcm: ArrayLike) -> tuple[Array, tuple[int, ...]]:
 
 
 def common_shape(a: tuple[int, ...], b: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the leading shape that both are broadcast to."""
+    """Return the common broadcast leading shape."""
     try:
         return np.broadcast_shapes(a, b)
     except ValueError:
@@ -85,7 +85,7 @@ def common_shape(a: tuple[int, ...], b: tuple[int, ...]) -> tuple[int, ...]:
 def apply(
     loop: Callable[[Array, Array], Any], rows: Array, leading: tuple[int, ...], *shape: int
 ) -> Array:
-    """Return what a kernel makes of each row, each of `shape` below the leading one."""
+    """Apply a kernel to each row, each of `shape` below the leading one."""
     out = np.empty((rows.shape[0], int(np.prod(shape))))
     loop(rows, out)
     return out.reshape(leading + shape)

@@ -1,4 +1,4 @@
-"""Roll, pitch and heading from and to the other forms, and how well they are known."""
+"""Roll, pitch and heading from and to the other forms, and their standard deviations."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def euler_from_dcm(dcm: ArrayLike) -> Array:
     Raises
     ------
     DataError
-        Wrong shape, a value that is not finite, or no rotation.
+        Wrong shape, a value that is not finite, or not a rotation.
     """
     return euler_from_quaternion(quaternion_from_dcm(dcm))
 
@@ -173,8 +173,8 @@ def euler_sd(euler_deg: ArrayLike, covariance: ArrayLike) -> Array:
     ndarray, (..., 3), deg
     """
     _, pitch, heading = np.moveaxis(np.radians(euler_deg), -1, 0)
-    # phi = turning of the three axes by which the angles turn: heading about down, pitch about
-    # the horizontal right, roll about forward.
+    # phi = rotation of the three axes of the angles: heading about down, pitch about the horizontal
+    # right, roll about forward.
     s, c, cp, zero = np.sin(heading), np.cos(heading), np.cos(pitch), np.zeros_like(pitch)
     axes = np.stack(
         [
@@ -219,7 +219,7 @@ def rotation_angle(q_1: ArrayLike, q_2: ArrayLike) -> Array:
 
 
 def unit_rotation_angle(q_1: Array, q_2: Array) -> Array:
-    """Angle between the attitudes of two arrays of unit quaternions, which is not checked.
+    """Angle between the attitudes of two arrays of unit quaternions, unchecked.
 
     Parameters
     ----------
@@ -236,7 +236,7 @@ def unit_rotation_angle(q_1: Array, q_2: Array) -> Array:
 
 
 def within_half_turn(angles_deg: Array) -> Array:
-    """Bring angles within half a turn.
+    """Wrap angles to within half a turn.
 
     Parameters
     ----------
@@ -245,7 +245,7 @@ def within_half_turn(angles_deg: Array) -> Array:
     Returns
     -------
     ndarray, (...), deg
-        From -180 to 180; what is within already keeps every digit.
+        From -180 to 180; values already within keep every digit.
     """
     wrapped = np.remainder(angles_deg + 180.0, 360.0) - 180.0
     return np.where(np.abs(angles_deg) <= 180.0, angles_deg, wrapped)

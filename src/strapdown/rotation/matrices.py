@@ -19,7 +19,7 @@ def dcm_from_quaternion(q: ArrayLike) -> Array:
     Parameters
     ----------
     q : array_like, (..., 4)
-        Quaternions of norm 1 within 1 %; they are normalised first.
+        Quaternions of norm 1 within 1 %; they are normalized first.
 
     Returns
     -------
@@ -50,7 +50,7 @@ def quaternion_from_dcm(dcm: ArrayLike) -> Array:
     Raises
     ------
     DataError
-        Wrong shape, a value that is not finite, or no rotation.
+        Wrong shape, a value that is not finite, or not a rotation.
 
     Notes
     -----

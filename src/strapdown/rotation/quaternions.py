@@ -1,4 +1,4 @@
-"""Rotations put one after the other, turned round and applied to vectors, as quaternions."""
+"""Composition, inversion and application of rotations, as quaternions."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def normalise(q_ab: ArrayLike) -> Array:
 
 
 def rotate(q_ab: ArrayLike, v_b: ArrayLike) -> Array:
-    """Turn vectors from frame ``b`` into frame ``a``.
+    """Rotate vectors from frame ``b`` into frame ``a``.
 
     Parameters
     ----------

@@ -52,12 +52,12 @@ def rotation_vector_from_quaternion(q: ArrayLike) -> Array:
     Parameters
     ----------
     q : array_like, (..., 4)
-        Quaternions of norm 1 within 1 %; they are normalised first.
+        Quaternions of norm 1 within 1 %; they are normalized first.
 
     Returns
     -------
     ndarray, (..., 3), rad
-        At exactly half a turn both directions are right and one is returned.
+        At exactly half a turn both directions are valid and one is returned.
 
     Raises
     ------
@@ -107,6 +107,6 @@ def rotation_vector_from_dcm(dcm: ArrayLike) -> Array:
     Raises
     ------
     DataError
-        Wrong shape, a value that is not finite, or no rotation (1 % of orthogonality).
+        Wrong shape, a value that is not finite, or not a rotation (1 % of orthogonality).
     """
     return rotation_vector_from_quaternion(quaternion_from_dcm(dcm))

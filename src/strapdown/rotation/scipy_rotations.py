@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 def to_scipy(q: ArrayLike) -> Rotation:
-    """Turn quaternions into a `scipy.spatial.transform.Rotation` (scalar last inside).
+    """Convert quaternions to a `scipy.spatial.transform.Rotation` (scalar last inside).
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def to_scipy(q: ArrayLike) -> Rotation:
 
 
 def from_scipy(rotation: Rotation) -> Array:
-    """Turn a `scipy.spatial.transform.Rotation` into quaternions, scalar first.
+    """Convert a `scipy.spatial.transform.Rotation` to quaternions, scalar first.
 
     Parameters
     ----------
