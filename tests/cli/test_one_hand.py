@@ -191,7 +191,7 @@ def results(tmp_path_factory, run_cli, sketched_module):
 def test_a_result_in_place_of_a_log_is_known_for_what_it_is(results, run_cli, command):
     done = run_cli(*command.split(), results / "rest", "--out", results / "out.toml")
     assert (done.code, done.out) == (4, "")
-    assert "it is a result that strapdown attitude wrote, and no " in done.err
+    assert "it is a result of strapdown attitude, not a " in done.err
     assert f"open {results / 'rest' / 'report.html'}" in done.err
     assert f"strapdown verify {results / 'rest'}" in done.err
     assert str(results / "rest" / "inputs" / "log" / "log.csv") in done.err

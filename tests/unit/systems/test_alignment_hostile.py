@@ -72,7 +72,7 @@ def test_a_channel_that_stops_is_refused_with_the_stretch_that_is_left(stand):
         stuck = stand.copy()
         column = stuck.columns.get_loc(channel)
         stuck.iloc[2000:, column] = stuck.iloc[2000, column] if value is None else value
-        with pytest.raises(DataError, match=f"{channel}.*67 % of the record") as error:
+        with pytest.raises(DataError, match=f"{channel}.*67% of the record") as error:
             channel_findings(stuck, SENSORS)
         assert "--duration 40" in error.value.finding.remedy
 
@@ -159,7 +159,7 @@ def test_rates_in_the_unit_in_which_they_are_small():
 @pytest.mark.parametrize(
     ("given", "place", "said"),
     [
-        ({"lat": float("nan")}, "--lat", "nan is no number"),
+        ({"lat": float("nan")}, "--lat", "nan does not fit"),
         ({"axes": "q,r,s"}, "--axes", "three axes"),
         ({"method": "known_heading"}, "--method, heading_deg", "it is missing"),
         ({"duration": -1.0}, "--duration", "no duration"),

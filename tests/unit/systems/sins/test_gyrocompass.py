@@ -115,7 +115,7 @@ def test_a_wrong_latitude_takes_the_witness_away():
     # 5 deg are 1.1 deg/h of the Earth's horizontal rate, a hundred times the gyros' bias.
     assert (light != 0).all()
     codes = [one.code for one in result.trust.unwitnessed]
-    assert codes[1:] == ["navigation.alignment-not-consistent"]
+    assert codes[1:] == ["navigation.rest-not-consistent"]
 
 
 def test_a_wrong_stored_heading_is_not_green_while_it_is_wrong():
