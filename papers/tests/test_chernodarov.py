@@ -52,16 +52,19 @@ def evidence(made, key, what):
     return next(e.value for e in found.evidence if e.what == what)
 
 
+@pytest.mark.slow
 def test_every_statement_is_there_once_in_the_order_of_the_paper(made):
     assert tuple(s.key for s in made.statements) == system.ORDER
     assert len(set(system.ORDER)) == len(system.ORDER)
 
 
+@pytest.mark.slow
 def test_each_has_a_quote_of_one_sentence_numbers_and_a_figure_that_exists(made):
     check_statements(made)
     assert {f"fig{k}" for k in range(4, 12)} <= {f.slug for f in made.figures}
 
 
+@pytest.mark.slow
 def test_the_quotes_stand_in_the_paper_word_for_word(made, recordings):
     path = recordings("..") / "papers" / "chernodarov-2009-sins-1000.md"
     if not path.exists():
@@ -81,6 +84,7 @@ def _plain(text: str) -> str:
     return re.sub(r"\s+", " ", text.replace("$", "").replace("*", ""))
 
 
+@pytest.mark.slow
 def test_progress_runs_from_the_first_stage_and_never_back(made, progress):
     shares = [share for _, share in progress]
     assert shares[0] == 0.0
@@ -88,17 +92,20 @@ def test_progress_runs_from_the_first_stage_and_never_back(made, progress):
     assert shares[-1] < 1.0
 
 
+@pytest.mark.slow
 def test_the_headline_counts_what_is_there(made):
     assert made.headline.startswith(f"Of {len(made.statements)} statements {made.count(HOLDS)} ")
     assert sum(made.count(v) for v in VERDICTS) == len(made.statements)
 
 
+@pytest.mark.slow
 def test_the_page_has_its_own_conventions(made):
     page = reproduction_page(made)
     for name, _ in made.conventions:
         assert name in page
 
 
+@pytest.mark.slow
 def test_curves_of_one_legend_are_told_apart_with_and_without_color(made):
     for figure in made.figures:
         style = looks(figure)
@@ -109,10 +116,12 @@ def test_curves_of_one_legend_are_told_apart_with_and_without_color(made):
             assert len({marker for _, _, marker in points.values()}) == len(points), figure.slug
 
 
+@pytest.mark.slow
 def test_the_page_has_the_statements_of_this_code(made):
     check_manual(made, PAGE)
 
 
+@pytest.mark.slow
 def test_the_covariance_tells_what_the_units_have(made):
     # Roots of means of 24 units, along two axes that are alike: 1/sqrt(96) = 10 % one sigma,
     # and what is known of a drift that moves is a bound and not the process: 20 %.
@@ -120,6 +129,7 @@ def test_the_covariance_tells_what_the_units_have(made):
     assert evidence(made, "comparison", "measured over predicted, most") < 1.4
 
 
+@pytest.mark.slow
 def test_a_free_height_grows_as_its_closed_form(made):
     found = evidence(made, "vertical", "time in which it grows by e")
     # Gravity falls by 2 g / R with height, but for the flattening and the rotation: 1 %.

@@ -94,6 +94,7 @@ def test_a_case_hangs_on_its_number_alone(few):
     assert late.unit.trigger != same.unit.trigger
 
 
+@pytest.mark.slow
 def test_bounds_are_not_blind():
     # A recorder that is four times worse than it says must fall out of its bounds.
     priors = TrialPriors()
@@ -195,6 +196,7 @@ def test_short_error_model_is_that_of_theory():
     assert table["down"] == pytest.approx(np.hypot(0.056, 0.055), rel=slack + 0.05)
 
 
+@pytest.mark.slow
 def test_coverage_of_two_thousand_cases():
     trials = coverage(2000, seed=1)
     table = trials.table()
@@ -203,12 +205,14 @@ def test_coverage_of_two_thousand_cases():
     assert table["inside"].between(0.9354, 0.9646).all(), table["inside"]
 
 
+@pytest.mark.slow
 def test_outcomes_do_not_depend_on_the_number_of_workers():
     one, two = coverage(12, seed=9, workers=1), coverage(12, seed=9, workers=2)
     pd.testing.assert_frame_equal(one.errors, two.errors, check_exact=True)
     pd.testing.assert_frame_equal(one.sds, two.sds, check_exact=True)
 
 
+@pytest.mark.slow
 def test_paper_experiment_says_decimetres():
     found = paper_experiment(500, seed=0)
     table = found.table()
@@ -223,6 +227,7 @@ def test_paper_experiment_says_decimetres():
     assert chain.loc["east", "rms"] < 0.04
 
 
+@pytest.mark.slow
 def test_bounds_fail_where_they_were_not_told():
     untold = {
         "nothing": Untold(),

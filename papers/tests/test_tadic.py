@@ -147,6 +147,7 @@ def test_a_picture_of_the_manual_is_what_is_drawn_now(made, slug, tmp_path):
     assert same_picture(shown, tmp_path / "now.svg"), "make pictures, and look at them"
 
 
+@pytest.mark.slow
 def test_a_second_run_has_the_same_bits(made):
     again = system.reproduce_tadic()
     assert reproduction_json(again) == reproduction_json(made)
