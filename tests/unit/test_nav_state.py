@@ -83,7 +83,7 @@ def test_every_number_is_finite(name, value):
 def test_velocity_is_three_finite_numbers():
     with pytest.raises(DataError, match="v_n east: not a finite number"):
         state(v_n=[0.0, math.nan, 0.0])
-    with pytest.raises(DataError, match=r"v_n: its shape is \(2\)"):
+    with pytest.raises(DataError, match=r"v_n: its shape is \(2,\)"):
         state(v_n=[0.0, 1.0])
     with pytest.raises(DataError, match=r"v_n: its shape is \(1, 3\)"):
         state(v_n=[[0.0, 1.0, 2.0]])

@@ -259,7 +259,7 @@ def checked_covariance(P: Array) -> Array:
     """
     P = np.array(P, dtype=np.float64, order="C")
     if P.ndim != 2 or P.shape[0] != P.shape[1] or not P.size:
-        raise _bad("estimation.covariance-not-square", shape=str(P.shape))
+        raise _bad("estimation.covariance-not-square", shape=P.shape)
     if not np.isfinite(P).all():
         i, j = np.argwhere(~np.isfinite(P))[0]
         raise _bad("estimation.covariance-not-finite", value=P[i, j], i=i + 1, j=j + 1)
