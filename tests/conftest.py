@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
 import sys
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
@@ -12,19 +11,17 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
-
-ROOT = Path(__file__).parent.parent
-DATA = Path(os.environ.get("STRAPDOWN_DATA", ROOT / "../shared/data")).resolve()
+from tests.recorded import DATA, without
 
 
 @pytest.fixture(scope="session")
 def recordings():
-    """A function that gives the path of a shared recording, or skips."""
+    """A function that gives the path of a shared recording (see `tests.recorded.without`)."""
 
     def find(name: str) -> Path:
         path = DATA / name
         if not path.exists():
-            pytest.skip(f"no recording {name}: set STRAPDOWN_DATA to the folder that holds it")
+            without(f"recording {name}")
         return path
 
     return find

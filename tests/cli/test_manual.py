@@ -45,8 +45,6 @@ SLOW = {
     "trust",
     "walking",
 }
-#: What the examples of a page use that is no part of the tests' installation.
-NEEDS = {"answer": ["vqf"], "peers": ["vqf", "ahrs"]}
 DOCUMENTS = [*sorted((ROOT / "docs").glob("*.md")), ROOT / "CONTRIBUTING.md"]
 
 
@@ -58,17 +56,10 @@ DOCUMENTS = [*sorted((ROOT / "docs").glob("*.md")), ROOT / "CONTRIBUTING.md"]
     ],
 )
 def test_every_example_of_a_page_prints_what_the_page_shows(page, capsys, monkeypatch, recordings):
-    for library in NEEDS.get(page.stem, []):
-        pytest.importorskip(library)
     if "STRAPDOWN_DATA" in page.read_text(encoding="utf-8"):
         monkeypatch.setenv("STRAPDOWN_DATA", str(recordings("mpu6050_turns").parent))
     monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
-    # A kernel that is compiled within a run can differ in its last bits from the same kernel loaded
-    # from the cache: a bundle of a first run is then not identical when it is verified. Version 0.1
-    # does so, too; kernels delivered compiled will end it. Until then a page has a second chance.
-    if RUNNER.check(page, write=False) != 0:
-        capsys.readouterr()
-        assert RUNNER.check(page, write=False) == 0, capsys.readouterr().out
+    assert RUNNER.check(page, write=False) == 0, capsys.readouterr().out
 
 
 @pytest.mark.parametrize("page", DOCUMENTS, ids=lambda page: page.stem)

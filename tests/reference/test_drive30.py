@@ -6,13 +6,12 @@ Data and the filter in C are those of the measuring sticks beside the recordings
 from __future__ import annotations
 
 import importlib.util
-import os
 import re
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.recorded import DATA, without
 
 from strapdown.aiding.gnss import Gnss
 from strapdown.estimation.covariance import COVARIANCES
@@ -25,8 +24,6 @@ from strapdown.nav_state import NavState
 from strapdown.navigation.navigator import Navigator, with_states
 from strapdown.tables import gnss_table, imu_table
 
-ROOT = Path(__file__).parents[2]
-DATA = Path(os.environ.get("STRAPDOWN_DATA", ROOT / "../shared/data")).resolve()
 SCRIPT = DATA.parent / "bench" / "drive30" / "drive30.py"
 FORMS = ("joseph", "ud", "wd")
 # How the script tells its scores, rounded to 0.001.
@@ -37,9 +34,8 @@ ROUNDING = 1e-3
 @pytest.fixture(scope="module")
 def script():
     """The script that generates the data and scores a result."""
-    pytest.importorskip("pyins")
     if not SCRIPT.exists():
-        pytest.skip(f"no {SCRIPT}: set STRAPDOWN_DATA to the folder beside the measuring sticks")
+        without(str(SCRIPT))
     if shutil.which("gcc") is None:
         pytest.skip("no gcc for the filter in C")
     spec = importlib.util.spec_from_file_location("drive30_script", SCRIPT)

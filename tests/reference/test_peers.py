@@ -15,18 +15,13 @@ import pytest
 from strapdown import read_log, rotation
 from strapdown.attitude import Quaternion, run_attitude
 from strapdown.increments import increments_from_imu
-from strapdown.peers import PEERS, available_peers, run_peers
+from strapdown.peers import PEERS, run_peers
 from strapdown.tables import MAG, QUATERNION
 
 ROTATION = ["02_undisturbed_slow_rotation_B", "07_undisturbed_fast_rotation_B"]
 TRANSLATION = "14_undisturbed_slow_translation_with_breaks_B"
 PHONE = "27_disturbed_phone_vibration_B"
 BROAD = [*ROTATION, TRANSLATION, PHONE]
-
-
-def need(name):
-    if name not in available_peers():
-        pytest.skip(f"{name} is not installed")
 
 
 @cache
@@ -59,7 +54,6 @@ def errors(attitude, truth):
 @pytest.mark.parametrize("name", BROAD)
 @pytest.mark.parametrize("peer", ["vqf", "ahrs:closed"])
 def test_the_gyro_alone_is_our_quaternion_with_mean_rates(recordings, name, peer):
-    need(peer.partition(":")[0])
     imu, start, _ = trial(recordings(f"broad/{name}.hdf5"))
     ((_, _, theirs),), findings = run_peers([peer], imu, start, ["gyro"])
     assert findings == ()
@@ -79,7 +73,6 @@ def test_vqf_is_as_good_as_its_authors_say(recordings, name):
     An axis or a sign that is wrong costs tens of degrees. Trial 27 is disturbed by a phone, and
     its magnetic heading is bounded by that alone.
     """
-    need("vqf")
     imu, start, truth = trial(recordings(f"broad/{name}.hdf5"))
     runs, findings = run_peers(["vqf"], imu, start, ["gyro+accel", "gyro+accel+mag"])
     assert findings == ()
@@ -105,12 +98,10 @@ def bounded(recordings, name, words):
 
 @pytest.mark.parametrize("name", BROAD)
 def test_imufusion_has_our_axes(recordings, name):
-    need("imufusion")
     bounded(recordings, name, ["imufusion"])
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", BROAD)
 def test_the_filters_of_ahrs_have_our_axes(recordings, name):
-    need("ahrs")
     bounded(recordings, name, [f"ahrs:{f}" for f in PEERS["ahrs"].filters])

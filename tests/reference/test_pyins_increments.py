@@ -12,8 +12,6 @@ import pytest
 from strapdown.increments import motion_increments
 from strapdown.tables import ACCEL, DV, GYRO, PHI
 
-pytest.importorskip("pyins")
-
 _spec = importlib.util.spec_from_file_location(
     "smooth_motion",
     Path(__file__).parents[1] / "unit" / "increments" / "smooth_motion.py",

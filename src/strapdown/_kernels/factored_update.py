@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 
 from strapdown._kernels.factors import mwgs, not_finite, stacked
+from strapdown._kernels.given_arrays import dot
 from strapdown._kernels.observation import expected, moved_state
 
 
@@ -97,7 +98,7 @@ def wd_begin(ud, Phi, Q, predicted, observations):
     return W, d, -1
 
 
-@njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
+@njit(cache=True, error_model="numpy")
 def wd_expect(W, d, x, z, H, j, work):
     """Write ``f = h W`` and ``V = d f`` to `work`; return innovation and f V (Eqs. 9 and 11)."""
     n, size = W.shape
@@ -110,14 +111,12 @@ def wd_expect(W, d, x, z, H, j, work):
             row = W[i]
             for k in range(size):
                 f[k] += factor * row[k]
-    s = 0.0
     for k in range(size):
         V[k] = d[k] * f[k]
-        s += f[k] * V[k]
-    return expected(x, z, H, j), s
+    return expected(x, z, H, j), dot(f, V, size)
 
 
-@njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
+@njit(cache=True, error_model="numpy")
 def wd_take(W, d, x, H, j, work, s, moved, slope, r):
     """Change W, d and x by observation j: ``W <- [W - slope K f, K]``, ``d <- [d, slope r]``.
 
@@ -126,11 +125,7 @@ def wd_take(W, d, x, H, j, work, s, moved, slope, r):
     n, size = W.shape
     f, V, g = work[0], work[1], work[2]
     for i in range(n):
-        row = W[i]
-        total = 0.0
-        for k in range(size):
-            total += row[k] * V[k]
-        g[i] = total
+        g[i] = dot(W[i], V, size)
     gain = moved_state(x, g, s, moved, slope, r)
     if slope == 0.0:
         return

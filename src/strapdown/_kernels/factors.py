@@ -11,6 +11,8 @@ import math
 import numpy as np
 from numba import njit
 
+from strapdown._kernels.given_arrays import dot
+
 EPSILON = 2.0**-52
 # What rounding leaves of a variance of one that is fully explained, in n roundings.
 NOTHING = 8.0
@@ -98,7 +100,7 @@ def udu_matrix(ud, out):
             out[j, i] = total
 
 
-@njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
+@njit(cache=True, error_model="numpy")
 def mwgs(W, d, out):
     """Turn ``W diag(d) W'``, W (n, N), into U and D: modified weighted Gram-Schmidt.
 
@@ -109,16 +111,14 @@ def mwgs(W, d, out):
     weighted, whole = np.empty(size), np.empty(n)
     for i in range(n):
         row = W[i]
-        total = 0.0
         for k in range(size):
-            total += abs(d[k]) * row[k] * row[k]
-        whole[i] = total
+            weighted[k] = abs(d[k]) * row[k]
+        whole[i] = dot(weighted, row, size)
     for j in range(n - 1, -1, -1):
         row = W[j]
-        total = 0.0
         for k in range(size):
             weighted[k] = d[k] * row[k]
-            total += weighted[k] * row[k]
+        total = dot(weighted, row, size)
         for i in range(j):
             out[j, i] = 0.0
         if abs(total) <= size * EPSILON * EPSILON * whole[j]:
@@ -130,10 +130,7 @@ def mwgs(W, d, out):
         inverse = 1.0 / total
         for i in range(j):
             other = W[i]
-            share = 0.0
-            for k in range(size):
-                share += weighted[k] * other[k]
-            share *= inverse
+            share = inverse * dot(weighted, other, size)
             out[i, j] = share
             if share != 0.0:
                 for k in range(size):

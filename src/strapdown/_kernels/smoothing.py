@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numba import njit
 
-from strapdown._kernels.given_arrays import GIVEN
+from strapdown._kernels.given_arrays import GIVEN, dot
 from strapdown._kernels.smoothing_rows import (
     CORE,
     COVARIANCE,
@@ -86,7 +86,7 @@ def inverse(P, out):
             out[i, j] = out[j, i] = total
 
 
-@njit(**GIVEN, fastmath={"contract"})
+@njit(**GIVEN)
 def product(A, B, n, out):
     """Fill ``A B``, (n, n) within padded matrices."""
     for i in range(n):
@@ -100,19 +100,16 @@ def product(A, B, n, out):
                     out[i, p + j] += a * B[m, p + j]
 
 
-@njit(**GIVEN, fastmath={"reassoc", "contract"})
+@njit(**GIVEN)
 def sandwich(A, S, n, half, out):
     """Fill ``A S A'``, symmetric S, (n, n) within padded matrices; `half` is room to work in."""
     product(A, S, n, half)
     for i in range(n):
         for j in range(i, n):
-            total = 0.0
-            for m in range(half.shape[1]):
-                total += half[i, m] * A[j, m]
-            out[i, j] = out[j, i] = total
+            out[i, j] = out[j, i] = dot(half[i], A[j], half.shape[1])
 
 
-@njit(**GIVEN, fastmath={"contract"})
+@njit(**GIVEN)
 def unpack_growth(row, n, core, decay):
     """Fill the first rows of a transition, and the decay of the others, padded, from a row."""
     at = begin_of_move(n)
@@ -125,7 +122,7 @@ def unpack_growth(row, n, core, decay):
         at += 1
 
 
-@njit(**GIVEN, fastmath={"contract"})
+@njit(**GIVEN)
 def estimate_of(row, told, n, out):
     """Fill ``P l`` with the covariance P of a row."""
     at = COVARIANCE
@@ -141,7 +138,7 @@ def estimate_of(row, told, n, out):
         at += n - i
 
 
-@njit(**GIVEN, fastmath={"contract"})
+@njit(**GIVEN)
 def told_before_growth(core, decay, told, new):
     """Change l to ``Phi' l``; vectors are padded."""
     for p in range(0, told.shape[0], LANES):
@@ -155,7 +152,7 @@ def told_before_growth(core, decay, told, new):
         told[j] = new[j]
 
 
-@njit(**GIVEN, fastmath={"contract"})
+@njit(**GIVEN)
 def less_before_growth(core, decay, less, n, half):
     """Change L to ``Phi' L Phi``, exactly symmetric; matrices are padded, `half` is room."""
     for i in range(n):
@@ -188,7 +185,7 @@ def less_before_growth(core, decay, less, n, half):
             less[i, j] = less[j, i]
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy")
 def before_update(row, P, told, less, room):
     """Take the adjoint pair over an update with the covariance P after it."""
     n = P.shape[0]
