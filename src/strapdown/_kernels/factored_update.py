@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from strapdown._kernels.factors import mwgs, not_finite, stacked
-from strapdown._kernels.given_arrays import dot
+from strapdown._kernels.given_arrays import dot, fma
 from strapdown._kernels.observation import expected, moved_state
 
 
@@ -110,7 +110,7 @@ def wd_expect(W, d, x, z, H, j, work):
         if factor != 0.0:
             row = W[i]
             for k in range(size):
-                f[k] += factor * row[k]
+                f[k] = fma(factor, row[k], f[k])
     for k in range(size):
         V[k] = d[k] * f[k]
     return expected(x, z, H, j), dot(f, V, size)
@@ -135,7 +135,7 @@ def wd_take(W, d, x, H, j, work, s, moved, slope, r):
         K = gain * g[i]
         factor = slope * K
         for k in range(size):
-            row[k] -= factor * f[k]
+            row[k] = fma(-factor, f[k], row[k])
         row[at] = K
     d[at] = slope * r
 

@@ -1,10 +1,11 @@
-"""How kernels are compiled, and the scalar product in lanes.
+"""How kernels are compiled, the fused product and sum, and the scalar product in lanes.
 
 A kernel gives the same bits whether it is compiled, inlined or loaded from the cache, because none
 is compiled with relaxed arithmetic (`fastmath`). A compiler that may contract a product and a sum
 does so where it happens to inline, and of several copies of one function numba runs another when
 kernels come from the cache: the first run of an installation differed from all later ones.
-Where sums in lanes are worth their speed, the source says so: `dot`.
+Where one rounding less keeps what would cancel, or sums in lanes are worth their speed, the source
+says so: `fma` and `dot`.
 """
 
 from __future__ import annotations
@@ -12,7 +13,9 @@ from __future__ import annotations
 from typing import Any
 
 from numba import njit
+from numba.core import types
 from numba.core.cpu import CPUTargetOptions
+from numba.extending import intrinsic
 
 # Numba counts who holds an array, by an atomic operation wherever a function names one of it: in a
 # kernel of a microsecond that is a third of the time. Who calls such a kernel holds its arrays
@@ -21,6 +24,16 @@ from numba.core.cpu import CPUTargetOptions
 # The option is one that numba does not document: without it kernels are slower, and right.
 UNCOUNTED = {"_nrt": False} if hasattr(CPUTargetOptions, "_nrt") else {}
 GIVEN: dict[str, Any] = {"cache": True, "error_model": "numpy", **UNCOUNTED}
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def fma(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
+    """Return ``a b + c``, rounded once (IEEE 754 fusedMultiplyAdd)."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.fma(*arguments)
+
+    return types.float64(types.float64, types.float64, types.float64), generate
 
 
 @njit(**GIVEN, forceinline=True)
