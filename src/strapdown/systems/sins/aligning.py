@@ -24,8 +24,8 @@ from strapdown.nav_state import NavState
 from strapdown.prefilter.prefilter import CHANNELS
 from strapdown.rotation import rotate
 from strapdown.systems.sins.by_antenna import errors_by_antenna
+from strapdown.systems.sins.fix_position import fixes_until, here_by_fix, site_of_fixes
 from strapdown.systems.sins.modes import Aligned, CoarseMode, FineMode
-from strapdown.systems.sins.source import fixes_until, here_by_fix, site_of_fixes
 from strapdown.tables import MOTION
 
 if TYPE_CHECKING:

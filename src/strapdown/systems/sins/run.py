@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -15,11 +15,19 @@ from numpy.typing import NDArray
 from strapdown.alignment.alignment import Alignment, Site
 from strapdown.alignment.fine_result import FineResult
 from strapdown.config.choice import SLOTS, make_choice
-from strapdown.config.navigation import CoarseModeSpec, FineModeSpec, NavigationSpec, StartTable
+from strapdown.config.navigation import (
+    CoarseModeSpec,
+    FineModeSpec,
+    NavigationSpec,
+    StartTable,
+    WithholdTable,
+    aids_of,
+)
 from strapdown.config.navigation_modules import given_of, make_aids, make_filter, sensors_of
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
 from strapdown.errors import Finding
 from strapdown.evaluation.control_points import ControlPointScore, score_control_points
+from strapdown.evaluation.gnss_outages import spans_to_withhold
 from strapdown.evaluation.trajectory_differences import (
     DifferenceSummary,
     summarise_differences,
@@ -27,7 +35,7 @@ from strapdown.evaluation.trajectory_differences import (
 )
 from strapdown.nav_state import NavState
 from strapdown.navigation.navigator import Navigator, with_states
-from strapdown.navigation.record import NavigationRecord
+from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.navigation.recorder import Recorder
 from strapdown.results.inputs import InputFiles
 from strapdown.sensors.uncertainty import ImuUncertainty
@@ -53,8 +61,8 @@ from strapdown.systems.sins.source import (
     read_navigation_source,
     said_of_file,
 )
-from strapdown.systems.sins.trust import IntegrityReport, trust_of
-from strapdown.systems.sins.withholding import Withheld, score_withholding
+from strapdown.systems.sins.trust import IntegrityReport, assess_integrity
+from strapdown.systems.sins.withholding import SETTLED, Withheld, score_withholding
 
 __all__ = ["Drive", "NavigationResult", "make_chain", "run_navigation"]
 
@@ -140,22 +148,31 @@ def run_navigation(
         points = score_control_points(
             told_by.trajectory, source.points, find_ellipsoid(spec.ellipsoid)
         )
-    withheld = score_withholding(
-        spec,
+
+    def after(stage: str, share: float) -> None:
+        progress(stage, ENDED + 0.02 * share)
+
+    withheld: tuple[Withheld, ...] = ()
+    if spec.withhold is not None:
+        begun, end = (float(run.record.trajectory.index[0]), float(source.imu.index[-1]))
+        withheld = score_withholding(
+            chain,
+            source.imu,
+            source.tables,
+            spec.withhold.aid or next(n for n, aid in aids_of(spec).items() if aid.kind == "gnss"),
+            _test_outages(spec.withhold, begun, end),
+            begun,
+            after,
+        )
+    trust = assess_integrity(
         chain,
-        source,
-        run.record,
-        lambda stage, share: progress(stage, ENDED + 0.02 * share),
-    )
-    trust = trust_of(
-        spec,
-        chain,
-        sensors,
+        make_filter(spec, sensors),
         source.imu,
         source.tables,
-        run.record,
-        run.aligned,
-        lambda stage, share: progress(stage, ENDED + 0.02 * share),
+        run,
+        (spec.trust.heading_limit_deg, spec.trust.heading_red_deg),
+        spec.trust.repeat,
+        after,
     )
     files = () if file is None else (input_files("configuration", str(file), (file,)),)
     aligned = {one.mode: one for one in run.aligned}
@@ -185,6 +202,18 @@ def run_navigation(
         inputs=(*files, *source.inputs),
         findings=tuple(dict.fromkeys(findings)),
     )
+
+
+def _test_outages(asked: WithholdTable, begun: float, end: float) -> Sequence[Span]:
+    """Spans of the GNSS outage test of a run from `begun` to `end`."""
+    if asked.spans_s:
+        return [Span(f"{e - b:g} s", b, e) for b, e in asked.spans_s]
+    first = begun + SETTLED if asked.from_s is None else asked.from_s
+    return [
+        span
+        for length in asked.lengths_s
+        for span in spans_to_withhold(first, end, length, asked.places)
+    ]
 
 
 def _against_truth(

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from strapdown.aiding.aid import Measurement, TabulatedMeasurement, lasting
 from strapdown.aiding.gnss import Gnss
-from strapdown.config.navigation import NavigationSpec
-from strapdown.config.navigation_modules import make_filter
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
 from strapdown.errors import Finding, StrapdownError
+from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.evaluation.heading_light import (
     SURE,
     HeadingIntegrity,
@@ -34,10 +33,9 @@ from strapdown.navigation.consistency import (
 )
 from strapdown.navigation.record import NavigationRecord
 from strapdown.navigation.recorder import IntervalRecorder
-from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.progress import Progress
 from strapdown.systems.sins.chain import NavigationPipeline
-from strapdown.systems.sins.drive import run_batch
+from strapdown.systems.sins.drive import PipelineRun, run_batch
 from strapdown.systems.sins.gyrocompass import (
     Manoeuvre,
     compasses_of,
@@ -55,11 +53,10 @@ from strapdown.systems.sins.heading_witness import (
     witnesses_of,
 )
 from strapdown.systems.sins.intake import joined_steps
-from strapdown.systems.sins.modes import Aligned
 from strapdown.tables import EULER, GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
 from strapdown.tables.checks import index_of, values_of
 
-__all__ = ["Advice", "IntegrityReport", "Repeated", "repeat_without", "trust_of"]
+__all__ = ["Advice", "IntegrityReport", "Repeated", "assess_integrity", "repeat_without"]
 
 
 Array = NDArray[np.float64]
@@ -135,31 +132,32 @@ class IntegrityReport:
         return next((one for one in self.inconsistencies if one.kind != "gross"), None)
 
 
-def trust_of(
-    spec: NavigationSpec,
+def assess_integrity(
     chain: NavigationPipeline,
-    sensors: ImuUncertainty,
+    filter_: ErrorFilter,
     imu: pd.DataFrame,
     tables: Mapping[str, pd.DataFrame],
-    record: NavigationRecord,
-    aligned: Sequence[Aligned],
+    run: PipelineRun,
+    limits_deg: tuple[float, float],
+    repeat: bool,
     progress: Progress,
 ) -> IntegrityReport:
     """Assess the integrity of a run.
 
     Parameters
     ----------
-    spec : NavigationSpec
     chain : NavigationPipeline
-        Pipeline of the run.
-    sensors : ImuUncertainty
+        Pipeline of the run, with the uncertainty of its sensors.
+    filter_ : ErrorFilter
+        Its filter without states of measurements, for independent solutions.
     imu : DataFrame
     tables : mapping of str to DataFrame
         By name of the measurement.
-    record : NavigationRecord
-        Result of the run.
-    aligned : sequence of Aligned
-        Its alignments.
+    run : PipelineRun
+    limits_deg : tuple of float, (2,), deg
+        Error limit for a trusted heading (green), and 95 % bound of a rejected one (red).
+    repeat : bool
+        Whether to run again excluding the first inconsistent measurement.
     progress : callable
         Called with a stage and the share of it that is done.
 
@@ -167,34 +165,32 @@ def trust_of(
     -------
     IntegrityReport
     """
-    asked = spec.trust
+    record = run.record
+    green, red = limits_deg
+    ellipsoid = find_ellipsoid(chain.navigator.filter.mechanization.ellipsoid)
     progress("judging the heading", 0.0)
     consistency = consistency_of_all(record.innovations)
     evidence: list[Evidence] = []
     made, why = None, _unable(chain, record)
     try:
         if why is None:
-            made = witnesses_of(make_filter(spec, sensors), chain, imu, tables, record, consistency)
+            made = witnesses_of(filter_, chain, imu, tables, record, consistency)
             why = None if made is not None else Finding(NO_FIXES, severity="note")
         if made is not None:
-            evidence = hear_witnesses(made, record, asked.heading_limit_deg / 3.0)
+            evidence = hear_witnesses(made, record, green / 3.0)
     except StrapdownError as error:
         # Where an independent solution is not possible, the run is reported without it.
         made, evidence = None, []
         why = Finding("navigation.no-second-solution", severity="note", reason=error.finding)
-    carried, no_north = _carried(spec, chain, sensors, imu, record, aligned)
+    assert chain.sensors is not None
+    north_sd = north_within(chain.sensors, float(record.trajectory["lat"].iloc[0]), ellipsoid)
+    carried, no_north = _carried(chain, imu, run, north_sd, green)
     sources = agreeing_sources(chain, record, carried)
     heard: list[Heard] = [*evidence, *carried, *sources]
-    light = heading_light(
-        record,
-        heard,
-        recent_scatter(record),
-        green=asked.heading_limit_deg,
-        red=asked.heading_red_deg,
-    )
+    light = heading_light(record, heard, recent_scatter(record), green=green, red=red)
     found = inconsistencies(consistency, record.innovations, lasting(chain.navigator.aids))
     repeated = None
-    if found and asked.repeat:
+    if found and repeat:
         stage = f"again, without {found[0].aid} where it is not consistent"
         progress(stage, 0.3)
         repeated = repeat_without(
@@ -203,13 +199,13 @@ def trust_of(
             tables,
             record,
             found,
-            find_ellipsoid(spec.ellipsoid),
+            ellipsoid,
             lambda _, share: progress(stage, 0.3 + 0.7 * share),
         )
     return IntegrityReport(
         light=light,
         unwitnessed=() if heard or why is None else (why, *no_north),
-        north_sd=_north_sd(spec, sensors, record),
+        north_sd=north_sd,
         advice=_advice(light, evidence, made, record),
         consistency=consistency,
         inconsistencies=found,
@@ -218,23 +214,19 @@ def trust_of(
 
 
 def _carried(
-    spec: NavigationSpec,
-    chain: NavigationPipeline,
-    sensors: ImuUncertainty,
-    imu: pd.DataFrame,
-    record: NavigationRecord,
-    aligned: Sequence[Aligned],
+    chain: NavigationPipeline, imu: pd.DataFrame, run: PipelineRun, north_sd: float, green: float
 ) -> tuple[list[CarriedHeading], tuple[Finding, ...]]:
     """Headings carried from rests, or why there are none."""
-    ellipsoid = find_ellipsoid(spec.ellipsoid)
-    north = _north_sd(spec, sensors, record)
-    if not SURE * north <= spec.trust.heading_limit_deg:
-        if north >= NO_NORTH:
+    sensors, record = chain.sensors, run.record
+    assert sensors is not None
+    ellipsoid = find_ellipsoid(chain.navigator.filter.mechanization.ellipsoid)
+    if not SURE * north_sd <= green:
+        if north_sd >= NO_NORTH:
             return [], (Finding("navigation.gyros-find-no-north", severity="note"),)
         code = "navigation.gyros-find-north-coarsely"
-        return [], (Finding(code, severity="note", north_sd_deg=north),)
+        return [], (Finding(code, severity="note", north_sd_deg=north_sd),)
     try:
-        found, doubts, why = compasses_of(chain, sensors, imu, record, aligned, ellipsoid)
+        found, doubts, why = compasses_of(chain, sensors, imu, record, run.aligned, ellipsoid)
         if not found:
             return [], () if why is None else (why,)
         end = float(record.trajectory.index[-1])
@@ -243,11 +235,6 @@ def _carried(
     except StrapdownError as error:
         code = "navigation.gyros-not-followed"
         return [], (Finding(code, severity="note", reason=error.finding),)
-
-
-def _north_sd(spec: NavigationSpec, sensors: ImuUncertainty, record: NavigationRecord) -> float:
-    lat_deg = float(record.trajectory["lat"].iloc[0])
-    return north_within(sensors, lat_deg, find_ellipsoid(spec.ellipsoid))
 
 
 def _unable(chain: NavigationPipeline, record: NavigationRecord) -> Finding | None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.config.navigation import NavigationSpec, WithholdTable, aids_of
 from strapdown.errors import ConfigError
 from strapdown.evaluation.gnss_outages import (
     WithheldScore,
@@ -16,21 +16,18 @@ from strapdown.evaluation.gnss_outages import (
     end_of_what_tells,
     score_of,
     score_of_smoothed,
-    spans_to_withhold,
 )
-from strapdown.navigation.record import NavigationChunk, NavigationRecord, Span
+from strapdown.navigation.record import NavigationChunk, Span
 from strapdown.systems.progress import Progress
 from strapdown.systems.sins.chain import NavigationPipeline, PipelineState
-from strapdown.systems.sins.source import NavigationSource
 from strapdown.tables import ACCEL, GYRO
-from strapdown.tables.checks import index_of, values_of
+from strapdown.tables.checks import index_of, source_of, values_of
 
 __all__ = [
     "SETTLED",
     "Withheld",
     "WithheldRun",
     "score_withholding",
-    "withheld_aid",
     "withheld_runs",
 ]
 
@@ -61,57 +58,51 @@ class Withheld:
         return self.smoothed or self.forward
 
 
-def withheld_aid(spec: NavigationSpec) -> str:
-    """Name of the measurement whose fixes a specification withholds."""
-    assert spec.withhold is not None
-    named = spec.withhold.aid
-    return named or next(name for name, aid in aids_of(spec).items() if aid.kind == "gnss")
-
-
 def score_withholding(
-    spec: NavigationSpec,
     chain: NavigationPipeline,
-    source: NavigationSource,
-    record: NavigationRecord,
+    imu: pd.DataFrame,
+    tables: Mapping[str, pd.DataFrame],
+    name: str,
+    spans: Sequence[Span],
+    begun: float,
     progress: Progress,
 ) -> tuple[Withheld, ...]:
     """Run a pipeline with all fixes up to each test outage, and through it with none.
 
     Parameters
     ----------
-    spec : NavigationSpec
     chain : NavigationPipeline
-    source : NavigationSource
-    record : NavigationRecord
-        Record of the whole run, for the begin of navigation.
+    imu : DataFrame
+    tables : mapping of str to DataFrame
+        By name of the measurement.
+    name : str
+        Name of the measurement whose fixes are withheld.
+    spans : sequence of Span
+        The test outages.
+    begun : float, s
+        Begin of navigation.
     progress : callable
 
     Returns
     -------
     tuple of Withheld
-        In the order of the outages; empty if none is specified.
+        In the order of the outages.
 
     Raises
     ------
     ConfigError
         An outage is not within the run, or has no fixes.
     """
-    asked = spec.withhold
-    if asked is None:
-        return ()
-    name = withheld_aid(spec)
-    time = index_of(source.imu)
-    values = values_of(source.imu, [*GYRO, *ACCEL])
-    begun = float(record.trajectory.index[0])
-    spans = _spans(asked, begun, float(time[-1]))
-    state = chain.begin(source.imu.attrs["sampling"], source.name)
-    for aid, table in source.tables.items():
+    time = index_of(imu)
+    values = values_of(imu, [*GYRO, *ACCEL])
+    state = chain.begin(imu.attrs["sampling"], source_of(imu))
+    for aid, table in tables.items():
         state = chain.tell(state, aid, table)
     for span in spans:
         if span.begin < begun or span.end > time[-1]:
             raise ConfigError(
                 "navigation.not-within-navigation-goes",
-                file=source.name,
+                file=source_of(imu),
                 quantity="withhold, spans_s",
                 begin=span.begin,
                 end=span.end,
@@ -195,14 +186,3 @@ def withheld_runs(
         at = first
         through, piece = blind.advance(state, time[first:last], values[first:last])
         yield WithheldRun(number, state, through, slice(first, last), piece.navigation)
-
-
-def _spans(asked: WithholdTable, begun: float, end: float) -> Sequence[Span]:
-    if asked.spans_s:
-        return [Span(f"{e - b:g} s", b, e) for b, e in asked.spans_s]
-    first = begun + SETTLED if asked.from_s is None else asked.from_s
-    return [
-        span
-        for length in asked.lengths_s
-        for span in spans_to_withhold(first, end, length, asked.places)
-    ]

@@ -17,7 +17,7 @@ from strapdown.nav_state import NavState
 from strapdown.navigation.navigator import with_states
 from strapdown.systems.sins.aligning import _added, _with_sensors, from_state
 from strapdown.systems.sins.by_antenna import errors_by_antenna
-from strapdown.systems.sins.source import here_by_fix
+from strapdown.systems.sins.fix_position import here_by_fix
 from strapdown.tables import GNSS
 
 HERE = np.array([50.0, 10.0, 500.0])

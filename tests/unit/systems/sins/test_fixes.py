@@ -7,7 +7,7 @@ from strapdown.ellipsoids import WGS84
 from strapdown.errors import DataError
 from strapdown.frames import geodetic_from_ned, ned_from_geodetic
 from strapdown.rotation import quaternion_from_euler
-from strapdown.systems.sins.source import fixes_until, here_by_fix, site_of_fixes
+from strapdown.systems.sins.fix_position import fixes_until, here_by_fix, site_of_fixes
 from strapdown.tables import gnss_table
 
 HERE = np.array([48.0, 11.0, 500.0])
