@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from strapdown.navigation.measurements.gnss import Gnss
 
 from papers.chernodarov.bench import ELLIPSOID, HEADING_DEG, SENSOR, SITE, after, align
-from strapdown.aiding import Gnss
 from strapdown.alignment import FineResult
 from strapdown.earth import radii_of_curvature
 from strapdown.errors import DataError, DivergenceError

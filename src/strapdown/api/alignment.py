@@ -32,11 +32,11 @@ from strapdown.config.navigation_file import navigation_spec
 from strapdown.config.spec import specify
 from strapdown.errors import ConfigError
 from strapdown.formats import read_raw
+from strapdown.progress import Progress, silent
 from strapdown.report.alignment import write_alignment
 from strapdown.report.coast import read_coasting_run, write_coast
 from strapdown.systems.alignment_run import AlignmentResult, run_alignment
-from strapdown.systems.coasting.run import CoastResult, run_coast
-from strapdown.systems.progress import Progress, silent
+from strapdown.systems.outage_run import CoastResult, run_coast
 from strapdown.tables import EULER
 
 __all__ = [

@@ -31,12 +31,12 @@ from strapdown.bundle.seal import Seal, check_destination
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.recording import Origin
 from strapdown.increments import increments_from_imu
+from strapdown.progress import Progress, silent
 from strapdown.report.attitude import write_attitude
 from strapdown.results.attitude_bench import AttitudeBench
 from strapdown.sensors.rest import find_rests
 from strapdown.systems.attitude_bench import bench_attitude, initial_attitude
 from strapdown.systems.attitude_source import Source
-from strapdown.systems.progress import Progress, silent
 from strapdown.tables import GYRO, QUATERNION, attitude_table
 
 if TYPE_CHECKING:

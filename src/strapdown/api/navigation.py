@@ -29,11 +29,11 @@ from strapdown.config.navigation_file import navigation_spec, read_navigation_sp
 from strapdown.config.spec import misfit, specify
 from strapdown.errors import ConfigError
 from strapdown.formats.clocks import on_clock_of
+from strapdown.navigation.integrity import IntegrityReport
+from strapdown.progress import Progress, silent
 from strapdown.report.navigation import write_navigation
-from strapdown.systems.progress import Progress, silent
-from strapdown.systems.sins.proposal import CODE_RECEIVER, propose
-from strapdown.systems.sins.run import NavigationResult, run_navigation
-from strapdown.systems.sins.trust import IntegrityReport
+from strapdown.systems.navigation_proposal import CODE_RECEIVER, propose
+from strapdown.systems.navigation_run import NavigationResult, run_navigation
 from strapdown.tables import EULER, GEODETIC, VELOCITY
 
 if TYPE_CHECKING:

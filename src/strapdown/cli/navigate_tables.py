@@ -20,7 +20,7 @@ from strapdown.report.navigation_trust import trust
 from strapdown.report.navigation_words import cautions, headline
 from strapdown.report.values import duration_words, spaced
 from strapdown.report.verdict_words import terminal_lines
-from strapdown.systems.sins.run import NavigationResult
+from strapdown.systems.navigation_run import NavigationResult
 
 __all__ = ["print_navigation"]
 

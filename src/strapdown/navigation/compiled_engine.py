@@ -13,8 +13,6 @@ from strapdown._kernels import fix_loop as fix_kernel
 from strapdown._kernels.growth import growth_arrays, growth_room, padded_width
 from strapdown._kernels.level import LEVEL
 from strapdown._kernels.level_place import NED, WANDER
-from strapdown.aiding.aid import Epochs
-from strapdown.aiding.gnss import POSITION_CODE
 from strapdown.errors import DivergenceError
 from strapdown.estimation.covariance import (
     BiermanThornton,
@@ -32,6 +30,8 @@ from strapdown.mechanization.mechanization import Mechanization
 from strapdown.mechanization.ned import NorthEastDown
 from strapdown.mechanization.wander_azimuth import WanderAzimuth
 from strapdown.navigation.engine import LARGEST_GROUP, SAME_INSTANT, Engine, EngineState, NodeRows
+from strapdown.navigation.measurements.gnss import POSITION_CODE
+from strapdown.navigation.measurements.measurement import Epochs
 
 __all__ = ["CompiledEngine", "compiled"]
 
@@ -193,7 +193,7 @@ class CompiledEngine(Engine):
         arm : ndarray, (3,), m
             Of the antenna.
         fixes : Epochs
-            Of `aiding.gnss.Gnss`.
+            Of `measurements.gnss.Gnss`.
 
         Returns
         -------

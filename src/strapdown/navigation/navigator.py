@@ -13,14 +13,6 @@ from numpy.typing import NDArray
 
 from strapdown._kernels.split_increment import split_increment
 from strapdown._kernels.steady_motion import STEADY, steady_motion
-from strapdown.aiding.aid import (
-    Epochs,
-    ImuDerivedMeasurement,
-    Measurement,
-    TabulatedMeasurement,
-    View,
-)
-from strapdown.aiding.gnss import HORIZONTAL_CODE, Gnss
 from strapdown.errors import ConfigError
 from strapdown.estimation.covariance import Innovations, Observation, UpdateRule
 from strapdown.estimation.error_filter import (
@@ -43,6 +35,14 @@ from strapdown.navigation.engine import (
     begun,
 )
 from strapdown.navigation.filter_options import ClosedLoop, Correction
+from strapdown.navigation.measurements.gnss import HORIZONTAL_CODE, Gnss
+from strapdown.navigation.measurements.measurement import (
+    Epochs,
+    ImuDerivedMeasurement,
+    Measurement,
+    TabulatedMeasurement,
+    View,
+)
 from strapdown.navigation.record import CovarianceSnapshot, InnovationRecord, NavigationChunk
 
 if TYPE_CHECKING:

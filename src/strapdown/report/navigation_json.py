@@ -24,7 +24,7 @@ from strapdown.report.navigation_found import Agreement, NavigationFound, Score,
 from strapdown.report.navigation_trust import trust
 from strapdown.report.navigation_words import cautions, headline
 from strapdown.report.values import distance_over_ground, worst_within
-from strapdown.systems.sins.run import NavigationResult
+from strapdown.systems.navigation_run import NavigationResult
 from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
 
 __all__ = ["navigation_json", "write_navigation_files"]

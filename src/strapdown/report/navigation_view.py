@@ -12,7 +12,7 @@ from strapdown.report.navigation_charts import innovation_chart
 from strapdown.report.navigation_found import NavigationTold, agreements, told_of
 from strapdown.report.navigation_plan import plan_chart
 from strapdown.report.svg_chart import notebook_figure
-from strapdown.systems.sins.run import NavigationResult
+from strapdown.systems.navigation_run import NavigationResult
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

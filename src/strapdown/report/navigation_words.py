@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from strapdown.constants import TWO_SIDED_95
 from strapdown.evaluation.plane_bound import plane_bound
-from strapdown.evaluation.truth_comparison import SmootherConsistency
 from strapdown.navigation.record import NavigationRecord, Span
+from strapdown.navigation.truth_comparison import SmootherConsistency
 from strapdown.report.chart import BLUE, GREY, Chart, Panel, curve
 from strapdown.report.document import KeyFigure, TableBlock
 from strapdown.report.navigation_charts import over_time

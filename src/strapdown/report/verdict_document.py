@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from strapdown import __version__
 from strapdown.constants import TWO_SIDED_95
-from strapdown.evaluation.heading_light import REASONS, HeadingIntegrity
 from strapdown.evaluation.plane_bound import plane_bound
+from strapdown.navigation.heading_integrity import REASONS, HeadingIntegrity
+from strapdown.navigation.heading_witness import UNSEEN
 from strapdown.report.chart import BLUE, GREY, VERMILLION, thin
 from strapdown.report.document import (
     Block,
@@ -40,8 +41,7 @@ from strapdown.report.verdict_words import (
     unwitnessed_words,
     witness_words,
 )
-from strapdown.systems.sins.heading_witness import UNSEEN
-from strapdown.systems.sins.run import NavigationResult
+from strapdown.systems.navigation_run import NavigationResult
 
 __all__ = [
     "LIGHTS",

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from strapdown.bundle.seal import to_json
-from strapdown.evaluation.heading_light import COLOURS, REASONS
 from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.formats import csv
 from strapdown.navigation.consistency import Inconsistency
+from strapdown.navigation.heading_integrity import COLOURS, REASONS
+from strapdown.navigation.integrity import Repeated
 from strapdown.report.document_files import write_text
 from strapdown.report.document_html import document_page
 from strapdown.report.verdict_document import verdict_document
@@ -23,8 +24,7 @@ from strapdown.report.verdict_words import (
     repeated_words,
     witness_words,
 )
-from strapdown.systems.sins.run import NavigationResult
-from strapdown.systems.sins.trust import Repeated
+from strapdown.systems.navigation_run import NavigationResult
 
 __all__ = ["verdict_json", "write_verdict"]
 

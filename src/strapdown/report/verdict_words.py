@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
-from strapdown.evaluation.heading_light import REASONS, SURE, WITNESSES, LightSpan
 from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.navigation.consistency import Inconsistency
+from strapdown.navigation.heading_integrity import REASONS, SURE, WITNESSES, LightSpan
+from strapdown.navigation.integrity import NO_NORTH, Advice, IntegrityReport, Repeated
 from strapdown.report.values import GAP, duration_words, half, length_words, plain, share_words
 from strapdown.report.values import alignment_values_instant as instant
-from strapdown.systems.sins.run import NavigationResult
-from strapdown.systems.sins.trust import NO_NORTH, Advice, IntegrityReport, Repeated
+from strapdown.systems.navigation_run import NavigationResult
 
 __all__ = [
     "advice_words",

@@ -19,7 +19,7 @@ import strapdown as sd
 from strapdown.api.reading import NOWHERE
 from strapdown.config.navigation_file import read_navigation_spec
 from strapdown.errors import ConfigError, DataError
-from strapdown.systems.sins.run import run_navigation
+from strapdown.systems.navigation_run import run_navigation
 
 SENSOR = "adis16495-1"
 

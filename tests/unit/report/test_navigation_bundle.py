@@ -16,7 +16,7 @@ from strapdown.report.document_files import drawings, write_drawings
 from strapdown.report.navigation_document import navigation_document
 from strapdown.report.navigation_found import examine, told_of, withheld_of
 from strapdown.report.navigation_json import navigation_json
-from strapdown.systems.sins.run import run_navigation
+from strapdown.systems.navigation_run import run_navigation
 
 FILE = """
 [simulation]
@@ -141,9 +141,8 @@ def test_the_terminal_says_what_the_page_says(result, capsys):
 
 
 def test_scores_of_what_was_withheld_are_told_as_they_are():
-    from strapdown.evaluation.gnss_outages import WithheldScore
+    from strapdown.navigation.outage_test import Withheld, WithheldScore
     from strapdown.navigation.record import Span
-    from strapdown.systems.sins.withholding import Withheld
 
     score = WithheldScore(
         Span("withheld", 10.0, 20.0),
