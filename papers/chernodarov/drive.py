@@ -8,7 +8,6 @@ from functools import cached_property
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from strapdown.navigation.measurements.gnss import Gnss
 
 from papers.chernodarov.bench import ELLIPSOID, HEADING_DEG, SENSOR, SITE, after, align
 from strapdown.alignment import FineResult
@@ -32,6 +31,7 @@ from strapdown.navigation import (
     NavigationChunk,
     Navigator,
 )
+from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.simulation import (
     Accelerate,
     GnssReceiver,

@@ -326,8 +326,6 @@ def _state(record: NavigationRecord, time: float) -> NavState:
 RATE = 1.0
 #: Tolerance between the stamps of epochs and rows, s.
 SAME = 1e-3
-#: Measured quantities of a receiver, in words.
-PARTS = {"position": "places", "velocity": "velocities"}
 #: Where less than this share of the fixes would remain in a run without others, their standard
 #: deviations are increased instead.
 LEAST_LEFT = 0.5
@@ -339,8 +337,8 @@ class Repeated:
 
     Attributes
     ----------
-    without : str
-        The change, in words.
+    change : Finding
+        What was excluded, or given larger standard deviations.
     record : NavigationRecord or None
         None where it could not be run.
     differences : DataFrame or None
@@ -351,7 +349,7 @@ class Repeated:
         Why it could not be run; None where it could.
     """
 
-    without: str
+    change: Finding
     record: NavigationRecord | None
     differences: pd.DataFrame | None
     left: tuple[Inconsistency, ...] = ()
@@ -389,28 +387,28 @@ def repeat_without(
     -------
     Repeated
     """
-    aids, told, words = _changed(chain.navigator.aids, tables, found)
+    aids, told, change = _changed(chain.navigator.aids, tables, found)
     changed = replace(chain, navigator=replace(chain.navigator, aids=aids, smoother=None))
     try:
         run = run_batch(
             changed, imu, told, IntervalRecorder(rate_hz=RATE), progress, chunk=60.0
         ).record
     except StrapdownError as error:
-        return Repeated(words, None, None, failed=error.finding)
+        return Repeated(change, None, None, failed=error.finding)
     rows = run.trajectory
     span = record.trajectory.index
     rows = rows[(rows.index >= span[0]) & (rows.index <= span[-1])]
     rows.attrs = dict(run.trajectory.attrs)
     differences = -trajectory_differences(rows, record.trajectory, ellipsoid)
     left = inconsistencies(consistency_of_all(run.innovations), run.innovations, lasting(aids))
-    return Repeated(words, run, differences, left)
+    return Repeated(change, run, differences, left)
 
 
 def _changed(
     aids: tuple[Measurement, ...],
     tables: Mapping[str, pd.DataFrame],
     found: Sequence[Inconsistency],
-) -> tuple[tuple[Measurement, ...], dict[str, pd.DataFrame], str]:
+) -> tuple[tuple[Measurement, ...], dict[str, pd.DataFrame], Finding]:
     """Measurements and tables after an exclusion, and its description."""
     one = found[0]
     aid = next(a for a in aids if a.name == one.aid)
@@ -427,34 +425,39 @@ def _changed(
             out = table[kept]
             out.attrs = dict(table.attrs)
             told[one.aid] = out
-            count = int((~kept).sum())
-            many = f"{count} of the {len(table)} rows of {one.aid}"
+            less = {"count": int((~kept).sum()), "rows": len(table)}
             if one.kind == "gross":
-                return aids, told, f"without {many}: its gross errors"
-            return aids, told, f"without {many}, from {one.since:.9g} to {one.until:.9g} s"
+                return aids, told, _excluded("gross-errors", one, **less)
+            less |= {"since": one.since, "until": one.until}
+            return aids, told, _excluded("interval", one, **less)
     if isinstance(aid, Gnss):
         both = aid.use_position and aid.use_velocity and _has_both(table)
-        if both and part in PARTS and one.kind != "gross":
-            less = (
-                replace(aid, use_position=False)
-                if part == "position"
-                else replace(aid, use_velocity=False)
-            )
-            return _swapped(aids, aid, less), told, f"without the {PARTS[part]} of {one.aid}"
+        if both and one.kind != "gross":
+            if part == "position":
+                other = _swapped(aids, aid, replace(aid, use_position=False))
+                return other, told, _excluded("positions", one)
+            if part == "velocity":
+                other = _swapped(aids, aid, replace(aid, use_velocity=False))
+                return other, told, _excluded("velocities", one)
         if not any(isinstance(a, Gnss) for a in aids if a is not aid):
             factor = max(one.factor, 2.0)
-            less = replace(
+            weaker = replace(
                 aid,
                 position_sd_factor=factor * aid.position_sd_factor,
                 velocity_sd_factor=factor * aid.velocity_sd_factor,
             )
-            words = (
-                f"with {one.aid}, of which nothing can be spared, believed {factor:.2g} times less"
+            change = Finding(
+                "navigation.rerun-with-larger-sd", severity="note", aid=one.aid, factor=factor
             )
-            return _swapped(aids, aid, less), told, words
+            return _swapped(aids, aid, weaker), told, change
     if isinstance(aid, TabulatedMeasurement):
         told.pop(one.aid, None)
-    return tuple(a for a in aids if a is not aid), told, f"without {one.aid}"
+    return tuple(a for a in aids if a is not aid), told, _excluded("measurement", one)
+
+
+def _excluded(what: str, one: Inconsistency, **values: float) -> Finding:
+    code = f"navigation.rerun-without-{what}"
+    return Finding(code, severity="note", data={"aid": one.aid, **values})
 
 
 def _swapped(

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from statistics import median
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import pandas as pd
@@ -181,11 +181,11 @@ class MeasurementMonitor:
         for one in piece.seen:
             name = one.name.rpartition(".")[0]
             if name in late:
-                events.append(_late(name, late.pop(name)))
+                events.append(_unused("late", name, late.pop(name)))
             if not one.innovations.weight.any():
                 rejected[one.name] = _more(rejected.get(one.name), one.time, _in_sd(one))
             elif one.name in rejected:
-                events.append(_rejected(one.name, rejected.pop(one.name)))
+                events.append(_unused("rejected", one.name, rejected.pop(one.name)))
             if name in aids:
                 aids[name] = self._delivered(name, aids[name], one, events, outages)
         for name, aid in aids.items():
@@ -199,16 +199,14 @@ class MeasurementMonitor:
         self, state: MeasurementMonitorState, time: float
     ) -> tuple[list[Event], list[tuple[str, Span]]]:
         """Report rejections and outages that are open at the end."""
-        events = [_rejected(name, one) for name, one in state.rejected.items()]
-        events += [_late(name, one) for name, one in state.late.items()]
+        events = [_unused("rejected", name, one) for name, one in state.rejected.items()]
+        events += [_unused("late", name, one) for name, one in state.late.items()]
         outages = []
         for name, aid in state.aids.items():
             if aid.out or (not aid.seen and time > aid.newest):
                 outages.append((name, Span(name, aid.newest, time)))
                 if not aid.out:
-                    events.append(
-                        Event(aid.newest, "outage", f"{name}: no observation in all of the run")
-                    )
+                    events.append(Event.of(aid.newest, "outage", "never-observed", name=name))
         return events, outages
 
     def _longest(self, aid: MeasurementStatus) -> float:
@@ -233,14 +231,8 @@ class MeasurementMonitor:
             if not aid.out:
                 events.append(_out(name, aid.newest + longest, aid.newest))
             outages.append((name, Span(name, aid.newest, one.time)))
-            events.append(
-                Event(
-                    one.time,
-                    "recovered",
-                    f"{name} again after {since:.4g} s: {one.name} {_in_sd(one):.2g} standard "
-                    "deviations from what was expected",
-                )
-            )
+            values = {"since": since, "observation": one.name, "sd": _in_sd(one)}
+            events.append(Event.of(one.time, "recovered", "recovered", name=name, **values))
             return replace(aid, newest=one.time, out=False)
         if not aid.seen:
             return replace(aid, newest=one.time, seen=True)
@@ -259,30 +251,13 @@ def _more(known: Rejected | None, at: float, size: float) -> Rejected:
     return Rejected(known.begin, max(known.end, at), known.count + 1, max(known.largest, size))
 
 
-def _epochs(one: Rejected) -> str:
-    if one.count == 1:
-        return f"at {one.begin:.9g} s"
-    return f"{one.count} of them, from {one.begin:.9g} to {one.end:.9g} s"
-
-
-def _rejected(name: str, one: Rejected) -> Event:
-    return Event(
-        one.begin,
-        "rejected",
-        f"{name} was not believed {_epochs(one)}: up to {one.largest:.3g} standard deviations off",
-    )
-
-
-def _late(name: str, one: Rejected) -> Event:
-    return Event(
-        one.begin,
-        "late",
-        f"{name} came after the samples that followed it, and was not used {_epochs(one)}",
-    )
+def _unused(kind: Literal["rejected", "late"], name: str, one: Rejected) -> Event:
+    code = f"{kind}-once" if one.count == 1 else kind
+    return Event.of(one.begin, kind, code, name=name, **asdict(one))
 
 
 def _out(name: str, at: float, newest: float) -> Event:
-    return Event(at, "outage", f"{name} has delivered nothing since {newest:.9g} s")
+    return Event.of(at, "outage", "outage", name=name, since=newest)
 
 
 Array = NDArray[np.float64]
@@ -638,19 +613,17 @@ class ModeSequencer:
 
     def _found(self, hole: Hole) -> None:
         policy = self._chain.intake.gaps
-        where = f"{hole.length:.4g} s without samples, from {hole.begin:.9g} to {hole.end:.9g} s"
+        gap = {"length": hole.length, "begin": hole.begin, "end": hole.end}
         if hole.length > policy.coast and policy.beyond == "refuse":
             raise DataError(
                 "navigation.gap",
                 file=self._state.intake.source,
                 quantity="time",
-                length=hole.length,
-                begin=hole.begin,
-                end=hole.end,
+                data=gap,
             )
         anew = hole.length > policy.coast and policy.beyond == "align"
-        done = "alignment begins anew" if anew else "bridged along a line, and not well known since"
-        self._events.append(Event(hole.begin, "gap", f"{where}: {done}"))
+        code = "gap-before-alignment" if anew else "gap-bridged"
+        self._events.append(Event.of(hole.begin, "gap", code, **gap))
         self._state = replace(self._state, holes=(*self._state.holes, hole))
 
     def _some(self, kept: Array) -> Array:
@@ -688,7 +661,7 @@ class ModeSequencer:
             next_try=mode.until.next_try(0.0),
             kept=GrowingRows.of(ROWS.stop),
         )
-        self._events.append(Event(time, "mode", mode.name))
+        self._events.append(Event.of(time, "mode", "mode-begins", mode=mode.name))
 
     def _due(self) -> float:
         """Time of the next event other than a sample."""
@@ -762,7 +735,7 @@ class ModeSequencer:
         elapsed = state.time - state.begun
         if elapsed >= mode.until.duration - INSTANT:
             found = align(self._chain, state)
-            self._aligned_to(found, state.mode + 1, f"after {elapsed:.6g} s")
+            self._aligned_to(found, state.mode + 1, "mode-timed-out", elapsed=elapsed)
             return
         self._state = replace(state, next_try=mode.until.next_try(elapsed))
         try:
@@ -773,8 +746,8 @@ class ModeSequencer:
         roll, pitch, heading = found.alignment.sd_deg_after(AHEAD).tolist()
         if mode.until.met(heading, max(roll, pitch)):
             roll, pitch, heading = found.alignment.sd_deg.tolist()
-            words = f"heading known to {heading:.3g}°, level to {max(roll, pitch):.3g}°"
-            self._aligned_to(found, state.mode + 1, words)
+            sd = {"heading_deg": heading, "tilt_deg": max(roll, pitch)}
+            self._aligned_to(found, state.mode + 1, "mode-converged", **sd)
 
     def _obey(self) -> None:
         """Execute the next command."""
@@ -784,31 +757,25 @@ class ModeSequencer:
         names = [mode.name for mode in chain.modes]
         place = state.mode + 1 if command.word == "next" else names.index(command.word)
         if place <= state.mode or place >= len(names):
-            self._events.append(
-                Event(state.time, "command", f"{command.word}: nothing to do, it is past")
-            )
+            late = Event.of(state.time, "command", "command-past", word=command.word)
+            self._events.append(late)
             return
         try:
             found = align(chain, state)
         except (DataError, DivergenceError) as error:
-            self._events.append(
-                Event(
-                    state.time,
-                    "command",
-                    f"{command.word}: not possible yet, {names[state.mode]} goes on: "
-                    f"{error.finding.what}",
-                )
-            )
+            refused = {"word": command.word, "mode": names[state.mode], "reason": error.finding}
+            early = Event.of(state.time, "command", "command-too-early", **refused)
+            self._events.append(early)
             return
-        self._events.append(Event(state.time, "command", command.word))
-        self._aligned_to(found, place, "by command")
+        self._events.append(Event.of(state.time, "command", "command", word=command.word))
+        self._aligned_to(found, place, "mode-commanded")
 
-    def _aligned_to(self, found: Aligned, place: int, why: str) -> None:
+    def _aligned_to(self, found: Aligned, place: int, why: str, **values: float) -> None:
         """End an alignment mode and begin the next mode."""
         state, chain = self._state, self._chain
         self._aligned.append(found)
         self._modes.append(Span(found.mode, state.begun, state.time))
-        self._events.append(Event(state.time, "mode", f"{found.mode} ends {why}"))
+        self._events.append(Event.of(state.time, "mode", why, mode=found.mode, **values))
         kept = state.kept.rows
         if chain.modes[place].kind == "navigation":
             begun = handed_over(chain, state, found)

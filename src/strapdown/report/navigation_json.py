@@ -111,7 +111,9 @@ def navigation_json(
             for w in found.told.withheld
         ],
         "modes": [{"mode": s.name, "from_s": s.begin, "to_s": s.end} for s in record.modes],
-        "events": [{"time_s": e.time, "kind": e.kind, "what": e.what} for e in record.events],
+        "events": [
+            {"time_s": e.time, "kind": e.kind, "what": e.finding.what} for e in record.events
+        ],
         "against": _against(found),
         "control_points": _points(found),
         "method": _method(result),
@@ -250,7 +252,7 @@ def _innovations(one: Agreement) -> dict[str, Any]:
         "correlation_next_epoch": _number(one.correlation),
         "correlation_by_chance_95": _number(one.correlation_bound),
         "verdicts": [
-            {"kind": v.kind, "component": v.component, "since_s": v.since, "what": v.what}
+            {"kind": v.kind, "component": v.component, "since_s": v.since, "what": v.finding.what}
             for v in one.consistency.verdicts
         ],
         "rms": {label: _number(_rms(one.nu[one.used, k])) for k, label in enumerate(one.labels)},
@@ -309,7 +311,7 @@ def write_navigation_files(result: NavigationResult, folder: Path) -> None:
         {
             "time_s": np.array([e.time for e in events], dtype=np.float64),
             "kind": np.array([e.kind for e in events], dtype=np.str_),
-            "what": np.array([e.what for e in events], dtype=np.str_),
+            "what": np.array([e.finding.what for e in events], dtype=np.str_),
         },
         told,
     )

@@ -277,7 +277,7 @@ def _innovations(result: NavigationResult) -> tuple[Block, ...]:
         )
     ]
     small = [
-        (name, v.what)
+        (name, v.finding.what)
         for name, one in trust.consistency.items()
         for v in one.verdicts
         if v.kind != "few"
@@ -319,7 +319,9 @@ def _first(result: NavigationResult) -> tuple[Block, ...]:
         blocks.append(picture)
     repeated = trust.repeated
     if repeated is not None and repeated.left:
-        rows_left = tuple((i.name, f"{kind_words(i)}: {i.what}.") for i in repeated.left[:_MOST])
+        rows_left = tuple(
+            (i.name, f"{kind_words(i)}: {i.finding.what}.") for i in repeated.left[:_MOST]
+        )
         blocks += [Paragraph("What does not agree in the repeated run:"), Items(rows_left)]
     return tuple(blocks)
 
@@ -483,7 +485,7 @@ def repeated_picture(result: NavigationResult) -> Picture | None:
         "repeated",
         picture.svg(),
         "The run and its repetition",
-        f"How far the run is from the same run {repeated.without}, beside the bounds of both.",
+        f"How far the run is from the same run {repeated.change.what}, beside the bounds of both.",
         "Differences of place and heading between the run and the repeated run, beside bounds",
     )
 

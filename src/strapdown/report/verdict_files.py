@@ -124,7 +124,7 @@ def verdict_json(result: NavigationResult) -> dict[str, Any]:
 
 def _repeated(repeated: Repeated, result: NavigationResult) -> dict[str, Any]:
     out: dict[str, Any] = {
-        "without": repeated.without,
+        "without": repeated.change.what,
         "answer": _plain(repeated_words(result)),
         "failed": None if repeated.failed is None else repeated.failed.plain(),
         "left": [_doubt(i) for i in repeated.left],
@@ -151,8 +151,8 @@ def _doubt(one: Inconsistency) -> dict[str, Any]:
         "since_s": one.since,
         "until_s": one.until,
         "epochs_s": one.epochs.tolist(),
-        "what": one.what,
-        "meaning": one.meaning,
+        "what": one.finding.what,
+        "meaning": one.finding.remedy,
     }
 
 

@@ -192,9 +192,11 @@ def first_words(trust: IntegrityReport) -> str:
         else f"at {instant(one.since)}"
     )
     where = one.component.partition(",")[0]
+    meaning = one.finding.remedy or ""
     return (
-        f"The first that does not agree is {one.name}, component {where}, {when}: {one.what}. "
-        f"{one.meaning[:1].upper()}{one.meaning[1:]}."
+        f"The first that does not agree is {one.name}, component {where}, {when}: "
+        f"{one.finding.what}. "
+        f"{meaning[:1].upper()}{meaning[1:]}."
     )
 
 
@@ -207,7 +209,7 @@ def repeated_words(result: NavigationResult) -> str:
             return ""
         return "It was not repeated without it: repeat is false in [trust]."
     if repeated.record is None or repeated.differences is None:
-        return f"Repeated {repeated.without}, the run fails: {_failed(repeated)}"
+        return f"Repeated {repeated.change.what}, the run fails: {_failed(repeated)}"
     table = repeated.differences
     place = np.hypot(table["north"].to_numpy(), table["east"].to_numpy())
     turn = np.abs(table["heading"].to_numpy(dtype=np.float64))
@@ -229,17 +231,17 @@ def repeated_words(result: NavigationResult) -> str:
     usual, most, last = (length_words(float(x)) for x in (np.median(place), max(place), place[-1]))
     turned = [degrees_words(float(x)) for x in (np.median(turn), max(turn), turn[-1])]
     return (
-        f"Repeated {repeated.without}, the place differs by {usual} in the middle and {most} at "
-        f"most ({beyond}), at the end by {last}; the heading by {turned[0]} in the middle and "
+        f"Repeated {repeated.change.what}, the place differs by {usual} in the middle and {most} "
+        f"at most ({beyond}), at the end by {last}; the heading by {turned[0]} in the middle and "
         f"{turned[1]} at most, at the end by {turned[2]} where its bound is "
         f"{degrees_words(bound)}; {rest}."
     )
 
 
-def terminal_lines(result: NavigationResult) -> list[tuple[str, str]]:
-    """Two to four lines for the terminal, each with its style."""
+def terminal_lines(result: NavigationResult, *, brief: bool = False) -> list[tuple[str, str]]:
+    """Up to four lines for the terminal, each with its style; brief, without the position."""
     trust = result.trust
-    lines = [(answer(result), _style(trust))]
+    lines = [(heading_words(trust) if brief else answer(result), _style(trust))]
     if trust.first is not None:
         first = trust.first
         since = "throughout" if first.throughout else f"first at {instant(first.since)}"

@@ -36,7 +36,7 @@ def test_an_outage_is_longer_than_three_of_the_aids_own_intervals():
     events, outages = told([seen(t, 3.0) for t in times], 14.0)
     # 4 to 7 s is three intervals and none; 8 to 11.5 s is one.
     assert [(e.time, e.kind) for e in events] == [(11.0, "outage"), (11.5, "recovered")]
-    assert "1.5 standard deviations" in events[1].what
+    assert events[1].finding.data["sd"] == pytest.approx(1.5)
     assert [(name, span.begin, span.end) for name, span in outages] == [("rtk", 8.0, 11.5)]
 
 
@@ -45,7 +45,7 @@ def test_an_outage_at_the_start_is_told_where_it_ends_and_one_at_the_end_stays_o
     assert [(e.time, e.kind) for e in events] == [(25.0, "outage")]
     assert [(span.begin, span.end) for _, span in outages] == [(22.0, 30.0)]
     events, outages = told([], 30.0)
-    assert events[0].what == "rtk: no observation in all of the run"
+    assert events[0].finding.code == "navigation.event-never-observed"
     assert [(span.begin, span.end) for _, span in outages] == [(0.0, 30.0)]
 
 
@@ -53,13 +53,21 @@ def test_rejections_one_after_the_other_are_one_event():
     run = [seen(1.0), seen(2.0, 20.0, 0.0), seen(3.0, 30.0, 0.0), seen(4.0), seen(5.0, 9.0, 0.0)]
     events, _ = told(run, 6.0)
     assert [(e.time, e.kind) for e in events] == [(2.0, "rejected"), (5.0, "rejected")]
-    assert "2 of them, from 2 to 3 s: up to 15 standard deviations" in events[0].what
+    assert events[0].finding.data == {
+        "name": "rtk.position",
+        "begin": 2.0,
+        "end": 3.0,
+        "count": 2,
+        "largest": 15.0,
+    }
+    assert events[1].finding.code == "navigation.event-rejected-once"
 
 
 def test_what_came_too_late_is_said_and_what_is_of_before_is_not():
     events, _ = told([seen(5.0), seen(6.0)], 7.0, late=(-0.5, 2.0, 3.0))
     assert [(e.time, e.kind) for e in events] == [(2.0, "late")]
-    assert "2 of them, from 2 to 3 s" in events[0].what
+    said = events[0].finding.data
+    assert (said["count"], said["begin"], said["end"]) == (2, 2.0, 3.0)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -81,7 +89,7 @@ def test_two_aids_do_not_mix():
     fewer = tuple(one for one in both if one.name != "rtk.position" or one.time < 3.0)
     piece = NavigationChunk(np.empty(0), np.empty((0, 10)), fewer, ())
     _, events, _ = deliveries.over(state, piece, 9.0)
-    assert [(e.time, e.what[:3]) for e in events] == [(5.0, "rtk")]
+    assert [(e.time, e.finding.data["name"]) for e in events] == [(5.0, "rtk")]
 
 
 def test_what_means_nothing_is_refused():

@@ -109,11 +109,13 @@ def test_events_and_spans_tell_the_timeline():
         ("coarse", 0.0, 10.0),
         ("navigation", 10.0, 20.0),
     ]
-    assert [event.what for event in run.record.events] == [
-        "coarse",
-        "coarse ends after 10 s",
-        "navigation",
+    said = [(event.finding.code, event.finding.data["mode"]) for event in run.record.events]
+    assert said == [
+        ("navigation.event-mode-begins", "coarse"),
+        ("navigation.event-mode-timed-out", "coarse"),
+        ("navigation.event-mode-begins", "navigation"),
     ]
+    assert run.record.events[1].finding.data["elapsed"] == pytest.approx(10.0)
     assert run.aligned[0].alignment.time == 10.0
     first = run.record.trajectory.index[0]
     assert first == pytest.approx(10.05)
@@ -124,8 +126,9 @@ def test_a_command_that_is_not_possible_yet_changes_nothing():
     chain = standing((LEVEL, Navigation()), commands=(Command(0.45, "next"), Command(6.0, "next")))
     run = run_batch(chain, rest())
     first, second = [event for event in run.record.events if event.kind == "command"]
-    assert first.time == pytest.approx(0.45) and "not possible yet" in first.what
-    assert second.what == "next" and run.record.modes[0].end == pytest.approx(6.0)
+    assert first.time == pytest.approx(0.45)
+    assert first.finding.code == "navigation.event-command-too-early"
+    assert second.finding.data["word"] == "next" and run.record.modes[0].end == pytest.approx(6.0)
 
 
 def test_a_live_command_is_one_of_the_list():
@@ -151,8 +154,8 @@ def test_a_live_command_is_one_of_the_list():
 def test_a_command_in_navigation_is_past():
     chain = standing((LEVEL, Navigation()), commands=(Command(15.0, "navigation"),))
     events = run_batch(chain, rest()).record.events
-    assert [event.what for event in events if event.kind == "command"] == [
-        "navigation: nothing to do, it is past"
+    assert [event.finding.code for event in events if event.kind == "command"] == [
+        "navigation.event-command-past"
     ]
 
 
