@@ -156,7 +156,7 @@ def coast(
     from strapdown.cli.console import WORDS, Stopwatch, print_findings, print_seal, progress
     from strapdown.cli.result_folder import default_folder, source_name
     from strapdown.report.coast import read_coasting_run
-    from strapdown.systems.part_of_log import check_part
+    from strapdown.systems.inputs import check_part
 
     check_part(from_s, to_s, duration)
     navigation, file = read_coasting_run(source)

@@ -161,7 +161,7 @@ def log_keys(given: Mapping[str, Any]) -> dict[str, Any]:
         A column name or the part of the log is invalid.
     """
     from strapdown.formats.columns import parse_column_option
-    from strapdown.systems.part_of_log import check_part
+    from strapdown.systems.inputs import check_part
 
     check_part(given["from_s"], given["to_s"], given["duration"])
     return {

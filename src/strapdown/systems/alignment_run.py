@@ -36,7 +36,7 @@ from strapdown.sensors.health_log import LEAST_SAMPLES
 from strapdown.sensors.imu_health import ChannelFault, check_imu_channels
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.alignment_source import AlignmentSource, read_alignment_source
-from strapdown.systems.attitude_source import input_files
+from strapdown.systems.inputs import input_files
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, EULER, GYRO
 from strapdown.tables.checks import index_of, source_of, values_of

@@ -26,9 +26,7 @@ from strapdown.sensors.triad_errors import (
     check_axes_matrix,
     report_transposed,
 )
-from strapdown.simulation import Origin, StationaryMotion, Wave, rocking_stand, simulate_imu
-from strapdown.systems.attitude_source import input_files, sensor_file
-from strapdown.systems.part_of_log import part_of_log
+from strapdown.systems.inputs import input_files, part_of_log, sensor_file
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import values_of
 
@@ -230,6 +228,8 @@ def _sensor_file(spec: AlignmentSpec) -> tuple[InputFiles, ...]:
 
 
 def _simulated(spec: AlignmentSpec) -> AlignmentSource:
+    from strapdown.simulation import Origin, StationaryMotion, Wave, rocking_stand, simulate_imu
+
     asked = spec.simulation
     assert asked is not None  # one of the two is there
     origin = Origin(spec.site.lat_deg, spec.site.lon_deg, spec.site.alt_m)

@@ -46,7 +46,6 @@ from strapdown.systems.attitude_known import (
 from strapdown.systems.attitude_source import (
     Source,
     describe,
-    input_files,
     read_options,
     read_source,
     with_truth,
@@ -64,7 +63,7 @@ from strapdown.systems.attitude_sweep import (
     trial_names,
     worst_sweep,
 )
-from strapdown.systems.part_of_log import check_part, part_of_log
+from strapdown.systems.inputs import check_part, input_files, part_of_log
 from strapdown.tables import GYRO
 
 __all__ = ["bench_attitude", "run_bench"]

@@ -33,8 +33,8 @@ from strapdown.results.inputs import InputFiles
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.crash_unit import Assumed, CrashUnit, Mounting, RecordedTriad
 from strapdown.sensors.uncertainty import stated_uncertainty
-from strapdown.systems.attitude_source import input_files, sensor_file
 from strapdown.systems.crash_reconstruction import CrashReconstruction, reconstruct_crash
+from strapdown.systems.inputs import input_files, sensor_file
 from strapdown.systems.one_thread import one_thread
 
 __all__ = [

@@ -53,7 +53,7 @@ from strapdown.navigation.replay import PipelineRun, run_batch
 from strapdown.progress import Progress, silent
 from strapdown.results.inputs import InputFiles
 from strapdown.sensors.uncertainty import ImuUncertainty
-from strapdown.systems.attitude_source import input_files
+from strapdown.systems.inputs import input_files
 from strapdown.systems.navigation_checks import channel_findings, look_through, saturated_findings
 from strapdown.systems.navigation_source import (
     NavigationSource,

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -33,15 +34,14 @@ from strapdown.navigation.measurements.measurement import TabulatedMeasurement
 from strapdown.results.inputs import InputFiles, Reading
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.error_chain import child, normal
-from strapdown.simulation import simulate_imu
-from strapdown.simulation.earth_motion import EarthMotion
-from strapdown.simulation.gnss import GnssReceiver, moved_places, simulate_gnss
 from strapdown.systems.alignment_source import body_record
-from strapdown.systems.attitude_source import input_files, sensor_file
-from strapdown.systems.trajectory_source import make_motion, with_key
+from strapdown.systems.inputs import input_files, sensor_file
 from strapdown.tables import GEODETIC, GNSS, POSITION_SD, VELOCITY_SD, gnss_table
 from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
 from strapdown.tables.checks import index_of, source_of, values_of
+
+if TYPE_CHECKING:
+    from strapdown.simulation.earth_motion import EarthMotion
 
 __all__ = [
     "COLUMN_UNITS",
@@ -169,6 +169,9 @@ def _simulated(
     inputs: list[InputFiles],
     findings: list[Finding],
 ) -> NavigationSource:
+    from strapdown.simulation import simulate_imu
+    from strapdown.systems.trajectory_source import make_motion, with_key
+
     asked = spec.simulation
     assert asked is not None  # one of the two is there
     sensor = asked.sensor or spec.sensors.sensor
@@ -286,6 +289,8 @@ def simulated_fixes(
     DataFrame
         Gnss table without the fixes of outages; outliers state the precision of the others.
     """
+    from strapdown.simulation.gnss import GnssReceiver, moved_places, simulate_gnss
+
     receiver = GnssReceiver(
         rate=asked.rate_hz,
         position_noise=asked.position_noise_m,

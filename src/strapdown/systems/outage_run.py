@@ -59,11 +59,10 @@ from strapdown.simulation.earth_motion import EarthMotion, Origin
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
 from strapdown.simulation.path_motion import Limits, Manoeuvre
 from strapdown.simulation.vehicles import Accelerate, Straight, Turn, car
-from strapdown.systems.attitude_source import input_files, sensor_file
+from strapdown.systems.inputs import check_part, input_files, sensor_file
 from strapdown.systems.navigation_run import make_chain
 from strapdown.systems.navigation_source import NavigationSource, read_navigation_source
 from strapdown.systems.one_thread import one_thread
-from strapdown.systems.part_of_log import check_part
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.aiding import odometer_table
 from strapdown.tables.checks import index_of, values_of

@@ -1,13 +1,18 @@
-"""Select a part of a log by begin, end or duration."""
+"""Inputs of a run: the files that it reads, and the part of a log that it uses."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
+from strapdown.bundle.seal import sha256
 from strapdown.errors import ConfigError
+from strapdown.results.inputs import InputFiles
+from strapdown.sensors.catalogue import SENSORS
 
-__all__ = ["check_part", "part_of_log"]
+__all__ = ["check_part", "input_files", "part_of_log", "sensor_file"]
 
 
 def check_part(from_s: float | None, to_s: float | None, duration_s: float | None) -> None:
@@ -104,3 +109,15 @@ def part_of_log(
     if out.attrs.get("first_row") is not None:
         out.attrs["first_row"] += int(np.argmax(kept))
     return out
+
+
+def input_files(role: str, path: str, files: tuple[Path, ...]) -> InputFiles:
+    """List files read in a role, with their present digests."""
+    return InputFiles(role, Path(path), files, tuple(sha256(file) for file in files))
+
+
+def sensor_file(sensor: str | None) -> tuple[InputFiles, ...]:
+    """Return the file of a sensor that is not from the catalogue."""
+    if sensor is None or sensor.lower() in SENSORS:
+        return ()
+    return (input_files("sensor", sensor, (Path(sensor),)),)
