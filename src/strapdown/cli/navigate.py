@@ -20,7 +20,6 @@ EPILOG = (
     "Example: strapdown navigate log.csv --gnss fixes.csv --sensor adis16470\n\n"
     "Example: strapdown navigate navigate.toml (strapdown init navigate LOG writes one)"
 )
-MOST = 6  # findings on the terminal
 
 
 @spread
@@ -147,16 +146,18 @@ def navigate(
     from strapdown.api.navigation import run_specified, smoothed_too
     from strapdown.bundle.seal import check_destination, write_latency, write_timing
     from strapdown.cli.align_options import flag_of, refuse_beside_file
-    from strapdown.cli.console import WORDS, Stopwatch, print_findings, print_seal, progress
-    from strapdown.cli.latency_table import print_latency
+    from strapdown.cli.console import WORDS, Stopwatch, print_seal, progress
     from strapdown.cli.navigate_options import FLAGS, navigation_of_flags
     from strapdown.cli.navigate_tables import print_navigation
     from strapdown.cli.result_folder import default_folder, refuse_result, source_name
     from strapdown.config.navigation_file import read_navigation_spec
-    from strapdown.live.replay import Replay, parse_pace
 
     refuse_result(source, "log")
-    played = None if pace is None else Replay(parse_pace(pace))
+    played = None
+    if pace is not None:
+        from strapdown.live.replay import Replay, parse_pace
+
+        played = Replay(parse_pace(pace))
     given: dict[str, Any] = {
         "gnss": gnss,
         "lever_arm": lever_arm,
@@ -214,8 +215,9 @@ def navigate(
         return
     if write.quiet:
         return
-    print_navigation(result)
+    print_navigation(result, result.findings, verbose=write.verbose)
     if latency is not None:
+        from strapdown.cli.latency_table import print_latency
+
         print_latency(latency, f"played, pace {pace}")
-    print_findings(result.findings, MOST)
     print_seal(seal, "report.html")

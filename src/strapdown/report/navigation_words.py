@@ -147,15 +147,14 @@ def longest_outages(found: NavigationFound) -> list[tuple[str, Span, float]]:
     return sorted(out, key=lambda o: (o[1].begin, o[0]))
 
 
-def cautions(found: NavigationFound) -> tuple[tuple[str, str], ...]:
-    """Return the cautions, each with its number."""
+def cautions(found: NavigationFound, *, brief: bool = False) -> tuple[tuple[str, str], ...]:
+    """Return the cautions, each with its number; brief, without those that the tables show."""
+    shown = () if brief else (*_memory(found), *_refused(found), *_not_told(found))
     return (
         *_outages(found),
         *_ended_without(found),
         *_heading_caution(found),
-        *_memory(found),
-        *_refused(found),
-        *_not_told(found),
+        *shown,
         *agreement_words(found),
     )
 

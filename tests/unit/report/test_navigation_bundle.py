@@ -16,6 +16,8 @@ from strapdown.report.document_files import drawings, write_drawings
 from strapdown.report.navigation_document import navigation_document
 from strapdown.report.navigation_found import examine, told_of, withheld_of
 from strapdown.report.navigation_json import navigation_json
+from strapdown.report.navigation_trust import trust
+from strapdown.report.verdict_words import answer, heading_words
 from strapdown.systems.navigation_run import run_navigation
 
 FILE = """
@@ -134,10 +136,24 @@ def test_the_terminal_says_what_the_page_says(result, capsys):
     print_navigation(result)
     said = " ".join(capsys.readouterr().out.split())
     found = examine(told_of(result))
-    document = navigation_document(found.told, "", found)
-    assert document.subtitle.replace("\u00a0", " ") in said
+    assert trust(found).sentence.replace("\u00a0", " ") in said
+    assert heading_words(result.trust).replace("\u00a0", " ") in said
     assert "rtk.position" in said
-    assert "horizontal, m" in said
+    assert "within bound" in said
+    print_navigation(result, verbose=True)
+    said = " ".join(capsys.readouterr().out.split())
+    assert answer(result).replace("\u00a0", " ") in said
+    assert "gyro bias x" in said
+
+
+def test_the_answer_on_the_terminal_fits_40_lines(result, capsys):
+    from strapdown.cli.navigate_tables import print_navigation
+
+    print_navigation(result, result.findings * 20)
+    # The paths and the seal take four lines.
+    printed = capsys.readouterr()
+    assert len((printed.out + printed.err).splitlines()) <= 36
+    assert "all of them are in the report" in printed.err
 
 
 def test_scores_of_what_was_withheld_are_told_as_they_are():
