@@ -143,7 +143,7 @@ def navigate(
     write: OutFlags,
 ) -> None:
     """Find position, velocity and attitude over a record, by inertial sensors and measurements."""
-    from strapdown.api.navigation import run_specified, smoothed_too
+    from strapdown.api.navigation import smoothed_too
     from strapdown.bundle.seal import check_destination, write_latency, write_timing
     from strapdown.cli.align_options import flag_of, refuse_beside_file
     from strapdown.cli.console import WORDS, Stopwatch, print_seal, progress
@@ -151,6 +151,7 @@ def navigate(
     from strapdown.cli.navigate_tables import print_navigation
     from strapdown.cli.result_folder import default_folder, refuse_result, source_name
     from strapdown.config.navigation_file import read_navigation_spec
+    from strapdown.systems.navigation_run import run_navigation
 
     refuse_result(source, "log")
     played = None
@@ -203,7 +204,7 @@ def navigate(
         report("looking through", 0.01)
         spec = navigation_of_flags(source, given) if asked is None else asked
         drive: dict[str, Any] = {} if played is None else {"drive": played}
-        result = run_specified(spec, source if own else None, report, **drive)
+        result = run_navigation(spec, source if own else None, report, **drive)
         seal = result.save(folder, force=write.force, progress=report)
         report.stop()
         write_timing(seal, report.seconds)

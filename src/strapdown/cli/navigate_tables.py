@@ -31,7 +31,7 @@ from strapdown.report.values import (
 )
 from strapdown.report.verdict_words import terminal_lines
 from strapdown.rotation import within_half_turn
-from strapdown.systems.navigation_run import NavigationResult
+from strapdown.systems.navigation_run import NavigationRun
 
 __all__ = ["print_navigation"]
 
@@ -54,13 +54,13 @@ SCORES = {
 
 
 def print_navigation(
-    result: NavigationResult, findings: Sequence[Finding] = (), *, verbose: bool = False
+    result: NavigationRun, findings: Sequence[Finding] = (), *, verbose: bool = False
 ) -> None:
     """Print the final state of a run, its uncertainty, the verdict, and findings.
 
     Parameters
     ----------
-    result : NavigationResult
+    result : NavigationRun
     findings : sequence of Finding
         Printed on the error stream, as many as there is room for.
     verbose : bool

@@ -46,7 +46,7 @@ from strapdown.navigation.recorder import Recorder
 from strapdown.navigation.replay import PipelineRun, Recording, run_batch
 from strapdown.progress import Progress, silent
 from strapdown.systems.alignment_source import axes_matrices
-from strapdown.systems.navigation_run import NavigationResult, make_chain, run_navigation
+from strapdown.systems.navigation_run import NavigationRun, make_chain, run_navigation
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import values_of
@@ -150,7 +150,7 @@ def receive(
 
 def result_of(
     live: LiveRun, folder: Path, file: Path | None = None, progress: Progress = silent
-) -> NavigationResult:
+) -> NavigationRun:
     """Write the received input, and return the result of the run over it.
 
     Parameters
@@ -165,7 +165,7 @@ def result_of(
 
     Returns
     -------
-    NavigationResult
+    NavigationRun
         From the states computed in real time. If reading the record back gives other numbers, from
         the record: the result can always be reproduced.
 

@@ -34,7 +34,7 @@ from strapdown.navigation.truth_comparison import (
     compare_with_truth,
     smoother_consistency,
 )
-from strapdown.systems.navigation_run import NavigationResult, withheld_aid
+from strapdown.systems.navigation_run import NavigationRun, withheld_aid
 from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
 
 __all__ = [
@@ -555,12 +555,12 @@ class NavigationTold:
 NO_RULE = "none: every observation counts in full, however far off it is"
 
 
-def told_of(result: NavigationResult) -> NavigationTold:
+def told_of(result: NavigationRun) -> NavigationTold:
     """Return the report input of a navigation result.
 
     Parameters
     ----------
-    result : NavigationResult
+    result : NavigationRun
 
     Returns
     -------

@@ -24,7 +24,7 @@ from strapdown.report.navigation_found import Agreement, NavigationFound, Score,
 from strapdown.report.navigation_trust import trust
 from strapdown.report.navigation_words import cautions, headline
 from strapdown.report.values import distance_over_ground, worst_within
-from strapdown.systems.navigation_run import NavigationResult
+from strapdown.systems.navigation_run import NavigationRun
 from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
 
 __all__ = ["navigation_json", "write_navigation_files"]
@@ -35,14 +35,12 @@ MODULES = (*STAGES, "aiding")
 Array = NDArray[np.float64]
 
 
-def navigation_json(
-    result: NavigationResult, found: NavigationFound | None = None
-) -> dict[str, Any]:
+def navigation_json(result: NavigationRun, found: NavigationFound | None = None) -> dict[str, Any]:
     """Return a navigation run as plain data for programs.
 
     Parameters
     ----------
-    result : NavigationResult
+    result : NavigationRun
     found : NavigationFound, optional
         From `examine`, if already computed.
 
@@ -136,7 +134,7 @@ def _smoothing(found: NavigationFound) -> dict[str, Any] | None:
     }
 
 
-def _method(result: NavigationResult) -> dict[str, Any]:
+def _method(result: NavigationRun) -> dict[str, Any]:
     """The modules and their options, without file paths."""
     chosen: dict[str, Any] = result.spec.model_dump(
         mode="json",
@@ -283,12 +281,12 @@ _WORDS = {"rad/s": "rad_s", "m/s²": "m_s2", "1": "", "(rad/s)/(m/s²)": "rad_s_
 MOST_POINTS = 10_000
 
 
-def write_navigation_files(result: NavigationResult, folder: Path) -> None:
+def write_navigation_files(result: NavigationRun, folder: Path) -> None:
     """Write the tables of a run.
 
     Parameters
     ----------
-    result : NavigationResult
+    result : NavigationRun
     folder : Path
         ``trajectory.*`` in the requested formats, ``sd.csv``, ``sensor_errors.csv``,
         ``innovations/NAME.csv``, ``events.csv``, and ``errors.csv`` if the truth is known; for a
@@ -335,7 +333,7 @@ def write_navigation_files(result: NavigationResult, folder: Path) -> None:
 
 
 def _write_states(
-    result: NavigationResult, record: NavigationRecord, folder: Path, told: dict[str, str]
+    result: NavigationRun, record: NavigationRecord, folder: Path, told: dict[str, str]
 ) -> None:
     """Write a trajectory, its standard deviations, and the estimated sensor errors."""
     options = TrajectoryFileOptions(ellipsoid=result.ellipsoid, most_points=MOST_POINTS)

@@ -24,17 +24,17 @@ from strapdown.report.verdict_words import (
     repeated_words,
     witness_words,
 )
-from strapdown.systems.navigation_run import NavigationResult
+from strapdown.systems.navigation_run import NavigationRun
 
 __all__ = ["verdict_json", "write_verdict"]
 
 
-def write_verdict(result: NavigationResult, name: str, folder: Path) -> None:
+def write_verdict(result: NavigationRun, name: str, folder: Path) -> None:
     """Write ``verdict.html``, ``verdict.json`` and ``heading_light.csv``.
 
     Parameters
     ----------
-    result : NavigationResult
+    result : NavigationRun
     name : str
         Folder name shown on the page.
     folder : Path
@@ -65,7 +65,7 @@ def write_verdict(result: NavigationResult, name: str, folder: Path) -> None:
     )
 
 
-def verdict_json(result: NavigationResult) -> dict[str, Any]:
+def verdict_json(result: NavigationRun) -> dict[str, Any]:
     """Return a verdict for programs; angles in degrees, lengths in meters, times in s."""
     trust, light = result.trust, result.trust.light
     bounds = plane_bound(result.record.covariance)
@@ -122,7 +122,7 @@ def verdict_json(result: NavigationResult) -> dict[str, Any]:
     }
 
 
-def _repeated(repeated: Repeated, result: NavigationResult) -> dict[str, Any]:
+def _repeated(repeated: Repeated, result: NavigationRun) -> dict[str, Any]:
     out: dict[str, Any] = {
         "without": repeated.change.what,
         "answer": _plain(repeated_words(result)),

@@ -12,7 +12,7 @@ from strapdown.navigation.heading_integrity import REASONS, SURE, WITNESSES, Lig
 from strapdown.navigation.integrity import NO_NORTH, Advice, IntegrityReport, Repeated
 from strapdown.report.values import GAP, duration_words, half, length_words, plain, share_words
 from strapdown.report.values import alignment_values_instant as instant
-from strapdown.systems.navigation_run import NavigationResult
+from strapdown.systems.navigation_run import NavigationRun
 
 __all__ = [
     "advice_words",
@@ -38,12 +38,12 @@ _KINDS = {
 }
 
 
-def answer(result: NavigationResult) -> str:
+def answer(result: NavigationRun) -> str:
     """Return the first sentence of a verdict."""
     return f"{place_words(result)} {heading_words(result.trust)}"
 
 
-def place_words(result: NavigationResult) -> str:
+def place_words(result: NavigationRun) -> str:
     """Return the 95 % bound of the position, at the end and at its worst."""
     bounds = plane_bound(result.record.covariance)
     end, worst = float(bounds[-1]), int(np.argmax(bounds))
@@ -200,7 +200,7 @@ def first_words(trust: IntegrityReport) -> str:
     )
 
 
-def repeated_words(result: NavigationResult) -> str:
+def repeated_words(result: NavigationRun) -> str:
     """Return the result of the re-run without it."""
     trust = result.trust
     repeated = trust.repeated
@@ -238,7 +238,7 @@ def repeated_words(result: NavigationResult) -> str:
     )
 
 
-def terminal_lines(result: NavigationResult, *, brief: bool = False) -> list[tuple[str, str]]:
+def terminal_lines(result: NavigationRun, *, brief: bool = False) -> list[tuple[str, str]]:
     """Up to four lines for the terminal, each with its style; brief, without the position."""
     trust = result.trust
     lines = [(heading_words(trust) if brief else answer(result), _style(trust))]
@@ -268,7 +268,7 @@ def _beyond(time: np.ndarray, apart: np.ndarray, marks: np.ndarray, bound: np.nd
     return f"beyond the repeated run's bound of 95{GAP}% for {share_words(share)} of the time"
 
 
-def _at(result: NavigationResult, mark: int) -> str:
+def _at(result: NavigationRun, mark: int) -> str:
     return f"at {instant(float(result.record.sd.index[mark]))}"
 
 

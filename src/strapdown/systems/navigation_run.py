@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, field, replace
 from functools import partial
+from html import escape
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -14,6 +17,7 @@ from numpy.typing import NDArray
 
 from strapdown.alignment.alignment import Alignment, Site
 from strapdown.alignment.fine import FineResult
+from strapdown.bundle.seal import Seal, check_destination
 from strapdown.config.choice import SLOTS, make_choice
 from strapdown.config.navigation import (
     CoarseModeSpec,
@@ -23,6 +27,7 @@ from strapdown.config.navigation import (
     WithholdTable,
     aids_of,
 )
+from strapdown.config.navigation_file import navigation_spec
 from strapdown.config.navigation_modules import given_of, make_aids, make_filter, sensors_of
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
 from strapdown.errors import Finding
@@ -53,7 +58,7 @@ from strapdown.navigation.replay import PipelineRun, run_batch
 from strapdown.progress import Progress, silent
 from strapdown.results.inputs import InputFiles
 from strapdown.sensors.uncertainty import ImuUncertainty
-from strapdown.systems.inputs import input_files
+from strapdown.systems.inputs import NOWHERE, Memory, input_files, moved_inputs, moved_paths
 from strapdown.systems.navigation_checks import channel_findings, look_through, saturated_findings
 from strapdown.systems.navigation_source import (
     NavigationSource,
@@ -62,8 +67,12 @@ from strapdown.systems.navigation_source import (
     said_of_file,
 )
 from strapdown.systems.one_thread import one_thread
+from strapdown.tables import EULER, GEODETIC, VELOCITY
 
-__all__ = ["Drive", "NavigationResult", "make_chain", "run_navigation", "withheld_aid"]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["Drive", "NavigationRun", "make_chain", "run_navigation", "withheld_aid"]
 
 
 #: Runs a pipeline over samples and tables, with a recorder and a progress callback.
@@ -85,7 +94,7 @@ def run_navigation(
     file: Path | None = None,
     progress: Progress = silent,
     drive: Drive = _AT_ONCE,
-) -> NavigationResult:
+) -> NavigationRun:
     """Read a record and its measurements, align, and navigate.
 
     Parameters
@@ -102,7 +111,7 @@ def run_navigation(
 
     Returns
     -------
-    NavigationResult
+    NavigationRun
 
     Raises
     ------
@@ -183,7 +192,7 @@ def run_navigation(
         *(f for one in run.aligned for f in one.alignment.findings),
         *(() if fine is None or fine.fine is None else fine.fine.findings),
     ]
-    return NavigationResult(
+    return NavigationRun(
         spec=spec,
         source=source,
         ellipsoid=find_ellipsoid(spec.ellipsoid),
@@ -241,12 +250,12 @@ def _rows_compared(time: NDArray[np.float64]) -> NDArray[np.intp]:
     return np.arange(len(time) - 1, -1, -each)[::-1]
 
 
-# Result of a navigation run.
+# The run as data.
 
 
-@dataclass(frozen=True, eq=False)
-class NavigationResult:
-    """Result of a navigation run.
+@dataclass(frozen=True, eq=False, repr=False)
+class NavigationRun:
+    """Result of a navigation run; in memory until `save` writes it.
 
     Attributes
     ----------
@@ -274,6 +283,8 @@ class NavigationResult:
     trust : IntegrityReport
     inputs : tuple of InputFiles
     findings : tuple of Finding
+    memory : Memory
+        Tables that are given in memory; files of the bundle.
     """
 
     spec: NavigationSpec
@@ -292,6 +303,7 @@ class NavigationResult:
     trust: IntegrityReport
     inputs: tuple[InputFiles, ...]
     findings: tuple[Finding, ...]
+    memory: Memory = field(default=Memory({}))
 
     @property
     def filtered(self) -> NavigationRecord:
@@ -302,6 +314,135 @@ class NavigationResult:
     def filtered_differences(self) -> pd.DataFrame | None:
         """Differences of the filter solution from the truth."""
         return self.differences if self.forward is None else self.forward_differences
+
+    @property
+    def trajectory(self) -> pd.DataFrame:
+        """Trajectory table by time in s; smoothed if the run is.
+
+        ``lat lon`` in deg, ``alt`` in m over the ellipsoid, ``VN VE VD`` in m/s, ``roll pitch
+        heading`` in deg.
+        """
+        return self.record.trajectory
+
+    @property
+    def sd(self) -> pd.DataFrame:
+        """Standard deviations by time: ``north east down`` m, ``VN VE VD`` m/s, angles deg."""
+        return self.record.sd
+
+    @property
+    def innovations(self) -> Mapping[str, pd.DataFrame]:
+        """By name of the observation (``gnss.position``): innovation, variance, weight."""
+        return self.record.innovations
+
+    @property
+    def sensor_errors(self) -> pd.DataFrame:
+        """Estimates of sensor and measurement errors by time, in SI (`record.units`)."""
+        return self.record.sensors
+
+    @property
+    def integrity(self) -> IntegrityReport:
+        """Whether heading and bounds can be trusted, and the first inconsistency."""
+        return self.trust
+
+    def to_pandas(self) -> pd.DataFrame:
+        """The trajectory with its standard deviations, at their common instants.
+
+        Returns
+        -------
+        DataFrame
+            Columns of `trajectory`, and those of `sd` with the suffix ``_sd``.
+        """
+        return self.trajectory.join(self.sd.add_suffix("_sd"), how="inner")
+
+    def plot(self, kind: str = "plan") -> Figure:
+        """Draw one chart of the report.
+
+        Parameters
+        ----------
+        kind : str
+            ``plan``, ``bound``, ``height``, ``velocity``, ``attitude``, or the name of an
+            observation of `innovations`.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Its ``axes`` are the panels. Independent of windows and global state.
+
+        Raises
+        ------
+        ConfigError
+            The chart does not exist for this run.
+        """
+        from strapdown.report.navigation_view import plot
+
+        return plot(self, kind)
+
+    def save(
+        self,
+        out: str | Path,
+        *,
+        report: bool = True,
+        force: bool = False,
+        progress: Progress = silent,
+    ) -> Seal:
+        """Write the run as a sealed bundle, which `verify` runs again.
+
+        Parameters
+        ----------
+        out : str or Path
+            New folder. Tables given in memory become input files in it.
+        report : bool
+            Whether to write its pages and figures as well.
+        force : bool
+            Overwrite an existing bundle.
+        progress : callable, optional
+            Called with a stage and the completed fraction.
+
+        Returns
+        -------
+        Seal
+
+        Raises
+        ------
+        ConfigError
+            `out` exists and may not be overwritten.
+        DataError
+            An input file has changed since it was read.
+        """
+        from strapdown.report.navigation import write_navigation
+
+        check_destination(Path(out), force)
+        with self.memory.as_files() if self.memory.tables else nullcontext(NOWHERE) as folder:
+            run = self.in_folder(NOWHERE, folder)
+            return write_navigation(run, out, report=report, force=force, progress=progress)
+
+    def in_folder(self, old: Path, new: Path) -> NavigationRun:
+        """Return the run with its inputs in memory moved from one folder to another."""
+        if not self.memory.tables or old == new:
+            return self
+        return replace(
+            self,
+            spec=navigation_spec(moved_paths(self.spec.plain(), old, new)),
+            inputs=moved_inputs(self.inputs, old, new, copied=True),
+        )
+
+    def __repr__(self) -> str:
+        time, smoothed = self.trajectory.index, "" if self.forward is None else ", smoothed"
+        last = self.sd.iloc[-1]
+        return (
+            f"<NavigationRun {self.source.name}: {time[-1] - time[0]:.6g} s{smoothed}; at the end "
+            f"sd north {last['north']:.3g} m, east {last['east']:.3g} m, heading "
+            f"{last['heading']:.3g}°; {len(self.findings)} findings>"
+        )
+
+    def _repr_html_(self) -> str:
+        rows = self.to_pandas().iloc[[0, -1]]
+        shown = rows[[*GEODETIC, *VELOCITY, *EULER, "north_sd", "east_sd", "heading_sd"]]
+        found = "".join(f"<li>{escape(str(f))}</li>" for f in self.findings)
+        return (
+            f"<div><b>{escape(repr(self)[1:-1])}</b></div>{shown.to_html(float_format='{:.6g}'.format)}"
+            f"<ul>{found}</ul>"
+        )
 
 
 # The pipeline of a configuration.
