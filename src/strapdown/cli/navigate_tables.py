@@ -26,7 +26,6 @@ from strapdown.report.values import (
     duration_words,
     length_words,
     plain,
-    share_words,
     spaced,
 )
 from strapdown.report.verdict_words import terminal_lines
@@ -109,21 +108,23 @@ def print_navigation(
 def _end(found: NavigationFound) -> TableBlock:
     """Start and end with 95 % bounds, and the errors of the run where the truth is known."""
     block = end_table(found)
+    errors = error_table(found)
+    of: dict[str, tuple[str, ...]] = {}
+    if found.errors is not None and errors is not None:
+        of = dict(zip((s.quantity for s in found.errors.scores), errors.rows, strict=True))
     rows = []
     for name, *cells in block.rows:
+        shown = of.get(SCORES.get(name, ""), ("",) * 6)
         if name == "place":
             # The height has a row of its own.
-            ends = found.record.trajectory[["lat", "lon"]].iloc[[0, -1]].to_numpy()
-            pairs = [(float(lat), float(within_half_turn(lon))) for lat, lon in ends]
             name = "latitude, longitude"
-            cells = [f"{plain(lat, 6)}°, {plain(lon, 6)}°" for lat, lon in pairs]
-        if found.errors is not None:
-            cells += ["", "", ""]
-            if name in SCORES:
-                score = found.errors.score(SCORES[name])
-                cells[-3:] = [f"{score.rms:.3g}", f"{score.largest:.3g}", share_words(score.share)]
-        rows.append((name, *cells))
-    more = () if found.errors is None else ("error, rms", "largest", "within bound")
+            ends = found.record.trajectory[["lat", "lon"]].iloc[[0, -1]].to_numpy()
+            cells = [
+                f"{plain(float(lat), 6)}°, {plain(float(within_half_turn(lon)), 6)}°"
+                for lat, lon in ends
+            ]
+        rows.append((name, *cells, *((shown[1], shown[2], shown[5]) if of else ())))
+    more = ("error, rms", "largest", "within bound") if of else ()
     return replace(block, columns=(*block.columns, *more), rows=tuple(rows))
 
 

@@ -63,7 +63,10 @@ def part_to(panel: str) -> Any:
 def part_long(panel: str) -> Any:
     """The option ``--duration``."""
     return typer.Option(
-        metavar="S", help="Use so much of it, in place of --to.", rich_help_panel=panel
+        "--duration",
+        metavar="S",
+        help="Use so much of it, in place of --to.",
+        rich_help_panel=panel,
     )
 
 

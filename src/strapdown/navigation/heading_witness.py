@@ -143,7 +143,8 @@ def hear_witnesses(made: Witnesses, record: NavigationRecord, enough: float) -> 
     firsts = np.searchsorted(made.time, cuts + NEAR, side="right").tolist()
     begun = np.array([made.time[k - 1] if k else made.begun for k in firsts])
     wanted = np.unique(np.concatenate([begun, made.time[places]]))
-    run = trajectory_at(record.trajectory, wanted, _ellipsoid(made.navigator))
+    ellipsoid = find_ellipsoid(made.navigator.filter.mechanization.ellipsoid)
+    run = trajectory_at(record.trajectory, wanted, ellipsoid)
     done: list[_Witness] = []
     heard: list[_Witness] = []
     told: list[_Witness] = []
@@ -305,10 +306,6 @@ def _begin(
     whole[:9, :9] = P
     told = record.sensors[names].iloc[k].to_numpy(dtype=np.float64)
     return replace(filter_.begin(start, whole), sensors=told)
-
-
-def _ellipsoid(navigator: Navigator) -> Ellipsoid:
-    return find_ellipsoid(navigator.filter.mechanization.ellipsoid)
 
 
 # Filter, joined increments and thinned fixes of the heading checks.

@@ -153,7 +153,7 @@ class MeasurementMonitor:
         aids = {name: replace(one, newest=time) for name, one in state.aids.items()}
         return replace(state, aids=aids, begun=time)
 
-    def over(
+    def process(
         self, state: MeasurementMonitorState, piece: NavigationChunk, time: float
     ) -> tuple[MeasurementMonitorState, list[Event], list[tuple[str, Span]]]:
         """Process the output of a chunk.
@@ -438,7 +438,11 @@ class NavigationPipeline:
         if state.navigator is not None:
             told = self.navigator.tell(state.navigator, name, table)
             state = replace(state, navigator=told)
-            return self._remembering(state, name, table) if self._aligns_anew else state
+            return (
+                self._remembering(state, name, table)
+                if self.intake.gaps.beyond == "align"
+                else state
+            )
         aid = self.navigator.by_name.get(name)
         if not isinstance(aid, TabulatedMeasurement):
             raise ConfigError(
@@ -496,17 +500,13 @@ class NavigationPipeline:
             As `Navigator.advance`.
         """
         intake, steps = self.intake.advance(state.intake, time, values, last)
-        going = ModeSequencer(self, replace(state, intake=intake))
-        going.over(steps)
-        return going.state(), going.piece(last)
+        sequencer = ModeSequencer(self, replace(state, intake=intake))
+        sequencer.process(steps)
+        return sequencer.state(), sequencer.chunk(last)
 
     def finish(self, state: PipelineState) -> tuple[PipelineState, PipelineChunk]:
         """End the input, as the last chunk does with `last`."""
         return self.advance(state, np.empty(0), np.empty((0, 6)), last=True)
-
-    @property
-    def _aligns_anew(self) -> bool:
-        return self.intake.gaps.beyond == "align"
 
     def _remembering(self, state: PipelineState, name: str, table: pd.DataFrame) -> PipelineState:
         """Keep a table for a later alignment; during navigation drop expired rows."""
@@ -557,7 +557,7 @@ class ModeSequencer:
         self._modes: list[Span] = []
         self._outages: list[tuple[str, Span]] = []
 
-    def over(self, steps: ImuIncrements) -> None:
+    def process(self, steps: ImuIncrements) -> None:
         """Process the steps of a chunk."""
         for hole in steps.holes:
             self._found(hole)
@@ -579,7 +579,7 @@ class ModeSequencer:
         """Return the present state."""
         return self._state
 
-    def piece(self, last: bool) -> PipelineChunk:
+    def chunk(self, last: bool) -> PipelineChunk:
         """Return the output of the chunk."""
         state = self._state
         mode = self._chain.modes[state.mode]
@@ -716,7 +716,7 @@ class ModeSequencer:
             state.navigator, now[:, TIME], np.ascontiguousarray(now[:, ROWS])
         )
         self._navigation.append(piece)
-        told = chain.deliveries.over(state.deliveries, piece, float(now[-1, TIME]))
+        told = chain.deliveries.process(state.deliveries, piece, float(now[-1, TIME]))
         deliveries, events, outages = told
         self._events += events
         self._outages += outages

@@ -225,7 +225,10 @@ def compare_with_places(
     q_nb = rotation.quaternion_from_euler(computed[EULER].to_numpy())
     arm = np.asarray(rotation.rotate(q_nb, np.asarray(antenna, dtype=np.float64)))
     errors = np.full((len(time), 9), np.nan)
-    errors[:, :3] = _displacements(places_of(computed), _places(usable), ellipsoid) + arm
+    errors[:, :3] = (
+        _displacements(places_of(computed), usable[GEODETIC].to_numpy(dtype=np.float64), ellipsoid)
+        + arm
+    )
     P = np.asarray(covariance)[mark].copy()
     # The antenna position has the error dr + psi x arm, too.
     J = np.concatenate(
@@ -272,10 +275,6 @@ def _displacements(computed: Array, true: Array, ellipsoid: Ellipsoid) -> Array:
             for lat, lon, alt, true_lat, true_lon, true_alt in pairs.tolist()
         ]
     )
-
-
-def _places(table: pd.DataFrame) -> Array:
-    return table[GEODETIC].to_numpy(dtype=np.float64)
 
 
 def _rows_of_marks(stamps: Array, marks: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -99,7 +99,11 @@ def read_alignment_source(spec: AlignmentSpec) -> AlignmentSource:
         recording.readings,
         (
             input_files("log", spec.log.path, recording.files),
-            *(() if spec.gnss is None else (_fixes(spec.gnss.path),)),
+            *(
+                ()
+                if spec.gnss is None
+                else (input_files("gnss", spec.gnss.path, files_of_fixes(spec.gnss.path)),)
+            ),
             *_sensor_file(spec),
         ),
         findings,
@@ -143,10 +147,6 @@ def body_record(
             findings += report_transposed(accel, force, recording.name)
     part = part_of_log(imu, log.from_s, log.to_s, log.duration_s, recording.name)
     return recording, part, tuple(findings)
-
-
-def _fixes(path: str) -> InputFiles:
-    return input_files("gnss", path, files_of_fixes(path))
 
 
 def _options(log: LogTable, axes: str | None) -> ReadOptions:

@@ -250,8 +250,9 @@ def _stage(page: Page, name: str, chosen: Mapping[str, Any]) -> None:
     page.key("kind", string(kind))
     if kind in slot.entries:
         _options(page, slot.entries[kind], chosen)
+    keys = [o.key for o in options_of(slot.entries[kind])] if kind in slot.entries else []
     for key, value in chosen.items():
-        if key != "kind" and key not in _keys(slot, kind):
+        if key != "kind" and key not in keys:
             page.key(key, toml_value(value) or "", _ENDS.get(key, ""))
 
 
@@ -262,10 +263,6 @@ _ENDS = {
     "until_heading_sd_deg": "it ends when the heading is known so well",
     "until_tilt_sd_deg": "and roll and pitch so well",
 }
-
-
-def _keys(slot: Slot, kind: str) -> tuple[str, ...]:
-    return tuple(o.key for o in options_of(slot.entries[kind])) if kind in slot.entries else ()
 
 
 def _options(page: Page, module: type, chosen: Mapping[str, Any]) -> None:

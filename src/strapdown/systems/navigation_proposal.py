@@ -17,7 +17,7 @@ from strapdown.errors import ConfigError, Finding
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.gnss_fixes import GnssOptions
-from strapdown.formats.recording import Recording, StatedStart
+from strapdown.formats.recording import Recording
 from strapdown.navigation.measurements.gnss_clock import time_offset, velocity_delay
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty
@@ -64,6 +64,8 @@ SURE, LEAST_DELAY, LEAST_OFFSET_SD = 4.0, 0.01, 0.05
 #: Stamps with an offset come from another clock, and two quartz clocks drift apart by 50 ppm:
 #: a random walk of this many s/√s over 400 s, during which the offset may be unobservable.
 APART = 1e-3
+#: Attributes of fixes with assumed standard deviations, and the keys of these.
+TAKEN = {"position_sd_taken": "position_sd_m", "velocity_sd_taken": "velocity_sd_m_per_s"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +159,9 @@ def propose(
         # For gyrocompassing gyros the rocking of a vehicle is motion, not noise.
         shaken = {} if _finds_north(named) else _louder(scatter, named)
         table["sensors"] = {"sensor": named, **shaken}
-    place = site or _place(recording.start)
+    place, start = site, recording.start
+    if not place and start is not None:
+        place = (start.lat_deg, start.lon_deg, start.alt)
     if place is not None:
         table["site"] = dict(zip(("lat_deg", "lon_deg", "alt_m"), place, strict=True))
     rest, drives = _motion(imu, fixes)
@@ -171,7 +175,7 @@ def propose(
                 "path": str(gnss),
                 "lever_arm_m": (0.0, 0.0, 0.0),
                 "update_rule": RULE,
-                **_taken(fixes),
+                **{k: fixes.attrs[taken] for taken, k in TAKEN.items() if taken in fixes.attrs},
                 **_clock(fixes, imu, drives),
             }
         }
@@ -245,15 +249,6 @@ def _nearest(noise: tuple[float, ...]) -> str:
         if far < least:
             best, least = name, far
     return best
-
-
-def _taken(fixes: pd.DataFrame) -> dict[str, float]:
-    keys = {"position_sd_taken": "position_sd_m", "velocity_sd_taken": "velocity_sd_m_per_s"}
-    return {key: fixes.attrs[taken] for taken, key in keys.items() if taken in fixes.attrs}
-
-
-def _place(start: StatedStart | None) -> tuple[float, float, float] | None:
-    return None if start is None else (start.lat_deg, start.lon_deg, start.alt)
 
 
 def _motion(imu: pd.DataFrame, fixes: pd.DataFrame | None) -> tuple[float, bool]:

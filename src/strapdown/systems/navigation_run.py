@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown.alignment.alignment import Alignment, Site
 from strapdown.alignment.fine import FineResult
@@ -236,18 +235,14 @@ def _against_truth(
 ) -> tuple[pd.DataFrame | None, DifferenceSummary | None]:
     if source.truth is None:
         return None, None
-    rows = _rows_compared(trajectory.index.to_numpy(dtype=np.float64))
-    kept = trajectory.iloc[rows]
+    # Rows at a constant interval, from the last one back.
+    time = trajectory.index.to_numpy(dtype=np.float64)
+    step = float(np.median(np.diff(time))) if len(time) > 1 else APART
+    each = max(1, round(APART / step)) if step > 0.0 else 1
+    kept = trajectory.iloc[np.arange(len(time) - 1, -1, -each)[::-1]]
     kept.attrs = dict(trajectory.attrs)
     differences = trajectory_differences(kept, source.truth, find_ellipsoid(spec.ellipsoid))
     return differences, summarise_differences(differences)
-
-
-def _rows_compared(time: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Rows at a constant interval, from the last one back."""
-    step = float(np.median(np.diff(time))) if len(time) > 1 else APART
-    each = max(1, round(APART / step)) if step > 0.0 else 1
-    return np.arange(len(time) - 1, -1, -each)[::-1]
 
 
 # The run as data.

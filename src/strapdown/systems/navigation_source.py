@@ -306,7 +306,8 @@ def simulated_fixes(
     place, velocity = values_of(table, GEODETIC), values_of(table, VELOCITY_COLUMNS)
     place_sd, velocity_sd = values_of(table, POSITION_SD), values_of(table, VELOCITY_SD)
     if asked.outlier_share > 0.0:
-        struck = _uniform(child(seed, _STRUCK), len(time)) < asked.outlier_share
+        chance = np.random.Generator(np.random.PCG64(child(seed, _STRUCK))).random(len(time))
+        struck = chance < asked.outlier_share
         way = normal(seed, _WAY, len(time), axes=6)
         for part in (way[:, :3], way[:, 3:]):
             part /= np.linalg.norm(part, axis=1, keepdims=True)
@@ -321,10 +322,6 @@ def simulated_fixes(
     return gnss_table(
         time[kept], place[kept], velocity[kept], place_sd[kept], velocity_sd[kept], source=name
     )
-
-
-def _uniform(seed: np.random.SeedSequence, count: int) -> Array:
-    return np.random.Generator(np.random.PCG64(seed)).random(count)
 
 
 # Findings with table rows converted to file rows.
@@ -347,16 +344,13 @@ def in_file(findings: Iterable[Finding], *tables: pd.DataFrame) -> tuple[Finding
         Without a row where it is not known.
     """
     known = {t.attrs.get("source"): t.attrs["first_row"] for t in tables if "first_row" in t.attrs}
-    return tuple(
-        one.replace(row=_moved(one.row, known[one.file]))
-        if one.row is not None and one.file in known
-        else one
-        for one in findings
-    )
-
-
-def _moved(row: int, first: int | None) -> int | None:
-    return None if first is None else first + row - 1
+    out = []
+    for one in findings:
+        if one.row is not None and one.file in known:
+            first = known[one.file]
+            one = one.replace(row=None if first is None else first + one.row - 1)
+        out.append(one)
+    return tuple(out)
 
 
 @contextmanager

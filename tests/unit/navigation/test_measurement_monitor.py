@@ -25,7 +25,7 @@ def told(observations, end, cuts=(), late=()):
         part = tuple(one for one in observations if first < one.time <= cut)
         missed = tuple(("rtk", at) for at in late if first < at <= cut)
         piece = NavigationChunk(np.empty(0), np.empty((0, 10)), part, (), missed)
-        state, more, ended = deliveries.over(state, piece, cut)
+        state, more, ended = deliveries.process(state, piece, cut)
         events, outages, first = [*events, *more], [*outages, *ended], cut
     more, ended = deliveries.finish(state, end)
     return sorted([*events, *more], key=lambda one: (one.time, one.kind)), [*outages, *ended]
@@ -88,7 +88,7 @@ def test_two_aids_do_not_mix():
     )
     fewer = tuple(one for one in both if one.name != "rtk.position" or one.time < 3.0)
     piece = NavigationChunk(np.empty(0), np.empty((0, 10)), fewer, ())
-    _, events, _ = deliveries.over(state, piece, 9.0)
+    _, events, _ = deliveries.process(state, piece, 9.0)
     assert [(e.time, e.finding.data["name"]) for e in events] == [(5.0, "rtk")]
 
 

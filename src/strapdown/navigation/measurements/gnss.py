@@ -385,7 +385,8 @@ def moving(view: View, arm: Array, arm_name: str) -> tuple[Moving, Moving, Movin
     d_acc = turning @ d_swept - cross_matrix(swept) @ d_W
     d_acc[:, ROTATION] -= cross_matrix(force)
     d_acc[:, VELOCITY] -= 2.0 * cross_matrix(spin)
-    d_acc[:, PHYSICAL:] += C @ _of_accel(view)
+    felt = np.concatenate([[1.0], view.rate, view.force])
+    d_acc[:, PHYSICAL:] += C @ np.tensordot(felt, view.model.stacked.accel, 1)
     return place, velocity, Moving(value, d_acc)
 
 
@@ -405,9 +406,3 @@ def _steady(view: View) -> tuple[Array, Array]:
         view.steady[:3] - np.tensordot(felt, stacked.gyro, 1) @ view.sensors,
         view.steady[3:] - np.tensordot(felt, stacked.accel, 1) @ view.sensors,
     )
-
-
-def _of_accel(view: View) -> Array:
-    """Sensitivity of the specific force to the sensor states, (3, k), body axes."""
-    felt = np.concatenate([[1.0], view.rate, view.force])
-    return np.tensordot(felt, view.model.stacked.accel, 1)
