@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from strapdown.config.navigation_file import read_navigation_spec
+from strapdown.errors import Finding
 from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.report.document_data import draw_stills
 from strapdown.report.document_files import drawings, write_drawings
@@ -149,7 +150,8 @@ def test_the_terminal_says_what_the_page_says(result, capsys):
 def test_the_answer_on_the_terminal_fits_40_lines(result, capsys):
     from strapdown.cli.navigate_tables import print_navigation
 
-    print_navigation(result, result.findings * 20)
+    many = [Finding("navigation.window-too-short", window=k) for k in range(60)]
+    print_navigation(result, many)
     # The paths and the seal take four lines.
     printed = capsys.readouterr()
     assert len((printed.out + printed.err).splitlines()) <= 36
