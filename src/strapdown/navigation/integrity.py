@@ -425,7 +425,7 @@ def _changed(
             out = table[kept]
             out.attrs = dict(table.attrs)
             told[one.aid] = out
-            less = {"count": int((~kept).sum()), "rows": len(table)}
+            less: dict[str, float] = {"count": int((~kept).sum()), "rows": len(table)}
             if one.kind == "gross":
                 return aids, told, _excluded("gross-errors", one, **less)
             less |= {"since": one.since, "until": one.until}
