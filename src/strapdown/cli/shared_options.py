@@ -223,7 +223,7 @@ Verbose = Annotated[
     typer.Option(
         "--verbose",
         "-v",
-        help="Print each stage with its duration, and which reader took which file.",
+        help="Print each stage with its duration, which reader took which file, and all tables.",
         rich_help_panel=OUT_PANEL,
         callback=log_level(logging.INFO),
     ),
