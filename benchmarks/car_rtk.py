@@ -179,7 +179,7 @@ def largest_error(made: Recording, begin: float, end: float, rolls: bool) -> flo
 
 def rows(folder: Path, lengths: Sequence[float], places: int) -> Iterator[str]:
     """Yield a line for each form and length: median and worst of the largest errors."""
-    from strapdown.evaluation.gnss_outages import spans_to_withhold
+    from strapdown.navigation.outage_test import spans_to_withhold
 
     made = recording(folder)
     time = made.imu.index

@@ -78,12 +78,12 @@ def drive(seed: int) -> Drive:
 
 
 def navigator(form: str) -> Any:
-    from strapdown.aiding.gnss import Gnss
     from strapdown.estimation.covariance import COVARIANCES
     from strapdown.estimation.error_filter import ErrorFilter
     from strapdown.estimation.error_model import RotationVectorModel
     from strapdown.estimation.sensor_blocks import accel_bias, gyro_bias
     from strapdown.mechanization import NorthEastDown
+    from strapdown.navigation.measurements.gnss import Gnss
     from strapdown.navigation.navigator import Navigator, with_states
 
     model = RotationVectorModel(

@@ -16,7 +16,7 @@ import numpy as np
 from benchmarks import light_fixes as fixes
 from benchmarks import light_rests as rests
 from benchmarks.light_case import LIMIT, Case, run
-from strapdown.evaluation.heading_light import COLOURS
+from strapdown.navigation.heading_integrity import COLOURS
 
 SCENARIOS: dict[str, Callable[[int], Case]] = {
     "as stated": fixes.nominal,

@@ -9,18 +9,18 @@ import numpy as np
 import pandas as pd
 
 from strapdown import rotation
-from strapdown.aiding.heading import Heading
 from strapdown.config.choice import SLOTS, make_choice
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.navigation_file import navigation_spec
-from strapdown.config.navigation_modules import given_of, sensors_of
+from strapdown.config.navigation_modules import given_of, make_filter, sensors_of
+from strapdown.navigation.integrity import assess_integrity
+from strapdown.navigation.measurements.heading import Heading
 from strapdown.navigation.navigator import with_states
-from strapdown.systems.progress import silent
-from strapdown.systems.sins.chain import NavigationPipeline
-from strapdown.systems.sins.drive import run_batch
-from strapdown.systems.sins.run import make_chain
-from strapdown.systems.sins.source import NavigationSource, read_navigation_source
-from strapdown.systems.sins.trust import trust_of
+from strapdown.navigation.pipeline import NavigationPipeline
+from strapdown.navigation.replay import run_batch
+from strapdown.progress import silent
+from strapdown.systems.navigation_run import make_chain
+from strapdown.systems.navigation_source import NavigationSource, read_navigation_source
 
 LIMIT = 3.0
 KNOWN = 1.0  # deg, stated of the heading at the start
@@ -115,7 +115,10 @@ def run(case: Case) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     recorder = make_choice(spec.recorder, SLOTS["recorder"], given_of(spec))
     ran = run_batch(chain, imu, tables, recorder)
     record = ran.record
-    light = trust_of(spec, chain, sensors, imu, tables, record, ran.aligned, silent).light.table
+    limits = (spec.trust.heading_limit_deg, spec.trust.heading_red_deg)
+    filter_ = make_filter(spec, sensors)
+    report = assess_integrity(chain, filter_, imu, tables, ran, limits, spec.trust.repeat, silent)
+    light = report.light.table
     time = light.index.to_numpy()
     own = np.interp(
         time, record.trajectory.index, np.unwrap(np.radians(record.trajectory["heading"]))

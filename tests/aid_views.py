@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from strapdown import rotation
-from strapdown.aiding.aid import View
 from strapdown.estimation.covariance import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.error_model import PHYSICAL, RotationVectorModel
 from strapdown.estimation.sensor_blocks import accel_bias, gyro_bias, gyro_scale
 from strapdown.frames import q_ne
 from strapdown.nav_state import NavState
+from strapdown.navigation.measurements.measurement import View
 from strapdown.sensors.antenna import antenna_motion
 from strapdown.simulation import Origin
 from strapdown.simulation.minimum_jerk import Track

@@ -7,7 +7,6 @@ from functools import cache
 import numpy as np
 
 from strapdown import rotation
-from strapdown.aiding.gnss import Gnss
 from strapdown.estimation.covariance import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.error_model import RotationVectorModel
@@ -16,6 +15,7 @@ from strapdown.frames import place_difference
 from strapdown.increments import motion_increments
 from strapdown.mechanization import MECHANIZATIONS
 from strapdown.nav_state import NavState
+from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.navigator import Navigator, with_states
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation import Origin, car, simulate_imu

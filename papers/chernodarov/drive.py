@@ -10,7 +10,6 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from papers.chernodarov.bench import ELLIPSOID, HEADING_DEG, SENSOR, SITE, after, align
-from strapdown.aiding import Gnss
 from strapdown.alignment import FineResult
 from strapdown.earth import radii_of_curvature
 from strapdown.errors import DataError, DivergenceError
@@ -32,6 +31,7 @@ from strapdown.navigation import (
     NavigationChunk,
     Navigator,
 )
+from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.simulation import (
     Accelerate,
     GnssReceiver,

@@ -8,7 +8,6 @@ from functools import cache
 import numpy as np
 
 from strapdown import rotation
-from strapdown.aiding.gnss import Gnss
 from strapdown.estimation.covariance import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.error_model import QuaternionModel, RotationVectorModel
@@ -18,6 +17,7 @@ from strapdown.mechanization import NorthEastDown, WanderAzimuth
 from strapdown.mechanization.state_error import state_error
 from strapdown.nav_state import NavState
 from strapdown.navigation.filter_options import DAMPINGS
+from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.navigator import Navigator, with_states
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation.earth_motion import Origin

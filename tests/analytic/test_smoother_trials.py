@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from strapdown.evaluation.truth_comparison import band_of_mean, normalised_squares
 from strapdown.mechanization.state_error import state_error
 from strapdown.nav_state import NavState
 from strapdown.navigation.recorder import FullRecorder
 from strapdown.navigation.smoother import RauchTungStriebel
+from strapdown.navigation.truth_comparison import band_of_mean, normalised_squares
 
 sys.path.insert(0, str(Path(__file__).parent))
 

@@ -18,7 +18,7 @@ from strapdown.report.alignment_trust import trust as alignment_trust
 from strapdown.report.navigation_found import examine, told_of
 from strapdown.report.navigation_trust import trust as navigation_trust
 from strapdown.systems.alignment_run import run_alignment
-from strapdown.systems.sins.run import run_navigation
+from strapdown.systems.navigation_run import run_navigation
 
 ROOMS = sorted(
     path.name.removesuffix(".toml")

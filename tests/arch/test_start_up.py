@@ -62,7 +62,7 @@ def test_the_public_names_are_there():
         assert getattr(strapdown, name) is not None
 
 
-ROOMS = ("aiding", "alignment", "crash", "dsp", "estimation", "evaluation", "navigation", "sensors")
+ROOMS = ("alignment", "crash", "dsp", "estimation", "evaluation", "navigation", "sensors")
 
 
 @pytest.mark.parametrize("room", ROOMS)

@@ -26,8 +26,8 @@ from strapdown.report.svg_chart import draw
 from strapdown.report.trajectory_simulation import simulation_chart
 from strapdown.report.verdict_document import light_picture
 from strapdown.systems.attitude_bench import bench_attitude
-from strapdown.systems.sins.draft import draft_navigation
-from strapdown.systems.sins.run import run_navigation
+from strapdown.systems.navigation_draft import draft_navigation
+from strapdown.systems.navigation_run import run_navigation
 from strapdown.systems.trajectory_source import make_motion
 
 sys.path.insert(0, str(Path(__file__).parents[1]))

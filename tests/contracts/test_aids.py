@@ -16,14 +16,18 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from aid_views import SITUATIONS, Moment, difference_columns, moment_of, view_of
 from aided_drives import drive, gnss_of, increments_of, navigator_of, run
 from strapdown import rotation
-from strapdown.aiding.aid import ImuDerivedMeasurement, Measurement, TabulatedMeasurement
-from strapdown.aiding.aids import AIDS
-from strapdown.aiding.barometer import Barometer
-from strapdown.aiding.gnss import Gnss
-from strapdown.aiding.heading import Heading
-from strapdown.aiding.standstill import ZeroRate, ZeroVelocity
-from strapdown.aiding.vehicle import BodyVelocity, NoSlip, Odometer
 from strapdown.mechanization import MECHANIZATIONS
+from strapdown.navigation.measurements import AIDS
+from strapdown.navigation.measurements.barometer import Barometer
+from strapdown.navigation.measurements.gnss import Gnss
+from strapdown.navigation.measurements.heading import Heading
+from strapdown.navigation.measurements.measurement import (
+    ImuDerivedMeasurement,
+    Measurement,
+    TabulatedMeasurement,
+)
+from strapdown.navigation.measurements.standstill import ZeroRate, ZeroVelocity
+from strapdown.navigation.measurements.vehicle import BodyVelocity, NoSlip, Odometer
 from strapdown.simulation.aiding_sensors import (
     Compass,
     PressureHeight,

@@ -22,9 +22,6 @@ from tests.town_drive import (
     motion,
 )
 
-from strapdown.aiding.aid import ImuDerivedMeasurement
-from strapdown.aiding.aids import AIDS
-from strapdown.aiding.gnss import Gnss
 from strapdown.alignment.alignment import Site
 from strapdown.alignment.coarse_alignments import COARSE_ALIGNMENTS
 from strapdown.alignment.fine import FineAlignment
@@ -36,24 +33,20 @@ from strapdown.estimation.sensor_blocks import accel_bias, gyro_bias, gyro_drift
 from strapdown.mechanization import MECHANIZATIONS
 from strapdown.nav_state import NavState
 from strapdown.navigation.filter_options import DAMPINGS
+from strapdown.navigation.measurements import AIDS
+from strapdown.navigation.measurements.gnss import Gnss
+from strapdown.navigation.measurements.measurement import ImuDerivedMeasurement
+from strapdown.navigation.modes import CoarseMode, Command, FineMode, KnownStart, Navigation, Until
 from strapdown.navigation.navigator import Navigator, with_states
+from strapdown.navigation.pipeline import NavigationPipeline
+from strapdown.navigation.preprocessing import GapPolicy, ImuPreprocessor
 from strapdown.navigation.recorder import RECORDERS, FullRecorder
+from strapdown.navigation.replay import Recording, run_batch, run_by_sample
 from strapdown.navigation.smoother import SMOOTHERS
 from strapdown.prefilter import PREFILTERS
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
 from strapdown.simulation import Origin, StationaryMotion, simulate_imu
-from strapdown.systems.sins.chain import NavigationPipeline
-from strapdown.systems.sins.drive import Recording, run_batch, run_by_sample
-from strapdown.systems.sins.intake import GapPolicy, ImuPreprocessor
-from strapdown.systems.sins.modes import (
-    CoarseMode,
-    Command,
-    FineMode,
-    KnownStart,
-    Navigation,
-    Until,
-)
 from strapdown.tables import (
     ACCEL,
     GYRO,

@@ -17,12 +17,12 @@ from one_file.cauchy import Cauchy
 from one_file.half_steps import HalfSteps
 from one_file.staff import Staff
 
-from strapdown.aiding.aids import AIDS
 from strapdown.config.navigation_file import read_navigation_spec
 from strapdown.errors import ConfigError
 from strapdown.estimation.robust import INFLUENCES
 from strapdown.mechanization import MECHANIZATIONS
-from strapdown.systems.sins.run import run_navigation
+from strapdown.navigation.measurements import AIDS
+from strapdown.systems.navigation_run import run_navigation
 
 FILE = """[simulation]
 rate_hz = 50.0

@@ -24,20 +24,20 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
-from strapdown.aiding.gnss import Gnss
-from strapdown.aiding.gnss_clock import time_offset, velocity_delay
-from strapdown.aiding.gnss_readiness import gnss_readiness
-from strapdown.aiding.vehicle import NoSlip
 from strapdown.alignment.levelling import level
 from strapdown.estimation.covariance import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.error_model import RotationVectorModel
 from strapdown.estimation.sensor_blocks import accel_bias, gyro_bias, gyro_drift
-from strapdown.evaluation.gnss_outages import score_withheld, scores_table, spans_to_withhold
 from strapdown.increments import motion_increments
 from strapdown.mechanization import MECHANIZATIONS
 from strapdown.nav_state import NavState
+from strapdown.navigation.measurements.gnss import Gnss
+from strapdown.navigation.measurements.gnss_clock import time_offset, velocity_delay
+from strapdown.navigation.measurements.gnss_readiness import gnss_readiness
+from strapdown.navigation.measurements.vehicle import NoSlip
 from strapdown.navigation.navigator import Navigator, with_states
+from strapdown.navigation.outage_test import score_withheld, scores_table, spans_to_withhold
 from strapdown.tables import gnss_table, imu_table
 
 DEG = np.pi / 180.0

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from strapdown.evaluation.gnss_outages import (
+from strapdown.navigation.outage_test import (
     score_withheld,
     score_withheld_smoothed,
     scores_table,

@@ -3,20 +3,20 @@
 import numpy as np
 import pytest
 
-from strapdown.aiding.gnss import Gnss
 from strapdown.alignment.coarse_alignments import COARSE_ALIGNMENTS
 from strapdown.estimation.covariance import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.error_model import RotationVectorModel
 from strapdown.estimation.sensor_blocks import accel_bias, gyro_bias
 from strapdown.mechanization import MECHANIZATIONS
+from strapdown.navigation.measurements.gnss import Gnss
+from strapdown.navigation.modes import CoarseMode, Navigation, Until
 from strapdown.navigation.navigator import Navigator, with_states
+from strapdown.navigation.pipeline import NavigationPipeline
+from strapdown.navigation.preprocessing import GapPolicy, ImuPreprocessor
 from strapdown.navigation.recorder import IntervalRecorder
+from strapdown.navigation.replay import run_batch
 from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
-from strapdown.systems.sins.chain import NavigationPipeline
-from strapdown.systems.sins.drive import run_batch
-from strapdown.systems.sins.intake import GapPolicy, ImuPreprocessor
-from strapdown.systems.sins.modes import CoarseMode, Navigation, Until
 from strapdown.tables import gnss_table, imu_table
 
 DEG = np.pi / 180.0

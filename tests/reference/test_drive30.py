@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from tests.recorded import DATA, without
 
-from strapdown.aiding.gnss import Gnss
 from strapdown.estimation.covariance import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.error_model import RotationVectorModel
@@ -21,6 +20,7 @@ from strapdown.estimation.sensor_blocks import accel_bias, gyro_bias
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown
 from strapdown.nav_state import NavState
+from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.navigator import Navigator, with_states
 from strapdown.tables import gnss_table, imu_table
 

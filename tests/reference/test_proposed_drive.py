@@ -12,10 +12,10 @@ import pytest
 
 from strapdown.config.alignment import LogTable
 from strapdown.config.navigation_file import navigation_spec
-from strapdown.evaluation.truth_comparison import smoother_consistency
 from strapdown.frames import place_difference
-from strapdown.systems.sins.proposal import propose
-from strapdown.systems.sins.run import run_navigation
+from strapdown.navigation.truth_comparison import smoother_consistency
+from strapdown.systems.navigation_proposal import propose
+from strapdown.systems.navigation_run import run_navigation
 from strapdown.tables import GEODETIC
 
 MOUNTING = -6.8

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from strapdown.config.navigation_file import read_navigation_spec
-from strapdown.systems.sins.run import run_navigation
+from strapdown.systems.navigation_run import run_navigation
 
 TEXT = """
 [simulation]

@@ -8,8 +8,7 @@ from strapdown.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
     from strapdown.alignment.alignment import Site
-    from strapdown.alignment.fine import FineAlignment
-    from strapdown.alignment.fine_result import FineResult
+    from strapdown.alignment.fine import FineAlignment, FineResult
     from strapdown.alignment.two_vector import TwoVector
 
 __all__ = [
@@ -23,8 +22,7 @@ load_on_first_use(
     __name__,
     {
         "alignment": "Site",
-        "fine": "FineAlignment",
-        "fine_result": "FineResult",
+        "fine": "FineAlignment FineResult",
         "two_vector": "TwoVector",
     },
 )

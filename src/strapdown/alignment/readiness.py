@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.alignment.alignment import Alignment, CoarseAlignment, Site
-from strapdown.alignment.fine import settled_epoch
-from strapdown.alignment.fine_result import FineResult, alignment_of
+from strapdown.alignment.fine import FineResult, alignment_of, settled_epoch
 from strapdown.alignment.inertial_sums import sum_inertially
 from strapdown.alignment.mean_errors import sensor_covariance, sensor_noise
 from strapdown.alignment.stationary import home_of

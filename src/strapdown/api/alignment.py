@@ -13,16 +13,7 @@ import pandas as pd
 from pydantic import ValidationError
 
 from strapdown.api.navigation import NavigationRun, refused_value
-from strapdown.api.reading import (
-    NOWHERE,
-    GnssFile,
-    ImuFile,
-    Memory,
-    imu_input,
-    moved_inputs,
-    moved_paths,
-    table_input,
-)
+from strapdown.api.reading import GnssFile, ImuFile, imu_input, table_input
 from strapdown.bundle.seal import Seal, check_destination
 from strapdown.config.alignment import AlignmentSpec, LogTable
 from strapdown.config.alignment_file import NOT_BEFORE_FINE, alignment_spec, read_alignment_spec
@@ -32,11 +23,12 @@ from strapdown.config.navigation_file import navigation_spec
 from strapdown.config.spec import specify
 from strapdown.errors import ConfigError
 from strapdown.formats import read_raw
+from strapdown.progress import Progress, silent
 from strapdown.report.alignment import write_alignment
 from strapdown.report.coast import read_coasting_run, write_coast
 from strapdown.systems.alignment_run import AlignmentResult, run_alignment
-from strapdown.systems.coasting.run import CoastResult, run_coast
-from strapdown.systems.progress import Progress, silent
+from strapdown.systems.inputs import NOWHERE, Memory, moved_inputs, moved_paths
+from strapdown.systems.outage_run import CoastResult, run_coast
 from strapdown.tables import EULER
 
 __all__ = [

@@ -15,28 +15,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
 from strapdown.alignment.levelling import level
-from strapdown.api.reading import (
-    NOWHERE,
-    ImuFile,
-    Memory,
-    imu_input,
-    imu_of,
-    imu_of_arrays,
-    moved_inputs,
-    moved_paths,
-)
+from strapdown.api.reading import ImuFile, imu_input, imu_of, imu_of_arrays
 from strapdown.attitude import attitude_history, make_algorithm
 from strapdown.attitude.tracker import AttitudeTracker
 from strapdown.bundle.seal import Seal, check_destination
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.recording import Origin
 from strapdown.increments import increments_from_imu
+from strapdown.progress import Progress, silent
 from strapdown.report.attitude import write_attitude
 from strapdown.results.attitude_bench import AttitudeBench
 from strapdown.sensors.rest import find_rests
 from strapdown.systems.attitude_bench import bench_attitude, initial_attitude
 from strapdown.systems.attitude_source import Source
-from strapdown.systems.progress import Progress, silent
+from strapdown.systems.inputs import NOWHERE, Memory, moved_inputs, moved_paths
 from strapdown.tables import GYRO, QUATERNION, attitude_table
 
 if TYPE_CHECKING:

@@ -2,42 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, field, fields, replace
-from html import escape
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
 from pydantic import ValidationError
 
-from strapdown.api.reading import (
-    NOWHERE,
-    GnssFile,
-    ImuFile,
-    Memory,
-    imu_input,
-    moved_inputs,
-    moved_paths,
-    table_input,
-)
-from strapdown.bundle.seal import Seal, check_destination
+from strapdown.api.reading import GnssFile, ImuFile, imu_input, table_input
 from strapdown.config.alignment import LogTable
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.navigation_file import navigation_spec, read_navigation_spec
 from strapdown.config.spec import misfit, specify
 from strapdown.errors import ConfigError
 from strapdown.formats.clocks import on_clock_of
-from strapdown.report.navigation import write_navigation
-from strapdown.systems.progress import Progress, silent
-from strapdown.systems.sins.proposal import CODE_RECEIVER, propose
-from strapdown.systems.sins.run import NavigationResult, run_navigation
-from strapdown.systems.sins.trust import IntegrityReport
-from strapdown.tables import EULER, GEODETIC, VELOCITY
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from strapdown.progress import Progress, silent
+from strapdown.systems.inputs import NOWHERE, Memory
+from strapdown.systems.navigation_proposal import CODE_RECEIVER, propose
+from strapdown.systems.navigation_run import NavigationRun, run_navigation
 
 __all__ = [
     "Barometer",
@@ -51,7 +35,6 @@ __all__ = [
     "ZeroAngularRate",
     "ZeroVelocity",
     "navigate",
-    "run_specified",
     "smoothed_too",
     "specify_navigation",
 ]
@@ -174,153 +157,6 @@ class Heading(_OfKind):
     KIND = "heading"
 
 
-# --- the result ---------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class NavigationRun(NavigationResult):
-    """Result of a navigation run.
-
-    It adds the properties below to the attributes of `NavigationResult`. `save` writes the result;
-    until then it is in memory only.
-    """
-
-    memory: Memory = field(default=Memory({}))
-
-    @property
-    def trajectory(self) -> pd.DataFrame:
-        """Trajectory table by time in s; smoothed if the run is.
-
-        ``lat lon`` in deg, ``alt`` in m over the ellipsoid, ``VN VE VD`` in m/s, ``roll pitch
-        heading`` in deg.
-        """
-        return self.record.trajectory
-
-    @property
-    def sd(self) -> pd.DataFrame:
-        """Standard deviations by time: ``north east down`` m, ``VN VE VD`` m/s, angles deg."""
-        return self.record.sd
-
-    @property
-    def innovations(self) -> Mapping[str, pd.DataFrame]:
-        """By name of the observation (``gnss.position``): innovation, variance, weight."""
-        return self.record.innovations
-
-    @property
-    def sensor_errors(self) -> pd.DataFrame:
-        """Estimates of sensor and measurement errors by time, in SI (`record.units`)."""
-        return self.record.sensors
-
-    @property
-    def integrity(self) -> IntegrityReport:
-        """Whether heading and bounds can be trusted, and the first inconsistency."""
-        return self.trust
-
-    def to_pandas(self) -> pd.DataFrame:
-        """The trajectory with its standard deviations, at their common instants.
-
-        Returns
-        -------
-        DataFrame
-            Columns of `trajectory`, and those of `sd` with the suffix ``_sd``.
-        """
-        return self.trajectory.join(self.sd.add_suffix("_sd"), how="inner")
-
-    def plot(self, kind: str = "plan") -> Figure:
-        """Draw one chart of the report.
-
-        Parameters
-        ----------
-        kind : str
-            ``plan``, ``bound``, ``height``, ``velocity``, ``attitude``, or the name of an
-            observation of `innovations`.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            Its ``axes`` are the panels. Independent of windows and global state.
-
-        Raises
-        ------
-        ConfigError
-            The chart does not exist for this run.
-        """
-        from strapdown.report.navigation_view import plot
-
-        return plot(self, kind)
-
-    def save(
-        self,
-        out: str | Path,
-        *,
-        report: bool = True,
-        force: bool = False,
-        progress: Progress = silent,
-    ) -> Seal:
-        """Write the run as a sealed bundle, which `verify` runs again.
-
-        Parameters
-        ----------
-        out : str or Path
-            New folder. Tables given in memory become input files in it.
-        report : bool
-            Whether to write its pages and figures as well.
-        force : bool
-            Overwrite an existing bundle.
-        progress : callable, optional
-            Called with a stage and the completed fraction.
-
-        Returns
-        -------
-        Seal
-
-        Raises
-        ------
-        ConfigError
-            `out` exists and may not be overwritten.
-        DataError
-            An input file has changed since it was read.
-        """
-        check_destination(Path(out), force)
-        with self._on_disk() as result:
-            return write_navigation(result, out, report=report, force=force, progress=progress)
-
-    @contextmanager
-    def _on_disk(self) -> Iterator[NavigationRun]:
-        """The run with every input a file."""
-        with self.memory.as_files() if self.memory.tables else nullcontext(NOWHERE) as folder:
-            yield _moved(self, NOWHERE, folder)
-
-    def __repr__(self) -> str:
-        time, smoothed = self.trajectory.index, "" if self.forward is None else ", smoothed"
-        last = self.sd.iloc[-1]
-        return (
-            f"<NavigationRun {self.source.name}: {time[-1] - time[0]:.6g} s{smoothed}; at the end "
-            f"sd north {last['north']:.3g} m, east {last['east']:.3g} m, heading "
-            f"{last['heading']:.3g}°; {len(self.findings)} findings>"
-        )
-
-    def _repr_html_(self) -> str:
-        rows = self.to_pandas().iloc[[0, -1]]
-        shown = rows[[*GEODETIC, *VELOCITY, *EULER, "north_sd", "east_sd", "heading_sd"]]
-        found = "".join(f"<li>{escape(str(f))}</li>" for f in self.findings)
-        return (
-            f"<div><b>{escape(repr(self)[1:-1])}</b></div>{shown.to_html(float_format='{:.6g}'.format)}"
-            f"<ul>{found}</ul>"
-        )
-
-
-def _moved(run: NavigationRun, old: Path, new: Path) -> NavigationRun:
-    """The run with its input paths moved from one folder to another."""
-    if not run.memory.tables or old == new:
-        return run
-    return replace(
-        run,
-        spec=navigation_spec(moved_paths(run.spec.plain(), old, new)),
-        inputs=moved_inputs(run.inputs, old, new, copied=True),
-    )
-
-
 # --- the run ------------------------------------------------------------------------------
 
 
@@ -382,7 +218,7 @@ def navigate(
                 quantity="measurements, sensor, start, reference, options",
             )
         spec = read_navigation_spec(imu)
-        return run_specified(smoothed_too(spec) if smooth else spec, Path(imu), progress)
+        return run_navigation(smoothed_too(spec) if smooth else spec, Path(imu), progress)
     memory = _memory(imu, measurements, reference)
     with memory.as_files() if memory.tables else nullcontext(NOWHERE) as folder:
         log = _log_in(imu, memory, folder)
@@ -398,33 +234,8 @@ def navigate(
             spec = specify_navigation(log, aids, sensor=sensor, start=start, options=extra)
         except ValidationError as error:
             raise refused_value(error) from None
-        run = run_specified(spec, None, progress)
-        return _moved(replace(run, memory=memory), folder, NOWHERE)
-
-
-def run_specified(
-    spec: NavigationSpec,
-    file: Path | None = None,
-    progress: Progress = silent,
-    **drive: Callable[..., Any],
-) -> NavigationRun:
-    """Run a specification of navigation.
-
-    Parameters
-    ----------
-    spec : NavigationSpec
-    file : Path, optional
-        File it was read from, also an input.
-    progress : callable, optional
-    **drive : callable
-        ``drive``: function that runs the chain, instead of one run at once.
-
-    Returns
-    -------
-    NavigationRun
-    """
-    result = run_navigation(spec, file, progress, **drive)
-    return NavigationRun(**{f.name: getattr(result, f.name) for f in fields(result)})
+        run = run_navigation(spec, None, progress)
+        return replace(run, memory=memory).in_folder(folder, NOWHERE)
 
 
 def smoothed_too(spec: NavigationSpec) -> NavigationSpec:

@@ -9,10 +9,8 @@ restores each number bitwise.
 from __future__ import annotations
 
 import hashlib
-import tempfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,16 +18,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from strapdown.bundle.configuration_paths import with_paths
 from strapdown.config.alignment import AxesTable, LogTable
 from strapdown.config.spec import specify
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
-from strapdown.formats import csv
-from strapdown.formats.clocks import GPS, UNIX, clock_of
 from strapdown.formats.gnss_files import GNSS_READERS, GnssOptions
 from strapdown.formats.gnss_files import read_gnss as read_gnss_table
-from strapdown.formats.log_writers import LOG_WRITERS
-from strapdown.results.inputs import InputFiles
 from strapdown.systems.alignment_source import body_record
 from strapdown.tables import ACCEL, GYRO, QUATERNION, imu_table
 
@@ -38,7 +31,6 @@ __all__ = [
     "GnssFixes",
     "Imu",
     "ImuFile",
-    "Memory",
     "Streams",
     "imu_input",
     "read",
@@ -488,88 +480,3 @@ def _unchanged(table: pd.DataFrame) -> ImuFile | GnssFile | None:
     """The file that a table was read from, if the table is unchanged."""
     file, digest = table.attrs.get("file", (None, ""))
     return file if file is not None and _digest(table) == digest else None
-
-
-#: Stands for the folder of the files that a bundle makes of tables in memory.
-NOWHERE = Path("memory")
-
-
-@dataclass(frozen=True)
-class Memory:
-    """Tables in memory, by their names as input files.
-
-    Attributes
-    ----------
-    tables : mapping of str to DataFrame
-        ``imu.npz``: an Imu table; ``NAME.csv``: a table by time, its columns in SI and degrees.
-    """
-
-    tables: Mapping[str, pd.DataFrame]
-
-    @contextmanager
-    def as_files(self) -> Iterator[Path]:
-        """Write each table exactly into a temporary folder, which is removed at the end."""
-        with tempfile.TemporaryDirectory(prefix="strapdown-") as name:
-            folder = Path(name).resolve()
-            for file, table in self.tables.items():
-                if file.endswith(".npz"):
-                    LOG_WRITERS["npz"](folder / file, table, None)
-                else:
-                    _write_csv(folder / file, table)
-            yield folder
-
-
-def _write_csv(path: Path, table: pd.DataFrame) -> None:
-    """Write the named columns, with the unit that their quantity has in a table."""
-    clock = clock_of(table).name
-    name = {GPS: "gps_sow_s", UNIX: "unix_time_s"}.get(clock, "time_s")
-    columns = {name: table.index.to_numpy(dtype=np.float64)}
-    week = table.attrs.get("gps_week")
-    if clock == GPS and week is not None:
-        columns["week"] = np.full(len(table), float(week))
-    for column in table.columns:
-        unit = _UNITS.get(str(column).removesuffix("_sd"), "")
-        columns[f"{column}{unit}"] = table[column].to_numpy(dtype=np.float64)
-    csv.write(path, columns, {})
-
-
-_UNITS = {
-    **dict.fromkeys(("lat", "lon", "roll", "pitch", "heading"), "_deg"),
-    **dict.fromkeys(("alt", "north", "east", "down", "height"), "_m"),
-    **dict.fromkeys(("VN", "VE", "VD", "speed", "vx", "vy", "vz"), "_m_s"),
-}
-
-
-def moved_inputs(
-    inputs: tuple[InputFiles, ...], old: Path, new: Path, *, copied: bool = False
-) -> tuple[InputFiles, ...]:
-    """Move inputs from one folder to another.
-
-    Parameters
-    ----------
-    inputs : tuple of InputFiles
-    old, new : Path
-    copied : bool
-        Whether a bundle copies the inputs in `new`, whatever their size.
-    """
-    return tuple(
-        replace(
-            one,
-            path=new / one.path.relative_to(old),
-            files=tuple(new / f.relative_to(old) for f in one.files),
-            copied=copied,
-        )
-        if one.path.is_relative_to(old)
-        else one
-        for one in inputs
-    )
-
-
-def moved_paths(configuration: Any, old: Path, new: Path) -> Any:
-    """A configuration as plain data, with paths moved from one folder to another."""
-
-    def change(path: str) -> str:
-        given = Path(path)
-        return str(new / given.relative_to(old)) if given.is_relative_to(old) else path
-
-    return with_paths(configuration, change)

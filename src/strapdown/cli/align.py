@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -23,30 +24,24 @@ EPILOG = (
 MOST = 6  # findings on the terminal
 
 
-@spread
-def align(
-    source: Annotated[
-        Path,
-        typer.Argument(
-            metavar="LOG|CONFIG.toml",
-            help="A log of gyros and accelerometers of a body that stays at its place, or the "
-            "file of an alignment.",
-        ),
-    ],
+@dataclass(frozen=True)
+class AlignFlags:
+    """Position, sensor and method of an alignment."""
+
     lat: Annotated[
         float | None,
         typer.Option(metavar="DEG", help="Latitude, north positive.", rich_help_panel=WITH_PANEL),
-    ] = None,
+    ] = None
     lon: Annotated[
         float | None,
         typer.Option(metavar="DEG", help="Longitude, east positive.", rich_help_panel=WITH_PANEL),
-    ] = None,
+    ] = None
     alt: Annotated[
         float | None,
         typer.Option(
             metavar="M", help="Height over the ellipsoid (0).", rich_help_panel=WITH_PANEL
         ),
-    ] = None,
+    ] = None
     sensor: Annotated[
         str | None,
         typer.Option(
@@ -55,7 +50,7 @@ def align(
             ".toml file of your own.",
             rich_help_panel=WITH_PANEL,
         ),
-    ] = None,
+    ] = None
     method: Annotated[
         str,
         typer.Option(
@@ -66,13 +61,13 @@ def align(
             show_default=False,
             rich_help_panel=RUN_PANEL,
         ),
-    ] = "inertial_frame",
+    ] = "inertial_frame"
     coarse_only: Annotated[
         bool,
         typer.Option(
             "--coarse-only", help="No fine alignment after it.", rich_help_panel=RUN_PANEL
         ),
-    ] = False,
+    ] = False
     gnss: Annotated[
         Path | None,
         typer.Option(
@@ -80,7 +75,7 @@ def align(
             help="Fixes of a satellite receiver, for --method gnss_course.",
             rich_help_panel=RUN_PANEL,
         ),
-    ] = None,
+    ] = None
     prefilter: Annotated[
         str,
         typer.Option(
@@ -90,7 +85,20 @@ def align(
             show_default=False,
             rich_help_panel=RUN_PANEL,
         ),
-    ] = "none",
+    ] = "none"
+
+
+@spread
+def align(
+    source: Annotated[
+        Path,
+        typer.Argument(
+            metavar="LOG|CONFIG.toml",
+            help="A log of gyros and accelerometers of a body that stays at its place, or the "
+            "file of an alignment.",
+        ),
+    ],
+    flags: AlignFlags,
     *,
     log: LogFlags,
     out: Annotated[Path | None, folder_to_make("LOG-align")] = None,
@@ -111,14 +119,10 @@ def align(
     from strapdown.config.alignment_file import read_alignment_spec
 
     given: dict[str, Any] = {
-        "lat": lat,
-        "lon": lon,
-        "alt": alt,
-        "sensor": sensor,
-        "method": None if method == "inertial_frame" else method,
-        "coarse_only": coarse_only or None,
-        "gnss": gnss,
-        "prefilter": None if prefilter == "none" else prefilter,
+        **asdict(flags),
+        "method": None if flags.method == "inertial_frame" else flags.method,
+        "coarse_only": flags.coarse_only or None,
+        "prefilter": None if flags.prefilter == "none" else flags.prefilter,
         **log.given(),
     }
     refuse_result(source, "log")

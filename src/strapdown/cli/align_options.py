@@ -8,7 +8,6 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from strapdown.api.alignment import specify_alignment
 from strapdown.api.reading import ImuFile
 from strapdown.cli.shared_options import log_keys
 from strapdown.config.alignment import AlignmentSpec, LogTable
@@ -111,6 +110,8 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
     DataError
         The log cannot be read.
     """
+    from strapdown.api.alignment import specify_alignment
+
     try:
         table = LogTable(path=str(log), **log_keys(given))
     except ValidationError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -28,6 +29,126 @@ _WHAT, _START, _WHERE = (
 )
 
 
+@dataclass(frozen=True)
+class MotionFlags:
+    """Motion of a sensor, by key of its table."""
+
+    speed_m_per_s: Annotated[
+        float | None,
+        typer.Option(
+            "--speed", metavar="M/S", help="It goes so fast (0: it stands).", rich_help_panel=_WHAT
+        ),
+    ] = None
+    to_speed_m_per_s: Annotated[
+        float | None,
+        typer.Option(
+            "--to-speed",
+            metavar="M/S",
+            help="To which it comes over the outage.",
+            rich_help_panel=_WHAT,
+        ),
+    ] = None
+    turn_rate_deg_per_s: Annotated[
+        float | None,
+        typer.Option(
+            "--turn-rate", metavar="DEG/S", help="It turns, to the right.", rich_help_panel=_WHAT
+        ),
+    ] = None
+    heading_deg: Annotated[
+        float | None,
+        typer.Option("--heading", metavar="DEG", help="Where it goes (45).", rich_help_panel=_WHAT),
+    ] = None
+    lat_deg: Annotated[
+        float | None,
+        typer.Option("--lat", metavar="DEG", help="Latitude (45).", rich_help_panel=_WHAT),
+    ] = None
+
+
+@dataclass(frozen=True)
+class StartFlags:
+    """What is known of a sensor at the start, by key of its table."""
+
+    aided_s: Annotated[
+        float | None,
+        typer.Option(
+            "--aided",
+            metavar="S",
+            help="So long a drive with fixes before it (600); 0: what an alignment leaves.",
+            rich_help_panel=_START,
+        ),
+    ] = None
+    fix_position_sd_m: Annotated[
+        float | None,
+        typer.Option(
+            "--fix-sd",
+            metavar="M",
+            help="Of these fixes, one a second (1.5).",
+            rich_help_panel=_START,
+        ),
+    ] = None
+    position_sd_m: Annotated[
+        float | None,
+        typer.Option(
+            "--position-sd",
+            metavar="M",
+            help="In place of what that leaves, each axis; so the following.",
+            rich_help_panel=_START,
+        ),
+    ] = None
+    velocity_sd_m_per_s: Annotated[
+        float | None,
+        typer.Option("--velocity-sd", metavar="M/S", help="Each axis.", rich_help_panel=_START),
+    ] = None
+    tilt_sd_deg: Annotated[
+        float | None,
+        typer.Option("--tilt-sd", metavar="DEG", help="Roll and pitch.", rich_help_panel=_START),
+    ] = None
+    heading_sd_deg: Annotated[
+        float | None,
+        typer.Option("--heading-sd", metavar="DEG", help="Heading.", rich_help_panel=_START),
+    ] = None
+    gyro_bias_sd_deg_per_h: Annotated[
+        float | None,
+        typer.Option(
+            "--gyro-bias-sd",
+            metavar="DEG/H",
+            help="What is left of the gyro biases.",
+            rich_help_panel=_START,
+        ),
+    ] = None
+    accel_bias_sd_ug: Annotated[
+        float | None,
+        typer.Option(
+            "--accel-bias-sd",
+            metavar="UG",
+            help="What is left of the accelerometer biases, millionths of g.",
+            rich_help_panel=_START,
+        ),
+    ] = None
+
+
+@dataclass(frozen=True)
+class OutageFlags:
+    """Outages of a navigation run, by key of its table."""
+
+    at_s: Annotated[
+        float | None,
+        typer.Option(
+            "--at",
+            metavar="S",
+            help="The outage begins at this stamp of the log; even places, if not given.",
+            rich_help_panel=_WHERE,
+        ),
+    ] = None
+    places: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="So many outages, evenly (10).", rich_help_panel=_WHERE),
+    ] = None
+    from_s: Annotated[float | None, part_from("where the filter has settled", _WHERE)] = None
+    to_s: Annotated[float | None, part_to(_WHERE)] = None
+    duration_s: Annotated[float | None, part_long(_WHERE)] = None
+
+
 @spread
 def coast(
     source: Annotated[
@@ -39,6 +160,7 @@ def coast(
             "then taken away.",
         ),
     ],
+    *,
     outage: Annotated[
         float,
         typer.Option(
@@ -48,28 +170,7 @@ def coast(
             rich_help_panel=RUN_PANEL,
         ),
     ] = 60.0,
-    speed: Annotated[
-        float | None,
-        typer.Option(metavar="M/S", help="It goes so fast (0: it stands).", rich_help_panel=_WHAT),
-    ] = None,
-    to_speed: Annotated[
-        float | None,
-        typer.Option(
-            metavar="M/S", help="To which it comes over the outage.", rich_help_panel=_WHAT
-        ),
-    ] = None,
-    turn_rate: Annotated[
-        float | None,
-        typer.Option(metavar="DEG/S", help="It turns, to the right.", rich_help_panel=_WHAT),
-    ] = None,
-    heading: Annotated[
-        float | None,
-        typer.Option(metavar="DEG", help="Where it goes (45).", rich_help_panel=_WHAT),
-    ] = None,
-    lat: Annotated[
-        float | None,
-        typer.Option(metavar="DEG", help="Latitude (45).", rich_help_panel=_WHAT),
-    ] = None,
+    motion: MotionFlags,
     keep: Annotated[
         list[str] | None,
         typer.Option(
@@ -80,67 +181,8 @@ def coast(
             rich_help_panel=_WHAT,
         ),
     ] = None,
-    aided: Annotated[
-        float | None,
-        typer.Option(
-            metavar="S",
-            help="So long a drive with fixes before it (600); 0: what an alignment leaves.",
-            rich_help_panel=_START,
-        ),
-    ] = None,
-    fix_sd: Annotated[
-        float | None,
-        typer.Option(
-            metavar="M", help="Of these fixes, one a second (1.5).", rich_help_panel=_START
-        ),
-    ] = None,
-    position_sd: Annotated[
-        float | None,
-        typer.Option(
-            metavar="M",
-            help="In place of what that leaves, each axis; so the following.",
-            rich_help_panel=_START,
-        ),
-    ] = None,
-    velocity_sd: Annotated[
-        float | None, typer.Option(metavar="M/S", help="Each axis.", rich_help_panel=_START)
-    ] = None,
-    tilt_sd: Annotated[
-        float | None, typer.Option(metavar="DEG", help="Roll and pitch.", rich_help_panel=_START)
-    ] = None,
-    heading_sd: Annotated[
-        float | None, typer.Option(metavar="DEG", help="Heading.", rich_help_panel=_START)
-    ] = None,
-    gyro_bias_sd: Annotated[
-        float | None,
-        typer.Option(
-            metavar="DEG/H", help="What is left of the gyro biases.", rich_help_panel=_START
-        ),
-    ] = None,
-    accel_bias_sd: Annotated[
-        float | None,
-        typer.Option(
-            metavar="UG",
-            help="What is left of the accelerometer biases, millionths of g.",
-            rich_help_panel=_START,
-        ),
-    ] = None,
-    at: Annotated[
-        float | None,
-        typer.Option(
-            metavar="S",
-            help="The outage begins at this stamp of the log; even places, if not given.",
-            rich_help_panel=_WHERE,
-        ),
-    ] = None,
-    places: Annotated[
-        int | None,
-        typer.Option(metavar="N", help="So many outages, evenly (10).", rich_help_panel=_WHERE),
-    ] = None,
-    from_s: Annotated[float | None, part_from("where the filter has settled", _WHERE)] = None,
-    to_s: Annotated[float | None, part_to(_WHERE)] = None,
-    duration: Annotated[float | None, part_long(_WHERE)] = None,
-    *,
+    start: StartFlags,
+    run: OutageFlags,
     out: Annotated[Path | None, folder_to_make("SENSOR-coast, or DRIVE-coast")] = None,
     write: OutFlags,
 ) -> None:
@@ -156,9 +198,9 @@ def coast(
     from strapdown.cli.console import WORDS, Stopwatch, print_findings, print_seal, progress
     from strapdown.cli.result_folder import default_folder, source_name
     from strapdown.report.coast import read_coasting_run
-    from strapdown.systems.part_of_log import check_part
+    from strapdown.systems.inputs import check_part
 
-    check_part(from_s, to_s, duration)
+    check_part(run.from_s, run.to_s, run.duration_s)
     navigation, file = read_coasting_run(source)
     named = None if navigation is None or file is None else source_name(navigation)
     folder = out or default_folder(source, "coast", named)
@@ -169,31 +211,10 @@ def coast(
             source,
             outage,
             navigation is not None,
-            motion={
-                "speed_m_per_s": speed,
-                "to_speed_m_per_s": to_speed,
-                "turn_rate_deg_per_s": turn_rate,
-                "heading_deg": heading,
-                "lat_deg": lat,
-            },
-            start={
-                "aided_s": aided,
-                "fix_position_sd_m": fix_sd,
-                "position_sd_m": position_sd,
-                "velocity_sd_m_per_s": velocity_sd,
-                "tilt_sd_deg": tilt_sd,
-                "heading_sd_deg": heading_sd,
-                "gyro_bias_sd_deg_per_h": gyro_bias_sd,
-                "accel_bias_sd_ug": accel_bias_sd,
-            },
+            motion=asdict(motion),
+            start=asdict(start),
             keep=keep or [],
-            run={
-                "at_s": at,
-                "places": places,
-                "from_s": from_s,
-                "to_s": to_s,
-                "duration_s": duration,
-            },
+            run=asdict(run),
         )
         if navigation is not None:
             WORDS.set("file")

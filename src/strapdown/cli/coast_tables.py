@@ -6,7 +6,7 @@ from strapdown.cli.console import console, print_block
 from strapdown.report.coast_document import budget_table, drift_table, time_table
 from strapdown.report.coast_words import headline, inside_words, motion_words, remedy, start_words
 from strapdown.report.values import spaced
-from strapdown.systems.coasting.run import CoastResult
+from strapdown.systems.outage_run import CoastResult
 
 __all__ = ["print_coast"]
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from strapdown.cli.shared_options import WriteFlags, folder_to_make, spread
 
 if TYPE_CHECKING:
-    from strapdown.systems.progress import Progress
+    from strapdown.progress import Progress
 
 EPILOG = "Example: strapdown demo --out demo"
 _PAGE = "index.html"

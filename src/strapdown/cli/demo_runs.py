@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from strapdown.progress import Progress
     from strapdown.report.demo_page import Shown
-    from strapdown.systems.progress import Progress
 
 __all__ = ["DemoRun", "demo_runs"]
 

@@ -200,7 +200,7 @@ def navigate(
     from strapdown.cli.result_folder import refuse_result
     from strapdown.config.alignment import LogTable
     from strapdown.config.spec import specify
-    from strapdown.systems.sins.draft import draft_navigation
+    from strapdown.systems.navigation_draft import draft_navigation
 
     check_free(out, "navigate.toml", force=force)
     refuse_result(log, "log")

@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from strapdown.aiding.aid import Measurement
-from strapdown.aiding.standstill import STANDSTILL_DETECTORS, STANDSTILL_THRESHOLDS
 from strapdown.attitude import ALGORITHMS, AttitudeAlgorithm
 from strapdown.config.choice import SLOTS, Slot, options_of
 from strapdown.config.motions import KINDS
@@ -19,6 +17,8 @@ from strapdown.formats.gnss_files import GNSS_READERS
 from strapdown.formats.log_writers import LOG_WRITERS
 from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS
 from strapdown.mechanization import MECHANIZATIONS, Mechanization
+from strapdown.navigation.measurements.measurement import Measurement
+from strapdown.navigation.measurements.standstill import STANDSTILL_DETECTORS, STANDSTILL_THRESHOLDS
 from strapdown.plugins import plugins
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.simulation import SCENARIOS

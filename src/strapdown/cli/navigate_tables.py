@@ -1,12 +1,15 @@
-"""Terminal output of ``strapdown navigate``."""
+"""Terminal output of ``strapdown navigate``: at most 40 lines, or all with ``--verbose``."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
-from strapdown.cli.console import console, print_block
+from strapdown.cli.console import WORDS, console, print_block, print_findings
+from strapdown.errors import Finding
+from strapdown.report.alignment_trust import MOST_SAID
 from strapdown.report.document import TableBlock
-from strapdown.report.navigation_found import examine, told_of
+from strapdown.report.navigation_found import NavigationFound, examine, told_of
 from strapdown.report.navigation_tables import (
     end_table,
     error_table,
@@ -17,49 +20,125 @@ from strapdown.report.navigation_tables import (
     withheld_table,
 )
 from strapdown.report.navigation_trust import trust
-from strapdown.report.navigation_words import cautions, headline
-from strapdown.report.values import duration_words, spaced
+from strapdown.report.navigation_words import cautions
+from strapdown.report.values import (
+    distance_over_ground,
+    duration_words,
+    length_words,
+    plain,
+    spaced,
+)
 from strapdown.report.verdict_words import terminal_lines
-from strapdown.systems.sins.run import NavigationResult
+from strapdown.rotation import within_half_turn
+from strapdown.systems.navigation_run import NavigationRun
 
 __all__ = ["print_navigation"]
 
-# Most rows of a table on the terminal; the report has all.
-_MOST = 12
+#: Most lines of the answer, of which the paths and the seal take the last four.
+LINES, PATHS = 40, 4
+#: Most rows of a table: of the answer, of its first table, and of those with `--verbose`.
+MOST, MOST_VERBOSE = 6, 12
+STYLES = {"trusted": "green", "reserve": "yellow", "distrusted": "bold red"}
+#: Quantities of `end_table` with an error against the truth.
+SCORES = {
+    "horizontal ±": "horizontal",
+    "height": "down",
+    "velocity north": "VN",
+    "velocity east": "VE",
+    "velocity down": "VD",
+    "heading": "heading",
+    "pitch": "pitch",
+    "roll": "roll",
+}
 
 
-def print_navigation(result: NavigationResult) -> None:
-    """Print the final state of a run, its uncertainty, and the warnings."""
+def print_navigation(
+    result: NavigationRun, findings: Sequence[Finding] = (), *, verbose: bool = False
+) -> None:
+    """Print the final state of a run, its uncertainty, the verdict, and findings.
+
+    Parameters
+    ----------
+    result : NavigationRun
+    findings : sequence of Finding
+        Printed on the error stream, as many as there is room for.
+    verbose : bool
+        Print also the start's and the sensors' tables, every caution and every finding.
+    """
     out = console()
     found = examine(told_of(result))
-    time = result.record.trajectory.index
-    out.print(
-        f"{result.source.name}: {result.source.what}, "
-        f"{spaced(duration_words(float(time[-1] - time[0])))}, {len(time)} samples"
-    )
-    tables = (
-        end_table(found),
-        error_table(found),
-        point_table(found),
-        observation_table(found),
-        outage_table(found),
-        withheld_table(found),
-        state_table(found),
-    )
-    for block in tables:
-        if block is not None:
-            _print(block)
-    out.print(spaced(headline(found)), style="bold")
     verdict = trust(found)
-    style = {"trusted": "green", "reserve": "yellow", "distrusted": "bold red"}[verdict.verdict]
-    out.print(spaced(verdict.sentence), style=style)
-    for head, text in cautions(found):
-        out.print(spaced(f"  - {head}: {text}"))
-    for text, style in terminal_lines(result):
-        out.print(spaced(text), style=style)
+    trajectory = result.record.trajectory
+    time = trajectory.index
+    duration = duration_words(float(time[-1] - time[0]))
+    way = length_words(distance_over_ground(trajectory))
+    name = f"{result.source.name}: {result.source.what}"
+    out.print(spaced(f"{name}, {duration}, {way}, {len(time)} samples"))
+    tables: list[TableBlock | None]
+    if verbose:
+        tables = [end_table(found), error_table(found), point_table(found)]
+        tables += [observation_table(found), outage_table(found), withheld_table(found)]
+        tables += [state_table(found)]
+    else:
+        tables = [_end(found), point_table(found), observation_table(found), withheld_table(found)]
+    lines = [(verdict.sentence, STYLES[verdict.verdict])]
+    lines += [(f"{head}: {said}", "") for head, said in cautions(found, brief=not verbose)]
+    lines += terminal_lines(result, brief=not verbose)
+    room = LINES - PATHS - 1
+    for k, block in enumerate(tables):
+        if block is not None:
+            most = MOST_VERBOSE if verbose or not k else MOST
+            print_block(replace(block, rows=block.rows[:most]))
+            room -= 4 + min(len(block.rows), most)
+            if len(block.rows) > most:
+                out.print(f"  {len(block.rows) - most} more rows; all of them are in the report")
+                room -= 1
+    for said, style in lines:
+        out.print(spaced(said), style=style)
+        room -= _lines(said, out.width)
+    if verbose:
+        print_findings(findings)
+        return
+    # The verdict says the first of these already.
+    others = [one for one in findings if one not in verdict.against[:MOST_SAID]]
+    others.sort(key=lambda one: one.severity == "note")
+    print_findings(others, _fitting(others, room, out.width))
 
 
-def _print(block: TableBlock) -> None:
-    print_block(replace(block, rows=block.rows[:_MOST]))
-    if len(block.rows) > _MOST:
-        console().print(f"  {len(block.rows) - _MOST} more rows; all of them are in the report")
+def _end(found: NavigationFound) -> TableBlock:
+    """Start and end with 95 % bounds, and the errors of the run where the truth is known."""
+    block = end_table(found)
+    errors = error_table(found)
+    of: dict[str, tuple[str, ...]] = {}
+    if found.errors is not None and errors is not None:
+        of = dict(zip((s.quantity for s in found.errors.scores), errors.rows, strict=True))
+    rows = []
+    for name, *cells in block.rows:
+        shown = of.get(SCORES.get(name, ""), ("",) * 6)
+        if name == "place":
+            # The height has a row of its own.
+            name = "latitude, longitude"
+            ends = found.record.trajectory[["lat", "lon"]].iloc[[0, -1]].to_numpy()
+            cells = [
+                f"{plain(float(lat), 6)}°, {plain(float(within_half_turn(lon)), 6)}°"
+                for lat, lon in ends
+            ]
+        rows.append((name, *cells, *((shown[1], shown[2], shown[5]) if of else ())))
+    more = ("error, rms", "largest", "within bound") if of else ()
+    return replace(block, columns=(*block.columns, *more), rows=tuple(rows))
+
+
+def _lines(text: str, width: int) -> int:
+    """Lines of a text on a terminal of so many columns."""
+    return max(1, -(-len(text) // width))
+
+
+def _fitting(findings: Sequence[Finding], room: int, width: int) -> int:
+    """Number of findings that fit into so many lines, with one for the number of the others."""
+    words = WORDS.get()
+    used = 0
+    for count, one in enumerate(findings):
+        used += sum(_lines(line, width) for line in f"note: {one.text(words)}".splitlines())
+        if used + (count + 1 < len(findings)) > room:
+            return count
+    return len(findings)

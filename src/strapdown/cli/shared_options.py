@@ -63,7 +63,10 @@ def part_to(panel: str) -> Any:
 def part_long(panel: str) -> Any:
     """The option ``--duration``."""
     return typer.Option(
-        metavar="S", help="Use so much of it, in place of --to.", rich_help_panel=panel
+        "--duration",
+        metavar="S",
+        help="Use so much of it, in place of --to.",
+        rich_help_panel=panel,
     )
 
 
@@ -161,7 +164,7 @@ def log_keys(given: Mapping[str, Any]) -> dict[str, Any]:
         A column name or the part of the log is invalid.
     """
     from strapdown.formats.columns import parse_column_option
-    from strapdown.systems.part_of_log import check_part
+    from strapdown.systems.inputs import check_part
 
     check_part(given["from_s"], given["to_s"], given["duration"])
     return {
@@ -220,7 +223,7 @@ Verbose = Annotated[
     typer.Option(
         "--verbose",
         "-v",
-        help="Print each stage with its duration, and which reader took which file.",
+        help="Print each stage with its duration, which reader took which file, and all tables.",
         rich_help_panel=OUT_PANEL,
         callback=log_level(logging.INFO),
     ),

@@ -9,8 +9,6 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 
 from pydantic import StrictBool, StrictInt, StrictStr, create_model
 
-from strapdown.aiding.aid import Measurement
-from strapdown.aiding.aids import AIDS
 from strapdown.alignment.alignment import CoarseAlignment
 from strapdown.alignment.coarse_alignments import COARSE_ALIGNMENTS
 from strapdown.alignment.fine import FineAlignment
@@ -23,6 +21,8 @@ from strapdown.estimation.error_model import ERROR_MODELS, ErrorModel
 from strapdown.estimation.robust import INFLUENCES, UPDATE_RULES, Influence
 from strapdown.mechanization import MECHANIZATIONS, Mechanization
 from strapdown.navigation.filter_options import DAMPINGS, Correction, FilterOptions
+from strapdown.navigation.measurements import AIDS
+from strapdown.navigation.measurements.measurement import Measurement
 from strapdown.navigation.recorder import RECORDERS, Recorder
 from strapdown.navigation.smoother import SMOOTHERS, Smoother
 from strapdown.plugins import WithPlugins

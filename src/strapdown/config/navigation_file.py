@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, create_model
 
-from strapdown.aiding.aid import TabulatedMeasurement
 from strapdown.config.alignment import PrefilterSpec
 from strapdown.config.alignment_file import MOST_SAMPLES, NEEDS_GNSS, NOT_BEFORE_FINE, SourceChecks
 from strapdown.config.choice import (
@@ -58,6 +57,7 @@ from strapdown.errors import ConfigError, Finding
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS
 from strapdown.nav_state import NavState
+from strapdown.navigation.measurements.measurement import TabulatedMeasurement
 from strapdown.navigation.navigator import with_states
 
 __all__ = [

@@ -6,7 +6,6 @@ from typing import Any
 
 from pydantic import create_model
 
-from strapdown.aiding.aid import Measurement
 from strapdown.config.alignment import AlignmentSpec
 from strapdown.config.choice import SLOTS, make_choice
 from strapdown.config.crash_case import OneOrThree, Positive
@@ -20,6 +19,7 @@ from strapdown.estimation.sensor_blocks import (
     stated_states,
     with_processes,
 )
+from strapdown.navigation.measurements.measurement import Measurement
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.uncertainty import STATED_KEYS, ImuUncertainty, stated_imu
 

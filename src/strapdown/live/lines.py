@@ -23,16 +23,16 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.aiding.aid import TabulatedMeasurement
 from strapdown.config.navigation import AidSpec
 from strapdown.errors import ConfigError, Finding
 from strapdown.formats import csv
 from strapdown.formats.sensorstream import blocks_of
+from strapdown.navigation.measurements.measurement import TabulatedMeasurement
+from strapdown.navigation.modes import PipelineChunk
 from strapdown.navigation.navigator import Navigator
 from strapdown.navigation.record import CovarianceSnapshot
 from strapdown.rotation.euler_angles import euler_sd
-from strapdown.systems.sins.modes import PipelineChunk
-from strapdown.systems.sins.source import COLUMN_UNITS
+from strapdown.systems.navigation_source import COLUMN_UNITS
 from strapdown.tables import EULER, GEODETIC, GNSS, TRAJECTORY, VELOCITY
 from strapdown.tables.checks import POSITION_SD, VELOCITY_SD
 

@@ -8,15 +8,15 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from strapdown.aiding.aid import Measurement
 from strapdown.errors import ConfigError
 from strapdown.live.clock import Clock, MachineClock
 from strapdown.live.latency import LatencyTape
 from strapdown.live.warm_up import warm_up
+from strapdown.navigation.measurements.measurement import Measurement
+from strapdown.navigation.pipeline import NavigationPipeline
 from strapdown.navigation.recorder import Recorder
-from strapdown.systems.progress import Progress, silent
-from strapdown.systems.sins.chain import NavigationPipeline
-from strapdown.systems.sins.drive import PipelineRun, Recording, pieces_by_sample
+from strapdown.navigation.replay import PipelineRun, Recording, pieces_by_sample
+from strapdown.progress import Progress, silent
 from strapdown.tables.checks import source_of
 
 __all__ = ["Replay", "before_stamp", "parse_pace"]
@@ -82,7 +82,7 @@ class Replay:
         recorder: Recorder | None = None,
         progress: Progress = silent,
     ) -> PipelineRun:
-        """Run a pipeline, as `systems.sins.drive.run_batch`."""
+        """Run a pipeline, as `navigation.replay.run_batch`."""
         warm_up(chain, imu.attrs["sampling"])
         recording, clock = Recording(chain, recorder), self._clock
         stamps = imu.index.to_numpy(dtype=np.float64)

@@ -15,7 +15,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.aiding.aid import TabulatedMeasurement
 from strapdown.config.choice import SLOTS, make_choice
 from strapdown.config.navigation import CommandTable, LiveTable, NavigationSpec, aids_of
 from strapdown.config.navigation_file import navigation_spec
@@ -39,15 +38,16 @@ from strapdown.live.lines import (
 from strapdown.live.sources import Line, LineSource
 from strapdown.live.warm_up import warm_up
 from strapdown.navigation.engine import SAME_INSTANT
+from strapdown.navigation.measurements.measurement import TabulatedMeasurement
+from strapdown.navigation.modes import PipelineChunk
+from strapdown.navigation.pipeline import NavigationPipeline
 from strapdown.navigation.record import GrowingRows
 from strapdown.navigation.recorder import Recorder
+from strapdown.navigation.replay import PipelineRun, Recording, run_batch
+from strapdown.progress import Progress, silent
 from strapdown.systems.alignment_source import axes_matrices
+from strapdown.systems.navigation_run import NavigationRun, make_chain, run_navigation
 from strapdown.systems.one_thread import one_thread
-from strapdown.systems.progress import Progress, silent
-from strapdown.systems.sins.chain import NavigationPipeline
-from strapdown.systems.sins.drive import PipelineRun, Recording, run_batch
-from strapdown.systems.sins.modes import PipelineChunk
-from strapdown.systems.sins.run import NavigationResult, make_chain, run_navigation
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import values_of
 
@@ -150,7 +150,7 @@ def receive(
 
 def result_of(
     live: LiveRun, folder: Path, file: Path | None = None, progress: Progress = silent
-) -> NavigationResult:
+) -> NavigationRun:
     """Write the received input, and return the result of the run over it.
 
     Parameters
@@ -165,7 +165,7 @@ def result_of(
 
     Returns
     -------
-    NavigationResult
+    NavigationRun
         From the states computed in real time. If reading the record back gives other numbers, from
         the record: the result can always be reproduced.
 

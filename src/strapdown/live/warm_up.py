@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from strapdown.aiding.gnss import Gnss
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import StrapdownError
 from strapdown.nav_state import NavState
-from strapdown.systems.sins.chain import NavigationPipeline
-from strapdown.systems.sins.drive import run_by_sample
-from strapdown.systems.sins.intake import GapPolicy
-from strapdown.systems.sins.modes import KnownStart, Navigation
+from strapdown.navigation.measurements.gnss import Gnss
+from strapdown.navigation.modes import KnownStart, Navigation
+from strapdown.navigation.pipeline import NavigationPipeline
+from strapdown.navigation.preprocessing import GapPolicy
+from strapdown.navigation.replay import run_by_sample
 from strapdown.tables import gnss_table, imu_table
 
 __all__ = ["warm_up"]

@@ -13,8 +13,6 @@ from strapdown._kernels import fix_loop as fix_kernel
 from strapdown._kernels.growth import growth_arrays, growth_room, padded_width
 from strapdown._kernels.level import LEVEL
 from strapdown._kernels.level_place import NED, WANDER
-from strapdown.aiding.aid import Epochs
-from strapdown.aiding.gnss import POSITION_CODE
 from strapdown.errors import DivergenceError
 from strapdown.estimation.covariance import (
     BiermanThornton,
@@ -32,6 +30,8 @@ from strapdown.mechanization.mechanization import Mechanization
 from strapdown.mechanization.ned import NorthEastDown
 from strapdown.mechanization.wander_azimuth import WanderAzimuth
 from strapdown.navigation.engine import LARGEST_GROUP, SAME_INSTANT, Engine, EngineState, NodeRows
+from strapdown.navigation.measurements.gnss import POSITION_CODE
+from strapdown.navigation.measurements.measurement import Epochs
 
 __all__ = ["CompiledEngine", "compiled"]
 
@@ -143,8 +143,8 @@ class CompiledEngine(Engine):
         self.filter, self.errors = state.filter, state.errors
         self.time, self.row, self.last = state.time, state.row, state.last
 
-    def over(self, time: Array, rows: Array, history: Array, note_at: float) -> int:
-        """Propagate over steps, as `Engine.over`."""
+    def propagate(self, time: Array, rows: Array, history: Array, note_at: float) -> int:
+        """Propagate over steps, as `Engine.propagate`."""
         made, why = 0, kernel.FULL
         while why == kernel.FULL:
             self.nodes.make_room(1)
@@ -167,14 +167,13 @@ class CompiledEngine(Engine):
         self._after(why, time, made)
         return made
 
-    def over_fixes(
+    def propagate_with_fixes(
         self,
         time: Array,
         rows: Array,
         history: Array,
         made: int,
-        note_at: float,
-        interval: float,
+        notes: tuple[float, float],
         arm: Array,
         fixes: Epochs,
     ) -> tuple[int, Fixed, bool]:
@@ -183,17 +182,15 @@ class CompiledEngine(Engine):
         Parameters
         ----------
         time, rows, history
-            As `over`; `rows` are changed where a fix cuts a step.
+            As `propagate`; `rows` are changed where a fix cuts a step.
         made : int
             Steps that are already done.
-        note_at : float, s
-            As `over`.
-        interval : float, s
-            From a mark to the next time to stop at.
+        notes : tuple of float, (2,), s
+            Time to stop at, as of `propagate`, and from a mark to the next such time.
         arm : ndarray, (3,), m
             Of the antenna.
         fixes : Epochs
-            Of `aiding.gnss.Gnss`.
+            Of `measurements.gnss.Gnss`.
 
         Returns
         -------
@@ -202,7 +199,7 @@ class CompiledEngine(Engine):
         noted : bool
             Whether it stopped for a covariance to be noted.
         """
-        size, k = len(fixes.time), self._n - 9
+        (note_at, interval), size, k = notes, len(fixes.time), self._n - 9
         told, at = np.empty((size, fix_kernel.TOLD, 3)), np.empty(size)
         noted, sensors, sd = np.empty((size, 9, 9)), np.empty((size, k)), np.empty((size, k))
         why, done = kernel.FULL, 0

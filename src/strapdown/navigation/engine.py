@@ -119,7 +119,7 @@ class Engine(ABC):
     last: Array
 
     @abstractmethod
-    def over(self, time: Array, rows: Array, history: Array, note_at: float) -> int:
+    def propagate(self, time: Array, rows: Array, history: Array, note_at: float) -> int:
         """Propagate over steps without observations.
 
         Parameters
@@ -195,8 +195,8 @@ class GeneralEngine(Engine):
         self.open_rows = list(state.open_rows)
         self.nodes = NodeRows(filter_, False)
 
-    def over(self, time: Array, rows: Array, history: Array, note_at: float) -> int:
-        """Propagate over steps, as `Engine.over`."""
+    def propagate(self, time: Array, rows: Array, history: Array, note_at: float) -> int:
+        """Propagate over steps, as `Engine.propagate`."""
         made = 0
         longest = self.navigation.step * BEYOND
         while made < len(time):
@@ -282,7 +282,11 @@ class GeneralEngine(Engine):
 
     def _steps(self, time: Array, rows: Array, history: Array) -> None:
         used = self.navigation
-        known = self.filter if self.feeds_back else replace(self.filter, sensors=self._nothing())
+        known = (
+            self.filter
+            if self.feeds_back
+            else replace(self.filter, sensors=np.zeros_like(self.filter.sensors))
+        )
         compensated = used.compensated(known, rows)
         raw = history if self.feeds_back else np.empty_like(history)
         if self.feeds_back:
@@ -296,9 +300,6 @@ class GeneralEngine(Engine):
             self.open_history.append(raw[i].copy())
             self.open_rows.append(compensated[i])
         self.time, self.row, self.last = float(time[-1]), raw[-1].copy(), compensated[-1]
-
-    def _nothing(self) -> Array:
-        return np.zeros_like(self.filter.sensors)
 
     def _open_anew(self) -> None:
         self.open_rows, self.open_history = [], [self.row]

@@ -13,14 +13,6 @@ from numpy.typing import NDArray
 
 from strapdown._kernels.split_increment import split_increment
 from strapdown._kernels.steady_motion import STEADY, steady_motion
-from strapdown.aiding.aid import (
-    Epochs,
-    ImuDerivedMeasurement,
-    Measurement,
-    TabulatedMeasurement,
-    View,
-)
-from strapdown.aiding.gnss import HORIZONTAL_CODE, Gnss
 from strapdown.errors import ConfigError
 from strapdown.estimation.covariance import Innovations, Observation, UpdateRule
 from strapdown.estimation.error_filter import (
@@ -43,6 +35,14 @@ from strapdown.navigation.engine import (
     begun,
 )
 from strapdown.navigation.filter_options import ClosedLoop, Correction
+from strapdown.navigation.measurements.gnss import HORIZONTAL_CODE, Gnss
+from strapdown.navigation.measurements.measurement import (
+    Epochs,
+    ImuDerivedMeasurement,
+    Measurement,
+    TabulatedMeasurement,
+    View,
+)
 from strapdown.navigation.record import CovarianceSnapshot, InnovationRecord, NavigationChunk
 
 if TYPE_CHECKING:
@@ -197,11 +197,11 @@ class Navigator:
         DivergenceError
             The state is outside the validity of the mechanization; the sample is named.
         """
-        going = EpochLoop(self, state)
+        loop = EpochLoop(self, state)
         # Compiled code has one type for writable and another for read-only arrays.
         stamps = np.require(time, np.float64, ["C", "W"])
-        going.over(stamps, np.require(rows, np.float64, ["C", "W"]))
-        return going.state(), going.piece()
+        loop.process(stamps, np.require(rows, np.float64, ["C", "W"]))
+        return loop.state(), loop.chunk()
 
     def finish(self, state: NavigatorState) -> NavigationChunk:
         """Return a mark of the newest sample, after the last epoch; the state is unchanged.
@@ -215,10 +215,11 @@ class Navigator:
         NavigationChunk
             Without samples; without a mark if there is one already.
         """
-        going = EpochLoop(self, state)
+        loop = EpochLoop(self, state)
         if state.time > state.marked + SAME_INSTANT:
-            going.end()
-        return going.piece()
+            loop.engine.close()
+            loop.mark()
+        return loop.chunk()
 
     def engine(self, state: EngineState) -> Engine:
         """Return the engine for a state: compiled, if available for the modules."""
@@ -325,42 +326,54 @@ class EpochLoop:
         self.time: Array = np.empty(0)
         self.history: Array = np.empty((0, navigator.filter.mechanization.row))
 
-    def over(self, time: Array, rows: Array) -> None:
-        """Process steps."""
+    def process(self, time: Array, rows: Array) -> None:
+        """Process steps, from epoch to epoch: propagate, split a step, or update."""
+        rows = self._prepared(time, rows)
+        done = self._fixes(0, time, rows)
+        while True:
+            epoch = min((q.time[0] for q in self.queues.values() if q.time.size), default=np.inf)
+            # 1. The epoch is due now.
+            if epoch <= self.engine.time + SAME_INSTANT:
+                self._observe(self.engine.time)
+                if done and self.engine.time <= time[done - 1] + SAME_INSTANT:
+                    self.history[done - 1] = self.engine.shown()
+                done = self._fixes(done, time, rows)
+                continue
+            # 2. The chunk ends before it.
+            if done == len(time):
+                return
+            first, k = done, int(time.searchsorted(epoch - SAME_INSTANT))
+            inside = k < len(time) and time[k] > epoch + SAME_INSTANT
+            # 3. Steps before the epoch, with the one that ends at it.
+            done = k if inside else min(k + 1, len(time))
+            self._propagate(time[first:done], rows[first:done], self.history[first:done])
+            # 4. The epoch is inside the next step: the part up to it now, the other one later.
+            if inside:
+                part, rest = np.empty(10), np.empty(10)
+                split_increment(rows[k], epoch - self.engine.time, part, rest)
+                rows[k] = rest
+                unseen = np.empty((1, self.history.shape[1]))
+                self._propagate(np.array([epoch]), part[None, :], unseen)
+
+    def _prepared(self, time: Array, rows: Array) -> Array:
+        """Look at steps before they are processed; return those that may be split."""
         for aid in self.navigator.aids:
             if isinstance(aid, ImuDerivedMeasurement):
                 self.memories[aid.name], self.queues[aid.name] = aid.watch(
                     self.memories[aid.name], time, rows
                 )
-        self._drop_late()
+        for name, queue in self.queues.items():
+            if queue.time.size and queue.time[0] < self.engine.time - SAME_INSTANT:
+                count = int(queue.time.searchsorted(self.engine.time - SAME_INSTANT))
+                self.late += [(name, float(t)) for t in queue.time[:count]]
+                self.queues[name] = Epochs(queue.time[count:], queue.values[count:])
         if len(time) and self._cuts(time):
             rows = rows.copy()
         if any(aid.wants_steady for aid in self.navigator.aids):
             self.steadies = np.empty((len(rows), 6))
             steady_motion(rows, STEADY_TIME, self.steady, self.steadies)
         self.time, self.history = time, np.empty((len(time), self.history.shape[1]))
-        at = self._fixes(0, time, rows)
-        while True:
-            epoch = self._next_epoch()
-            if epoch <= self.engine.time + SAME_INSTANT:
-                self._observe(self.engine.time)
-                if at and self.engine.time <= time[at - 1] + SAME_INSTANT:
-                    self.history[at - 1] = self.engine.shown()
-                at = self._fixes(at, time, rows)
-                continue
-            if at == len(time):
-                break
-            # The step that contains the next epoch, or ends at it.
-            told = int(time.searchsorted(epoch - SAME_INSTANT))
-            if told < len(time) and time[told] > epoch + SAME_INSTANT:
-                at = self._steps(at, told, time, rows)
-                first, second = np.empty(10), np.empty(10)
-                split_increment(rows[told], epoch - self.engine.time, first, second)
-                room = np.empty((1, self.history.shape[1]))
-                self._run(np.array([epoch]), first[None, :], room)
-                rows[told] = second
-            else:
-                at = self._steps(at, min(told + 1, len(time)), time, rows)
+        return rows
 
     def _cuts(self, time: Array) -> bool:
         """Whether an epoch is within a step, which is then split there."""
@@ -372,11 +385,6 @@ class EpochLoop:
             if (time[time.searchsorted(due - SAME_INSTANT)] > due + SAME_INSTANT).any():
                 return True
         return False
-
-    def end(self) -> None:
-        """Mark the newest sample."""
-        self.engine.close()
-        self._mark()
 
     def _fixes(self, made: int, time: Array, rows: Array) -> int:
         """Process the fixes of a single receiver up to an outage; return the steps."""
@@ -391,21 +399,15 @@ class EpochLoop:
             usual = self._until_outage(Epochs(queue.time[:due], queue.values[:due]))
             if not usual.time.size:
                 break
-            made, fixed, stopped = engine.over_fixes(
-                time,
-                rows,
-                self.history,
-                made,
-                self.marked + interval,
-                interval,
-                arm,
-                usual,
+            notes = (self.marked + interval, interval)
+            made, fixed, stopped = engine.propagate_with_fixes(
+                time, rows, self.history, made, notes, arm, usual
             )
             done = len(fixed.told)
             self._fixed(aid, queue, fixed)
             queue = Epochs(queue.time[done:], queue.values[done:])
             if stopped:
-                self._mark()
+                self.mark()
         self.queues[aid.name] = queue
         return made
 
@@ -449,7 +451,7 @@ class EpochLoop:
             self.tilted,
         )
 
-    def piece(self) -> NavigationChunk:
+    def chunk(self) -> NavigationChunk:
         """Result of the chunk."""
         return NavigationChunk(
             self.time,
@@ -469,29 +471,15 @@ class EpochLoop:
             return np.asarray(self.steadies[k - 1])
         return self.begun_steady[:6] if self.begun_steady[6] else None
 
-    def _next_epoch(self) -> float:
-        return min((q.time[0] for q in self.queues.values() if q.time.size), default=np.inf)
-
-    def _drop_late(self) -> None:
-        for name, queue in self.queues.items():
-            if queue.time.size and queue.time[0] < self.engine.time - SAME_INSTANT:
-                count = int(queue.time.searchsorted(self.engine.time - SAME_INSTANT))
-                self.late += [(name, float(t)) for t in queue.time[:count]]
-                self.queues[name] = Epochs(queue.time[count:], queue.values[count:])
-
-    def _steps(self, begin: int, end: int, time: Array, rows: Array) -> int:
-        """Steps from `begin` to before `end`."""
-        self._run(time[begin:end], rows[begin:end], self.history[begin:end])
-        return end
-
-    def _run(self, time: Array, rows: Array, history: Array) -> None:
+    def _propagate(self, time: Array, rows: Array, history: Array) -> None:
+        """Propagate over steps without epochs, and mark the covariance in time."""
         made = 0
         while made < len(time):
             # Rounded to the interval of a decimal clock.
             note_at = self.marked + self.navigator.mark_interval * (1.0 - 1e-9)
-            made += self.engine.over(time[made:], rows[made:], history[made:], note_at)
+            made += self.engine.propagate(time[made:], rows[made:], history[made:], note_at)
             if made < len(time):
-                self._mark()
+                self.mark()
 
     def _observe(self, at: float) -> None:
         """Update with all observations at an instant."""
@@ -520,7 +508,7 @@ class EpochLoop:
             self.queues[aid.name] = Epochs(queue.time[count:], queue.values[count:])
         if told:
             if at > self.observed + ALONE * self.navigator.mark_interval:
-                self._mark(JUST_BEFORE)
+                self.mark(JUST_BEFORE)
             self.observed = at
             observations = [one for _, one in told]
             known = [self.engine.known(one) for one in observations]
@@ -529,7 +517,7 @@ class EpochLoop:
                 InnovationRecord(at, one.name, one.labels, nu, one)
                 for one, nu in zip(known, innovations, strict=True)
             ]
-        self._mark()
+        self.mark()
 
     def _told(
         self, rules: list[UpdateRule | None], observations: list[Observation]
@@ -562,7 +550,7 @@ class EpochLoop:
             engine.widen(Q)
         self.tilted = is_large(after)
 
-    def _mark(self, before: float = 0.0) -> None:
+    def mark(self, before: float = 0.0) -> None:
         """Record covariance and estimates, with a time stamp so much earlier."""
         filter_, state = self.navigator.filter, self.engine.filter
         P = filter_.physical_covariance(state)

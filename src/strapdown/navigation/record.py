@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.errors import Finding
 from strapdown.estimation.covariance import Innovations, Observation
 
 __all__ = [
@@ -35,13 +36,18 @@ class Event:
     time : float, s
     kind : str
         ``mode``, ``outage``, ``recovered``, ``rejected``, ``late``, ``gap``, ``command``.
-    what : str
-        Description as text.
+    finding : Finding
+        Description, with its numbers.
     """
 
     time: float
     kind: str
-    what: str
+    finding: Finding
+
+    @classmethod
+    def of(cls, time: float, kind: str, code: str, **values: Any) -> Event:
+        """Return an event described by a finding of the catalogue, ``navigation.event-CODE``."""
+        return cls(time, kind, Finding(f"navigation.event-{code}", severity="note", **values))
 
 
 @dataclass(frozen=True)

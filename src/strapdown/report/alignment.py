@@ -13,6 +13,7 @@ import pandas as pd
 from strapdown.alignment.alignment import Alignment
 from strapdown.bundle.seal import Seal, to_json
 from strapdown.config.alignment_file import alignment_spec
+from strapdown.progress import Progress, silent
 from strapdown.report.alignment_document import CONVENTIONS, alignment_document, limits
 from strapdown.report.alignment_trust import answer_error, trust
 from strapdown.report.crash_json import write_table
@@ -22,7 +23,6 @@ from strapdown.report.document_html import document_page
 from strapdown.report.report_bundle import report_bundle
 from strapdown.systems.alignment_run import AlignmentResult, run_alignment
 from strapdown.systems.one_thread import one_thread
-from strapdown.systems.progress import Progress, silent
 from strapdown.tables import EULER
 
 __all__ = ["alignment_json", "rerun_alignment", "write_alignment"]

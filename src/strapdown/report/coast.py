@@ -18,6 +18,8 @@ from strapdown.config.navigation_file import navigation_spec, read_navigation_sp
 from strapdown.config.toml_file import read_toml
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import csv
+from strapdown.navigation.outage import QUANTITIES
+from strapdown.progress import Progress, silent
 from strapdown.report.coast_document import coast_document
 from strapdown.report.coast_words import end_bound, headline, inside_words, remedy, start_words
 from strapdown.report.document_data import draw_stills
@@ -26,10 +28,8 @@ from strapdown.report.document_html import document_page
 from strapdown.report.report_bundle import report_bundle
 from strapdown.report.values import spaced
 from strapdown.sensors.catalogue import SENSORS
-from strapdown.systems.coasting.forecast import QUANTITIES
-from strapdown.systems.coasting.run import CoastResult, run_coast
 from strapdown.systems.one_thread import one_thread
-from strapdown.systems.progress import Progress, silent
+from strapdown.systems.outage_run import CoastResult, run_coast
 
 __all__ = ["coast_json", "read_coasting_run", "rerun_coast", "write_coast", "write_coast_tables"]
 

@@ -48,8 +48,7 @@ from strapdown.report.document import (
 )
 from strapdown.report.error_envelope import ellipse
 from strapdown.report.values import GAP, duration_words, half, length_words, plain, share_words
-from strapdown.systems.coasting.recorded import Drift
-from strapdown.systems.coasting.run import CoastResult
+from strapdown.systems.outage_run import CoastResult, Drift
 
 __all__ = [
     "budget_chart",

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from strapdown.constants import DEG_PER_HOUR, MICRO_G
+from strapdown.navigation.outage import Share
 from strapdown.report.document import KeyFigure
 from strapdown.report.values import (
     GAP,
@@ -18,8 +19,7 @@ from strapdown.report.values import (
     share_words,
     shown_unit,
 )
-from strapdown.systems.coasting.forecast import Share
-from strapdown.systems.coasting.run import CoastResult
+from strapdown.systems.outage_run import CoastResult
 
 __all__ = [
     "aids_name",

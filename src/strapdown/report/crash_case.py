@@ -8,6 +8,7 @@ from typing import Any
 from strapdown.bundle.seal import Seal, to_json
 from strapdown.config.crash_case import CaseSpec
 from strapdown.formats.mme_writer import write_mme
+from strapdown.progress import Progress, silent
 from strapdown.report.crash_document import crash_document
 from strapdown.report.crash_figures import crash_figures
 from strapdown.report.crash_json import (
@@ -25,7 +26,6 @@ from strapdown.report.document_pdf import write_pdf
 from strapdown.report.report_bundle import report_bundle
 from strapdown.systems.crash_case import CaseResult, run_case
 from strapdown.systems.one_thread import one_thread
-from strapdown.systems.progress import Progress, silent
 
 __all__ = ["file_name", "rerun_crash", "write_crash"]
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from strapdown.bundle.seal import Seal, to_json
 from strapdown.config.navigation_file import navigation_spec
+from strapdown.progress import Progress, silent
 from strapdown.report.document_data import draw_stills, no_stills
 from strapdown.report.document_files import write_drawings, write_text
 from strapdown.report.document_html import document_page
@@ -16,9 +17,8 @@ from strapdown.report.navigation_json import navigation_json, write_navigation_f
 from strapdown.report.report_bundle import report_bundle
 from strapdown.report.verdict_document import light_section
 from strapdown.report.verdict_files import write_verdict
+from strapdown.systems.navigation_run import NavigationRun, run_navigation
 from strapdown.systems.one_thread import one_thread
-from strapdown.systems.progress import Progress, silent
-from strapdown.systems.sins.run import NavigationResult, run_navigation
 
 __all__ = ["rerun_navigation", "write_navigation"]
 
@@ -35,7 +35,7 @@ def rerun_navigation(configuration: dict[str, Any], out: Path, *, report: bool =
 
 @one_thread()
 def write_navigation(
-    result: NavigationResult,
+    result: NavigationRun,
     out: str | Path,
     *,
     name: str | None = None,
@@ -47,7 +47,7 @@ def write_navigation(
 
     Parameters
     ----------
-    result : NavigationResult
+    result : NavigationRun
     out : str or Path
         Folder to create.
     name : str, optional

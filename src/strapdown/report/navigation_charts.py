@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from strapdown.constants import TWO_SIDED_95
 from strapdown.evaluation.plane_bound import plane_bound
-from strapdown.evaluation.truth_comparison import bounds
 from strapdown.navigation.record import NavigationRecord, Span
+from strapdown.navigation.truth_comparison import bounds
 from strapdown.report.chart import (
     AXIS_COLOURS,
     BLACK,

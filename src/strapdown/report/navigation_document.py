@@ -167,8 +167,8 @@ def _verdicts(found: NavigationFound) -> tuple[Block, ...]:
         kinds = dict.fromkeys(v.kind for v in one.consistency.verdicts)
         for kind in kinds:
             alike = [v for v in one.consistency.verdicts if v.kind == kind]
-            said = "; ".join(v.what for v in alike)
-            rows.append((one.name, f"{said}. {_capital(alike[0].meaning)}."))
+            said = "; ".join(v.finding.what for v in alike)
+            rows.append((one.name, f"{said}. {_capital(alike[0].finding.remedy or '')}."))
     if not rows:
         return (Paragraph("Nothing in them speaks against what was stated of sensors and aids."),)
     return (

@@ -11,7 +11,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.aiding.aid import lasting
 from strapdown.config.choice import ChoiceSpec
 from strapdown.config.navigation import aids_of
 from strapdown.config.navigation_modules import make_aids
@@ -20,22 +19,22 @@ from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import Finding
 from strapdown.evaluation.control_points import ControlPointScore
 from strapdown.evaluation.plane_bound import plane_bound, plane_reach
-from strapdown.evaluation.truth_comparison import (
+from strapdown.navigation.consistency import (
+    ComponentConsistency,
+    ObservationConsistency,
+    consistency_of,
+)
+from strapdown.navigation.measurements.measurement import lasting
+from strapdown.navigation.outage_test import Withheld as WithheldScores
+from strapdown.navigation.record import NavigationRecord
+from strapdown.navigation.truth_comparison import (
     SmootherConsistency,
     TruthComparison,
     band_of_mean,
     compare_with_truth,
     smoother_consistency,
 )
-from strapdown.navigation.consistency import (
-    ComponentConsistency,
-    ObservationConsistency,
-    consistency_of,
-)
-from strapdown.navigation.record import NavigationRecord
-from strapdown.systems.sins.run import NavigationResult
-from strapdown.systems.sins.withholding import Withheld as WithheldScores
-from strapdown.systems.sins.withholding import withheld_aid
+from strapdown.systems.navigation_run import NavigationRun, withheld_aid
 from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
 
 __all__ = [
@@ -556,12 +555,12 @@ class NavigationTold:
 NO_RULE = "none: every observation counts in full, however far off it is"
 
 
-def told_of(result: NavigationResult) -> NavigationTold:
+def told_of(result: NavigationRun) -> NavigationTold:
     """Return the report input of a navigation result.
 
     Parameters
     ----------
-    result : NavigationResult
+    result : NavigationRun
 
     Returns
     -------

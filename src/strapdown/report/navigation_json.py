@@ -24,7 +24,7 @@ from strapdown.report.navigation_found import Agreement, NavigationFound, Score,
 from strapdown.report.navigation_trust import trust
 from strapdown.report.navigation_words import cautions, headline
 from strapdown.report.values import distance_over_ground, worst_within
-from strapdown.systems.sins.run import NavigationResult
+from strapdown.systems.navigation_run import NavigationRun
 from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
 
 __all__ = ["navigation_json", "write_navigation_files"]
@@ -35,14 +35,12 @@ MODULES = (*STAGES, "aiding")
 Array = NDArray[np.float64]
 
 
-def navigation_json(
-    result: NavigationResult, found: NavigationFound | None = None
-) -> dict[str, Any]:
+def navigation_json(result: NavigationRun, found: NavigationFound | None = None) -> dict[str, Any]:
     """Return a navigation run as plain data for programs.
 
     Parameters
     ----------
-    result : NavigationResult
+    result : NavigationRun
     found : NavigationFound, optional
         From `examine`, if already computed.
 
@@ -111,7 +109,9 @@ def navigation_json(
             for w in found.told.withheld
         ],
         "modes": [{"mode": s.name, "from_s": s.begin, "to_s": s.end} for s in record.modes],
-        "events": [{"time_s": e.time, "kind": e.kind, "what": e.what} for e in record.events],
+        "events": [
+            {"time_s": e.time, "kind": e.kind, "what": e.finding.what} for e in record.events
+        ],
         "against": _against(found),
         "control_points": _points(found),
         "method": _method(result),
@@ -134,7 +134,7 @@ def _smoothing(found: NavigationFound) -> dict[str, Any] | None:
     }
 
 
-def _method(result: NavigationResult) -> dict[str, Any]:
+def _method(result: NavigationRun) -> dict[str, Any]:
     """The modules and their options, without file paths."""
     chosen: dict[str, Any] = result.spec.model_dump(
         mode="json",
@@ -250,7 +250,7 @@ def _innovations(one: Agreement) -> dict[str, Any]:
         "correlation_next_epoch": _number(one.correlation),
         "correlation_by_chance_95": _number(one.correlation_bound),
         "verdicts": [
-            {"kind": v.kind, "component": v.component, "since_s": v.since, "what": v.what}
+            {"kind": v.kind, "component": v.component, "since_s": v.since, "what": v.finding.what}
             for v in one.consistency.verdicts
         ],
         "rms": {label: _number(_rms(one.nu[one.used, k])) for k, label in enumerate(one.labels)},
@@ -281,12 +281,12 @@ _WORDS = {"rad/s": "rad_s", "m/s²": "m_s2", "1": "", "(rad/s)/(m/s²)": "rad_s_
 MOST_POINTS = 10_000
 
 
-def write_navigation_files(result: NavigationResult, folder: Path) -> None:
+def write_navigation_files(result: NavigationRun, folder: Path) -> None:
     """Write the tables of a run.
 
     Parameters
     ----------
-    result : NavigationResult
+    result : NavigationRun
     folder : Path
         ``trajectory.*`` in the requested formats, ``sd.csv``, ``sensor_errors.csv``,
         ``innovations/NAME.csv``, ``events.csv``, and ``errors.csv`` if the truth is known; for a
@@ -309,7 +309,7 @@ def write_navigation_files(result: NavigationResult, folder: Path) -> None:
         {
             "time_s": np.array([e.time for e in events], dtype=np.float64),
             "kind": np.array([e.kind for e in events], dtype=np.str_),
-            "what": np.array([e.what for e in events], dtype=np.str_),
+            "what": np.array([e.finding.what for e in events], dtype=np.str_),
         },
         told,
     )
@@ -333,7 +333,7 @@ def write_navigation_files(result: NavigationResult, folder: Path) -> None:
 
 
 def _write_states(
-    result: NavigationResult, record: NavigationRecord, folder: Path, told: dict[str, str]
+    result: NavigationRun, record: NavigationRecord, folder: Path, told: dict[str, str]
 ) -> None:
     """Write a trajectory, its standard deviations, and the estimated sensor errors."""
     options = TrajectoryFileOptions(ellipsoid=result.ellipsoid, most_points=MOST_POINTS)

@@ -251,7 +251,7 @@ def event_table(found: NavigationFound) -> TableBlock | None:
     more = f"; {rest} more stand in navigation.json" if rest else ""
     return TableBlock(
         ("at", "event", "what"),
-        tuple((instant(e.time), e.kind, e.what) for e in shown),
+        tuple((instant(e.time), e.kind, e.finding.what) for e in shown),
         text=(0, 1, 2),
         caption=f"What happened, in the order of time{more}.",
     )

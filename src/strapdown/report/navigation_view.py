@@ -12,7 +12,7 @@ from strapdown.report.navigation_charts import innovation_chart
 from strapdown.report.navigation_found import NavigationTold, agreements, told_of
 from strapdown.report.navigation_plan import plan_chart
 from strapdown.report.svg_chart import notebook_figure
-from strapdown.systems.sins.run import NavigationResult
+from strapdown.systems.navigation_run import NavigationRun
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -28,12 +28,12 @@ KINDS: dict[str, Callable[[NavigationTold], Chart | None]] = {
 }
 
 
-def plot(result: NavigationResult, kind: str) -> Figure:
+def plot(result: NavigationRun, kind: str) -> Figure:
     """Draw one chart of a run, as its report shows it.
 
     Parameters
     ----------
-    result : NavigationResult
+    result : NavigationRun
     kind : str
         One of `KINDS`, or the name of an observation.
 

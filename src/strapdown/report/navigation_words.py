@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from strapdown.constants import TWO_SIDED_95
 from strapdown.evaluation.plane_bound import plane_bound
-from strapdown.evaluation.truth_comparison import SmootherConsistency
 from strapdown.navigation.record import NavigationRecord, Span
+from strapdown.navigation.truth_comparison import SmootherConsistency
 from strapdown.report.chart import BLUE, GREY, Chart, Panel, curve
 from strapdown.report.document import KeyFigure, TableBlock
 from strapdown.report.navigation_charts import over_time
@@ -147,15 +147,14 @@ def longest_outages(found: NavigationFound) -> list[tuple[str, Span, float]]:
     return sorted(out, key=lambda o: (o[1].begin, o[0]))
 
 
-def cautions(found: NavigationFound) -> tuple[tuple[str, str], ...]:
-    """Return the cautions, each with its number."""
+def cautions(found: NavigationFound, *, brief: bool = False) -> tuple[tuple[str, str], ...]:
+    """Return the cautions, each with its number; brief, without those that the tables show."""
+    shown = () if brief else (*_memory(found), *_refused(found), *_not_told(found))
     return (
         *_outages(found),
         *_ended_without(found),
         *_heading_caution(found),
-        *_memory(found),
-        *_refused(found),
-        *_not_told(found),
+        *shown,
         *agreement_words(found),
     )
 

@@ -21,7 +21,8 @@ from strapdown.report.crash_simulation import stated_errors, write_crash_simulat
 from strapdown.report.trajectory_simulation import write_trajectory_simulation
 from strapdown.simulation import SCENARIOS, Motion, PulseMotion, TriadErrors, find_scenario
 from strapdown.simulation.crash_cases import CASES
-from strapdown.systems.attitude_source import scenario_errors, sensor_file, simulate_scenario
+from strapdown.systems.attitude_source import scenario_errors, simulate_scenario
+from strapdown.systems.inputs import sensor_file
 
 __all__ = ["simulate", "write_simulation"]
 

@@ -24,7 +24,7 @@ from strapdown.report.crash_simulation import stated_errors
 from strapdown.report.path_marks import View, path_marks
 from strapdown.report.svg_chart import draw
 from strapdown.simulation import TriadErrors
-from strapdown.systems.attitude_source import sensor_file
+from strapdown.systems.inputs import sensor_file
 from strapdown.systems.trajectory_source import simulate_trajectory
 from strapdown.tables import EULER, places_of
 

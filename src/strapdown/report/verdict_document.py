@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from strapdown import __version__
 from strapdown.constants import TWO_SIDED_95
-from strapdown.evaluation.heading_light import REASONS, HeadingIntegrity
 from strapdown.evaluation.plane_bound import plane_bound
+from strapdown.navigation.heading_integrity import REASONS, HeadingIntegrity
+from strapdown.navigation.heading_witness import UNSEEN
 from strapdown.report.chart import BLUE, GREY, VERMILLION, thin
 from strapdown.report.document import (
     Block,
@@ -40,8 +41,7 @@ from strapdown.report.verdict_words import (
     unwitnessed_words,
     witness_words,
 )
-from strapdown.systems.sins.heading_witness import UNSEEN
-from strapdown.systems.sins.run import NavigationResult
+from strapdown.systems.navigation_run import NavigationRun
 
 __all__ = [
     "LIGHTS",
@@ -57,12 +57,12 @@ __all__ = [
 _MOST = 12
 
 
-def verdict_document(result: NavigationResult, name: str) -> Document:
+def verdict_document(result: NavigationRun, name: str) -> Document:
     """Return the verdict page of a navigation run.
 
     Parameters
     ----------
-    result : NavigationResult
+    result : NavigationRun
     name : str
         Folder name.
 
@@ -97,7 +97,7 @@ def verdict_document(result: NavigationResult, name: str) -> Document:
     )
 
 
-def light_section(result: NavigationResult) -> Section:
+def light_section(result: NavigationRun) -> Section:
     """Heading integrity, as a section of the report."""
     said = Paragraph(answer(result))
     return Section(
@@ -105,7 +105,7 @@ def light_section(result: NavigationResult) -> Section:
     )
 
 
-def _of_filter(result: NavigationResult) -> tuple[Block, ...]:
+def _of_filter(result: NavigationRun) -> tuple[Block, ...]:
     """Note for a smoothed run on the parts that use the filter alone."""
     if result.forward is None:
         return ()
@@ -118,7 +118,7 @@ def _of_filter(result: NavigationResult) -> tuple[Block, ...]:
     )
 
 
-def _keys(result: NavigationResult) -> tuple[KeyFigure, ...]:
+def _keys(result: NavigationRun) -> tuple[KeyFigure, ...]:
     trust, light = result.trust, result.trust.light
     bounds = plane_bound(result.record.covariance)
     heading = half(result.record.sd["heading"].iloc[-1])
@@ -157,7 +157,7 @@ def _keys(result: NavigationResult) -> tuple[KeyFigure, ...]:
     )
 
 
-def _agrees(result: NavigationResult) -> str:
+def _agrees(result: NavigationRun) -> str:
     trust = result.trust
     if not trust.consistency:
         return "nothing"
@@ -169,7 +169,7 @@ def _agrees(result: NavigationResult) -> str:
     return "does not agree"
 
 
-def _since(result: NavigationResult, colour: str) -> str:
+def _since(result: NavigationRun, colour: str) -> str:
     seconds = 0.0
     for span in reversed(result.trust.light.spans):
         if span.colour != colour:
@@ -178,7 +178,7 @@ def _since(result: NavigationResult, colour: str) -> str:
     return duration_words(seconds)
 
 
-def _heading(result: NavigationResult) -> tuple[Block, ...]:
+def _heading(result: NavigationRun) -> tuple[Block, ...]:
     trust, light = result.trust, result.trust.light
     if not len(light.table):
         return (Paragraph("The run is shorter than a second."),)
@@ -214,7 +214,7 @@ def _heading(result: NavigationResult) -> tuple[Block, ...]:
     return (*blocks, *(() if table is None else (table,)))
 
 
-def _reasons(result: NavigationResult) -> TableBlock:
+def _reasons(result: NavigationRun) -> TableBlock:
     table = result.trust.light.table
     rows = []
     for colour, number in (("green", 0), ("amber", 1), ("red", 2)):
@@ -230,7 +230,7 @@ def _reasons(result: NavigationResult) -> TableBlock:
     )
 
 
-def _against_truth(result: NavigationResult) -> TableBlock | None:
+def _against_truth(result: NavigationRun) -> TableBlock | None:
     """Sizes of the errors under each status color; None if the truth is not known."""
     light = result.trust.light
     error = heading_error(result, light.table.index.to_numpy(dtype=np.float64))
@@ -256,7 +256,7 @@ def _against_truth(result: NavigationResult) -> TableBlock | None:
     )
 
 
-def _innovations(result: NavigationResult) -> tuple[Block, ...]:
+def _innovations(result: NavigationRun) -> tuple[Block, ...]:
     trust = result.trust
     if not trust.consistency:
         return (Paragraph("Nothing was observed."),)
@@ -277,7 +277,7 @@ def _innovations(result: NavigationResult) -> tuple[Block, ...]:
         )
     ]
     small = [
-        (name, v.what)
+        (name, v.finding.what)
         for name, one in trust.consistency.items()
         for v in one.verdicts
         if v.kind != "few"
@@ -294,7 +294,7 @@ def _innovations(result: NavigationResult) -> tuple[Block, ...]:
     return tuple(blocks)
 
 
-def _first(result: NavigationResult) -> tuple[Block, ...]:
+def _first(result: NavigationRun) -> tuple[Block, ...]:
     trust = result.trust
     blocks: list[Block] = [Paragraph(first_words(trust))]
     if len(trust.inconsistencies) > 1:
@@ -319,7 +319,9 @@ def _first(result: NavigationResult) -> tuple[Block, ...]:
         blocks.append(picture)
     repeated = trust.repeated
     if repeated is not None and repeated.left:
-        rows_left = tuple((i.name, f"{kind_words(i)}: {i.what}.") for i in repeated.left[:_MOST])
+        rows_left = tuple(
+            (i.name, f"{kind_words(i)}: {i.finding.what}.") for i in repeated.left[:_MOST]
+        )
         blocks += [Paragraph("What does not agree in the repeated run:"), Items(rows_left)]
     return tuple(blocks)
 
@@ -387,7 +389,7 @@ class _Frame:
         return np.column_stack([across, self.top + self.height * (1.0 - share)])
 
 
-def heading_error(result: NavigationResult, time: Array) -> Array | None:
+def heading_error(result: NavigationRun, time: Array) -> Array | None:
     """Heading error at given instants, deg; None if the truth is not known."""
     differences = result.filtered_differences
     if differences is None or not len(differences):
@@ -397,7 +399,7 @@ def heading_error(result: NavigationResult, time: Array) -> Array | None:
     return np.asarray(np.interp(time, known, error, left=np.nan, right=np.nan))
 
 
-def light_picture(result: NavigationResult) -> Picture:
+def light_picture(result: NavigationRun) -> Picture:
     """Heading integrity of each second, with the bounds that determine it."""
     light = result.trust.light
     table = light.table
@@ -436,7 +438,7 @@ def light_picture(result: NavigationResult) -> Picture:
     )
 
 
-def repeated_picture(result: NavigationResult) -> Picture | None:
+def repeated_picture(result: NavigationRun) -> Picture | None:
     """Difference of a run from its re-run, with the bounds of both; None without a re-run."""
     repeated = result.trust.repeated
     if repeated is None or repeated.differences is None or repeated.record is None:
@@ -483,7 +485,7 @@ def repeated_picture(result: NavigationResult) -> Picture | None:
         "repeated",
         picture.svg(),
         "The run and its repetition",
-        f"How far the run is from the same run {repeated.without}, beside the bounds of both.",
+        f"How far the run is from the same run {repeated.change.what}, beside the bounds of both.",
         "Differences of place and heading between the run and the repeated run, beside bounds",
     )
 

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from strapdown.bundle.seal import to_json
-from strapdown.evaluation.heading_light import COLOURS, REASONS
 from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.formats import csv
 from strapdown.navigation.consistency import Inconsistency
+from strapdown.navigation.heading_integrity import COLOURS, REASONS
+from strapdown.navigation.integrity import Repeated
 from strapdown.report.document_files import write_text
 from strapdown.report.document_html import document_page
 from strapdown.report.verdict_document import verdict_document
@@ -23,18 +24,17 @@ from strapdown.report.verdict_words import (
     repeated_words,
     witness_words,
 )
-from strapdown.systems.sins.run import NavigationResult
-from strapdown.systems.sins.trust import Repeated
+from strapdown.systems.navigation_run import NavigationRun
 
 __all__ = ["verdict_json", "write_verdict"]
 
 
-def write_verdict(result: NavigationResult, name: str, folder: Path) -> None:
+def write_verdict(result: NavigationRun, name: str, folder: Path) -> None:
     """Write ``verdict.html``, ``verdict.json`` and ``heading_light.csv``.
 
     Parameters
     ----------
-    result : NavigationResult
+    result : NavigationRun
     name : str
         Folder name shown on the page.
     folder : Path
@@ -65,7 +65,7 @@ def write_verdict(result: NavigationResult, name: str, folder: Path) -> None:
     )
 
 
-def verdict_json(result: NavigationResult) -> dict[str, Any]:
+def verdict_json(result: NavigationRun) -> dict[str, Any]:
     """Return a verdict for programs; angles in degrees, lengths in meters, times in s."""
     trust, light = result.trust, result.trust.light
     bounds = plane_bound(result.record.covariance)
@@ -122,9 +122,9 @@ def verdict_json(result: NavigationResult) -> dict[str, Any]:
     }
 
 
-def _repeated(repeated: Repeated, result: NavigationResult) -> dict[str, Any]:
+def _repeated(repeated: Repeated, result: NavigationRun) -> dict[str, Any]:
     out: dict[str, Any] = {
-        "without": repeated.without,
+        "without": repeated.change.what,
         "answer": _plain(repeated_words(result)),
         "failed": None if repeated.failed is None else repeated.failed.plain(),
         "left": [_doubt(i) for i in repeated.left],
@@ -151,8 +151,8 @@ def _doubt(one: Inconsistency) -> dict[str, Any]:
         "since_s": one.since,
         "until_s": one.until,
         "epochs_s": one.epochs.tolist(),
-        "what": one.what,
-        "meaning": one.meaning,
+        "what": one.finding.what,
+        "meaning": one.finding.remedy,
     }
 
 

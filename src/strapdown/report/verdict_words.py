@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
-from strapdown.evaluation.heading_light import REASONS, SURE, WITNESSES, LightSpan
 from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.navigation.consistency import Inconsistency
+from strapdown.navigation.heading_integrity import REASONS, SURE, WITNESSES, LightSpan
+from strapdown.navigation.integrity import NO_NORTH, Advice, IntegrityReport, Repeated
 from strapdown.report.values import GAP, duration_words, half, length_words, plain, share_words
 from strapdown.report.values import alignment_values_instant as instant
-from strapdown.systems.sins.run import NavigationResult
-from strapdown.systems.sins.trust import NO_NORTH, Advice, IntegrityReport, Repeated
+from strapdown.systems.navigation_run import NavigationRun
 
 __all__ = [
     "advice_words",
@@ -38,12 +38,12 @@ _KINDS = {
 }
 
 
-def answer(result: NavigationResult) -> str:
+def answer(result: NavigationRun) -> str:
     """Return the first sentence of a verdict."""
     return f"{place_words(result)} {heading_words(result.trust)}"
 
 
-def place_words(result: NavigationResult) -> str:
+def place_words(result: NavigationRun) -> str:
     """Return the 95 % bound of the position, at the end and at its worst."""
     bounds = plane_bound(result.record.covariance)
     end, worst = float(bounds[-1]), int(np.argmax(bounds))
@@ -192,13 +192,15 @@ def first_words(trust: IntegrityReport) -> str:
         else f"at {instant(one.since)}"
     )
     where = one.component.partition(",")[0]
+    meaning = one.finding.remedy or ""
     return (
-        f"The first that does not agree is {one.name}, component {where}, {when}: {one.what}. "
-        f"{one.meaning[:1].upper()}{one.meaning[1:]}."
+        f"The first that does not agree is {one.name}, component {where}, {when}: "
+        f"{one.finding.what}. "
+        f"{meaning[:1].upper()}{meaning[1:]}."
     )
 
 
-def repeated_words(result: NavigationResult) -> str:
+def repeated_words(result: NavigationRun) -> str:
     """Return the result of the re-run without it."""
     trust = result.trust
     repeated = trust.repeated
@@ -207,7 +209,7 @@ def repeated_words(result: NavigationResult) -> str:
             return ""
         return "It was not repeated without it: repeat is false in [trust]."
     if repeated.record is None or repeated.differences is None:
-        return f"Repeated {repeated.without}, the run fails: {_failed(repeated)}"
+        return f"Repeated {repeated.change.what}, the run fails: {_failed(repeated)}"
     table = repeated.differences
     place = np.hypot(table["north"].to_numpy(), table["east"].to_numpy())
     turn = np.abs(table["heading"].to_numpy(dtype=np.float64))
@@ -229,17 +231,17 @@ def repeated_words(result: NavigationResult) -> str:
     usual, most, last = (length_words(float(x)) for x in (np.median(place), max(place), place[-1]))
     turned = [degrees_words(float(x)) for x in (np.median(turn), max(turn), turn[-1])]
     return (
-        f"Repeated {repeated.without}, the place differs by {usual} in the middle and {most} at "
-        f"most ({beyond}), at the end by {last}; the heading by {turned[0]} in the middle and "
+        f"Repeated {repeated.change.what}, the place differs by {usual} in the middle and {most} "
+        f"at most ({beyond}), at the end by {last}; the heading by {turned[0]} in the middle and "
         f"{turned[1]} at most, at the end by {turned[2]} where its bound is "
         f"{degrees_words(bound)}; {rest}."
     )
 
 
-def terminal_lines(result: NavigationResult) -> list[tuple[str, str]]:
-    """Two to four lines for the terminal, each with its style."""
+def terminal_lines(result: NavigationRun, *, brief: bool = False) -> list[tuple[str, str]]:
+    """Up to four lines for the terminal, each with its style; brief, without the position."""
     trust = result.trust
-    lines = [(answer(result), _style(trust))]
+    lines = [(heading_words(trust) if brief else answer(result), _style(trust))]
     if trust.first is not None:
         first = trust.first
         since = "throughout" if first.throughout else f"first at {instant(first.since)}"
@@ -266,7 +268,7 @@ def _beyond(time: np.ndarray, apart: np.ndarray, marks: np.ndarray, bound: np.nd
     return f"beyond the repeated run's bound of 95{GAP}% for {share_words(share)} of the time"
 
 
-def _at(result: NavigationResult, mark: int) -> str:
+def _at(result: NavigationRun, mark: int) -> str:
     return f"at {instant(float(result.record.sd.index[mark]))}"
 
 

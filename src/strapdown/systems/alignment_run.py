@@ -12,8 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.alignment.alignment import Alignment, CoarseAlignment, Site
-from strapdown.alignment.fine import FineAlignment
-from strapdown.alignment.fine_result import FineResult
+from strapdown.alignment.fine import FineAlignment, FineResult
 from strapdown.alignment.readiness import (
     Manoeuvre,
     carried_attitude,
@@ -30,15 +29,15 @@ from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import DataError, Finding
 from strapdown.prefilter import Prefilter, PrefilterReport
 from strapdown.prefilter.prefilter import LOW_RATE
+from strapdown.progress import Progress, silent
 from strapdown.results.inputs import InputFiles
 from strapdown.rotation import within_half_turn
 from strapdown.sensors.health_log import LEAST_SAMPLES
 from strapdown.sensors.imu_health import ChannelFault, check_imu_channels
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.alignment_source import AlignmentSource, read_alignment_source
-from strapdown.systems.attitude_source import input_files
+from strapdown.systems.inputs import input_files
 from strapdown.systems.one_thread import one_thread
-from strapdown.systems.progress import Progress, silent
 from strapdown.tables import ACCEL, EULER, GYRO
 from strapdown.tables.checks import index_of, source_of, values_of
 

@@ -26,9 +26,7 @@ from strapdown.sensors.triad_errors import (
     check_axes_matrix,
     report_transposed,
 )
-from strapdown.simulation import Origin, StationaryMotion, Wave, rocking_stand, simulate_imu
-from strapdown.systems.attitude_source import input_files, sensor_file
-from strapdown.systems.part_of_log import part_of_log
+from strapdown.systems.inputs import input_files, part_of_log, sensor_file
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import values_of
 
@@ -101,7 +99,11 @@ def read_alignment_source(spec: AlignmentSpec) -> AlignmentSource:
         recording.readings,
         (
             input_files("log", spec.log.path, recording.files),
-            *(() if spec.gnss is None else (_fixes(spec.gnss.path),)),
+            *(
+                ()
+                if spec.gnss is None
+                else (input_files("gnss", spec.gnss.path, files_of_fixes(spec.gnss.path)),)
+            ),
             *_sensor_file(spec),
         ),
         findings,
@@ -145,10 +147,6 @@ def body_record(
             findings += report_transposed(accel, force, recording.name)
     part = part_of_log(imu, log.from_s, log.to_s, log.duration_s, recording.name)
     return recording, part, tuple(findings)
-
-
-def _fixes(path: str) -> InputFiles:
-    return input_files("gnss", path, files_of_fixes(path))
 
 
 def _options(log: LogTable, axes: str | None) -> ReadOptions:
@@ -230,6 +228,8 @@ def _sensor_file(spec: AlignmentSpec) -> tuple[InputFiles, ...]:
 
 
 def _simulated(spec: AlignmentSpec) -> AlignmentSource:
+    from strapdown.simulation import Origin, StationaryMotion, Wave, rocking_stand, simulate_imu
+
     asked = spec.simulation
     assert asked is not None  # one of the two is there
     origin = Origin(spec.site.lat_deg, spec.site.lon_deg, spec.site.alt_m)

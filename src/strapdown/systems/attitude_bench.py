@@ -26,6 +26,7 @@ from strapdown.formats import read_log
 from strapdown.formats.references import read_reference_words
 from strapdown.formats.unit_words import factor_of, parse_unit
 from strapdown.increments import increments_from_imu
+from strapdown.progress import Progress, silent
 from strapdown.results.attitude_bench import AttitudeBench
 from strapdown.results.inputs import InputFiles
 from strapdown.results.rests import RestStretch
@@ -45,7 +46,6 @@ from strapdown.systems.attitude_known import (
 from strapdown.systems.attitude_source import (
     Source,
     describe,
-    input_files,
     read_options,
     read_source,
     with_truth,
@@ -63,8 +63,7 @@ from strapdown.systems.attitude_sweep import (
     trial_names,
     worst_sweep,
 )
-from strapdown.systems.part_of_log import check_part, part_of_log
-from strapdown.systems.progress import Progress, silent
+from strapdown.systems.inputs import check_part, input_files, part_of_log
 from strapdown.tables import GYRO
 
 __all__ = ["bench_attitude", "run_bench"]

@@ -27,7 +27,8 @@ from strapdown.results.attitude_bench import AttitudeRun, PeerRun, Score, Second
 from strapdown.results.rests import RestStretch, SamePose
 from strapdown.sensors.rest import find_rests
 from strapdown.simulation import find_scenario
-from strapdown.systems.attitude_source import Source, input_files
+from strapdown.systems.attitude_source import Source
+from strapdown.systems.inputs import input_files
 from strapdown.tables import QUATERNION, THETA, attitude_table, find_gaps
 
 Array = NDArray[np.float64]

@@ -10,7 +10,6 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.attitude import Quaternion, run_attitude
-from strapdown.bundle.seal import sha256
 from strapdown.config import AttitudeSpec, LogSpec, ScenarioSpec
 from strapdown.errors import DataError, Finding
 from strapdown.evaluation.differences import error_angles
@@ -19,8 +18,9 @@ from strapdown.formats.recording import Origin, ReadOptions
 from strapdown.formats.references import read_truth
 from strapdown.increments import increments_from_imu
 from strapdown.results.inputs import InputFiles, Reading
-from strapdown.sensors.catalogue import SENSORS, load_sensor
+from strapdown.sensors.catalogue import load_sensor
 from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
+from strapdown.systems.inputs import input_files, sensor_file
 from strapdown.tables import QUATERNION
 
 Array = NDArray[np.float64]
@@ -122,18 +122,6 @@ def read_source(spec: AttitudeSpec) -> Source:
         inputs,
         None,
     )
-
-
-def input_files(role: str, path: str, files: tuple[Path, ...]) -> InputFiles:
-    """List files read in a role, with their present digests."""
-    return InputFiles(role, Path(path), files, tuple(sha256(file) for file in files))
-
-
-def sensor_file(sensor: str | None) -> tuple[InputFiles, ...]:
-    """Return the file of a sensor that is not from the catalogue."""
-    if sensor is None or sensor.lower() in SENSORS:
-        return ()
-    return (input_files("sensor", sensor, (Path(sensor),)),)
 
 
 def _scenario(spec: ScenarioSpec) -> Source:

@@ -19,9 +19,9 @@ from strapdown.errors import ConfigError, DivergenceError, Finding
 from strapdown.evaluation.differences import Errors, Known, angles_to_errors
 from strapdown.evaluation.reference_points import reference_errors
 from strapdown.increments import increments_from_imu
+from strapdown.progress import Progress
 from strapdown.results.attitude_bench import AttitudeBench, AttitudeRun, Share, Trials
 from strapdown.rotation.euler_angles import unit_rotation_angle
-from strapdown.systems.progress import Progress
 from strapdown.tables import DTHETA, QUATERNION, THETA, increments_table
 
 Array = NDArray[np.float64]

@@ -28,14 +28,14 @@ from strapdown.formats.crash_records import read_crash_record
 from strapdown.formats.crash_triad import triad_of_channels
 from strapdown.formats.gnss_files import files_of_fixes, read_gnss
 from strapdown.formats.named_columns import read_reference_path
+from strapdown.progress import Progress, silent
 from strapdown.results.inputs import InputFiles
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.crash_unit import Assumed, CrashUnit, Mounting, RecordedTriad
 from strapdown.sensors.uncertainty import stated_uncertainty
-from strapdown.systems.attitude_source import input_files, sensor_file
 from strapdown.systems.crash_reconstruction import CrashReconstruction, reconstruct_crash
+from strapdown.systems.inputs import input_files, sensor_file
 from strapdown.systems.one_thread import one_thread
-from strapdown.systems.progress import Progress, silent
 
 __all__ = [
     "CaseResult",

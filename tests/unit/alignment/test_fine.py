@@ -14,8 +14,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from resting import SITE, UNCERTAINTY, resting, roughly
 
 from strapdown import rotation
-from strapdown.alignment.fine import FineAlignment
-from strapdown.alignment.fine_result import FINE_COLUMNS
+from strapdown.alignment.fine import FINE_COLUMNS, FineAlignment
 from strapdown.errors import ConfigError, DataError
 from strapdown.estimation.covariance import COVARIANCES
 from strapdown.estimation.error_model import ERROR_MODELS, QuaternionModel

@@ -16,10 +16,10 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "cli"))
 from bad_navigate import write_drive
 
 import strapdown as sd
-from strapdown.api.reading import NOWHERE
 from strapdown.config.navigation_file import read_navigation_spec
 from strapdown.errors import ConfigError, DataError
-from strapdown.systems.sins.run import run_navigation
+from strapdown.systems.inputs import NOWHERE
+from strapdown.systems.navigation_run import run_navigation
 
 SENSOR = "adis16495-1"
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from strapdown.aiding.aid import TabulatedMeasurement
-from strapdown.aiding.aids import AIDS
 from strapdown.errors import DataError
 from strapdown.formats.aid_tables import AID_READERS
+from strapdown.navigation.measurements import AIDS
+from strapdown.navigation.measurements.measurement import TabulatedMeasurement
 
 ROWS = np.column_stack([np.arange(5.0), np.full(5, 36.0), np.full(5, 0.36)])
 

@@ -19,8 +19,8 @@ from strapdown.live.clock import MachineClock
 from strapdown.live.run import live_spec, receive, result_of, write_received
 from strapdown.live.sources import LineSource, open_source
 from strapdown.navigation.recorder import FullRecorder
-from strapdown.systems.sins.drive import run_batch
-from strapdown.systems.sins.run import make_chain
+from strapdown.navigation.replay import run_batch
+from strapdown.systems.navigation_run import make_chain
 
 FIXES = ["lat", "lon", "alt", "VN", "VE", "VD"]
 SD = ["north_sd", "east_sd", "down_sd", "VN_sd", "VE_sd", "VD_sd"]

@@ -12,7 +12,7 @@ from strapdown.errors import ConfigError
 from strapdown.live.latency import LatencyTape
 from strapdown.live.replay import Replay, parse_pace
 from strapdown.navigation.recorder import FullRecorder
-from strapdown.systems.sins.drive import run_batch
+from strapdown.navigation.replay import run_batch
 
 RATE = 50.0
 

@@ -56,7 +56,7 @@ def test_a_wrong_standard_deviation_is_named_with_its_factor(factor):
         size = [one for one in found if one.kind == ("understated" if factor > 1 else "overstated")]
         assert {one.component for one in size} == set(LABELS)
         for one in size:
-            said = float(one.what.split("scatters ")[1].split()[0])
+            said = one.finding.data["scale"]
             # 1 / sqrt(2 n) of it is its standard deviation; five of them.
             assert abs(said / factor - 1.0) < 5.0 / np.sqrt(240.0)
             assert one.since == 0.0
@@ -68,10 +68,11 @@ def test_a_bias_of_one_standard_deviation_is_of_its_component_alone():
         found = verdicts(rng.normal((1.0, 0.0, 0.0), 1.0, (120, 3)))
         assert found[0].kind == "bias"
         assert found[0].component == LABELS[0]
-        # The label is 'north, m': the unit stands with the number, and the name alone.
+        # The label is 'north, m': a name and a unit.
         name, unit = LABELS[0].split(", ")
-        assert found[0].what.startswith(f"{name} is ")
-        assert found[0].what.endswith(f" {unit})")
+        assert found[0].finding.code == "navigation.innovations-biased"
+        assert found[0].finding.data["component"] == name
+        assert found[0].finding.data["unit"] == f" {unit}"
         assert not [one for one in found if one.component != LABELS[0]]
         # The bias is no scatter.
         assert {one.kind for one in found} == {"bias"}
@@ -87,7 +88,8 @@ def test_coloured_noise_follows_itself():
             coloured[k] = 0.5 * coloured[k - 1] + np.sqrt(0.75) * white[k]
         found = [one for one in verdicts(coloured) if one.kind == "correlated"]
         assert len(found) >= 2
-        assert all("+0." in one.what and "coloured" in one.meaning for one in found)
+        assert {one.finding.code for one in found} == {"navigation.innovations-colored"}
+        assert all(0.0 < one.finding.data["lag_1"] < 1.0 for one in found)
 
 
 def test_an_observation_that_is_believed_too_much_is_taken_back():
@@ -95,7 +97,7 @@ def test_an_observation_that_is_believed_too_much_is_taken_back():
     white = rng.normal(size=(301, 1))
     found = verdicts((white[1:] - white[:-1]) / np.sqrt(2.0))
     assert found[0].kind == "correlated"
-    assert "takes back" in found[0].meaning
+    assert found[0].finding.code == "navigation.innovations-anticorrelated"
 
 
 def test_a_jump_is_dated():
@@ -127,10 +129,10 @@ def test_gross_errors_are_counted_and_are_not_held_against_the_filter():
     out = consistency_of("x", innovation_table(u))
     assert out.consistent
     assert [one.kind for one in out.verdicts] == ["gross"] * 3
-    assert all(
-        one.since == 30.0 and "9 gross errors in 300 epochs (3.0 %)" in one.what
-        for one in out.verdicts
-    )
+    assert all(one.since == one.finding.data["first"] == 30.0 for one in out.verdicts)
+    counts = {(one.finding.data["gross"], one.finding.data["count"]) for one in out.verdicts}
+    assert counts == {(9, 300)}
+    assert all(one.finding.data["percent"] == pytest.approx(3.0) for one in out.verdicts)
     assert all(one.gross == 9 and one.count == 300 for one in out.components)
     assert out.nis["nis"].max() == pytest.approx(7500.0)
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from tests.town_drive import ARM, begun, fixes, increments
 
-from strapdown.aiding.gnss import Gnss
+from strapdown.navigation.measurements.gnss import Gnss
 
 
 def on(navigator, state, first, end):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from strapdown.errors import ConfigError
-from strapdown.navigation.innovations import InnovationMonitor
+from strapdown.navigation.consistency import InnovationMonitor
 
 
 def alarms_of(monitor, u):

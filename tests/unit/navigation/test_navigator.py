@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from tests import aided_drives
 
-from strapdown.aiding.gnss import Gnss
 from strapdown.errors import ConfigError, DivergenceError
 from strapdown.estimation.covariance import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter
@@ -23,6 +22,7 @@ from strapdown.nav_state import NavState
 from strapdown.navigation import navigator as navigator_module
 from strapdown.navigation.compiled_engine import compiled
 from strapdown.navigation.filter_options import OpenLoop
+from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.navigator import Navigator, with_states
 from strapdown.sensors.triad_errors import ImuErrors
 from strapdown.simulation import Origin, SineVelocityMotion, simulate_imu

@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 from tests.aided_drives import begin, drive, gnss_of, increments_of, navigator_of, truth_at
 
-from strapdown.aiding.gnss import Gnss
-from strapdown.aiding.vehicle import NoSlip
 from strapdown.errors import ConfigError
 from strapdown.estimation.error_model import QuaternionModel
 from strapdown.mechanization import NorthEastDown
@@ -19,6 +17,8 @@ from strapdown.mechanization.state_error import state_error
 from strapdown.nav_state import NavState
 from strapdown.navigation import engine as node_rows
 from strapdown.navigation import smoother as smoothing_tape
+from strapdown.navigation.measurements.gnss import Gnss
+from strapdown.navigation.measurements.vehicle import NoSlip
 from strapdown.navigation.recorder import FullRecorder, IntervalRecorder
 from strapdown.navigation.smoother import RauchTungStriebel
 from strapdown.rotation import dcm_from_quaternion

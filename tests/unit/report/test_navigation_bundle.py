@@ -10,13 +10,16 @@ import numpy as np
 import pytest
 
 from strapdown.config.navigation_file import read_navigation_spec
+from strapdown.errors import Finding
 from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.report.document_data import draw_stills
 from strapdown.report.document_files import drawings, write_drawings
 from strapdown.report.navigation_document import navigation_document
 from strapdown.report.navigation_found import examine, told_of, withheld_of
 from strapdown.report.navigation_json import navigation_json
-from strapdown.systems.sins.run import run_navigation
+from strapdown.report.navigation_trust import trust
+from strapdown.report.verdict_words import answer, heading_words
+from strapdown.systems.navigation_run import run_navigation
 
 FILE = """
 [simulation]
@@ -134,16 +137,30 @@ def test_the_terminal_says_what_the_page_says(result, capsys):
     print_navigation(result)
     said = " ".join(capsys.readouterr().out.split())
     found = examine(told_of(result))
-    document = navigation_document(found.told, "", found)
-    assert document.subtitle.replace("\u00a0", " ") in said
+    assert trust(found).sentence.replace("\u00a0", " ") in said
+    assert heading_words(result.trust).replace("\u00a0", " ") in said
     assert "rtk.position" in said
-    assert "horizontal, m" in said
+    assert "within bound" in said
+    print_navigation(result, verbose=True)
+    said = " ".join(capsys.readouterr().out.split())
+    assert answer(result).replace("\u00a0", " ") in said
+    assert "gyro bias x" in said
+
+
+def test_the_answer_on_the_terminal_fits_40_lines(result, capsys):
+    from strapdown.cli.navigate_tables import print_navigation
+
+    many = [Finding("navigation.window-too-short", window=k) for k in range(60)]
+    print_navigation(result, many)
+    # The paths and the seal take four lines.
+    printed = capsys.readouterr()
+    assert len((printed.out + printed.err).splitlines()) <= 36
+    assert "all of them are in the report" in printed.err
 
 
 def test_scores_of_what_was_withheld_are_told_as_they_are():
-    from strapdown.evaluation.gnss_outages import WithheldScore
+    from strapdown.navigation.outage_test import Withheld, WithheldScore
     from strapdown.navigation.record import Span
-    from strapdown.systems.sins.withholding import Withheld
 
     score = WithheldScore(
         Span("withheld", 10.0, 20.0),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from strapdown.config.navigation_file import navigation_spec
-from strapdown.systems.sins.readiness import look_through
+from strapdown.systems.navigation_checks import look_through
 from strapdown.tables import imu_table
 
 FREE, HELD = {"kind": "wander_azimuth"}, {"kind": "wander_azimuth", "height": "held"}

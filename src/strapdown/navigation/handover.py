@@ -1,0 +1,721 @@
+"""Alignment at the end of an alignment mode, and the handover to navigation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown import rotation
+from strapdown.alignment.alignment import Alignment, Site
+from strapdown.alignment.course_sums import Antenna
+from strapdown.alignment.fine import FineResult
+from strapdown.alignment.gnss_course import GnssCourse
+from strapdown.constants import MAD_TO_SD
+from strapdown.dsp.running_integral import running_integral
+from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
+from strapdown.errors import DataError
+from strapdown.estimation.error_filter import ErrorFilter, FilterState, symmetric
+from strapdown.estimation.error_model import PHYSICAL
+from strapdown.frames import geodetic_from_ned, ned_from_geodetic
+from strapdown.nav_state import NavState
+from strapdown.navigation.measurements.measurement import (
+    DISPLACEMENT,
+    ROTATION,
+    VELOCITY,
+    Measurement,
+)
+from strapdown.navigation.modes import Aligned, CoarseMode, FineMode
+from strapdown.prefilter.prefilter import CHANNELS
+from strapdown.rotation import rotate
+from strapdown.tables import GEODETIC, MOTION, POSITION_SD, VELOCITY_SD, check_gnss
+from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
+from strapdown.tables.checks import index_of, source_of, values_of
+
+if TYPE_CHECKING:
+    from strapdown.navigation.pipeline import NavigationPipeline, PipelineState
+
+__all__ = [
+    "Place",
+    "align",
+    "errors_by_antenna",
+    "fixes_until",
+    "from_alignment",
+    "from_fine",
+    "from_state",
+    "handed_over",
+    "here_by_fix",
+    "site_of_fixes",
+    "unused_fixes",
+]
+
+
+Array = NDArray[np.float64]
+
+# Tolerance of an instant, s.
+INSTANT = 1e-7
+# The rate at an instant is a mean over this time before and after it, s.
+STEADY = 0.1
+
+
+def align(chain: NavigationPipeline, state: PipelineState) -> Aligned:
+    """Align with the steps and measurements kept during the mode.
+
+    Parameters
+    ----------
+    chain : NavigationPipeline
+    state : PipelineState
+        In an alignment mode.
+
+    Returns
+    -------
+    Aligned
+
+    Raises
+    ------
+    DataError, DivergenceError
+        The alignment is not possible.
+    """
+    mode = chain.modes[state.mode]
+    assert chain.sensors is not None
+    kept = _window(chain, state)
+    imu = _table(kept[:, 1:7], kept[:, 0], CHANNELS, state)
+    imu.attrs["sampling"] = chain.intake.sampling(state.intake)
+    imu.attrs["axes"] = "forward-right-down"
+    if isinstance(mode, FineMode):
+        assert state.aligned is not None
+        coarse = state.aligned.alignment
+        site, _ = _site(chain, state, coarse.q_nb)
+        increments = _table(kept[1:, 7:17], kept[1:, 0], MOTION, state)
+        fine = mode.way.align(imu, site, chain.sensors, coarse, increments=increments)
+        return Aligned(mode.name, state.begun, state.time, fine.alignment, fine)
+    assert isinstance(mode, CoarseMode)
+    site, _ = _site(chain, state, None)
+    if isinstance(mode.way, GnssCourse):
+        fixes, antenna = _fixes(chain, state), _antenna(chain)
+        found = mode.way.align(imu, site, chain.sensors, fixes, antenna)
+    else:
+        found = mode.way.align(imu, site, chain.sensors, _fixes(chain, state))
+    return Aligned(mode.name, state.begun, state.time, found)
+
+
+def handed_over(chain: NavigationPipeline, state: PipelineState, found: Aligned) -> FilterState:
+    """Return the filter state with which navigation begins.
+
+    Parameters
+    ----------
+    chain : NavigationPipeline
+    state : PipelineState
+        At the end of an alignment mode.
+    found : Aligned
+
+    Returns
+    -------
+    FilterState
+    """
+    filter_ = chain.navigator.filter
+    rest = _window(chain, state)[:, 1:7].mean(axis=0)
+    q_nb = found.alignment.q_nb
+    still = np.zeros(3)
+    if found.fine is not None:
+        assert state.aligned is not None
+        before = state.aligned.alignment.q_nb
+        _, sd = _site(chain, state, before)
+        shift, by_others = still, None
+        if chain.site is None:
+            arm = _lever_arm(chain)
+            shift = rotate(before, arm) - rotate(q_nb, arm)
+            by_others = _by_antenna(chain, q_nb, still, still)
+        return from_fine(filter_, found.fine, rest, sd, shift, by_others)
+    mode = chain.modes[state.mode]
+    if isinstance(mode, CoarseMode) and isinstance(mode.way, GnssCourse):
+        ellipsoid = find_ellipsoid(filter_.mechanization.ellipsoid)
+        assert found.alignment.velocity is not None and found.alignment.joint is not None
+        place = here_by_fix(
+            _fixes(chain, state),
+            state.time,
+            q_nb,
+            _lever_arm(chain),
+            ellipsoid,
+            found.alignment.velocity,
+            found.alignment.joint[:3, :3],
+        )
+        turn = _turn(_window(chain, state), state.time)
+        return from_alignment(
+            filter_,
+            found.alignment,
+            place.state,
+            place.covariance,
+            rest,
+            _by_antenna(chain, q_nb, place.state.v_n, turn),
+        )
+    site, sd = _site(chain, state, q_nb)
+    start = NavState.from_degrees(site.lat_deg, site.lon_deg, site.alt, time=state.time)
+    P = np.diag(np.square(np.concatenate([sd, chain.velocity_sd])))
+    by_others = None if chain.site is not None else _by_antenna(chain, q_nb, still, still)
+    return from_alignment(filter_, found.alignment, start, P, rest, by_others)
+
+
+def unused_fixes(
+    chain: NavigationPipeline, state: PipelineState, begun: float
+) -> dict[str, tuple[pd.DataFrame, ...]]:
+    """Return the fixes of the alignment's receiver that the alignment has not used.
+
+    Parameters
+    ----------
+    chain : NavigationPipeline
+    state : PipelineState
+        At the end of an alignment mode.
+    begun : float, s
+        When navigation begins.
+
+    Returns
+    -------
+    dict of str to tuple of DataFrame
+        By name of the measurement: rows after an alignment by course. A fix at its very end has
+        already given position and velocity, and would count twice.
+    """
+    mode, name = chain.modes[state.mode], chain.fixes_from
+    if name is None or not (isinstance(mode, CoarseMode) and isinstance(mode.way, GnssCourse)):
+        return {}
+    offset = float(getattr(_receiver(chain), "time_offset", 0.0))
+    out = [table[table.index - offset > begun + INSTANT] for table in state.told[name]]
+    return {name: tuple(table for table in out if len(table))}
+
+
+def _by_antenna(
+    chain: NavigationPipeline, q_nb: Array, velocity: Array, turn: Array
+) -> Array | None:
+    """Error of position and velocity from fixes per physical error."""
+    if chain.fixes_from is None:
+        return None
+    arm, filter_ = _lever_arm(chain), chain.navigator.filter
+    return errors_by_antenna(filter_, chain.fixes_from, q_nb, arm, velocity, turn)
+
+
+def _turn(kept: Array, at: float) -> Array:
+    """Mean body rate about an instant, body axes."""
+    near = np.abs(kept[:, 0] - at) <= STEADY
+    if not near.any():
+        near = np.arange(len(kept)) == np.argmin(np.abs(kept[:, 0] - at))
+    return np.asarray(kept[near, 1:4].mean(axis=0))
+
+
+def _window(chain: NavigationPipeline, state: PipelineState) -> Array:
+    """Steps to align with."""
+    kept, mode = state.kept.rows, chain.modes[state.mode]
+    if not isinstance(mode, CoarseMode):
+        return kept
+    return kept[np.searchsorted(kept[:, 0], state.time - mode.window - INSTANT) :]
+
+
+def _table(values: Array, time: Array, columns: list[str], state: PipelineState) -> pd.DataFrame:
+    table = pd.DataFrame(values.copy(), index=pd.Index(time, name="time"), columns=columns)
+    table.attrs["source"] = state.intake.source
+    return table
+
+
+def _fixes(chain: NavigationPipeline, state: PipelineState) -> pd.DataFrame | None:
+    name = chain.fixes_from
+    if name is None:
+        return None
+    offset = float(getattr(chain.navigator.by_name[name], "time_offset", 0.0))
+    return fixes_until(state.told[name], state.time + INSTANT, offset)
+
+
+def _site(
+    chain: NavigationPipeline, state: PipelineState, q_nb: Array | None
+) -> tuple[Site, Array]:
+    """Position of the sensors and its standard deviation."""
+    if chain.site is not None:
+        return chain.site, np.asarray(chain.site_sd, dtype=np.float64)
+    ellipsoid = find_ellipsoid(chain.navigator.filter.mechanization.ellipsoid)
+    site, sd = site_of_fixes(_fixes(chain, state), state.begun, state.time, ellipsoid)
+    arm = _lever_arm(chain)
+    if q_nb is None or not arm.any():
+        return site, sd
+    antenna = np.array([site.lat_deg, site.lon_deg, site.alt])
+    place = geodetic_from_ned(-rotate(q_nb, arm), antenna, ellipsoid=ellipsoid)
+    lat_deg, lon_deg, alt = place.tolist()
+    return Site(lat_deg, lon_deg, alt, ellipsoid), sd
+
+
+def _receiver(chain: NavigationPipeline) -> Measurement | None:
+    """The receiver whose table holds the fixes."""
+    return chain.navigator.by_name.get(chain.fixes_from or "")
+
+
+def _antenna(chain: NavigationPipeline) -> Antenna:
+    """Lever arm and time offset of the receiver."""
+    aid = _receiver(chain)
+    x, y, z = _lever_arm(chain).tolist()
+    return Antenna(
+        (x, y, z),
+        float(getattr(aid, "velocity_delay", 0.0)),
+        float(getattr(aid, "time_offset_sd", 0.0)),
+    )
+
+
+def _lever_arm(chain: NavigationPipeline) -> Array:
+    """Lever arm of the receiver's antenna."""
+    arm = getattr(_receiver(chain), "lever_arm", (0.0, 0.0, 0.0))
+    return np.asarray(arm, dtype=np.float64)
+
+
+# Handover from alignment to navigation: the state and its covariance.
+
+
+# Sensor errors that are correlated to within this fraction count as one.
+SAME = 1e-9
+
+
+def from_state(filter_: ErrorFilter, start: NavState, P: Array) -> FilterState:
+    """Initialize a filter with a state and the covariance of its nine errors.
+
+    Parameters
+    ----------
+    filter_ : ErrorFilter
+    start : NavState
+    P : ndarray, (9, 9)
+        Displacement, velocity, rotation in north-east-down; sensor errors are as the model states.
+
+    Returns
+    -------
+    FilterState
+    """
+    return filter_.begin(start, _with_sensors(filter_, P))
+
+
+def from_alignment(
+    filter_: ErrorFilter,
+    found: Alignment,
+    start: NavState,
+    P: Array,
+    rest: Array,
+    by_others: Array | None = None,
+) -> FilterState:
+    """Initialize a filter with a coarse alignment.
+
+    Parameters
+    ----------
+    filter_ : ErrorFilter
+    found : Alignment
+        Its biases, if estimated, are subtracted.
+    start : NavState
+        Position and velocity; the attitude is that of the alignment.
+    P : ndarray, (6, 6)
+        Displacement and velocity, north-east-down. The velocity block is replaced by the
+        alignment's, if estimated.
+    rest : ndarray, (6,)
+        Mean rate and specific force of the record; they scale the scale-factor errors.
+    by_others : ndarray, (6, p), optional
+        Error of position and velocity per physical error, north-east-down
+        (`by_antenna.errors_by_antenna`), which correlates them from the start.
+
+    Returns
+    -------
+    FilterState
+        If the alignment does not estimate biases, its tilt is correlated with the accelerometer
+        errors at rest (`_levelled`). If they were independent, the first zero-velocity update
+        would take each to confirm the other, and both covariances would become too small.
+    """
+    whole = np.zeros((PHYSICAL, PHYSICAL))
+    whole[:6, :6] = P
+    whole[6:9, 6:9] = found.covariance
+    start = replace(start, time=found.time, q_nb=found.q_nb)
+    if found.gyro_bias is None or found.accel_bias is None:
+        P = _levelled(filter_, whole, found.q_nb, rest)
+        return filter_.begin(start, _added(P, by_others))
+    assert found.gyro_bias_sd is not None and found.accel_bias_sd is not None
+    told = np.concatenate([found.gyro_bias, found.accel_bias])
+    sd = np.concatenate([found.gyro_bias_sd, found.accel_bias_sd])
+    if found.by_input is not None:
+        told = np.concatenate([told, found.by_input])
+        sd = np.concatenate([sd, np.zeros(len(found.by_input))])
+    joint = np.zeros((PHYSICAL + len(told), PHYSICAL + len(told)))
+    joint[:PHYSICAL, :PHYSICAL] = whole
+    joint[PHYSICAL:, PHYSICAL:] = np.diag(np.square(sd))
+    if found.joint is not None:
+        joint[3:, 3:] = found.joint
+        # A velocity error has moved the position since its fix, and carries the alignment's
+        # correlations with the velocity.
+        joint[:3, 3:] = np.linalg.solve(P[3:, 3:], P[3:, :3]).T @ found.joint[:3]
+        joint[3:, :3] = joint[:3, 3:].T
+    return _with_biases(filter_, start, joint, told, rest, by_others)
+
+
+def from_fine(
+    filter_: ErrorFilter,
+    fine: FineResult,
+    rest: Array,
+    site_sd: ArrayLike = (0.0, 0.0, 0.0),
+    shift: ArrayLike = (0.0, 0.0, 0.0),
+    by_others: Array | None = None,
+) -> FilterState:
+    """Initialize a filter with the result of a fine alignment.
+
+    The fine alignment has one bias for the total error of a sensor at rest; its covariance with
+    the attitude is carried over. Where the filter has more states that act as a bias at rest (a
+    drift, a scale factor under gravity), the bias is divided in proportion to their variances, as
+    by a Kalman update with their sum: with x of covariance P0 before, and ``b = A x``,
+    ``K = P0 A' (A P0 A')^-1``, the estimate is ``K b``, the covariance ``K P_b K' + (1 - K A) P0``
+    and that with an attitude ``K P_ba``. With bias states alone K is 1.
+
+    Parameters
+    ----------
+    filter_ : ErrorFilter
+        Filter of navigation; any mechanization, error model and form.
+    fine : FineResult
+    rest : ndarray, (6,)
+        Mean rate in rad/s and specific force in m/s² at rest, body axes.
+    site_sd : array_like, (3,), m
+        Standard deviation of the site of alignment, north, east, down.
+    shift : array_like, (3,), m
+        Correction of the position, north, east, down: effect of the refined attitude on the lever
+        arm of the antenna by which it was found.
+    by_others : ndarray, (6, p), optional
+        As in `from_alignment`.
+
+    Returns
+    -------
+    FilterState
+    """
+    old, state = fine.filter, fine.state
+    P = old.physical_covariance(state)
+    level = old.mechanization.level_from_ned(state.row)
+    turn = np.eye(len(P))
+    for at in (0, 3, 6):
+        turn[at : at + 3, at : at + 3] = level.T
+    P = turn @ P @ turn.T
+    P[0:3, 0:3] += np.diag(np.square(np.asarray(site_sd, dtype=np.float64)))
+    start = old.mechanization.nav_state(state.mechanization, state.time)
+    moved = np.asarray(shift, dtype=np.float64)
+    if moved.any():
+        here = np.array([math.degrees(start.lat), math.degrees(start.lon), start.alt])
+        ellipsoid = find_ellipsoid(old.mechanization.ellipsoid)
+        lat, lon, alt = geodetic_from_ned(moved, here, ellipsoid=ellipsoid).tolist()
+        start = replace(start, lat=math.radians(lat), lon=math.radians(lon), alt=alt)
+    return _with_biases(filter_, start, P, state.sensors, np.asarray(rest), by_others)
+
+
+def _added(P: Array, by_others: Array | None) -> Array:
+    """Covariance with the errors of position and velocity per physical error added."""
+    if by_others is None:
+        return P
+    T = np.eye(len(P))
+    T[:6] += by_others
+    return symmetric(T @ P @ T.T)
+
+
+def _with_sensors(filter_: ErrorFilter, P: Array) -> Array:
+    """Covariance of all physical errors, with the sensor errors of their model."""
+    out = np.diag(np.concatenate([np.zeros(PHYSICAL), np.square(filter_.model.stacked.sd)]))
+    out[:PHYSICAL, :PHYSICAL] = P
+    return out
+
+
+def _levelled(filter_: ErrorFilter, P: Array, q_nb: Array, rest: Array) -> Array:
+    """Covariance of all physical errors after leveling by accelerometers.
+
+    Accelerometer errors at rest, ``e = A x`` of the states x, tilt the measured gravity by
+    ``psi_x = -(C e)_east / g``, ``psi_y = (C e)_north / g``. A heading correlated with the tilt is
+    correlated with x accordingly. Where x may exceed the stated tilt, the correlation is limited
+    to the largest possible.
+    """
+    out = _with_sensors(filter_, P)
+    P0 = out[PHYSICAL:, PHYSICAL:]
+    north_east = rotation.dcm_from_quaternion(q_nb)[:2] / float(np.linalg.norm(rest[3:]))
+    T = np.array([[0.0, -1.0], [1.0, 0.0]]) @ north_east @ _read_at_rest(filter_, rest)[3:]
+    attitude = P[6:9, 6:9]
+    root = np.linalg.cholesky(attitude[:2, :2])
+    own = np.linalg.solve(root, T @ np.sqrt(P0))
+    part = min(1.0, 1.0 / max(float(np.linalg.norm(own, 2)), 1e-300))
+    by_tilt = attitude[:, :2] @ np.linalg.inv(attitude[:2, :2])
+    out[6:9, PHYSICAL:] = part * by_tilt @ T @ P0
+    out[PHYSICAL:, 6:9] = out[6:9, PHYSICAL:].T
+    return symmetric(out)
+
+
+def _with_biases(
+    filter_: ErrorFilter,
+    start: NavState,
+    joint: Array,
+    told: Array,
+    rest: Array,
+    by_others: Array | None = None,
+) -> FilterState:
+    """Initialize with a state whose errors are correlated with estimated sensor errors.
+
+    The first six sensor errors are those at the mean input; any more are per input.
+    """
+    P0 = np.diag(np.square(filter_.model.stacked.sd))
+    A = _read_at_rest(filter_, rest - told[:6])
+    if len(told) > len(A):
+        A = np.vstack([A, _read_by_input(filter_)])
+    size = np.sqrt(np.diagonal(A @ P0 @ A.T))
+    known = size > 0.0
+    A, at, size = A[known], PHYSICAL + np.flatnonzero(known), size[known]
+    # Where a channel has scale-factor errors only, its bias is one of them.
+    parts = np.linalg.pinv(A @ P0 @ A.T / np.outer(size, size), SAME, hermitian=True)
+    K = P0 @ A.T @ (parts / np.outer(size, size))
+    P = _with_sensors(filter_, joint[:PHYSICAL, :PHYSICAL])
+    left = symmetric(P0 - K @ A @ P0)
+    P[PHYSICAL:, PHYSICAL:] = symmetric(K @ joint[np.ix_(at, at)] @ K.T) + left
+    P[PHYSICAL:, :PHYSICAL] = K @ joint[at, :PHYSICAL]
+    P[:PHYSICAL, PHYSICAL:] = P[PHYSICAL:, :PHYSICAL].T
+    state = filter_.begin(start, _added(symmetric(P), by_others))
+    return replace(state, sensors=K @ told[at - PHYSICAL])
+
+
+def _read_at_rest(filter_: ErrorFilter, rest: Array) -> Array:
+    """Contribution of each sensor state to the six channels of a stationary body, (6, k)."""
+    stacked = filter_.model.stacked
+    inputs = np.concatenate([[1.0], rest])
+    return np.vstack([np.tensordot(inputs, of, axes=1) for of in (stacked.gyro, stacked.accel)])
+
+
+def _read_by_input(filter_: ErrorFilter) -> Array:
+    """Contribution of each sensor state to `Alignment.by_input`, (27, k)."""
+    stacked = filter_.model.stacked
+    parts = (stacked.gyro[1:4], stacked.gyro[4:7], stacked.accel[4:7])
+    return np.concatenate([one.transpose(1, 0, 2).reshape(9, -1) for one in parts])
+
+
+# Correlation of a position and velocity from fixes with lever arm and time offset.
+
+
+def errors_by_antenna(
+    filter_: ErrorFilter,
+    name: str,
+    q_nb: Array,
+    lever_arm: Array,
+    velocity: Array,
+    turn: Array,
+) -> Array:
+    """Return the errors of position and velocity from fixes per physical error.
+
+    Parameters
+    ----------
+    filter_ : ErrorFilter
+    name : str
+        Name of the measurement with the fixes.
+    q_nb : ndarray, (4,)
+    lever_arm : ndarray, (3,), m
+        Lever arm of the antenna, body axes.
+    velocity : ndarray, (3,), m/s
+        North, east, down.
+    turn : ndarray, (3,), rad/s
+        Rate of the body relative to the Earth, body axes.
+
+    Returns
+    -------
+    ndarray, (6, p)
+        Displacement and velocity, north-east-down, per physical error.
+
+    Notes
+    -----
+    A time offset that is assumed too large by tau shifts a fix in time, so that the position is
+    wrong by ``v tau``. With arm r and rate W in north-east-down, the position ``p - r``
+    is wrong by ``[r x] psi - C e``, and the velocity ``v - W x r`` by
+    ``[(W x r) x] psi - W x C e``, where psi is the error of the attitude and e that of the arm.
+    Without these correlations the first fixes would count as independent of the position that was
+    made from them, and would confirm a zero time offset.
+    """
+    columns = filter_.model.columns_of
+    C = rotation.dcm_from_quaternion(q_nb)
+    out = np.zeros((6, filter_.model.physical_size))
+    out[DISPLACEMENT, ROTATION] = rotation.cross_matrix(C @ lever_arm)
+    out[VELOCITY, ROTATION] = rotation.cross_matrix(C @ np.cross(turn, lever_arm))
+    if f"{name}.lever_arm" in columns:
+        arm = columns[f"{name}.lever_arm"]
+        out[DISPLACEMENT, arm] = -C
+        out[VELOCITY, arm] = -C @ rotation.cross_matrix(turn)
+    if f"{name}.time_offset" in columns:
+        out[DISPLACEMENT, columns[f"{name}.time_offset"]] = velocity[:, None]
+    return out
+
+
+# Position during an alignment: the stated site, or the fixes of a receiver.
+
+
+# Standard deviation of a vehicle's acceleration, m/s².
+MANOEUVRE = 1.0
+# Fixes considered for outliers: most, longest time, s, and fewest.
+LOOKED_AT, LOOKED_BACK, LEAST_LOOKED_AT = 9, 10.0, 4
+# Standard deviations that make a fix an outlier.
+CLEAR = 5.0
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Position and velocity of the sensors at an instant.
+
+    Attributes
+    ----------
+    state : NavState
+        With the given attitude.
+    covariance : ndarray, (6, 6)
+        Displacement and velocity, north-east-down.
+    """
+
+    state: NavState
+    covariance: Array
+
+
+def fixes_until(
+    tables: Sequence[pd.DataFrame], time: float, offset: float = 0.0
+) -> pd.DataFrame | None:
+    """Concatenate the fixes up to an instant.
+
+    Parameters
+    ----------
+    tables : sequence of DataFrame
+        Gnss tables, one after the other.
+    time : float, s
+    offset : float, s
+        Stamps minus the time of the inertial sensors.
+
+    Returns
+    -------
+    DataFrame or None
+        By the time of the inertial sensors; None without fixes.
+    """
+    if not tables:
+        return None
+    joined = tables[0] if len(tables) == 1 else pd.concat(tables)
+    out: pd.DataFrame = joined[joined.index - offset <= time]
+    if offset:
+        out = out.set_axis(out.index - offset)
+    out.attrs = dict(tables[0].attrs)
+    if out.empty:
+        return None
+    check_gnss(out)
+    return out
+
+
+def site_of_fixes(
+    fixes: pd.DataFrame | None, begin: float, time: float, ellipsoid: Ellipsoid
+) -> tuple[Site, Array]:
+    """Return the position of a stationary body, by the median of its fixes.
+
+    Parameters
+    ----------
+    fixes : DataFrame or None
+        Fixes until `time`.
+    begin, time : float, s
+        Of the rest. If it holds no fix, the newest one before is taken.
+    ellipsoid : Ellipsoid
+
+    Returns
+    -------
+    site : Site
+    sd : ndarray, (3,), m
+        The smallest stated by a fix: correlated errors do not average out.
+
+    Raises
+    ------
+    DataError
+        No fix has a position.
+    """
+    place, sd, stamps = _good(fixes, POSITION_SD, time)
+    first = min(int(np.searchsorted(stamps, begin)), len(stamps) - 1)
+    lat, lon, alt = np.median(place[first:], axis=0).tolist()
+    return Site(lat, lon, alt, ellipsoid), np.asarray(sd[first:].min(axis=0))
+
+
+def here_by_fix(
+    fixes: pd.DataFrame | None,
+    time: float,
+    q_nb: Array,
+    lever_arm: Array,
+    ellipsoid: Ellipsoid,
+    velocity: Array,
+    velocity_covariance: Array,
+) -> Place:
+    """Return the position of a vehicle, by its newest fix that agrees with those before.
+
+    Parameters
+    ----------
+    fixes : DataFrame or None
+        Fixes until `time`.
+    time : float, s
+    q_nb : ndarray, (4,)
+    lever_arm : ndarray, (3,), m
+        Lever arm of the antenna, body axes.
+    ellipsoid : Ellipsoid
+    velocity : ndarray, (3,), m/s
+        Velocity of the sensors at `time`, north, east, down.
+    velocity_covariance : ndarray, (3, 3), (m/s)²
+
+    Returns
+    -------
+    Place
+        Propagated from the fix by the velocity; the acceleration is unknown, 1 m/s². The effect of
+        a wrong stamp of the fix is left to `by_antenna.errors_by_antenna`.
+
+    Raises
+    ------
+    DataError
+        No fix has a position.
+    """
+    place, sd, stamps = _good(fixes, POSITION_SD, time)
+    assert fixes is not None
+    k = _newest_that_agrees(fixes, place, sd, stamps, ellipsoid)
+    after = time - float(stamps[k])
+    off = velocity * after - rotation.rotate(q_nb, lever_arm)
+    lat, lon, alt = geodetic_from_ned(off, place[k], ellipsoid=ellipsoid).tolist()
+    state = NavState(time, np.radians(lat), np.radians(lon), alt, velocity, q_nb)
+    P = np.zeros((6, 6))
+    unknown = np.square(sd[k]) + (0.5 * MANOEUVRE * after**2) ** 2
+    P[:3, :3] = np.diag(unknown) + velocity_covariance * after**2
+    P[:3, 3:] = P[3:, :3] = velocity_covariance * after
+    P[3:, 3:] = velocity_covariance
+    return Place(state, P)
+
+
+def _newest_that_agrees(
+    fixes: pd.DataFrame, place: Array, sd: Array, stamps: Array, ellipsoid: Ellipsoid
+) -> int:
+    """Newest position that agrees with the positions before it, propagated by velocities.
+
+    Each velocity is the median of three; the expected position is the median of the predictions
+    by the newest fixes.
+    """
+    rows = np.flatnonzero(stamps >= stamps[-1] - LOOKED_BACK)[-LOOKED_AT:]
+    told = np.isfinite(values_of(fixes, VELOCITY_SD)).all(axis=1)
+    told &= values_of(fixes, ["quality"])[:, 0] > 0.0
+    if len(rows) < LEAST_LOOKED_AT or told.sum() < LEAST_LOOKED_AT:
+        return len(stamps) - 1
+    v, v_time = values_of(fixes, VELOCITY_COLUMNS)[told], index_of(fixes)[told]
+    near = np.clip(np.arange(len(v))[:, None] + np.arange(-1, 2), 0, len(v) - 1)
+    v = np.median(v[near], axis=1)
+    v = np.column_stack([np.interp(stamps[rows], v_time, one) for one in v.T])
+    way = running_integral(stamps[rows], v)
+    at = np.array([ned_from_geodetic(one, place[-1], ellipsoid=ellipsoid) for one in place[rows]])
+    off = at - way
+    off -= np.median(off, axis=0)
+    usual = np.maximum(sd[rows], MAD_TO_SD * np.median(np.abs(off), axis=0))
+    good = (np.abs(off) <= CLEAR * usual).all(axis=1)
+    return int(rows[np.flatnonzero(good)[-1]]) if good.any() else len(stamps) - 1
+
+
+def _good(
+    fixes: pd.DataFrame | None, columns: Sequence[str], time: float
+) -> tuple[Array, Array, Array]:
+    """Positions, standard deviations and stamps of the fixes that have them."""
+    if fixes is not None:
+        sd = values_of(fixes, columns)
+        good = np.isfinite(sd).all(axis=1) & (values_of(fixes, ["quality"])[:, 0] > 0.0)
+        if good.any():
+            return values_of(fixes, GEODETIC)[good], sd[good], index_of(fixes)[good]
+    raise DataError(
+        "navigation.no-position-for-alignment",
+        file=None if fixes is None else source_of(fixes),
+        quantity="site",
+        time=time,
+    )

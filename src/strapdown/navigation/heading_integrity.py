@@ -1,0 +1,368 @@
+"""Heading integrity, second by second: trusted, unverified or rejected (green, amber, red).
+
+Green is a promise: the heading error is within the requested limit. It requires two solutions that
+do not share the assumptions made at the start: the run by its own bound, and an independent heading
+check by its own. The check is a solution by fixes that began without a heading
+(`navigation.heading_witness`), gyrocompassing at rest carried on by the gyros
+(`navigation.heading_witness.carry_headings`), or two independent sources of heading
+(`navigation.heading_witness.agreeing_sources`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.constants import TWO_SIDED_95
+from strapdown.errors import ConfigError
+from strapdown.navigation.record import NavigationRecord
+
+__all__ = [
+    "COLOURS",
+    "REASONS",
+    "SURE",
+    "WITNESSES",
+    "HeadingIntegrity",
+    "LightSpan",
+    "doubted",
+    "heading_light",
+    "recent_scatter",
+    "seconds_of",
+]
+
+
+Array = NDArray[np.float64]
+
+COLOURS = ("green", "amber", "red")
+GREEN, AMBER, RED = range(3)
+#: Reason of a status other than green, by its code.
+REASONS: dict[str, str] = {
+    "": "two reckonings agree that it is within the limit",
+    "assumed": "its own bound is good, but rests on what it began with or on one aid alone",
+    "faint": "a second reckoning does not know it well enough yet to bear it out",
+    "wide": "its own bound is beyond the limit",
+    "scatter": "observations scatter more than they should",
+    "apart": "a reckoning that began without a heading says otherwise",
+    "unknown": "it is hardly known",
+}
+#: Independent heading checks, by kind.
+WITNESSES: dict[str, str] = {
+    "motion": "a second reckoning by fixes",
+    "gyrocompass": "north as the gyros found it at rest",
+    "sources": "two sources of a heading that share nothing",
+}
+#: Two-sided 99 % quantile of the normal distribution: a larger difference is significant, and
+#: so many standard deviations bound the error of an independent check.
+SURE = 2.5758293035489004
+#: Scatter of the innovations over the last seconds, relative to the predicted one: beyond the first
+#: limit the status is not green, beyond the second it is red.
+FAR_OFF, REFUTED = 2.0, 3.0
+#: Validity of the result of a check, s, and the factor on the run's own growth since then.
+CARRIED, GROWS = 60.0, 2.0
+#: Window of the scatter, s, and fewest components in it.
+RECENT, FEWEST = 30.0, 8
+#: Labels of components without information on the heading.
+VERTICAL = ("down", "VD", "height")
+#: Limit of one normalized innovation, and its value if it was rejected: half of them are as much as
+#: refutes a run.
+CLIP, REJECTED = 4.0, 3.0
+
+
+class Heard(Protocol):
+    """Result of an independent heading check: see `navigation.heading_witness.Evidence`.
+
+    Its `kind` is one of `WITNESSES`.
+    """
+
+    @property
+    def since(self) -> float: ...
+    @property
+    def time(self) -> Array: ...
+    @property
+    def difference(self) -> Array: ...
+    @property
+    def sd(self) -> Array: ...
+    @property
+    def kind(self) -> str: ...
+
+
+@dataclass(frozen=True)
+class LightSpan:
+    """Consecutive seconds of one status for one reason.
+
+    Attributes
+    ----------
+    begin, end : float, s
+    colour : str
+    reason : str
+        A key of `REASONS`.
+    """
+
+    begin: float
+    end: float
+    colour: str
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class HeadingIntegrity:
+    """Heading integrity of each second of a run.
+
+    Attributes
+    ----------
+    table : DataFrame
+        By time in s, the seconds of the run: ``light`` (0 green, 1 amber, 2 red), ``reason`` (a key
+        of `REASONS`), ``bound`` (1.96 standard deviations of the run, deg), ``difference`` (run
+        minus check, deg), ``witness_sd`` (standard deviation of the check, deg), ``witnessed``
+        (`SURE` standard deviations of the check plus the difference, deg), ``carried`` (that, or an
+        earlier one plus the growth since, deg: the value that decides on green), ``witness_since``
+        (s), ``witness`` (a key of `WITNESSES`, or empty), ``scatter`` (of the innovations, relative
+        to the predicted one).
+    green, red : float, deg
+        Limits.
+    """
+
+    table: pd.DataFrame
+    green: float
+    red: float
+
+    def share(self, colour: str) -> float:
+        """Share of the seconds with a status."""
+        light = self.table["light"].to_numpy()
+        return float(np.mean(light == COLOURS.index(colour))) if len(light) else 0.0
+
+    @property
+    def spans(self) -> tuple[LightSpan, ...]:
+        """Consecutive seconds of one status for one reason, in order of time."""
+        time = self.table.index.to_numpy(dtype=np.float64)
+        if not len(time):
+            return ()
+        keys = list(zip(self.table["light"].tolist(), self.table["reason"].tolist(), strict=True))
+        starts = [k for k in range(len(keys)) if k == 0 or keys[k] != keys[k - 1]]
+        ends = [*(time[k] for k in starts[1:]), float(time[-1]) + 1.0]
+        return tuple(
+            LightSpan(float(time[k]), float(end), COLOURS[keys[k][0]], keys[k][1])
+            for k, end in zip(starts, ends, strict=True)
+        )
+
+
+def heading_light(
+    record: NavigationRecord,
+    evidence: Sequence[Heard],
+    scatter: Array | None = None,
+    *,
+    green: float = 3.0,
+    red: float = 10.0,
+) -> HeadingIntegrity:
+    """Return the heading integrity of each second of a run.
+
+    Parameters
+    ----------
+    record : NavigationRecord
+    evidence : sequence of Heard
+        Results of the independent checks; empty without a check.
+    scatter : ndarray, (n,), optional
+        Of `recent_scatter` at the seconds of the run.
+    green, red : float, deg
+        Green promises an error below the first; beyond the second a bound is red.
+
+    Returns
+    -------
+    HeadingIntegrity
+
+    Raises
+    ------
+    ConfigError
+        The limits are invalid.
+
+    Notes
+    -----
+    The error e of the run is its known difference d from an independent check plus the error of the
+    check: ``|e| < |d| + 2.58 sd`` in 99 % of all cases. This bound does not depend on the heading
+    given to the run. For up to a minute after a check the growth since then is added: twice 2.58
+    times the root of the total growth of the run's own variance, not reduced by updates. The run is
+    contradicted where d is beyond 2.58 standard deviations of both, and beyond half of the limit.
+    """
+    if not 0.0 < green <= red:
+        raise ConfigError(
+            "evaluation.green-below-red-beyond-no", quantity="trust", green=green, red=red
+        )
+    seconds = seconds_of(record)
+    count = len(seconds)
+    own = _own_sd(record, seconds)
+    difference, witness, since, who = _best(seconds, evidence)
+    witnessed = np.abs(difference) + SURE * witness
+    spread = np.ones(count) if scatter is None else scatter
+    bound = TWO_SIDED_95 * own
+    with np.errstate(invalid="ignore"):
+        apart = (np.abs(difference) > SURE * np.hypot(witness, own)) & (
+            np.abs(difference) > 0.5 * green
+        )
+    apart |= _contradicted(seconds, evidence, own, green)
+    carried = _carried(seconds, witnessed, own, apart)
+    light = np.full(count, AMBER)
+    reason = np.full(count, "assumed", dtype=object)
+    wide = ~(bound <= green)
+    reason[wide] = "wide"
+    good = ~wide & (carried <= green)
+    light[good], reason[good] = GREEN, ""
+    loose = ~wide & ~good & np.isfinite(witness) & (SURE * witness <= red)
+    reason[loose] = "faint"
+    off = spread > FAR_OFF
+    light[off & (light == GREEN)] = AMBER
+    reason[off] = "scatter"
+    light[spread > REFUTED] = RED
+    light[apart], reason[apart] = RED, "apart"
+    unknown = ~(bound <= red)
+    light[unknown], reason[unknown] = RED, "unknown"
+    table = pd.DataFrame(
+        {
+            "light": light,
+            "reason": reason,
+            "bound": bound,
+            "difference": difference,
+            "witness_sd": witness,
+            "witnessed": witnessed,
+            "carried": carried,
+            "witness_since": since,
+            "witness": who,
+            "scatter": spread,
+        },
+        index=pd.Index(seconds, name="time"),
+    )
+    return HeadingIntegrity(table, green, red)
+
+
+def seconds_of(record: NavigationRecord) -> Array:
+    """Whole seconds within a run."""
+    time = record.trajectory.index
+    return np.arange(np.ceil(float(time[0])), np.floor(float(time[-1])) + 1.0)
+
+
+def recent_scatter(record: NavigationRecord) -> Array:
+    """Recent scatter of the innovations over the predicted one, at each second of a run.
+
+    Parameters
+    ----------
+    record : NavigationRecord
+
+    Returns
+    -------
+    ndarray, (n,)
+        Of the worst observation: root mean square of the normalized innovations of the last half
+        minute, each limited to four; 1 is expected, and is the value without observations.
+    """
+    seconds = seconds_of(record)
+    worst = np.ones(len(seconds))
+    for table in record.innovations.values():
+        labels = [c for c in table.columns if str(c).startswith("nu ")]
+        labels = [c for c in labels if not str(c)[3:].startswith(VERTICAL)]
+        if not labels:
+            continue
+        nu = table[labels].to_numpy(dtype=np.float64)
+        s = table[[f"s {str(c)[3:]}" for c in labels]].to_numpy(dtype=np.float64)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            u = np.where(s > 0.0, nu / np.sqrt(s), np.nan)
+        weight = table[[f"weight {str(c)[3:]}" for c in labels]].to_numpy(dtype=np.float64)
+        told = np.isfinite(u)
+        # Rejected measurements did no harm, unless there are many.
+        lost = told & (weight <= 0.0)
+        u = np.where(lost, REJECTED, np.clip(u, -CLIP, CLIP))
+        square = np.where(told, np.where(told, u, 0.0) ** 2, 0.0)
+        total = np.concatenate([[0.0], np.cumsum(square.sum(axis=1))])
+        count = np.concatenate([[0], np.cumsum(told.sum(axis=1))])
+        time = table.index.to_numpy(dtype=np.float64)
+        upto = np.searchsorted(time, seconds + 1e-6, side="right")
+        since = np.searchsorted(time, seconds - RECENT, side="right")
+        many = count[upto] - count[since]
+        mean = (total[upto] - total[since]) / np.maximum(many, 1)
+        worst = np.where(many >= FEWEST, np.maximum(worst, np.sqrt(mean)), worst)
+    return worst
+
+
+def doubted(record: NavigationRecord, evidence: Sequence[Heard], upto: float, green: float) -> bool:
+    """Whether a run was contradicted, or its innovations scattered too much, until an instant.
+
+    Parameters
+    ----------
+    record : NavigationRecord
+    evidence : sequence of Heard
+        Results of the independent checks.
+    upto : float, s
+    green : float, deg
+        As of `heading_light`.
+
+    Returns
+    -------
+    bool
+    """
+    seconds = seconds_of(record)
+    before = seconds <= upto
+    apart = _contradicted(seconds, evidence, _own_sd(record, seconds), green)
+    return bool((apart | (recent_scatter(record) > FAR_OFF))[before].any())
+
+
+def _own_sd(record: NavigationRecord, seconds: Array) -> Array:
+    """Standard deviation of the heading of a run at each second, deg."""
+    marks = record.sd.index.to_numpy(dtype=np.float64)
+    sd = record.sd["heading"].to_numpy(dtype=np.float64)
+    # A standard deviation grows to the next mark: the larger of the two marks around a second.
+    after = np.clip(np.searchsorted(marks, seconds - 1e-6), 0, len(marks) - 1)
+    before = np.clip(after - 1, 0, None)
+    return np.where(marks[after] <= seconds + 1e-6, sd[after], np.maximum(sd[before], sd[after]))
+
+
+def _best(
+    seconds: Array, evidence: Sequence[Heard]
+) -> tuple[Array, Array, Array, NDArray[np.object_]]:
+    """Difference, standard deviation, start and kind of the tightest check of each second."""
+    difference, sd, since = (np.full(len(seconds), np.nan) for _ in range(3))
+    who = np.full(len(seconds), "", dtype=object)
+    least = np.full(len(seconds), np.inf)
+    for one in evidence:
+        at = np.searchsorted(seconds, one.time - 1e-6)
+        inside = at < len(seconds)
+        at, d, s = at[inside], one.difference[inside], one.sd[inside]
+        better = np.abs(d) + SURE * s < least[at]
+        at = at[better]
+        difference[at], sd[at], since[at] = d[better], s[better], one.since
+        who[at] = one.kind
+        least[at] = (np.abs(d) + SURE * s)[better]
+    return difference, sd, since, who
+
+
+def _carried(seconds: Array, witnessed: Array, own: Array, apart: NDArray[np.bool_]) -> Array:
+    """Bound by the checks now, or by an earlier check plus the growth since."""
+    out = np.where(np.isfinite(witnessed), witnessed, np.inf)
+    grown = np.maximum(np.diff(own**2, prepend=own[:1] ** 2), 0.0)
+    told, added, since = math.inf, 0.0, -math.inf
+    for k, now in enumerate(seconds.tolist()):
+        added += float(grown[k])
+        if apart[k]:
+            told = math.inf
+            continue
+        held = told + GROWS * SURE * math.sqrt(added) if now - since <= CARRIED else math.inf
+        if out[k] <= held:
+            told, added, since = float(out[k]), 0.0, now
+        else:
+            out[k] = held
+    return out
+
+
+def _contradicted(
+    seconds: Array, evidence: Sequence[Heard], own: Array, green: float
+) -> NDArray[np.bool_]:
+    """Seconds at which any check with a known heading contradicts the run."""
+    out = np.zeros(len(seconds), dtype=np.bool_)
+    for one in evidence:
+        at = np.searchsorted(seconds, one.time - 1e-6)
+        inside = at < len(seconds)
+        at, d, s = at[inside], np.abs(one.difference[inside]), one.sd[inside]
+        out[at[(d > SURE * np.hypot(s, own[at])) & (d > 0.5 * green)]] = True
+    return out

@@ -1,0 +1,701 @@
+"""Independent heading check: a second solution without the first one's heading assumptions.
+
+Small navigators process the same record in parallel, each from some instant on, with a heading
+that is practically unknown there, and GNSS fixes alone. The heading of such a check comes from
+the motion since then, not from the initial heading, an alignment or a heading measurement.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from strapdown import rotation
+from strapdown._kernels.attitude import quaternion_advance
+from strapdown.constants import MAD_TO_SD
+from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
+from strapdown.errors import DataError, DivergenceError
+from strapdown.estimation.covariance import Joseph
+from strapdown.estimation.error_filter import ErrorFilter, FilterState
+from strapdown.estimation.error_model import RotationVectorModel
+from strapdown.estimation.robust import Igg3, RobustUpdate
+from strapdown.evaluation.trajectory_differences import trajectory_at
+from strapdown.frames import q_ne
+from strapdown.mechanization.ned import NorthEastDown
+from strapdown.mechanization.wander_azimuth import WanderAzimuth
+from strapdown.nav_state import NavState
+from strapdown.navigation.consistency import ObservationConsistency
+from strapdown.navigation.gyrocompass import Compass
+from strapdown.navigation.heading_integrity import GROWS, RECENT, SURE, doubted, seconds_of
+from strapdown.navigation.measurements.gnss import Gnss
+from strapdown.navigation.measurements.heading import Heading
+from strapdown.navigation.navigator import Navigator, NavigatorState
+from strapdown.navigation.pipeline import NavigationPipeline
+from strapdown.navigation.preprocessing import NEAR as NEAR_FIXES
+from strapdown.navigation.preprocessing import JoinedSteps, joined_steps
+from strapdown.navigation.record import CovarianceSnapshot, NavigationChunk, NavigationRecord
+from strapdown.rotation.euler_angles import euler_sd
+from strapdown.sensors.uncertainty import ImuUncertainty
+from strapdown.tables import EULER, GEODETIC, VELOCITY
+from strapdown.tables.checks import index_of, values_of
+
+__all__ = [
+    "LONGEST",
+    "UNSEEN",
+    "AgreeingSources",
+    "CarriedHeading",
+    "Evidence",
+    "Witnesses",
+    "agreeing_sources",
+    "carry_headings",
+    "hear_witnesses",
+    "witnesses_of",
+]
+
+
+Array = NDArray[np.float64]
+
+#: Standard deviation of a practically unknown heading, deg; linearization fails beyond it.
+UNKNOWN = 20.0
+#: Lower limit of the check's heading standard deviation, deg: its steps are joined, its fixes
+#: thinned.
+LEAST_HEADING = 0.03
+#: Factor on the run's standard deviations of all errors but the heading.
+LOOSER = 2.0
+#: Lower limits of the initial standard deviations: m, m/s, deg of roll and pitch.
+LEAST_PLACE, LEAST_VELOCITY, LEAST_TILT = 0.1, 0.05, 0.2
+#: The same for roll and pitch after the run became doubtful, deg: the tilt that a velocity change
+#: at 0.2 g leaves where the heading is off by 10 deg.
+DOUBTED_TILT = 2.0
+#: Interval between checks, s; the same once one is accurate enough; length of the parts in which
+#: the record is processed.
+TURN, RENEWED, HEARD = 60.0, 180.0, 20.0
+#: Epochs over which the scatter of the innovations is judged, and the fewest needed.
+JUDGED, FEWEST = 60, 8
+#: Limit of a normalized innovation in the estimate of their scatter.
+CLIP = 3.0
+#: Stamps within this are equal, s.
+NEAR = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """Result of one heading check.
+
+    Attributes
+    ----------
+    since : float, s
+        When the check began.
+    time : ndarray, (n,), s
+        Seconds of the run, after `since`.
+    difference : ndarray, (n,), deg
+        Heading of the run minus that of the check.
+    sd : ndarray, (n,), deg
+        Standard deviation of the check's heading, times `scale`.
+    scale : ndarray, (n,)
+        Factor by which its innovations scatter more than expected, correlation included: 1 or more.
+    covariance : ndarray, (n, 9, 9)
+        As `NavigationRecord.covariance`, of the check.
+    kind : str
+    """
+
+    since: float
+    time: Array
+    difference: Array
+    sd: Array
+    scale: Array
+    covariance: Array
+    kind: str = "motion"
+
+
+def hear_witnesses(made: Witnesses, record: NavigationRecord, enough: float) -> list[Evidence]:
+    """Run heading checks over a record, two at a time at most.
+
+    A new check begins each minute, and each three minutes while one is accurate enough. The older
+    of two continues until the younger is accurate enough, or more accurate.
+
+    Sensor and tilt estimates of a faulty run stay wrong long after its innovations are consistent
+    again. So after a doubt, a new check starts from the sensor errors at the run's start.
+
+    Parameters
+    ----------
+    made : Witnesses
+    record : NavigationRecord
+    enough : float, deg
+        Standard deviation of a heading below which older evidence is not needed: a third of the
+        limit.
+
+    Returns
+    -------
+    list of Evidence
+        In order of `since`.
+    """
+    end = float(made.time[-1])
+    cuts = np.arange(made.begun, end, HEARD)
+    seconds = np.arange(math.ceil(made.begun + NEAR), math.floor(end) + 1.0)
+    places = np.clip(np.searchsorted(made.time, seconds - NEAR), 0, len(made.time) - 1)
+    firsts = np.searchsorted(made.time, cuts + NEAR, side="right").tolist()
+    begun = np.array([made.time[k - 1] if k else made.begun for k in firsts])
+    wanted = np.unique(np.concatenate([begun, made.time[places]]))
+    ellipsoid = find_ellipsoid(made.navigator.filter.mechanization.ellipsoid)
+    run = trajectory_at(record.trajectory, wanted, ellipsoid)
+    done: list[_Witness] = []
+    heard: list[_Witness] = []
+    told: list[_Witness] = []
+    doubt = False
+    for at, first, last in zip(begun.tolist(), firsts, [*firsts[1:], len(made.time)], strict=True):
+        if len(heard) > 1 and heard[-1].sd <= enough:
+            heard = heard[-1:]
+        youngest = at - heard[-1].since if heard else math.inf
+        if youngest >= (RENEWED if heard and heard[-1].sd <= enough else TURN) - HEARD / 2.0:
+            if len(heard) > 1:
+                heard = [min(heard, key=lambda one: one.sd)]
+            if not doubt:
+                said = [one.evidence() for one in told if one.marks]
+                doubt = doubted(record, said, at, 3.0 * enough)
+            fresh = _Witness(made, record, run, at, doubt)
+            done.append(fresh)
+            heard.append(fresh)
+            told = list(heard)
+        for one in heard:
+            one.over(made.time[first:last], made.rows[first:last])
+        heard = [one for one in heard if not one.lost]
+    return [one.evidence() for one in done if one.marks]
+
+
+class _Witness:
+    """Heading check in progress."""
+
+    def __init__(
+        self,
+        made: Witnesses,
+        record: NavigationRecord,
+        run: pd.DataFrame,
+        since: float,
+        doubt: bool,
+    ) -> None:
+        self.navigator, self.run, self.since = made.navigator, run, since
+        self.marks: list[CovarianceSnapshot] = []
+        self.times: list[Array] = []
+        self.history: list[Array] = []
+        self.seen: list[tuple[float, Array]] = []
+        self.lost = False
+        state = self.navigator.begin_from(_begin(self.navigator.filter, record, run, since, doubt))
+        for aid in self.navigator.aids:
+            assert isinstance(aid, Gnss)
+            table = made.tables[aid.name]
+            later = table[index_of(table) > since + aid.time_offset + aid.velocity_delay]
+            if len(later):
+                later.attrs = dict(table.attrs)
+                state = self.navigator.tell(state, aid.name, later)
+        self.state: NavigatorState = state
+
+    @property
+    def sd(self) -> float:
+        """Filter standard deviation of the heading at the newest snapshot, deg."""
+        if not self.marks:
+            return math.inf
+        return math.degrees(math.sqrt(max(float(self.marks[-1].covariance[8, 8]), 0.0)))
+
+    def over(self, time: Array, rows: Array) -> None:
+        """Process steps; a diverged check gives no more results."""
+        try:
+            self.state, piece = self.navigator.advance(self.state, time, rows.copy())
+        except (DivergenceError, DataError):
+            self.lost = True
+            return
+        self._take(piece)
+
+    def _take(self, piece: NavigationChunk) -> None:
+        self.marks += piece.marks
+        self.times.append(piece.time)
+        self.history.append(piece.history)
+        for one in piece.seen:
+            # The vertical innovation does not observe the heading.
+            nu, s = one.innovations.nu[:2], one.innovations.s[:2]
+            self.seen.append((one.time, nu / np.sqrt(s)))
+
+    def evidence(self) -> Evidence:
+        """Return the result at each second."""
+        marked = np.array([mark.time for mark in self.marks])
+        seconds = np.arange(math.ceil(self.since + NEAR), math.floor(marked[-1]) + 1.0)
+        at = np.searchsorted(marked, seconds + NEAR, side="right") - 1
+        seconds, at = seconds[at >= 0], at[at >= 0]
+        covariance = np.array([self.marks[k].covariance for k in at]).reshape(-1, 9, 9)
+        times, rows = np.concatenate(self.times), np.concatenate(self.history)
+        near = np.clip(np.searchsorted(times, seconds - NEAR), 0, len(times) - 1)
+        near, back = np.unique(near, return_inverse=True)
+        own = self.navigator.filter.mechanization.trajectory(times[near], rows[near], None)
+        heading = self.run["heading"].to_numpy(dtype=np.float64)
+        heading = heading[np.searchsorted(index_of(self.run), times[near] - NEAR)]
+        apart = rotation.within_half_turn(heading - own["heading"].to_numpy(dtype=np.float64))[back]
+        euler = own[EULER].to_numpy(dtype=np.float64)[back]
+        scale = self._scale(seconds)
+        sd = euler_sd(euler, covariance[:, 6:, 6:])[:, 2] if len(seconds) else seconds
+        sd = np.hypot(scale * sd, LEAST_HEADING)
+        return Evidence(self.since, seconds, apart, sd, scale, covariance)
+
+    def _scale(self, seconds: Array) -> Array:
+        """Factor by which the newest innovations exceed their expected scatter and correlation."""
+        if not self.seen:
+            return np.ones(len(seconds))
+        time = np.array([t for t, _ in self.seen])
+        u = np.array([x for _, x in self.seen])
+        # All available epochs, up to a full window.
+        size = np.minimum(u.shape[0], JUDGED)
+        upto = np.searchsorted(time, seconds + NEAR, side="right")
+        out = np.ones(len(seconds))
+        full = upto >= size
+        every = sliding_window_view(u, size, axis=0).reshape(len(u) - size + 1, -1)
+        if size >= FEWEST:
+            out[full] = _scatter(every)[upto[full] - size]
+        for k in np.flatnonzero(~full & (upto >= FEWEST)).tolist():
+            out[k] = _scatter(u[: upto[k]].reshape(1, -1))[0]
+        return out
+
+
+def _scatter(u: Array) -> Array:
+    """Scatter of rows of normalized innovations, 1 or more; a few gross errors count little."""
+    whole = np.sqrt(np.minimum(u * u, CLIP**2).mean(axis=1))
+    middle = MAD_TO_SD * np.median(np.abs(u), axis=1)
+    return np.asarray(np.maximum(1.0, np.maximum(whole, middle)))
+
+
+def _begin(
+    filter_: ErrorFilter, record: NavigationRecord, run: pd.DataFrame, at: float, doubt: bool
+) -> FilterState:
+    """State at an instant of a run, with a practically unknown heading."""
+    model = filter_.model
+    row = run.iloc[int(np.searchsorted(index_of(run), at - NEAR))]
+    lat, lon, alt = (float(row[c]) for c in GEODETIC)
+    roll, pitch, heading = (float(row[c]) for c in EULER)
+    start = replace(
+        NavState.from_degrees(
+            lat,
+            lon,
+            alt,
+            v_n=row[VELOCITY].to_numpy(dtype=np.float64),
+            roll_deg=roll,
+            pitch_deg=pitch,
+            heading_deg=heading,
+        ),
+        time=at,
+    )
+    marks = record.sd.index.to_numpy(dtype=np.float64)
+    k = max(int(np.searchsorted(marks, at + NEAR, side="right")) - 1, 0)
+    P = LOOSER**2 * record.covariance[k]
+    P[8, :8] = P[:8, 8] = 0.0
+    P[8, 8] = max(math.radians(UNKNOWN) ** 2, float(P[8, 8]))
+    tilt = DOUBTED_TILT if doubt else LEAST_TILT
+    P = P + np.diag(
+        np.square(
+            np.repeat([LEAST_PLACE, LEAST_VELOCITY, math.radians(tilt)], 3)
+            * np.array([1.0] * 8 + [0.0])
+        )
+    )
+    names = list(model.layout.labels())[9:]
+    k = 0 if doubt else k
+    sd = LOOSER * record.sensors_sd[names].iloc[k].to_numpy(dtype=np.float64)
+    whole = np.diag(np.concatenate([np.zeros(9), np.square(sd)]))
+    whole[:9, :9] = P
+    told = record.sensors[names].iloc[k].to_numpy(dtype=np.float64)
+    return replace(filter_.begin(start, whole), sensors=told)
+
+
+# Filter, joined increments and thinned fixes of the heading checks.
+
+
+#: Least interval between fixes, s.
+FIXES_APART = 1.0
+#: Latitude beyond which the local north is not used, deg.
+POLAR = 85.0
+
+
+@dataclass(frozen=True, eq=False)
+class Witnesses:
+    """Filter, receivers and record of the heading checks.
+
+    Attributes
+    ----------
+    navigator : Navigator
+    time : ndarray, (n,), s
+        Ends of the joined steps.
+    rows : ndarray, (n, 10)
+        Motion increments.
+    tables : mapping of str to DataFrame
+        Fixes, thinned.
+    begun : float, s
+        Start of the first step.
+    """
+
+    navigator: Navigator
+    time: Array
+    rows: Array
+    tables: Mapping[str, pd.DataFrame]
+    begun: float
+
+
+def witnesses_of(
+    filter_: ErrorFilter,
+    chain: NavigationPipeline,
+    imu: pd.DataFrame,
+    tables: Mapping[str, pd.DataFrame],
+    record: NavigationRecord,
+    consistency: Mapping[str, ObservationConsistency],
+) -> Witnesses | None:
+    """Prepare the heading checks of a run.
+
+    Parameters
+    ----------
+    filter_ : ErrorFilter
+        Filter of the run, without the states of its measurements.
+    chain : NavigationPipeline
+        Pipeline of the run.
+    imu : DataFrame
+        Samples of the run.
+    tables : mapping of str to DataFrame
+        By name of the measurement.
+    record : NavigationRecord
+        Result of the run.
+    consistency : mapping of str to ObservationConsistency
+        Consistency of its innovations.
+
+    Returns
+    -------
+    Witnesses or None
+        None without a GNSS receiver: no other measurement observes a direction independently.
+    """
+    receivers = [aid for aid in chain.navigator.aids if type(aid) is Gnss and aid.name in tables]
+    if not receivers:
+        return None
+    span = record.trajectory.index
+    steps = joined_steps(chain.intake, imu, float(span[0]), float(span[-1]))
+    time, rows = steps.time, steps.rows
+    if len(time) < 2:
+        return None
+    robust = filter_.rule is not None or any(_robust(aid, consistency) for aid in receivers)
+    aids = tuple(_known(aid, record, robust) for aid in receivers)
+    ellipsoid = filter_.mechanization.ellipsoid
+    polar = record.trajectory["lat"].abs().max() > POLAR
+    model = filter_.model
+    small = ErrorFilter(
+        (WanderAzimuth if polar else NorthEastDown)(ellipsoid=ellipsoid),
+        RotationVectorModel(model.gyro_noise, model.accel_noise, model.sensors),
+        Joseph(),
+        None,
+        step=FIXES_APART,
+    )
+    thinned = {aid.name: _thinned(tables[aid.name]) for aid in receivers}
+    begun = float(time[0] - rows[0, 0])
+    return Witnesses(Navigator(small, aids, mark_interval=FIXES_APART), time, rows, thinned, begun)
+
+
+def _known(aid: Gnss, record: NavigationRecord, robust: bool) -> Gnss:
+    """A receiver with the run's final lever arm and time offset."""
+    found = record.sensors.iloc[-1]
+    arm = list(aid.lever_arm)
+    for k, axis in enumerate("xyz"):
+        arm[k] -= float(found.get(f"{aid.name}.lever_arm_{axis}", 0.0))
+    offset = next(
+        (float(v) for n, v in found.items() if str(n).startswith(f"{aid.name}.time_offset")), 0.0
+    )
+    return replace(
+        aid,
+        rule=(aid.rule or RobustUpdate(Igg3())) if robust else None,
+        lever_arm=(arm[0], arm[1], arm[2]),
+        lever_arm_sd=0.0,
+        time_offset=aid.time_offset - offset,
+        time_offset_sd=0.0,
+        time_offset_drift=0.0,
+    )
+
+
+def _robust(aid: Gnss, consistency: Mapping[str, ObservationConsistency]) -> bool:
+    """Whether the fixes of a receiver need robust weighting."""
+    return aid.rule is not None or any(
+        one.gross
+        for name, of in consistency.items()
+        if name.partition(".")[0] == aid.name
+        for one in of.components
+    )
+
+
+def _thinned(table: pd.DataFrame) -> pd.DataFrame:
+    """Rows thinned to the least interval between fixes."""
+    time = index_of(table)
+    cell = np.floor(time / FIXES_APART + NEAR_FIXES)
+    kept = np.concatenate([[True], np.diff(cell) > 0.0]) if len(time) else np.empty(0, bool)
+    out = table[kept]
+    out.attrs = dict(table.attrs)
+    return out
+
+
+# Heading found at rest and carried forward by the gyros alone.
+
+
+#: Assumed unobserved change of a gyro since, in standard deviations of its bias.
+UNSEEN = 30.0
+#: Longest time without an observation of the gyros, s.
+LONGEST = 7200.0
+#: Length of a step, or time between two, that counts as a gap, s.
+GAP = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class CarriedHeading:
+    """Headings of a run after one rest, carried by the gyros; as `heading_light.Heard`.
+
+    Attributes
+    ----------
+    since : float, s
+        When the rest ended.
+    time : ndarray, (n,), s
+        Seconds of the run after the rest.
+    difference : ndarray, (n,), deg
+        Heading of the run minus the carried one.
+    sd : ndarray, (n,), deg
+        99 % bound of the error of the carried heading, divided by `heading_light.SURE`.
+    plain : ndarray, (n,), deg
+        The same from the stated gyro errors, without the gyro errors observed during the rest.
+    kind : str
+    """
+
+    since: float
+    time: Array
+    difference: Array
+    sd: Array
+    plain: Array
+    kind: str = "gyrocompass"
+
+
+def carry_headings(
+    compasses: Sequence[Compass],
+    doubts: Sequence[float],
+    steps: JoinedSteps,
+    record: NavigationRecord,
+    sensors: ImuUncertainty,
+    ellipsoid: Ellipsoid,
+) -> list[CarriedHeading]:
+    """Carry headings forward, each until a later one agrees with it.
+
+    Parameters
+    ----------
+    compasses : sequence of Compass
+        In order of time.
+    doubts : sequence of float, s
+        Instants at which a gyro change was detected; headings are not carried beyond them.
+    steps : JoinedSteps
+        From the first of the compasses on.
+    record : NavigationRecord
+        Run that gives the position: a kilometer turns north by less than 0.02 deg.
+    sensors : ImuUncertainty
+    ellipsoid : Ellipsoid
+
+    Returns
+    -------
+    list of CarriedHeading
+
+    Notes
+    -----
+    Between two instants the gyros give the rotation of the body in inertial space; the Earth's
+    rotation and the traveled path give that of north. The bound of such a heading combines that
+    of the rest, the noise, the residual bias and the scale factors since, and the effect of a gyro
+    change by `UNSEEN` standard deviations, which only another rest could reveal.
+    """
+    if not compasses or not len(steps.time):
+        return []
+    rows = record.trajectory
+    seconds = seconds_of(record)
+    at = np.clip(np.searchsorted(index_of(rows), seconds - 1e-6), 0, len(rows) - 1)
+    stamps, own = index_of(rows)[at], values_of(rows, EULER)[at, 2]
+    carried = [_Carried(one, steps, rows, ellipsoid, sensors) for one in compasses]
+    out = []
+    for k, one in enumerate(carried):
+        until = min(one.compass.time + LONGEST, one.unbroken)
+        until = min([until, *(at for at in doubts if at > one.compass.time)])
+        for later in carried[k + 1 :]:
+            if later.compass.time <= until and one.agrees(later.compass):
+                until = min(until, later.compass.time)
+                break
+        used = (seconds >= one.compass.time - 1e-6) & (seconds <= until + 1e-6)
+        told = stamps[used]
+        difference = np.asarray(rotation.within_half_turn(own[used] - one.heading(told)))
+        bound, plain = one.bounds(told)
+        out.append(
+            CarriedHeading(one.compass.time, seconds[used], difference, bound / SURE, plain / SURE)
+        )
+    return [one for one in out if len(one.time)]
+
+
+class _Carried:
+    """Attitude of one rest, at the end of each step after it."""
+
+    def __init__(
+        self,
+        compass: Compass,
+        steps: JoinedSteps,
+        rows: pd.DataFrame,
+        ellipsoid: Ellipsoid,
+        sensors: ImuUncertainty,
+    ) -> None:
+        self.compass, self.sensors = compass, sensors
+        # A rest that ends within a step: the body is stationary there.
+        after = int(np.searchsorted(steps.time, compass.time + 1e-6))
+        dt = np.ascontiguousarray(steps.rows[after:, 0])
+        turns = np.ascontiguousarray(steps.rows[after:, 1:4] - dt[:, None] * compass.gyro_bias)
+        turned = np.empty((len(dt), 4))
+        quaternion_advance(np.array([1.0, 0.0, 0.0, 0.0]), dt, turns, turns, turned, 0.0, 1.0)
+        self.time = np.concatenate([[compass.time], steps.time[after:]])
+        # No heading is carried through a gap.
+        gaps = np.flatnonzero((dt > GAP) | (np.diff(self.time) > dt + GAP))
+        self.unbroken = float(self.time[gaps[0]]) if len(gaps) else math.inf
+        turned = np.concatenate([[[1.0, 0.0, 0.0, 0.0]], turned])
+        known = index_of(rows)
+        lat, lon = np.interp(self.time, known, rows["lat"]), _longitude(self.time, rows)
+        lon = lon + math.degrees(ellipsoid.rotation_rate) * (self.time - compass.time)
+        q_ni = q_ne(lat, rotation.within_half_turn(lon))
+        first = rotation.compose(rotation.conjugate(q_ni[0]), compass.q_nb)
+        q_nb = rotation.compose(q_ni, rotation.compose(first, turned))
+        heading = rotation.euler_from_quaternion(q_nb)[:, 2]
+        self.unwrapped = np.degrees(np.unwrap(np.radians(heading)))
+        away = np.abs(self.unwrapped - self.unwrapped[0])
+        self.turned = np.radians(np.maximum.accumulate(away))
+
+    def heading(self, time: Array) -> Array:
+        """Heading at some instants, deg."""
+        return np.asarray(np.interp(time, self.time, self.unwrapped))
+
+    def bounds(self, time: Array) -> tuple[Array, Array]:
+        """99 % bound of headings at some instants, deg: by the rest, and by the stated errors."""
+        gyro, drift = self.sensors.gyro, self.sensors.gyro_drift
+        since = np.maximum(time - self.compass.time, 0.0)
+        bias = float(np.max(np.hypot(gyro.axis("bias"), drift.triad)))
+        noise = float(np.max(gyro.axis("noise_density")))
+        scale = float(np.max(np.hypot(gyro.axis("scale"), gyro.axis("misalignment"))))
+        turned = np.interp(time, self.time, self.turned)
+        chance = np.sqrt(noise**2 * since + (bias * since) ** 2 + (scale * turned) ** 2)
+        unseen = UNSEEN * bias + GROWS * self.compass.unsteady
+        grown = np.degrees(SURE * chance + unseen * since)
+        return self.compass.bound + grown, SURE * self.compass.sd + grown
+
+    def agrees(self, later: Compass) -> bool:
+        """Whether a later rest found the carried heading."""
+        at = np.array([later.time])
+        there = float(rotation.euler_from_quaternion(later.q_nb)[2])
+        apart = abs(float(rotation.within_half_turn(self.heading(at)[0] - there)))
+        return bool(apart <= math.hypot(float(self.bounds(at)[0][0]), later.bound))
+
+
+def _longitude(time: Array, rows: pd.DataFrame) -> Array:
+    """Longitude at some instants, deg, also across the date line."""
+    lon = np.degrees(np.unwrap(np.radians(rows["lon"].to_numpy(dtype=np.float64))))
+    return np.asarray(np.interp(time, index_of(rows), lon))
+
+
+# Agreement of independent heading sources: two or more confirm each other.
+
+
+#: Fewest readings of a source.
+FEWEST_SOURCES = 5
+
+
+@dataclass(frozen=True, eq=False)
+class AgreeingSources:
+    """Heading by the second-best of several agreeing sources; as `heading_light.Heard`.
+
+    Attributes
+    ----------
+    since : float, s
+    time : ndarray, (n,), s
+        Seconds with two or more sources, all of which agree.
+    difference, sd : ndarray, (n,), deg
+        Heading of the run minus that of the second-best source, and its standard deviation.
+    kind : str
+    """
+
+    since: float
+    time: Array
+    difference: Array
+    sd: Array
+    kind: str = "sources"
+
+
+def agreeing_sources(
+    chain: NavigationPipeline, record: NavigationRecord, carried: Sequence[CarriedHeading]
+) -> list[AgreeingSources]:
+    """Combine heading measurements and headings found by gyrocompassing.
+
+    A constant error of a heading measurement is not observable from it alone, and the filter
+    becomes overconfident. Independent sources, such as a magnetic compass and two antennas, or two
+    antennas and the gyros' north, do not share it: the accuracy of the worse of them holds while
+    all agree with the run within 2.58 standard deviations. A measurement with an estimated
+    misalignment does not count as a source.
+
+    Parameters
+    ----------
+    chain : NavigationPipeline
+    record : NavigationRecord
+    carried : sequence of CarriedHeading
+
+    Returns
+    -------
+    list of AgreeingSources
+        One or none.
+    """
+    seconds = seconds_of(record)
+    told = [
+        one
+        for aid in chain.navigator.aids
+        if isinstance(aid, Heading) and aid.misalignment_sd_deg == 0.0
+        for one in [_of_aid(record, aid.name, seconds)]
+        if one is not None
+    ]
+    if carried:
+        told.append(_of_gyros(carried, seconds))
+    if len(told) < 2:
+        return []
+    d, s = np.array([x for x, _ in told]), np.array([x for _, x in told])
+    known = np.isfinite(s)
+    bound = np.where(known, np.abs(d) + SURE * s, np.inf)
+    own = np.interp(seconds, index_of(record.sd), record.sd["heading"])
+    agree = (~known | (np.abs(d) <= SURE * np.hypot(s, own))).all(axis=0)
+    good = agree & (known.sum(axis=0) >= 2)
+    second = np.argsort(bound, axis=0)[1]
+    column = np.arange(len(seconds))
+    d, s = d[second, column], s[second, column]
+    if not good.any():
+        return []
+    return [AgreeingSources(float(seconds[good][0]), seconds[good], d[good], s[good])]
+
+
+def _of_aid(record: NavigationRecord, name: str, seconds: Array) -> tuple[Array, Array] | None:
+    """Run minus measurement, and its standard deviation with a common error of all readings."""
+    table = record.innovations.get(f"{name}.heading")
+    if table is None or not len(table):
+        return None
+    time = index_of(table)
+    nu, s = (np.degrees(table.iloc[:, 0]), np.degrees(np.sqrt(table.iloc[:, 1])))
+    nu, s = nu.to_numpy(dtype=np.float64), s.to_numpy(dtype=np.float64)
+    first = np.searchsorted(time, seconds - RECENT, side="right")
+    last = np.searchsorted(time, seconds + 1e-6, side="right")
+    d, sd = np.full(len(seconds), np.nan), np.full(len(seconds), np.inf)
+    for k, (a, b) in enumerate(zip(first.tolist(), last.tolist(), strict=True)):
+        if b - a >= FEWEST_SOURCES:
+            d[k], sd[k] = np.median(nu[a:b]), np.median(s[a:b])
+    return d, sd
+
+
+def _of_gyros(carried: Sequence[CarriedHeading], seconds: Array) -> tuple[Array, Array]:
+    """Run minus the heading carried from the newest rest, by the stated gyro errors."""
+    d, sd = np.full(len(seconds), np.nan), np.full(len(seconds), np.inf)
+    for one in carried:
+        at = np.searchsorted(seconds, one.time - 1e-6)
+        inside = at < len(seconds)
+        d[at[inside]], sd[at[inside]] = one.difference[inside], one.plain[inside]
+    return d, sd

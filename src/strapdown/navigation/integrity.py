@@ -1,0 +1,489 @@
+"""Integrity of a navigation run: heading, innovations, and the first inconsistency."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
+from strapdown.errors import Finding, StrapdownError
+from strapdown.estimation.error_filter import ErrorFilter
+from strapdown.evaluation.trajectory_differences import trajectory_differences
+from strapdown.nav_state import NavState
+from strapdown.navigation.consistency import (
+    Inconsistency,
+    ObservationConsistency,
+    consistency_of_all,
+    inconsistencies,
+)
+from strapdown.navigation.gyrocompass import (
+    Manoeuvre,
+    compasses_of,
+    manoeuvres_from,
+    north_within,
+    sd_after,
+)
+from strapdown.navigation.heading_integrity import (
+    SURE,
+    HeadingIntegrity,
+    Heard,
+    LightSpan,
+    heading_light,
+    recent_scatter,
+)
+from strapdown.navigation.heading_witness import (
+    CarriedHeading,
+    Evidence,
+    Witnesses,
+    agreeing_sources,
+    carry_headings,
+    hear_witnesses,
+    witnesses_of,
+)
+from strapdown.navigation.measurements.gnss import Gnss
+from strapdown.navigation.measurements.measurement import Measurement, TabulatedMeasurement, lasting
+from strapdown.navigation.pipeline import NavigationPipeline
+from strapdown.navigation.preprocessing import joined_steps
+from strapdown.navigation.record import NavigationRecord
+from strapdown.navigation.recorder import IntervalRecorder
+from strapdown.navigation.replay import PipelineRun, run_batch
+from strapdown.progress import Progress
+from strapdown.tables import EULER, GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
+from strapdown.tables.checks import index_of, values_of
+
+__all__ = ["Advice", "IntegrityReport", "Repeated", "assess_integrity", "repeat_without"]
+
+
+Array = NDArray[np.float64]
+
+#: Most spans with advice, and their least length, s.
+MOST_ADVISED, LEAST_ADVISED = 4, 5.0
+#: Standard deviation beyond which a heading counts as unknown, deg.
+NO_NORTH = 45.0
+#: Interval between states from which a check can begin, s.
+LONGEST_STEP = 0.25
+NO_FIXES = "navigation.no-receiver-fixes"
+
+
+@dataclass(frozen=True)
+class Advice:
+    """Maneuvers that would have improved an untrusted heading.
+
+    Attributes
+    ----------
+    span : LightSpan
+    time : float, s
+        Last second of the span.
+    sd : float, deg
+        Standard deviation of the heading then, without assumptions about it.
+    options : tuple of (Manoeuvre, float)
+        Each with the standard deviation after it, deg; the best first. Empty without fixes of a
+        receiver to observe one.
+    """
+
+    span: LightSpan
+    time: float
+    sd: float
+    options: tuple[tuple[Manoeuvre, float], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class IntegrityReport:
+    """Integrity of a run.
+
+    Attributes
+    ----------
+    light : HeadingIntegrity
+    unwitnessed : tuple of Finding
+        Why no independent heading check was possible; empty where one was.
+    north_sd : float, deg
+        Standard deviation of north found by these gyros at rest.
+    advice : tuple of Advice
+        For the longest spans that are not green.
+    consistency : mapping of str to ObservationConsistency
+        By name of the observation.
+    inconsistencies : tuple of Inconsistency
+        In order of time.
+    repeated : Repeated or None
+        The run without the first of them.
+    """
+
+    light: HeadingIntegrity
+    unwitnessed: tuple[Finding, ...]
+    north_sd: float
+    advice: tuple[Advice, ...]
+    consistency: Mapping[str, ObservationConsistency]
+    inconsistencies: tuple[Inconsistency, ...]
+    repeated: Repeated | None
+
+    @property
+    def first(self) -> Inconsistency | None:
+        """The first inconsistency."""
+        return self.inconsistencies[0] if self.inconsistencies else None
+
+    @property
+    def against_bounds(self) -> Inconsistency | None:
+        """The first inconsistency other than gross errors, which do not question the filter."""
+        return next((one for one in self.inconsistencies if one.kind != "gross"), None)
+
+
+def assess_integrity(
+    chain: NavigationPipeline,
+    filter_: ErrorFilter,
+    imu: pd.DataFrame,
+    tables: Mapping[str, pd.DataFrame],
+    run: PipelineRun,
+    limits_deg: tuple[float, float],
+    repeat: bool,
+    progress: Progress,
+) -> IntegrityReport:
+    """Assess the integrity of a run.
+
+    Parameters
+    ----------
+    chain : NavigationPipeline
+        Pipeline of the run, with the uncertainty of its sensors.
+    filter_ : ErrorFilter
+        Its filter without states of measurements, for independent solutions.
+    imu : DataFrame
+    tables : mapping of str to DataFrame
+        By name of the measurement.
+    run : PipelineRun
+    limits_deg : tuple of float, (2,), deg
+        Error limit for a trusted heading (green), and 95 % bound of a rejected one (red).
+    repeat : bool
+        Whether to run again excluding the first inconsistent measurement.
+    progress : callable
+        Called with a stage and the share of it that is done.
+
+    Returns
+    -------
+    IntegrityReport
+    """
+    record = run.record
+    green, red = limits_deg
+    ellipsoid = find_ellipsoid(chain.navigator.filter.mechanization.ellipsoid)
+    progress("judging the heading", 0.0)
+    consistency = consistency_of_all(record.innovations)
+    evidence: list[Evidence] = []
+    made, why = None, _unable(chain, record)
+    try:
+        if why is None:
+            made = witnesses_of(filter_, chain, imu, tables, record, consistency)
+            why = None if made is not None else Finding(NO_FIXES, severity="note")
+        if made is not None:
+            evidence = hear_witnesses(made, record, green / 3.0)
+    except StrapdownError as error:
+        # Where an independent solution is not possible, the run is reported without it.
+        made, evidence = None, []
+        why = Finding("navigation.no-second-solution", severity="note", reason=error.finding)
+    assert chain.sensors is not None
+    north_sd = north_within(chain.sensors, float(record.trajectory["lat"].iloc[0]), ellipsoid)
+    carried, no_north = _carried(chain, imu, run, north_sd, green)
+    sources = agreeing_sources(chain, record, carried)
+    heard: list[Heard] = [*evidence, *carried, *sources]
+    light = heading_light(record, heard, recent_scatter(record), green=green, red=red)
+    found = inconsistencies(consistency, record.innovations, lasting(chain.navigator.aids))
+    repeated = None
+    if found and repeat:
+        stage = f"again, without {found[0].aid} where it is not consistent"
+        progress(stage, 0.3)
+        repeated = repeat_without(
+            chain,
+            imu,
+            tables,
+            record,
+            found,
+            ellipsoid,
+            lambda _, share: progress(stage, 0.3 + 0.7 * share),
+        )
+    return IntegrityReport(
+        light=light,
+        unwitnessed=() if heard or why is None else (why, *no_north),
+        north_sd=north_sd,
+        advice=_advice(light, evidence, made, record),
+        consistency=consistency,
+        inconsistencies=found,
+        repeated=repeated,
+    )
+
+
+def _carried(
+    chain: NavigationPipeline, imu: pd.DataFrame, run: PipelineRun, north_sd: float, green: float
+) -> tuple[list[CarriedHeading], tuple[Finding, ...]]:
+    """Headings carried from rests, or why there are none."""
+    sensors, record = chain.sensors, run.record
+    assert sensors is not None
+    ellipsoid = find_ellipsoid(chain.navigator.filter.mechanization.ellipsoid)
+    if not SURE * north_sd <= green:
+        if north_sd >= NO_NORTH:
+            return [], (Finding("navigation.gyros-find-no-north", severity="note"),)
+        code = "navigation.gyros-find-north-coarsely"
+        return [], (Finding(code, severity="note", north_sd_deg=north_sd),)
+    try:
+        found, doubts, why = compasses_of(chain, sensors, imu, record, run.aligned, ellipsoid)
+        if not found:
+            return [], () if why is None else (why,)
+        end = float(record.trajectory.index[-1])
+        steps = joined_steps(chain.intake, imu, found[0].time, end)
+        return carry_headings(found, doubts, steps, record, sensors, ellipsoid), ()
+    except StrapdownError as error:
+        code = "navigation.gyros-not-followed"
+        return [], (Finding(code, severity="note", reason=error.finding),)
+
+
+def _unable(chain: NavigationPipeline, record: NavigationRecord) -> Finding | None:
+    """Why a record does not allow heading checks by fixes."""
+    if not any(type(aid) is Gnss for aid in chain.navigator.aids):
+        return Finding(NO_FIXES, severity="note")
+    time = record.trajectory.index.to_numpy(dtype=np.float64)
+    if len(time) < 2 or float(np.median(np.diff(time))) > LONGEST_STEP:
+        return Finding("navigation.recorder-too-slow-for-second-solution", severity="note")
+    return None
+
+
+def _advice(
+    light: HeadingIntegrity,
+    evidence: list[Evidence],
+    made: Witnesses | None,
+    record: NavigationRecord,
+) -> tuple[Advice, ...]:
+    """Advice for the longest spans that are not green."""
+    spans = [s for s in light.spans if s.colour != "green" and s.end - s.begin >= LEAST_ADVISED]
+    longest = sorted(spans, key=lambda s: s.begin - s.end)[:MOST_ADVISED]
+    out = []
+    for span in sorted(longest, key=lambda s: s.begin):
+        if made is None:
+            out.append(Advice(span, span.end - 1.0, math.nan, ()))
+            continue
+        # The newest instant with a check: there is none at the very end of a run.
+        times = [e.time[(e.time >= span.begin) & (e.time < span.end)] for e in evidence]
+        heard = np.concatenate([*times, []])
+        if heard.size:
+            out.append(_advised(span, float(heard.max()), evidence, made, record))
+    return tuple(out)
+
+
+def _advised(
+    span: LightSpan,
+    time: float,
+    evidence: list[Evidence],
+    made: Witnesses,
+    record: NavigationRecord,
+) -> Advice:
+    told = [(e, int(np.searchsorted(e.time, time))) for e in evidence]
+    told = [(e, k) for e, k in told if k < len(e.time) and e.time[k] == time]
+    start = _state(record, time)
+    best, at = min(told, key=lambda pair: pair[0].sd[pair[1]])
+    filter_ = made.navigator.filter
+    mark = max(int(np.searchsorted(index_of(record.sd), time + 1e-6)) - 1, 0)
+    names = list(filter_.model.layout.labels())[9:]
+    sd = record.sensors_sd[names].iloc[mark].to_numpy(dtype=np.float64)
+    P = np.diag(np.concatenate([np.zeros(9), np.square(sd)]))
+    # By the factor by which its innovations exceed their expected scatter.
+    P[:9, :9] = best.covariance[at] * best.scale[at] ** 2
+    aid = made.navigator.aids[0]
+    assert isinstance(aid, Gnss)
+    table = made.tables[aid.name]
+    place = _typical(table, POSITION_SD, aid.position_sd_factor) if aid.use_position else None
+    speed = _typical(table, VELOCITY_SD, aid.velocity_sd_factor) if aid.use_velocity else None
+    steps = np.diff(index_of(table))
+    interval = float(np.clip(np.median(steps), 0.2, 2.0)) if steps.size else 1.0
+    options = [
+        (one, sd_after(filter_, start, P, one, place, speed, interval))
+        for one in manoeuvres_from(float(np.hypot(*start.v_n[:2])))
+    ]
+    options.sort(key=lambda pair: pair[1])
+    return Advice(span, time, float(best.sd[at]), tuple(options))
+
+
+def _typical(table: pd.DataFrame, columns: list[str], factor: float) -> Array | None:
+    """Standard deviations of the middle row; None where it has none."""
+    sd = values_of(table, columns)
+    sd = sd[np.isfinite(sd).all(axis=1) & (sd > 0.0).all(axis=1)]
+    return np.asarray(factor * np.median(sd, axis=0)) if len(sd) else None
+
+
+def _state(record: NavigationRecord, time: float) -> NavState:
+    row = record.trajectory.iloc[int(np.searchsorted(record.trajectory.index, time - 1e-6))]
+    lat, lon, alt = (float(row[c]) for c in GEODETIC)
+    roll, pitch, heading = (float(row[c]) for c in EULER)
+    v_n = row[VELOCITY].to_numpy(dtype=np.float64)
+    return NavState.from_degrees(
+        lat, lon, alt, v_n=v_n, roll_deg=roll, pitch_deg=pitch, heading_deg=heading
+    )
+
+
+# Re-run of the navigation without the inconsistent measurements.
+
+
+#: Rate at which the two runs are compared, Hz.
+RATE = 1.0
+#: Tolerance between the stamps of epochs and rows, s.
+SAME = 1e-3
+#: Where less than this share of the fixes would remain in a run without others, their standard
+#: deviations are increased instead.
+LEAST_LEFT = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Repeated:
+    """Re-run excluding an inconsistency, compared with the run itself.
+
+    Attributes
+    ----------
+    change : Finding
+        What was excluded, or given larger standard deviations.
+    record : NavigationRecord or None
+        None where it could not be run.
+    differences : DataFrame or None
+        Run minus re-run (`trajectory_differences`), once a second.
+    left : tuple of Inconsistency
+        Inconsistencies of the re-run.
+    failed : Finding or None
+        Why it could not be run; None where it could.
+    """
+
+    change: Finding
+    record: NavigationRecord | None
+    differences: pd.DataFrame | None
+    left: tuple[Inconsistency, ...] = ()
+    failed: Finding | None = None
+
+
+def repeat_without(
+    chain: NavigationPipeline,
+    imu: pd.DataFrame,
+    tables: Mapping[str, pd.DataFrame],
+    record: NavigationRecord,
+    found: Sequence[Inconsistency],
+    ellipsoid: Ellipsoid,
+    progress: Progress,
+) -> Repeated:
+    """Re-run a pipeline excluding an inconsistent measurement, its epochs or a stretch of it.
+
+    Gross errors are excluded epoch by epoch, a change over its stretch. A measurement that is
+    inconsistent throughout is excluded if another one observes position or velocity; otherwise its
+    standard deviation is increased by the factor that makes it consistent.
+
+    Parameters
+    ----------
+    chain : NavigationPipeline
+    imu : DataFrame
+    tables : mapping of str to DataFrame
+    record : NavigationRecord
+        Result of the run.
+    found : sequence of Inconsistency
+        The first is excluded; of gross errors all those of the same measurement.
+    ellipsoid : Ellipsoid
+    progress : callable
+
+    Returns
+    -------
+    Repeated
+    """
+    aids, told, change = _changed(chain.navigator.aids, tables, found)
+    changed = replace(chain, navigator=replace(chain.navigator, aids=aids, smoother=None))
+    try:
+        run = run_batch(
+            changed, imu, told, IntervalRecorder(rate_hz=RATE), progress, chunk=60.0
+        ).record
+    except StrapdownError as error:
+        return Repeated(change, None, None, failed=error.finding)
+    rows = run.trajectory
+    span = record.trajectory.index
+    rows = rows[(rows.index >= span[0]) & (rows.index <= span[-1])]
+    rows.attrs = dict(run.trajectory.attrs)
+    differences = -trajectory_differences(rows, record.trajectory, ellipsoid)
+    left = inconsistencies(consistency_of_all(run.innovations), run.innovations, lasting(aids))
+    return Repeated(change, run, differences, left)
+
+
+def _changed(
+    aids: tuple[Measurement, ...],
+    tables: Mapping[str, pd.DataFrame],
+    found: Sequence[Inconsistency],
+) -> tuple[tuple[Measurement, ...], dict[str, pd.DataFrame], Finding]:
+    """Measurements and tables after an exclusion, and its description."""
+    one = found[0]
+    aid = next(a for a in aids if a.name == one.aid)
+    told = dict(tables)
+    part = one.name.rpartition(".")[2]
+    table = tables.get(one.aid)
+    if table is not None and not one.throughout:
+        alike = [x for x in found if x.aid == one.aid and x.kind == "gross"]
+        kept = np.ones(len(table), dtype=np.bool_)
+        for each in alike if one.kind == "gross" else [one]:
+            kept &= _kept(table, each, aid)
+        others = [a for a in aids if a is not aid and isinstance(a, Gnss)]
+        if kept.any() and (others or kept.mean() >= LEAST_LEFT):
+            out = table[kept]
+            out.attrs = dict(table.attrs)
+            told[one.aid] = out
+            less: dict[str, float] = {"count": int((~kept).sum()), "rows": len(table)}
+            if one.kind == "gross":
+                return aids, told, _excluded("gross-errors", one, **less)
+            less |= {"since": one.since, "until": one.until}
+            return aids, told, _excluded("interval", one, **less)
+    if isinstance(aid, Gnss):
+        both = aid.use_position and aid.use_velocity and _has_both(table)
+        if both and one.kind != "gross":
+            if part == "position":
+                other = _swapped(aids, aid, replace(aid, use_position=False))
+                return other, told, _excluded("positions", one)
+            if part == "velocity":
+                other = _swapped(aids, aid, replace(aid, use_velocity=False))
+                return other, told, _excluded("velocities", one)
+        if not any(isinstance(a, Gnss) for a in aids if a is not aid):
+            factor = max(one.factor, 2.0)
+            weaker = replace(
+                aid,
+                position_sd_factor=factor * aid.position_sd_factor,
+                velocity_sd_factor=factor * aid.velocity_sd_factor,
+            )
+            change = Finding(
+                "navigation.rerun-with-larger-sd", severity="note", aid=one.aid, factor=factor
+            )
+            return _swapped(aids, aid, weaker), told, change
+    if isinstance(aid, TabulatedMeasurement):
+        told.pop(one.aid, None)
+    return tuple(a for a in aids if a is not aid), told, _excluded("measurement", one)
+
+
+def _excluded(what: str, one: Inconsistency, **values: float) -> Finding:
+    code = f"navigation.rerun-without-{what}"
+    return Finding(code, severity="note", data={"aid": one.aid, **values})
+
+
+def _swapped(
+    aids: tuple[Measurement, ...], old: Measurement, new: Measurement
+) -> tuple[Measurement, ...]:
+    return tuple(new if a is old else a for a in aids)
+
+
+def _has_both(table: pd.DataFrame | None) -> bool:
+    """Whether fixes hold positions and velocities."""
+    return table is not None and all(
+        bool(np.isfinite(values_of(table, sd)).all(axis=1).any())
+        for sd in (POSITION_SD, VELOCITY_SD)
+    )
+
+
+def _kept(table: pd.DataFrame, one: Inconsistency, aid: Measurement) -> NDArray[np.bool_]:
+    """Rows of a table other than the given epochs."""
+    time = index_of(table) - float(getattr(aid, "time_offset", 0.0))
+    if one.name.endswith(".velocity"):
+        time = time - float(getattr(aid, "velocity_delay", 0.0))
+    if one.kind == "change":
+        return np.asarray((time < one.since - SAME) | (time > one.until + SAME))
+    near = np.searchsorted(one.epochs, time)
+    apart = np.full(len(time), np.inf)
+    for k in (near - 1, near):
+        good = (k >= 0) & (k < len(one.epochs))
+        apart[good] = np.minimum(apart[good], np.abs(one.epochs[k[good]] - time[good]))
+    return np.asarray(apart > SAME)

@@ -1,0 +1,408 @@
+"""Positions and velocities of a GNSS receiver."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown._kernels.level import AXIS
+from strapdown.earth import gravity
+from strapdown.errors import ConfigError, DataError
+from strapdown.estimation.covariance import Observation
+from strapdown.estimation.error_model import PHYSICAL
+from strapdown.estimation.sensor_blocks import lever_arm, random_walk, time_offset
+from strapdown.estimation.sensor_states import SensorStates
+from strapdown.mechanization.state_error import displacement_between
+from strapdown.nav_state import NavState
+from strapdown.navigation.measurements.measurement import (
+    DISPLACEMENT,
+    ROTATION,
+    VELOCITY,
+    Epochs,
+    TabulatedMeasurement,
+    View,
+)
+from strapdown.navigation.measurements.vehicle import turn_of_body
+from strapdown.rotation import cross_matrix
+from strapdown.tables import GEODETIC, GNSS, POSITION_SD, VELOCITY_SD, check_gnss
+from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
+from strapdown.tables.checks import index_of, is_number, source_of, values_of
+from strapdown.tables.gnss import QUALITIES
+
+__all__ = ["Gnss", "Moving", "arm_of", "moving"]
+
+
+Array = NDArray[np.float64]
+
+#: Kind of an epoch: the first of its values.
+POSITION_CODE, VELOCITY_CODE, HORIZONTAL_CODE = 0.0, 1.0, 2.0
+PLACE = ("north, m", "east, m", "down, m")
+SPEED = ("VN, m/s", "VE, m/s", "VD, m/s")
+#: Beyond this, s, a time offset is a wrong clock, and the second-order arc is not valid.
+LARGEST_OFFSET = 2.0
+
+
+def _in(unit: str, default: float = 0.0) -> float:
+    made: float = field(default=default, metadata={"unit": unit})
+    return made
+
+
+@dataclass(frozen=True)
+class Gnss(TabulatedMeasurement):
+    """A GNSS receiver: positions of its antenna, velocities, or both.
+
+    A time offset as a state is modeled by the antenna's position, velocity and acceleration at the
+    epoch; the neglected term is a sixth of its jerk times the offset's third power. If the
+    estimated state exceeds 0.1 s, start again with the estimate as `time_offset`.
+
+    The acceleration is that of `View.steady`. An accelerometer reading at an instant is mostly
+    vibration that a receiver does not see: as acceleration, it would make every velocity falsely
+    confirm a zero offset.
+
+    Attributes
+    ----------
+    lever_arm : tuple of float, (3,), m
+        Of the antenna from the inertial sensors, body axes.
+    lever_arm_sd : float or tuple of float, (3,), m
+        Its standard deviation. Above zero it is estimated: states ``NAME.lever_arm``, assumed −
+        true.
+    time_offset : float, s
+        Time stamps of the aid minus the time of the inertial sensors: a stamp t means
+        ``t - time_offset``.
+    time_offset_sd : float, s
+        Its standard deviation. Above zero it is estimated: state ``NAME.time_offset``, assumed −
+        true.
+    time_offset_drift : float, s/√s
+        By which that state walks.
+    velocity_delay : float, s
+        Delay of the velocity against the position of the same row: half of the interval for a
+        mean over the preceding interval.
+    use_position, use_velocity : bool
+    position_sd_factor, velocity_sd_factor : float
+        Factors on the stated standard deviations.
+    least_position_sd, least_velocity_sd : float, m and m/s
+        Lower bounds of the standard deviations.
+    qualities : tuple of int
+        Fix qualities to be used, as in NMEA 0183 GGA; 6 is dead reckoning by the receiver
+        without satellites.
+
+    Raises
+    ------
+    ConfigError
+        An option is out of range.
+    """
+
+    lever_arm: tuple[float, float, float] = field(default=(0.0, 0.0, 0.0), metadata={"unit": "m"})
+    lever_arm_sd: float | tuple[float, float, float] = field(default=0.0, metadata={"unit": "m"})
+    time_offset: float = _in("s")
+    time_offset_sd: float = _in("s")
+    time_offset_drift: float = _in("s_per_sqrt_s")
+    velocity_delay: float = _in("s")
+    use_position: bool = True
+    use_velocity: bool = True
+    position_sd_factor: float = 1.0
+    velocity_sd_factor: float = 1.0
+    least_position_sd: float = _in("m")
+    least_velocity_sd: float = _in("m_per_s")
+    qualities: tuple[int, ...] = (1, 2, 3, 4, 5, 7, 8)
+
+    kind: ClassVar[str] = "gnss"
+    summary: ClassVar[str] = "places and velocities of a satellite receiver"
+    source: ClassVar[str] = (
+        "Groves (2013), secs. 14.3.1 and 14.3.2; Chernodarov (2009), Eqs. (19), (20)"
+    )
+    columns: ClassVar[tuple[str, ...]] = tuple(GNSS)
+
+    def __post_init__(self) -> None:
+        arm = self.lever_arm
+        if len(arm) != 3 or not all(is_number(x) and math.isfinite(x) for x in arm):
+            raise ConfigError(
+                "navigation.lever-arm-not-three-numbers", quantity="lever_arm", arm=arm
+            )
+        for name, least, most in (
+            ("time_offset", -math.inf, math.inf),
+            ("time_offset_sd", 0.0, LARGEST_OFFSET),
+            ("time_offset_drift", 0.0, math.inf),
+            ("velocity_delay", 0.0, math.inf),
+            ("least_position_sd", 0.0, math.inf),
+            ("least_velocity_sd", 0.0, math.inf),
+            ("position_sd_factor", 1e-6, math.inf),
+            ("velocity_sd_factor", 1e-6, math.inf),
+        ):
+            value = getattr(self, name)
+            if not (is_number(value) and math.isfinite(value) and least <= value <= most):
+                raise ConfigError(
+                    "navigation.option-not-between"
+                    if math.isfinite(most)
+                    else "navigation.option-below"
+                    if math.isfinite(least)
+                    else "navigation.option-not-finite",
+                    quantity=name,
+                    value=value,
+                    least=least,
+                    most=most,
+                )
+        if not (self.use_position or self.use_velocity):
+            raise ConfigError(
+                "navigation.nothing-of-fixes-used",
+                quantity="use_position, use_velocity",
+            )
+        if not set(self.qualities) <= set(QUALITIES) - {0}:
+            raise ConfigError(
+                "navigation.no-qualities-fixes", quantity="qualities", qualities=self.qualities
+            )
+        if self.time_offset_drift and not self.time_offset_sd:
+            raise ConfigError(
+                "navigation.time-offset-walks-not-estimated", quantity="time_offset_drift"
+            )
+        lever_arm(self.lever_arm_sd)
+
+    def states(self) -> tuple[SensorStates, ...]:
+        """Errors of the lever arm and of the time offset, if these are uncertain."""
+        out = []
+        if np.any(np.asarray(self.lever_arm_sd) > 0.0):
+            out.append(lever_arm(self.lever_arm_sd).named(self._arm))
+        if self.time_offset_sd > 0.0:
+            offset = time_offset(self.time_offset_sd).named(self._offset)
+            out.append(random_walk(offset, self.time_offset_drift))
+        return tuple(out)
+
+    @property
+    def wants_steady(self) -> bool:
+        """Only with an estimated time offset, which needs the acceleration."""
+        return self.time_offset_sd > 0.0
+
+    def epochs(self, table: pd.DataFrame) -> Epochs:
+        """Return an epoch for each position and velocity; see `TabulatedMeasurement.epochs`.
+
+        A velocity without a vertical component has two components.
+        """
+        check_gnss(table)
+        time = index_of(table) - self.time_offset
+        good = np.isin(values_of(table, ["quality"])[:, 0], self.qualities)
+        times, rows = [], []
+        for code, used, columns, sds, delay, factor, least in (
+            (
+                POSITION_CODE,
+                self.use_position,
+                GEODETIC,
+                POSITION_SD,
+                0.0,
+                self.position_sd_factor,
+                self.least_position_sd,
+            ),
+            (
+                VELOCITY_CODE,
+                self.use_velocity,
+                VELOCITY_COLUMNS,
+                VELOCITY_SD,
+                self.velocity_delay,
+                self.velocity_sd_factor,
+                self.least_velocity_sd,
+            ),
+        ):
+            value, sd = values_of(table, columns), values_of(table, sds)
+            measured = np.isfinite(sd)
+            told = good & measured.all(axis=1) & used
+            codes = np.full(len(value), code)
+            if code == POSITION_CODE:
+                value = np.column_stack([np.radians(value[:, :2]), value[:, 2]])
+            elif used:
+                # Many receivers output speed and course only.
+                level = good & measured[:, :2].all(axis=1) & ~measured[:, 2]
+                codes[level], told = HORIZONTAL_CODE, told | level
+                value, sd = np.where(measured, value, 0.0), np.where(measured, sd, np.inf)
+            sd = np.maximum(factor * sd, least)
+            _refuse_certain(table, told, sd, sds, code)
+            times.append(time[told] - delay)
+            rows.append(np.column_stack([codes, value, sd**2])[told])
+        at = np.concatenate(times)
+        order = np.argsort(at, kind="stable")
+        return Epochs(at[order], np.concatenate(rows)[order])
+
+    def observe(self, view: View, values: Array) -> list[Observation]:
+        """Return the innovation of a position or velocity, NED: computed − measured."""
+        arm = arm_of(view, self._arm, np.asarray(self.lever_arm))
+        place, velocity, acceleration = moving(view, arm, self._arm)
+        of_place = values[0] == POSITION_CODE
+        computed = place if of_place else velocity
+        if view.has(self._offset):
+            late = float(view.estimate(self._offset)[0])
+            computed = _later(view, self._offset, late, of_place, place, velocity, acceleration)
+        C_nl = view.C_ln.T
+        z, H = C_nl @ computed.value, C_nl @ computed.H
+        if of_place:
+            lat, lon, alt = values[1:4].tolist()
+            measured = NavState(view.time, lat, lon, alt, np.zeros(3), view.here.q_nb)
+            z += displacement_between(view.here, measured, view.ellipsoid)
+        else:
+            z -= values[1:4]
+        name, labels = self.names(float(values[0]))
+        n = len(labels)
+        return [Observation(name, z[:n], H[:n], values[4 : 4 + n], labels)]
+
+    def names(self, code: float) -> tuple[str, tuple[str, ...]]:
+        """Return the name of the observation of an epoch, and the labels of its components."""
+        if code == POSITION_CODE:
+            return f"{self.name}.position", PLACE
+        return f"{self.name}.velocity", SPEED[:2] if code == HORIZONTAL_CODE else SPEED
+
+    @property
+    def _arm(self) -> str:
+        return f"{self.name}.lever_arm"
+
+    @property
+    def _offset(self) -> str:
+        return f"{self.name}.time_offset"
+
+
+def _later(
+    view: View,
+    name: str,
+    late: float,
+    of_place: bool,
+    place: Moving,
+    velocity: Moving,
+    acceleration: Moving,
+) -> Moving:
+    """Position or velocity after the epoch by the error of the assumed offset."""
+    speed = velocity.after(acceleration, late)
+    out, changes = speed, acceleration
+    if of_place:
+        out, changes = place.after(velocity, late).after(acceleration, 0.5 * late**2), speed
+    H = out.H.copy()
+    H[:, view.place(name)] = -changes.value[:, None]
+    return Moving(out.value, H)
+
+
+def _refuse_certain(
+    table: pd.DataFrame, told: NDArray[np.bool_], sd: Array, columns: list[str], code: float
+) -> None:
+    certain = np.argwhere((sd == 0.0) & told[:, None])
+    if len(certain):
+        row, column = certain[0].tolist()
+        what = "least_position_sd_m" if code == POSITION_CODE else "least_velocity_sd_m_per_s"
+        raise DataError(
+            "navigation.sd-zero-in-rows",
+            file=source_of(table),
+            row=row + 1,
+            quantity=columns[column],
+            count=len(np.unique(certain[:, 0])),
+            what=what,
+        )
+
+
+# Motion of an antenna by the navigator's state, and its sensitivity to the navigator's errors.
+#
+# With the arm r of the antenna in level axes, ``W = C_lb w_ib - w_ie`` the rate of the body
+# relative to the Earth and f the specific force, relative to the Earth
+#
+#     position     p + r
+#     velocity     v + W x r
+#     acceleration f + g - 2 w_ie x v + W x (W x r)
+#
+# Gravity g includes the centrifugal part. The angular acceleration term, ``W' x r``, is unknown and
+# neglected, as is the change of g with position.
+
+
+@dataclass(frozen=True, eq=False)
+class Moving:
+    """A vector of the antenna in level axes, and its sensitivity to the physical errors.
+
+    Attributes
+    ----------
+    value : ndarray, (3,)
+    H : ndarray, (3, p)
+        Its error by the physical errors, to first order.
+    """
+
+    value: Array
+    H: Array
+
+    def after(self, other: Moving, time: float) -> Moving:
+        """Return this with `time` times the other added."""
+        return Moving(self.value + time * other.value, self.H + time * other.H)
+
+
+def arm_of(view: View, name: str, assumed: Array) -> Array:
+    """Return an arm in body axes, (3,), m, minus the filter's estimate of its error."""
+    return assumed - view.estimate(name) if view.has(name) else assumed
+
+
+def moving(view: View, arm: Array, arm_name: str) -> tuple[Moving, Moving, Moving]:
+    """Return position, velocity and acceleration of the antenna relative to the body.
+
+    Parameters
+    ----------
+    view : View
+    arm : ndarray, (3,), m
+        Body axes, minus the estimate of its error.
+    arm_name : str
+        Name of the block of states of its error, which may be absent.
+
+    Returns
+    -------
+    place : Moving, m
+        The value is the arm: antenna minus body position. H includes the position error, too.
+    velocity : Moving, m/s
+        Relative to the Earth.
+    acceleration : Moving, m/s²
+    """
+    C = view.C_lb
+    r = C @ arm
+    spin = view.ellipsoid.rotation_rate * view.level[AXIS : AXIS + 3]
+    turn, of_turn = turn_of_body(view)
+    W = C @ turn
+    arm_at = view.place(arm_name) if view.has(arm_name) else None
+    across, turning = cross_matrix(r), cross_matrix(W)
+
+    d_arm = np.zeros((3, view.columns))
+    d_arm[:, ROTATION] = -across
+    if arm_at is not None:
+        d_arm[:, arm_at] = C
+    d_W = C @ of_turn
+    d_W[:, ROTATION] -= turning
+
+    swept = turning @ r
+    d_swept = turning @ d_arm - across @ d_W
+    place = Moving(r, d_arm + _at(DISPLACEMENT, view.columns))
+    velocity = Moving(view.velocity + swept, d_swept + _at(VELOCITY, view.columns))
+
+    rate, felt = _steady(view)
+    force = C @ felt
+    W = C @ rate - spin
+    turning = cross_matrix(W)
+    swept = turning @ r
+    d_swept = turning @ d_arm - across @ d_W
+    here = view.here
+    g = gravity(math.degrees(here.lat), here.alt, ellipsoid=view.ellipsoid)
+    value = force + view.C_ln @ g - 2.0 * np.cross(spin, view.velocity) + turning @ swept
+    d_acc = turning @ d_swept - cross_matrix(swept) @ d_W
+    d_acc[:, ROTATION] -= cross_matrix(force)
+    d_acc[:, VELOCITY] -= 2.0 * cross_matrix(spin)
+    felt = np.concatenate([[1.0], view.rate, view.force])
+    d_acc[:, PHYSICAL:] += C @ np.tensordot(felt, view.model.stacked.accel, 1)
+    return place, velocity, Moving(value, d_acc)
+
+
+def _at(where: slice, columns: int) -> Array:
+    out = np.zeros((3, columns))
+    out[:, where] = np.eye(3)
+    return out
+
+
+def _steady(view: View) -> tuple[Array, Array]:
+    """Rate and force without vibration, if known, with the estimated errors subtracted."""
+    if view.steady is None:
+        return view.rate, view.force
+    stacked = view.model.stacked
+    felt = np.concatenate([[1.0], view.steady])
+    return (
+        view.steady[:3] - np.tensordot(felt, stacked.gyro, 1) @ view.sensors,
+        view.steady[3:] - np.tensordot(felt, stacked.accel, 1) @ view.sensors,
+    )

@@ -1,0 +1,278 @@
+"""Check a receiver's fixes before a record is navigated with them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.errors import DataError, Finding
+from strapdown.frames import place_difference
+from strapdown.navigation.measurements.gnss import Gnss
+from strapdown.navigation.measurements.gnss_clock import (
+    check_overlap,
+    find_time_offset,
+    find_velocity_delay,
+    velocity_delay,
+)
+from strapdown.tables import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD, check_gnss, find_gaps
+from strapdown.tables.checks import index_of, source_of, values_of
+
+__all__ = ["check_fixes", "gnss_readiness"]
+
+
+def gnss_readiness(
+    table: pd.DataFrame, imu: pd.DataFrame | None = None, aid: Gnss | None = None
+) -> tuple[Finding, ...]:
+    """Check fixes by themselves, and against the inertial record.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Gnss table.
+    imu : DataFrame, optional
+        Imu table.
+    aid : Gnss, optional
+        As it is configured: options already set are not reported again.
+
+    Returns
+    -------
+    tuple of Finding
+        Each with the option or the deed that helps.
+
+    Raises
+    ------
+    DataError
+        The fixes cannot be used as they are (`gnss_checks.check_fixes`,
+        `gnss_clock.check_overlap`).
+    """
+    aid = aid or Gnss(name="gnss")
+    found = check_fixes(table)
+    if aid.use_velocity and aid.use_position:
+        found += find_velocity_delay(table, aid.velocity_delay)
+    if imu is None:
+        return tuple(found)
+    found += check_overlap(table, imu, aid.time_offset)
+    delay = aid.velocity_delay
+    if not delay and (measured := velocity_delay(table)) is not None:
+        delay = measured.delay
+    found += find_time_offset(table, imu, aid.time_offset, delay, aid.time_offset_sd)
+    return tuple(found)
+
+
+# Errors of fixes that a Gnss table alone reveals.
+
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+#: Limits beyond any vehicle: a speed over the ground, m/s, and an acceleration, m/s².
+LARGEST_SPEED, LARGEST_ACCELERATION = 12_000.0, 60.0
+#: In standard deviations of the positions and of the displacement between them.
+JUMP = 8.0
+#: Number of steps for the check of units, and the least speed for it, m/s.
+LEAST_STEPS, LEAST_SPEED = 10, 2.0
+#: A receiver repeats itself if so many consecutive rows are equal while it moves.
+ALIKE = 3
+#: Number of rows that a message lists.
+NAMED = 5
+
+
+def check_fixes(table: pd.DataFrame) -> list[Finding]:
+    """Check the fixes of a table.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Gnss table.
+
+    Returns
+    -------
+    list of Finding
+        Standard deviations of zero; gaps; positions that jump; a receiver that repeats itself.
+
+    Raises
+    ------
+    DataError
+        As `check_gnss`; there are no fixes; positions are in radians or minutes; they move
+        faster than any vehicle.
+    """
+    check_gnss(table)
+    source = source_of(table)
+    time = index_of(table)
+    good = np.asarray(values_of(table, ["quality"])[:, 0] > 0.0)
+    placed = good & np.isfinite(values_of(table, POSITION_SD)).all(axis=1)
+    fast = good & np.isfinite(values_of(table, VELOCITY_SD)).all(axis=1)
+    if not len(time):
+        raise DataError("navigation.no-fixes", file=source, quantity="time")
+    if not (placed | fast).any():
+        raise DataError(
+            "navigation.none-rows-fix-quality-or", file=source, quantity="quality", count=len(time)
+        )
+    _refuse_units(table, time, placed, source)
+    found = [*_certain(table, good, source), *_gaps(time, placed | fast, source)]
+    if not placed.any():
+        found.append(
+            Finding(
+                "navigation.no-place-used-none-rows",
+                file=source,
+                quantity=", ".join(POSITION_SD),
+                count=len(time),
+            )
+        )
+    found += _jumps(table, time, placed, fast, source)
+    found += _repeats(table, placed, fast, source)
+    return found
+
+
+def _refuse_units(table: pd.DataFrame, time: Array, placed: Flags, source: str | None) -> None:
+    """Refuse positions whose speed shows that they are not in degrees."""
+    rows = np.flatnonzero(placed)
+    if len(rows) < 2:
+        return
+    place, velocity = values_of(table, GEODETIC)[rows], values_of(table, VELOCITY)[rows]
+    moved = np.linalg.norm(place_difference(place[1:], place[:-1])[:, :2], axis=1)
+    speed = np.asarray(moved / np.diff(time[rows]))
+    beyond = np.flatnonzero(speed > LARGEST_SPEED)
+    if beyond.size > 0.5 * len(speed):
+        k = int(beyond[0])
+        raise DataError(
+            "navigation.places-move-fix-fix-steps",
+            file=source,
+            row=int(rows[k + 1]) + 1,
+            quantity="lat, lon",
+            speed=speed[k],
+            size=beyond.size,
+            count=len(speed),
+        )
+    told = np.asarray(np.linalg.norm(0.5 * (velocity[1:] + velocity[:-1])[:, :2], axis=1))
+    finite = np.isfinite(values_of(table, VELOCITY_SD)[rows]).min(axis=1)
+    clear = (told > LEAST_SPEED) & finite[1:] & finite[:-1]
+    if clear.sum() < LEAST_STEPS:
+        return
+    ratio = float(np.median(speed[clear] / told[clear]))
+    row = int(rows[np.flatnonzero(clear)[0]]) + 1
+    # Radians taken as degrees are near the equator, where a degree of longitude is longer.
+    small = bool((np.abs(place[:, :2]) <= [0.5 * np.pi, np.pi]).all())
+    for fits, code in (
+        (small and 0.016 < ratio < 0.1, "navigation.fixes-in-radians"),
+        (55.0 < ratio < 65.0, "navigation.fixes-in-minutes"),
+    ):
+        if fits:
+            raise DataError(code, file=source, row=row, quantity="lat, lon", ratio=ratio)
+
+
+def _certain(table: pd.DataFrame, good: Flags, source: str | None) -> list[Finding]:
+    out = []
+    for columns, option in (
+        (POSITION_SD, "least_position_sd_m"),
+        (VELOCITY_SD, "least_velocity_sd_m_per_s"),
+    ):
+        zero = good & (values_of(table, columns) == 0.0).any(axis=1)
+        if zero.any():
+            out.append(
+                Finding(
+                    "navigation.fix-sd-zero",
+                    file=source,
+                    row=int(np.argmax(zero)) + 1,
+                    quantity=", ".join(columns),
+                    rows=_rows(zero),
+                    option=option,
+                )
+            )
+    return out
+
+
+def _gaps(time: Array, told: Flags, source: str | None) -> list[Finding]:
+    rows = np.flatnonzero(told)
+    gaps = find_gaps(time[rows])
+    if not gaps:
+        return []
+    longest = max(gaps, key=lambda gap: gap.length)
+    listed = [f"{gap.length:.3g} s from {gap.start:.9g} s" for gap in gaps[:NAMED]]
+    listed += ["…"] if len(gaps) > NAMED else []
+    return [
+        Finding(
+            "navigation.outages" if len(gaps) > 1 else "navigation.outage",
+            file=source,
+            row=int(rows[longest.sample]) + 1,
+            quantity="time",
+            count=len(gaps),
+            length=longest.length,
+            usual=longest.usual,
+            listed=listed,
+        )
+    ]
+
+
+def _jumps(
+    table: pd.DataFrame, time: Array, placed: Flags, fast: Flags, source: str | None
+) -> list[Finding]:
+    """Positions that no vehicle reaches from the previous one."""
+    rows = np.flatnonzero(placed)
+    if len(rows) < 3:
+        return []
+    place = values_of(table, GEODETIC)[rows]
+    sd = np.linalg.norm(values_of(table, POSITION_SD)[rows], axis=1)
+    moved = place_difference(place[1:], place[:-1])
+    steps = np.diff(time[rows])
+    has = (fast[rows][1:] & fast[rows][:-1])[:, None]
+    v = np.where(fast[rows][:, None], values_of(table, VELOCITY)[rows], 0.0)
+    # Without a velocity that of the step before is used.
+    before = np.vstack([moved[1] / steps[1], (moved / steps[:, None])[:-1]])
+    way = np.where(has, 0.5 * (v[1:] + v[:-1]), before) * steps[:, None]
+    off = np.linalg.norm(moved - way, axis=1)
+    # Effect of an acceleration beyond the mean of two velocities, or beyond one speed.
+    free = np.where(has[:, 0], 0.125, 1.0) * LARGEST_ACCELERATION * steps**2
+    allowed = JUMP * np.hypot(sd[1:], sd[:-1]) + free
+    struck = off > allowed
+    if not struck.any():
+        return []
+    k = int(np.argmax(off / allowed))
+    at = np.zeros(len(time), dtype=np.bool_)
+    at[rows[1:][struck]] = True
+    return [
+        Finding(
+            "navigation.position-jumps",
+            file=source,
+            row=int(rows[k + 1]) + 1,
+            quantity="lat, lon, alt",
+            rows=_rows(at),
+            off=off[k],
+            sd=sd[k + 1],
+        )
+    ]
+
+
+def _repeats(table: pd.DataFrame, placed: Flags, fast: Flags, source: str | None) -> list[Finding]:
+    """Rows that are identical while the receiver reports motion."""
+    values = values_of(table, [*GEODETIC, *VELOCITY])
+    same = np.zeros(len(values), dtype=np.bool_)
+    same[1:] = (values[1:] == values[:-1]).all(axis=1) & placed[1:] & placed[:-1]
+    speed = np.linalg.norm(values[:, 3:], axis=1)
+    sd = np.where(fast, np.linalg.norm(values_of(table, VELOCITY_SD), axis=1), np.inf)
+    same &= speed > np.maximum(3.0 * sd, 0.5)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
+    runs = [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= ALIKE - 1]
+    if not runs:
+        return []
+    frozen = np.zeros(len(values), dtype=np.bool_)
+    for a, b in runs:
+        frozen[a:b] = True
+    first = int(runs[0][0])
+    return [
+        Finding(
+            "navigation.receiver-repeats",
+            file=source,
+            row=first + 1,
+            quantity="lat, lon, alt, VN, VE, VD",
+            rows=_rows(frozen),
+            speed=speed[first],
+        )
+    ]
+
+
+def _rows(struck: Flags) -> list[int | str]:
+    """The first rows, counted from 1, as text; dots for further ones."""
+    at: list[int | str] = [*(np.flatnonzero(struck) + 1).tolist()]
+    return [*at[:NAMED], "…"] if len(at) > NAMED else at

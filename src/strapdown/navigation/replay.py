@@ -1,0 +1,243 @@
+"""Run a pipeline over a whole record in chunks, or sample by sample."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.errors import ConfigError
+from strapdown.navigation.engine import SAME_INSTANT
+from strapdown.navigation.modes import Aligned, PipelineChunk
+from strapdown.navigation.pipeline import NavigationPipeline, PipelineState
+from strapdown.navigation.record import Event, NavigationRecord, Span
+from strapdown.navigation.recorder import FullRecorder, Recorder
+from strapdown.progress import Progress, silent
+from strapdown.tables import ACCEL, GYRO, check_imu
+from strapdown.tables.checks import check_columns, source_of, values_of
+
+__all__ = [
+    "PipelineRun",
+    "Recording",
+    "pieces_by_sample",
+    "pieces_of",
+    "run_batch",
+    "run_by_sample",
+]
+
+
+Array = NDArray[np.float64]
+
+#: Length of a chunk of a record, s.
+CHUNK = 60.0
+CHANNELS = [*GYRO, *ACCEL]
+
+
+@dataclass(frozen=True, eq=False)
+class PipelineRun:
+    """Result of a pipeline run.
+
+    Attributes
+    ----------
+    record : NavigationRecord
+    aligned : tuple of Aligned
+        Result of each alignment mode.
+    smoothed : NavigationRecord or None
+        Smoothed solution, where the navigator has a smoother.
+    """
+
+    record: NavigationRecord
+    aligned: tuple[Aligned, ...]
+    smoothed: NavigationRecord | None = None
+
+
+class Recording:
+    """Collect the output chunks of a pipeline in a recorder.
+
+    Parameters
+    ----------
+    chain : NavigationPipeline
+    recorder : Recorder, optional
+        All samples, if not given.
+    """
+
+    def __init__(self, chain: NavigationPipeline, recorder: Recorder | None = None) -> None:
+        smoother = chain.navigator.smoother
+        self._smoothing = None if smoother is None else smoother.begin(chain.navigator)
+        self._tape = (recorder or FullRecorder()).begin(chain.navigator)
+        self._aligned: list[Aligned] = []
+        self._events: list[Event] = []
+        self._modes: list[Span] = []
+        self._outages: list[tuple[str, Span]] = []
+
+    def take(self, piece: PipelineChunk) -> None:
+        """Append a chunk."""
+        for navigation in piece.navigation:
+            self._tape.take(navigation)
+            if self._smoothing is not None:
+                self._smoothing.take(navigation)
+        self._aligned += piece.aligned
+        self._events += piece.events
+        self._modes += piece.modes
+        self._outages += piece.outages
+
+    def run(self, source: str | None = None) -> PipelineRun:
+        """Return the collected run.
+
+        Parameters
+        ----------
+        source : str, optional
+            Name for messages.
+        """
+        names = dict.fromkeys(name for name, _ in self._outages)
+        record = partial(
+            self._tape.record,
+            source,
+            events=tuple(sorted(self._events, key=lambda one: one.time)),
+            modes=tuple(self._modes),
+            outages={
+                name: tuple(span for of, span in self._outages if of == name) for name in names
+            },
+        )
+        smoothed = None if self._smoothing is None else record(smoothing=self._smoothing)
+        return PipelineRun(record(), tuple(self._aligned), smoothed)
+
+
+def run_batch(
+    chain: NavigationPipeline,
+    imu: pd.DataFrame,
+    tables: Mapping[str, pd.DataFrame] | None = None,
+    recorder: Recorder | None = None,
+    progress: Progress = silent,
+    chunk: float = CHUNK,
+) -> PipelineRun:
+    """Run a pipeline over a record.
+
+    Parameters
+    ----------
+    chain : NavigationPipeline
+    imu : DataFrame
+        Imu table.
+    tables : mapping of str to DataFrame, optional
+        By name of the measurement.
+    recorder : Recorder, optional
+        All samples, if not given.
+    progress : callable, optional
+        Called with the mode and the share that is done.
+    chunk : float, s
+        Length of the chunks of the record; limits the size of copies.
+
+    Returns
+    -------
+    PipelineRun
+
+    Raises
+    ------
+    DataError, ConfigError, DivergenceError
+        As `NavigationPipeline.advance` and `NavigationPipeline.tell`.
+    """
+    recording = Recording(chain, recorder)
+    begin, end = float(imu.index[0]), float(imu.index[-1])
+    for piece in pieces_of(chain, imu, tables, chunk):
+        recording.take(piece)
+        share = (piece.time - begin) / max(end - begin, 1e-9)
+        progress(piece.mode, float(np.clip(share, 0.0, 1.0)))
+    return recording.run(source_of(imu))
+
+
+def run_by_sample(
+    chain: NavigationPipeline,
+    imu: pd.DataFrame,
+    tables: Mapping[str, pd.DataFrame] | None = None,
+    recorder: Recorder | None = None,
+    ahead: float = 0.0,
+) -> PipelineRun:
+    """Run a pipeline over a record as in real time: sample by sample, each fix when it is due.
+
+    Parameters
+    ----------
+    chain, imu, tables, recorder
+        As `run_batch`, whose numbers it reproduces to the last bit.
+    ahead : float, s
+        Time by which table rows precede the samples of their stamps; at least the known delay of a
+        measurement with late stamps.
+
+    Returns
+    -------
+    PipelineRun
+    """
+    recording = Recording(chain, recorder)
+    for piece in pieces_by_sample(chain, imu, tables, ahead):
+        recording.take(piece)
+    return recording.run(source_of(imu))
+
+
+def pieces_of(
+    chain: NavigationPipeline,
+    imu: pd.DataFrame,
+    tables: Mapping[str, pd.DataFrame] | None = None,
+    chunk: float = CHUNK,
+) -> Iterator[PipelineChunk]:
+    """Run a pipeline over a record in chunks, and yield the output chunks; see `run_batch`."""
+    if not chunk > 0.0:
+        raise ConfigError("navigation.chunk-not-positive", quantity="chunk", chunk=chunk)
+    check_columns(imu, CHANNELS, source_of(imu))
+    state = _begun(chain, imu)
+    for name, table in (tables or {}).items():
+        state = chain.tell(state, name, table)
+    time = imu.index.to_numpy(dtype=np.float64)
+    span = max(float(time[-1] - time[0]), 0.0) if len(time) else 0.0
+    size = len(time) if span <= chunk else max(1, int(len(time) * chunk / span))
+    for at in range(0, len(time), size):
+        last = at + size >= len(time)
+        values = values_of(imu.iloc[at : at + size], CHANNELS)
+        state, piece = chain.advance(state, time[at : at + size], values, last)
+        yield piece
+
+
+def pieces_by_sample(
+    chain: NavigationPipeline,
+    imu: pd.DataFrame,
+    tables: Mapping[str, pd.DataFrame] | None = None,
+    ahead: float = 0.0,
+    each: Callable[[PipelineState, float], PipelineState] | None = None,
+) -> Iterator[PipelineChunk]:
+    """Run a pipeline sample by sample; see `run_by_sample`.
+
+    Parameters
+    ----------
+    chain, imu, tables, ahead
+        As `run_by_sample`.
+    each : callable, optional
+        Called with the state and the stamp before each sample; returns the state. Commands are
+        given here.
+    """
+    check_columns(imu, CHANNELS, source_of(imu))
+    state = _begun(chain, imu)
+    tables = tables or {}
+    stamps = {name: table.index.to_numpy(dtype=np.float64) for name, table in tables.items()}
+    told = dict.fromkeys(tables, 0)
+    time, values = imu.index.to_numpy(dtype=np.float64), values_of(imu, CHANNELS)
+    for k in range(len(time)):
+        for name, table in tables.items():
+            upto = time[k] + ahead + SAME_INSTANT
+            first, end = told[name], int(stamps[name].searchsorted(upto, side="right"))
+            if end > first:
+                rows = table.iloc[first:end]
+                rows.attrs = dict(table.attrs)
+                state = chain.tell(state, name, rows)
+                told[name] = end
+        if each is not None:
+            state = each(state, float(time[k]))
+        last = k + 1 == len(time)
+        state, piece = chain.advance(state, time[k : k + 1], values[k : k + 1], last)
+        yield piece
+
+
+def _begun(chain: NavigationPipeline, imu: pd.DataFrame) -> PipelineState:
+    check_imu(imu)
+    return chain.begin(imu.attrs["sampling"], source_of(imu))

@@ -1,1 +1,0 @@
-"""Drift during a GNSS outage."""

@@ -1,0 +1,343 @@
+"""Check before a run whether a record and its measurements allow navigation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+
+from strapdown import rotation
+from strapdown.config.navigation import NavigationSpec, StartTable, aids_of
+from strapdown.config.navigation_modules import make_aids
+from strapdown.constants import STANDARD_GRAVITY
+from strapdown.errors import DataError, Finding
+from strapdown.estimation.error_model import ERROR_MODELS
+from strapdown.frames import ecef_from_geodetic
+from strapdown.navigation.measurements.gnss import Gnss
+from strapdown.navigation.measurements.gnss_readiness import gnss_readiness
+from strapdown.navigation.measurements.measurement import TabulatedMeasurement
+from strapdown.sensors.health_log import LEAST_SAMPLES, ChannelFault
+from strapdown.sensors.imu_health import check_imu_channels
+from strapdown.sensors.uncertainty import ImuUncertainty
+from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD
+from strapdown.tables.checks import index_of, source_of, values_of
+
+__all__ = ["channel_findings", "look_through", "saturated_findings"]
+
+
+#: Time in which the error of an unaided height grows by the factor e, s: sqrt(R / 2 g).
+VERTICAL = 570.0
+#: Duration from which this is reported, s.
+LONG = 1800.0
+#: Tolerance of the first fix from a stated position: standard deviations, m, and m/s since.
+FAR_SD, FAR, FAST = 10.0, 1000.0, 340.0
+#: Measurements that bound the height error.
+HOLDS_HEIGHT = ("gnss", "barometer", "no_slip", "body_velocity")
+
+
+def look_through(
+    spec: NavigationSpec, imu: pd.DataFrame, tables: Mapping[str, pd.DataFrame]
+) -> tuple[Finding, ...]:
+    """Check measurements against the record.
+
+    Parameters
+    ----------
+    spec : NavigationSpec
+    imu : DataFrame
+        Imu table of the used span.
+    tables : mapping of str to DataFrame
+        By name of the measurement, on the clock of the samples.
+
+    Returns
+    -------
+    tuple of Finding
+
+    Raises
+    ------
+    DataError
+        A measurement has no overlap in time with the record, or no usable row; the message names
+        file, row and remedy.
+    """
+    found: list[Finding] = []
+    for aid in make_aids(spec):
+        table = tables.get(aid.name)
+        if table is None:
+            continue
+        if isinstance(aid, Gnss):
+            found += gnss_readiness(table, imu, aid)
+            _refuse_far(spec, table, imu, aid)
+        elif isinstance(aid, TabulatedMeasurement):
+            _refuse_apart(table, imu)
+    return (*found, *_height(spec, imu))
+
+
+def _refuse_apart(table: pd.DataFrame, imu: pd.DataFrame) -> None:
+    time, stamps = index_of(table), index_of(imu)
+    if ((time >= stamps[0]) & (time <= stamps[-1])).any():
+        return
+    raise DataError(
+        "navigation.aid-outside-record",
+        file=source_of(table),
+        quantity="time",
+        time=time[0],
+        time_2=time[-1],
+        stamps=stamps[0],
+        stamps_2=stamps[-1],
+    )
+
+
+def _refuse_far(spec: NavigationSpec, table: pd.DataFrame, imu: pd.DataFrame, aid: Gnss) -> None:
+    """Refuse a first fix far from the stated position."""
+    name, stated = ("start", spec.start) if spec.start is not None else ("site", spec.site)
+    if stated is None or not aid.use_position:
+        return
+    sd = values_of(table, POSITION_SD)
+    placed = np.isfinite(sd).all(axis=1) & (values_of(table, ["quality"])[:, 0] > 0.0)
+    after = index_of(table) - aid.time_offset - float(imu.index[0])
+    rows = np.flatnonzero(placed & (after >= 0.0))
+    if not rows.size:
+        return
+    k = int(rows[0])
+    here = np.array([stated.lat_deg, stated.lon_deg, stated.alt_m])
+    fix = values_of(table, GEODETIC)[k]
+    scatter = math.hypot(float(np.linalg.norm(stated.position_sd_m)), float(sd[k].max()))
+    allowed = FAR_SD * scatter + FAR + FAST * float(after[k])
+    if (off := _apart(fix, here)) <= allowed:
+        return
+    swapped = abs(fix[0]) <= 180.0 and abs(fix[1]) <= 90.0
+    swapped = swapped and _apart(fix[[1, 0, 2]], here) <= allowed
+    raise DataError(
+        "navigation.fixes-swap-latitude-and-longitude"
+        if swapped
+        else "navigation.first-fix-far-from-stated-position",
+        file=source_of(table),
+        row=k + 1,
+        quantity="lat, lon",
+        table=name,
+        lat_deg=fix[0],
+        lon_deg=fix[1],
+        stated_lat_deg=here[0],
+        stated_lon_deg=here[1],
+        apart_km=off / 1000.0,
+    )
+
+
+def _apart(one: np.ndarray, other: np.ndarray) -> float:
+    return float(np.linalg.norm(ecef_from_geodetic(one) - ecef_from_geodetic(other)))
+
+
+def _height(spec: NavigationSpec, imu: pd.DataFrame) -> tuple[Finding, ...]:
+    """Warn of the growing error of an unaided height."""
+    if getattr(spec.mechanization, "height", "free") != "free":
+        return ()
+    length = float(imu.index[-1] - imu.index[0])
+    times = math.exp(min(length / VERTICAL, 700.0))
+    model = getattr(getattr(spec.filter, "error_model", None), "kind", "")
+    if (named := ERROR_MODELS.get(model)) is not None and not named.has_height:
+        return (
+            Finding(
+                "navigation.error-model-without-height",
+                file=source_of(imu),
+                quantity="height",
+                model=model,
+                e_folding_s=VERTICAL,
+                times=times,
+            ),
+        )
+    if length <= LONG or any(aid.kind in HOLDS_HEIGHT for aid in aids_of(spec).values()):
+        return ()
+    return (
+        Finding(
+            "navigation.height-not-aided",
+            file=source_of(imu),
+            quantity="height",
+            length=length / 60.0,
+            e_folding_s=VERTICAL,
+            times=times,
+        ),
+    )
+
+
+# Channels that do not read the motion of the body: reported or refused before use.
+
+
+#: Faults that make a channel unusable, and their largest share of a record.
+SILENT, MOST = ("missing", "stuck", "saturated"), 0.5
+#: Largest share of saturated samples: a linear filter does not know the lost rotation.
+MOST_SATURATED = 0.15
+#: Share of the largest reading of a saturated stretch that counts as saturated, too.
+AT_END = 0.999
+#: Approximate noise ratio to the data sheet of gyros in deg/s that are read as rad/s.
+DEGREES = (57.3 / 2.0, 57.3 * 2.0)
+#: Relative distance of the usual reading from gravity in another unit.
+NEAR = 0.05
+#: Length of the first interval compared with a stated start, s, and its tolerance, deg.
+FIRST, CHANNELS_FAR = 1.0, 60.0
+
+
+def channel_findings(
+    imu: pd.DataFrame, sensors: ImuUncertainty, start: StartTable | None
+) -> tuple[Finding, ...]:
+    """Check the channels of a record.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        Recorded Imu table, body axes.
+    sensors : ImuUncertainty
+    start : StartTable or None
+        Known state at its first sample.
+
+    Returns
+    -------
+    tuple of Finding
+        The longest stretch of each channel and kind of fault.
+
+    Raises
+    ------
+    DataError
+        A channel is silent over half of the record or saturated over 15 %, gyros are in degrees,
+        accelerometers in another unit, or gravity contradicts the stated attitude.
+    """
+    _refuse_unit(imu)
+    _refuse_gravity(imu, start)
+    if len(imu) < LEAST_SAMPLES:
+        return ()
+    _refuse_degrees(imu, sensors)
+    return _told(imu, check_imu_channels(imu, sensors).faults)
+
+
+def _told(imu: pd.DataFrame, faults: Sequence[ChannelFault]) -> tuple[Finding, ...]:
+    """The longest stretch of each channel and kind of fault."""
+    worst: dict[tuple[str, str], ChannelFault] = {}
+    lost: dict[tuple[str, str], int] = {}
+    for fault in faults:
+        key = (fault.channel, fault.kind)
+        lost[key] = lost.get(key, 0) + _without(imu, fault)
+        if key not in worst or fault.last - fault.first > worst[key].last - worst[key].first:
+            worst[key] = fault
+    for (channel, kind), count in lost.items():
+        most = MOST_SATURATED if kind == "saturated" else MOST
+        if kind in SILENT and count > most * len(imu):
+            said = worst[channel, kind].finding
+            raise DataError(
+                "navigation.channel-lost",
+                file=said.file,
+                row=said.row,
+                quantity=said.quantity,
+                reason=said,
+            )
+    return tuple(_counted(worst[key].finding, lost[key], len(imu)) for key in worst)
+
+
+def saturated_findings(imu: pd.DataFrame, sensors: ImuUncertainty) -> tuple[Finding, ...]:
+    """Find saturation: the longest stretch of each channel.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        Imu table, body axes.
+    sensors : ImuUncertainty
+
+    Returns
+    -------
+    tuple of Finding
+
+    Raises
+    ------
+    DataError
+        A channel is saturated over 15 % of the record.
+    """
+    if len(imu) < LEAST_SAMPLES:
+        return ()
+    faults = check_imu_channels(imu, sensors).faults
+    return _told(imu, [one for one in faults if one.kind == "saturated"])
+
+
+def _without(imu: pd.DataFrame, fault: ChannelFault) -> int:
+    """Unusable samples; of an intermittently saturated stretch, the saturated ones."""
+    if fault.kind != "saturated":
+        return fault.last - fault.first + 1
+    values = imu[fault.channel].to_numpy(dtype=np.float64)[fault.first : fault.last + 1]
+    return int(np.count_nonzero(np.abs(values) >= AT_END * fault.size))
+
+
+def _counted(finding: Finding, lost: int, samples: int) -> Finding:
+    return Finding(
+        "navigation.channel-fault",
+        severity=finding.severity,
+        file=finding.file,
+        row=finding.row,
+        quantity=finding.quantity,
+        reason=finding,
+        percent=100.0 * lost / samples,
+    )
+
+
+def _refuse_degrees(imu: pd.DataFrame, sensors: ImuUncertainty) -> None:
+    """Refuse gyros whose noise on every axis fits deg/s read as rad/s."""
+    step = float(np.median(np.diff(index_of(imu))))
+    density = np.asarray(sensors.gyro.axis("noise_density"))
+    if not density.all():
+        return
+    second = np.diff(values_of(imu, GYRO), n=2, axis=0)
+    times = np.sqrt(np.median(np.square(second), axis=0) / MEDIAN / 6.0 * step) / density
+    # A vehicle does not turn around within a second.
+    wild = float(np.quantile(np.abs(values_of(imu, GYRO)), 0.99)) > WILD
+    if wild and ((times > DEGREES[0]) & (times < DEGREES[1])).all():
+        raise DataError(
+            "navigation.gyros-seem-in-deg-per-s",
+            file=source_of(imu),
+            quantity="gyro",
+            times=times.min(),
+            times_2=times.max(),
+        )
+
+
+#: Median of the square of a standard normal number, and a rate in rad/s.
+MEDIAN, WILD = 0.4549364, 6.0
+
+
+def _refuse_unit(imu: pd.DataFrame) -> None:
+    """Refuse accelerometers whose usual reading is gravity in another unit."""
+    time, force = index_of(imu), values_of(imu, ACCEL)
+    starts = np.unique(np.searchsorted(time, np.arange(time[0], time[-1], FIRST)))
+    count = np.diff(np.append(starts, len(time)))[:, None]
+    size = np.median(np.linalg.norm(np.add.reduceat(force, starts) / count, axis=1))
+    for unit, factor in (("g", 1.0 / STANDARD_GRAVITY), ("m/s2", STANDARD_GRAVITY)):
+        wanted = STANDARD_GRAVITY * factor
+        if abs(size / wanted - 1.0) < NEAR:
+            raise DataError(
+                "navigation.accelerometers-seem-in-other-unit",
+                file=source_of(imu),
+                quantity="accel",
+                size=size,
+                standard_gravity=STANDARD_GRAVITY,
+                unit=unit,
+            )
+
+
+def _refuse_gravity(imu: pd.DataFrame, start: StartTable | None) -> None:
+    """Compare the specific force of the first second with gravity by a stated attitude."""
+    if start is None:
+        return
+    time = index_of(imu)
+    force = values_of(imu, ACCEL)[time <= time[0] + FIRST].mean(axis=0)
+    q = rotation.quaternion_from_euler([start.roll_deg, start.pitch_deg, start.heading_deg])
+    wanted = rotation.rotate(rotation.conjugate(q), np.array([0.0, 0.0, -1.0]))
+    size = float(np.linalg.norm(force))
+    cosine = float(force @ wanted) / size if size > 0.0 else 0.0
+    apart = float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+    if apart < CHANNELS_FAR:
+        return
+    raise DataError(
+        "navigation.gravity-upside-down"
+        if apart > 180.0 - CHANNELS_FAR
+        else "navigation.gravity-contradicts-attitude",
+        file=source_of(imu),
+        quantity="accel",
+        force=force,
+        apart_deg=apart,
+    )

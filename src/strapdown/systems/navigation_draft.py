@@ -1,0 +1,593 @@
+"""Write a proposed navigation configuration from log and fixes, with the open questions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.config.alignment import LogTable
+from strapdown.config.choice import SLOTS, Slot, options_of
+from strapdown.config.navigation_file import NAVIGATION_STAGES
+from strapdown.config.toml_text import ASK, Asked, Page, named_from, string
+from strapdown.constants import STANDARD_GRAVITY
+from strapdown.errors import DataError, Finding
+from strapdown.estimation.sensor_blocks import STATED_STATES, resting_sd, states_that_are_stated
+from strapdown.formats.gnss_fixes import POSITION_SDS, VELOCITY_SDS
+from strapdown.sensors.catalogue import SENSORS, load_sensor
+from strapdown.sensors.uncertainty import ImuUncertainty
+from strapdown.systems.alignment_draft import listed_kinds, log_table_keys, toml_value
+from strapdown.systems.navigation_proposal import Proposal, propose
+from strapdown.tables import ACCEL, GYRO
+from strapdown.tables.checks import index_of, source_of, values_of
+
+__all__ = [
+    "STANCE",
+    "STANDING",
+    "NavigationDraft",
+    "draft_navigation",
+    "first_stand",
+    "on_foot",
+    "second_order",
+]
+
+
+#: Other measurements, as comments.
+OTHER_AIDS = ("no_slip", "zero_velocity", "odometer", "barometer")
+
+
+@dataclass(frozen=True)
+class NavigationDraft:
+    """Proposed navigation configuration as text.
+
+    Attributes
+    ----------
+    text : str
+    found : tuple of str
+        Findings from log and fixes.
+    asked : tuple of Asked
+        Questions that the user has to answer.
+    to_check : tuple of Asked
+        Assumptions to check.
+    findings : tuple of Finding
+        Findings of reading.
+    """
+
+    text: str
+    found: tuple[str, ...]
+    asked: tuple[Asked, ...]
+    to_check: tuple[Asked, ...]
+    findings: tuple[Finding, ...]
+
+
+def draft_navigation(
+    log: LogTable,
+    *,
+    folder: Path,
+    axes: str | None = None,
+    gnss: Path | None = None,
+    sensor: str | None = None,
+    foot: bool = False,
+) -> NavigationDraft:
+    """Write the proposed navigation configuration of a log.
+
+    Parameters
+    ----------
+    log : LogTable
+        With a readable path.
+    folder : Path
+        Folder of the configuration; other files are named relative to it.
+    axes, gnss, sensor
+        As `propose`.
+    foot : bool
+        Whether the unit is on a shoe: zero-velocity updates at its stances (`on_foot`).
+
+    Returns
+    -------
+    NavigationDraft
+
+    Raises
+    ------
+    DataError, ConfigError
+        A file cannot be read; the message names file, row and remedy.
+    """
+    made = propose(log, axes=axes, gnss=gnss, sensor=sensor)
+    if foot:
+        made = on_foot(made)
+        log = log.model_copy(update={"from_s": made.table["log"].get("from_s", log.from_s)})
+    page = Page()
+    page.say(
+        f"Navigation over {made.recording.name}: place, velocity and attitude, and how well each "
+        "is known.",
+        "Each table is a place in the chain, and kind says what stands there; keys that begin "
+        "with # show the defaults. Then: strapdown navigate on this file.",
+    )
+    found = [*_log(page, log, made, folder), *_where(page, made, foot)]
+    _axes(page, axes)
+    found += _sensors(page, made)
+    _stage(page, "prefilter", {})
+    page.blank()
+    page.say(f"Alignment: {made.how}.")
+    for name in ("coarse", "fine"):
+        _stage(page, name, made.table[name])
+    for name in ("mechanization", "filter", "damping", "smoother", "recorder"):
+        _stage(page, name, made.table.get(name, {}))
+    found += _aids(page, made, folder, foot)
+    _rest(page, foot)
+    return NavigationDraft(
+        page.text, tuple(found), tuple(page.asked), tuple(page.to_check), made.findings
+    )
+
+
+def _log(page: Page, log: LogTable, made: Proposal, folder: Path) -> list[str]:
+    time = index_of(made.imu)
+    rate = (len(time) - 1) / float(time[-1] - time[0])
+    span = f"{len(time)} samples, {time[0]:.9g} to {time[-1]:.9g} s, {rate:.4g} Hz"
+    page.table("[log]", f"Found: {span}, {made.imu.attrs['sampling']} values.")
+    log_table_keys(page, log, folder)
+    if log.from_s is log.to_s is log.duration_s is None:
+        page.say(f"from_s = {time[0]:.9g}, duration_s = 300.0 (or to_s): a part alone")
+    return [f"{made.recording.name}: {span}"]
+
+
+def _where(page: Page, made: Proposal, foot: bool) -> list[str]:
+    said = made.table.get("site")
+    where = "Where the body stands while it is aligned."
+    if said is not None:
+        page.table("[site]", where, "Found: the log states it; check that it is so.")
+        for key, value in said.items():
+            page.key(key, repr(value))
+        return [f"place: {said['lat_deg']:.6f}°, {said['lon_deg']:.6f}°"]
+    if made.gnss is not None:
+        page.blank()
+        page.say(
+            f"{where} Left out, it is that of the fixes: [site] with lat_deg, lon_deg, alt_m, "
+            "position_sd_m.",
+            "A state that is known takes the place of all alignment: [start] with lat_deg, "
+            "lon_deg, alt_m, v_ned_m_per_s, roll_deg, pitch_deg, heading_deg and position_sd_m, "
+            "velocity_sd_m_per_s, tilt_sd_deg, heading_sd_deg.",
+        )
+        return []
+    if foot:
+        page.table(
+            "[site]",
+            "Where it begins: gravity and the Earth's rate go by the latitude, to a degree. Places "
+            "are counted from there.",
+        )
+        page.key("lat_deg", ASK, "only you know: geodetic latitude, north positive; to a degree")
+        page.key("lon_deg", "0.0", "assumed: it changes nothing but the labels of a map")
+        page.key("alt_m", "0.0", "assumed: height over the ellipsoid")
+        page.key("position_sd_m", repr(HERE), "bounds are of the path from here on")
+        page.key("velocity_sd_m_per_s", repr(STILL))
+        return []
+    page.table("[site]", where)
+    page.key("lat_deg", ASK, "only you know: geodetic latitude, north positive")
+    page.key("lon_deg", ASK, "only you know: longitude, east positive")
+    page.key("alt_m", "0.0", "assumed: height over the ellipsoid")
+    return []
+
+
+def _axes(page: Page, axes: str | None) -> None:
+    page.table("[axes]", "How the sensor's axes lie in the body, where the log does not say it.")
+    if axes:
+        page.key("axes", string(axes))
+    page.say(
+        'axes = "forward-left-up": where x, y, z of the sensor point; or "x,-y,-z", the axes that '
+        "point forward, right, down"
+    )
+
+
+def _sensors(page: Page, made: Proposal) -> list[str]:
+    page.table(
+        "[sensors]",
+        "How good the sensors are: every bound, and the weight of every aid, rests on it.",
+    )
+    named = made.table.get("sensors", {}).get("sensor")
+    told: list[str] = []
+    if made.noise is not None:
+        gyro, accel = made.noise
+        noise = (
+            f"{60.0 * math.degrees(gyro):.2g} deg/√h and "
+            f"{accel / STANDARD_GRAVITY * 1e6:.3g} µg/√Hz"
+        )
+        told = [f"noise while it is quiet: gyros and accelerometers {noise}"]
+        page.say(f"Found: noise of {noise} while it is quiet.")
+    if named is None:
+        page.key("sensor", ASK, "only you know: one of the catalogue, or a .toml file of your own")
+    else:
+        check = "" if not made.guessed else "the sensor of the catalogue that is nearest by noise"
+        remark = "assumed: nearest of the catalogue by its noise" if made.guessed else ""
+        page.key("sensor", string(named), remark, check=check)
+    page.say(
+        f"The catalogue (strapdown modules): {', '.join(s.name for s in _whole())}; or a .toml "
+        "file of your own. In its place, or to replace numbers of it, in tables [sensors.gyro] "
+        "and [sensors.accel]: bias_sd_deg_per_h, noise_density_deg_per_sqrt_h; bias_sd_ug, "
+        "noise_density_ug_per_sqrt_hz, …",
+        f"states = [ … ]: which of their errors are estimated, of {', '.join(STATED_STATES)}; "
+        "biases, drifts, and what is stated of scale factors and misalignments, if not given",
+    )
+    chosen = made.table.get("sensors", {}).get("states")
+    if chosen is not None:
+        page.key("states", toml_value(chosen) or "")
+    for triad in ("gyro", "accel"):
+        stated = made.table.get("sensors", {}).get(triad)
+        if stated is None:
+            continue
+        page.table(
+            f"[sensors.{triad}]",
+            "Found: it shakes far beyond its data sheet; half of the time so much, x, y, z:",
+        )
+        for key, value in stated.items():
+            page.key(key, toml_value(value) or "")
+        told.append(f"{triad}s shake far beyond the data sheet: {key} {list(value)}")
+    for block, stated in made.table.get("states", {}).items():
+        page.table(
+            f"[states.{block}]",
+            "As a start whose tilt is hardly known wants it: once the tilt is found, gravity along "
+            "the body is another by its square, and a linear filter does not carry that over.",
+        )
+        for key, value in stated.items():
+            page.key(key, toml_value(value) or "")
+    return told
+
+
+def _whole() -> list[Any]:
+    """Sensors of the catalogue whose gyros and accelerometers measure motion."""
+    return [s for s in map(load_sensor, SENSORS) if s.grade != "crash"]
+
+
+def _stage(page: Page, name: str, chosen: Mapping[str, Any]) -> None:
+    slot = SLOTS[name]
+    default, empty = NAVIGATION_STAGES[name][1:]
+    kind = chosen.get("kind", default)
+    page.table(f"[{name}]", f"{slot.title}:", *listed_kinds(slot, empty))
+    page.key("kind", string(kind))
+    if kind in slot.entries:
+        _options(page, slot.entries[kind], chosen)
+    keys = [o.key for o in options_of(slot.entries[kind])] if kind in slot.entries else []
+    for key, value in chosen.items():
+        if key != "kind" and key not in keys:
+            page.key(key, toml_value(value) or "", _ENDS.get(key, ""))
+
+
+#: End conditions of an alignment.
+_ENDS = {
+    "duration_s": "it ends then",
+    "window_s": "the newest part of it that is aligned",
+    "until_heading_sd_deg": "it ends when the heading is known so well",
+    "until_tilt_sd_deg": "and roll and pitch so well",
+}
+
+
+def _options(page: Page, module: type, chosen: Mapping[str, Any]) -> None:
+    """Write chosen options as keys, the others as comments with their defaults."""
+    for option in options_of(module):
+        if option.key in chosen:
+            page.key(option.key, _inline(chosen[option.key]))
+            continue
+        value = toml_value(option.default)
+        if option.slot is not None:
+            said = value if option.default is not None else '"none"'
+            page.say(f"{option.key} = {said}    of {', '.join(option.slot.entries)}")
+        elif value is not None:
+            page.say(f"{option.key} = {value}")
+        elif not option.has_default:
+            page.key(option.key, ASK, f"only you know: {_WANTED.get(option.key, 'no default')}")
+
+
+def _inline(value: Any) -> str:
+    """Write a value, or a module with its options, on one line."""
+    if isinstance(value, Mapping):
+        parts = ", ".join(f"{key} = {_inline(one)}" for key, one in value.items())
+        return f"{{ {parts} }}"
+    return toml_value(value) or ""
+
+
+#: Ready-made tables for a vehicle.
+WHEELS = ("[aiding.no_slip]", 'kind = "no_slip"', "mounting_sd_deg = [6.0, 6.0]")
+
+#: Ready-made tables for a unit on a shoe.
+ON_FOOT = (
+    "stance: zero velocity at each stance, the heart of it. It bounds velocity, roll and pitch, "
+    "and with them two of the gyros' biases; of heading and place it tells nothing: the heading "
+    "drifts by the bias of the gyro that is upright, and the error of place grows with the way. "
+    "More time standing at the start, ten seconds, tells that bias.",
+    'threshold_rule = "stated" keeps the threshold, in standard deviations of the two keys below '
+    "it; otsu finds it from stances and swings as they come. pivot_m: height of the unit over the "
+    "ground.",
+)
+
+_WANTED = {
+    "heading_deg": "heading of the body at the start, clockwise from north (gyros that "
+    "find north at a rest of a minute need none: name their sensor with --sensor)",
+    "sd_deg": "how well it is known",
+}
+
+
+def _aids(page: Page, made: Proposal, folder: Path, foot: bool) -> list[str]:
+    slot = SLOTS["aiding"]
+    page.blank()
+    page.say(
+        "What tells more than the inertial sensors do: [aiding.NAME], each with a name of its own. "
+        "Kinds:",
+        *listed_kinds(slot, False),
+    )
+    if foot:
+        page.say(*ON_FOOT)
+    elif made.gnss is None:
+        page.say(
+            "None is given here: height goes away by e in 570 s without one. [aiding.gnss] and "
+            "path = …, from the folder of this file",
+        )
+    for name, aid in made.table.get("aiding", {}).items():
+        page.table(f"[aiding.{name}]")
+        page.key("kind", string(aid["kind"]))
+        if "path" in aid:
+            page.key("path", string(named_from(Path(aid["path"]), folder)))
+            _with_remarks(page)
+        for key, what, usual in (
+            ("position_sd_m", "place, m", POSITION_SDS),
+            ("velocity_sd_m_per_s", "velocity, m/s", VELOCITY_SDS),
+        ):
+            if key in aid:
+                page.key(
+                    key,
+                    repr(aid[key]),
+                    f"assumed: the fixes do not state it; {usual}",
+                    check=f"how well each fix knows its {what}: {usual}",
+                )
+        _options(page, slot.entries[aid["kind"]], aid)
+    if made.drives:
+        page.say(
+            "Does it drive on wheels? Then take the signs off; it bounds what an outage costs. How "
+            "the unit stands in the vehicle is estimated; lever_arm_m is of the middle of the axle "
+            "that is not steered."
+        )
+        for line in WHEELS:
+            page.say(line)
+    page.say(*_other(slot, OTHER_AIDS))
+    if foot:
+        began = made.table["log"].get("from_s")
+        if began is not None and began > index_of(made.imu)[0]:
+            return [f"it moves where it begins; its first stance, at {began:.6g} s, is the start"]
+        return [f"it stands for the first {made.rest:.3g} s"]
+    if made.gnss is None:
+        return []
+    time, own = index_of(made.gnss), index_of(made.imu)
+    within = int(((time >= own[0]) & (time <= own[-1])).sum())
+    told = [f"{made.gnss.attrs['source']}: {within} of {len(time)} fixes within the log"]
+    if made.rest >= 1.0:
+        told.append(f"it stands for the first {made.rest:.4g} s, by the fixes")
+    return told
+
+
+def _with_remarks(page: Page) -> None:
+    page.say(
+        "lever_arm_m: of the antenna from the inertial sensors, forward, right, down; zero is "
+        "assumed: measure it. time_offset_sd_s above zero: stamps may be off by it, and by how "
+        "much is estimated."
+    )
+
+
+def _other(slot: Slot, kinds: Sequence[str]) -> list[str]:
+    return [
+        f"[aiding.{kind}] with {', '.join(o.key for o in options_of(slot.entries[kind])[1:5])}, …"
+        for kind in kinds
+        if kind in slot.entries
+    ]
+
+
+def _rest(page: Page, foot: bool) -> None:
+    page.table("[output]", "Forms of the trajectory: csv, parquet, kml, geojson, nav, tum.")
+    page.key("files", '["csv", "kml", "geojson"]')
+    page.blank()
+    page.say("[truth] and path = …: a reference trajectory, to hold the answer beside")
+    if foot:
+        page.say(
+            "[control_points] and path = …: a table of time, north, east of places that it was at, "
+            "in any level frame; an origin and a heading are fitted"
+        )
+
+
+# Foot-mounted pedestrian dead reckoning without GNSS: a path relative to its start.
+
+
+#: Zero-velocity updates at stances. Their noise per sample is that of a swaying foot and a soft
+#: sole, far beyond the sensor's. The threshold begins at ten times it, 10 deg/s and 1 m/s², and
+#: adapts to separate stance from swing. A speed that the filter knows better than this rejects a
+#: stance, unless none was seen for five seconds. During a stance the shoe rolls over its sole,
+#: about the ground 0.1 m below the unit.
+STANCE: dict[str, Any] = {
+    "kind": "zero_velocity",
+    "detector": "shoe",
+    "window_s": 0.025,
+    "threshold": 10.0,
+    "threshold_rule": "otsu",
+    "rate_sd_deg_per_s": 1.0,
+    "force_sd_m_per_s2": 0.1,
+    "interval_s": 0.02,
+    "largest_speed_m_per_s": 0.5,
+    "gate_time_s": 5.0,
+    "sd_m_per_s": 0.02,
+    "pivot_m": 0.1,
+    "correlation_time_s": 0.1,
+}
+#: ZARU where the whole person is stationary: gyro bias, limited by the sway of the body.
+STANDING: dict[str, Any] = {
+    "kind": "zero_rate",
+    "detector": "variance",
+    "window_s": 0.4,
+    "threshold": 3.0,
+    "rate_sd_deg_per_s": 0.5,
+    "force_sd_m_per_s2": 0.05,
+    "interval_s": 0.4,
+    "largest_speed_m_per_s": 0.2,
+    "sd_deg_per_s": 0.3,
+}
+#: Rate and acceleration beyond which a foot has left its stance, rad/s and m/s².
+LEAVES, PUSHES = math.radians(30.0), 2.0
+#: The stance ends this long before the first such sample, s; least duration of a stance, s.
+BEFORE, LEAST = 0.2, 0.3
+#: Stance between two steps: least duration, and the rolling part at either end, s.
+STEPPED, ROLLS = 0.2, 0.05
+#: The alignment takes half of the initial stance, at most this, s; the other half gives the gyro
+#: biases.
+LONGEST = 10.0
+#: Longest step of the covariance, s: in a swing of half a second a foot turns by 70 deg and back,
+#: and steps of 0.1 s would assign sensor errors to wrong directions.
+STEP = 0.02
+#: Time, some strides, over which the filter's linearization holds, s.
+BENT = 10.0
+#: The position is relative to the start: initial uncertainty, m, m/s.
+HERE, STILL = 0.01, 0.01
+#: The heading is relative to the unit's direction at the start: initial uncertainty, deg.
+FROM_START = 0.1
+
+
+def first_stand(imu: pd.DataFrame) -> tuple[float, float] | None:
+    """Find the first stationary interval of a unit on a shoe.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        Imu table with specific force.
+
+    Returns
+    -------
+    begin, length : float, s
+        The start of the record, until it turns by 30 deg/s or feels 2 m/s² beyond gravity, less
+        0.2 s; where that is less than 0.3 s, the first stance of 0.2 s or more, without 0.05 s at
+        either end. None where there is none.
+    """
+    time = index_of(imu)
+    rate = np.linalg.norm(values_of(imu, GYRO), axis=1)
+    force: NDArray[np.float64] = np.linalg.norm(values_of(imu, ACCEL), axis=1)
+    moves = (rate > LEAVES) | (np.abs(force - STANDARD_GRAVITY) > PUSHES)
+    if not moves.any():
+        return float(time[0]), float(time[-1] - time[0])
+    length = float(time[np.argmax(moves)]) - BEFORE - float(time[0])
+    if length >= LEAST:
+        return float(time[0]), length
+    edges = np.flatnonzero(np.diff(np.concatenate([[1], moves, [1]])))
+    begin, end = time[edges[::2]], time[edges[1::2] - 1]
+    stances = np.flatnonzero(end - begin >= STEPPED)
+    if not stances.size:
+        return None
+    k = int(stances[0])
+    return float(begin[k]) + ROLLS, float(end[k] - begin[k]) - 2.0 * ROLLS
+
+
+def second_order(sensors: ImuUncertainty) -> float:
+    """Second-order effect of a tilt that stationary accelerometers cannot observe.
+
+    Parameters
+    ----------
+    sensors : ImuUncertainty
+
+    Returns
+    -------
+    float, m/s²
+        ``sqrt(2) g sd²`` for a tilt of standard deviation sd: root mean square of
+        ``g (x² + y²)/2``, the difference of gravity along a body tilted by x and y. Accelerometer
+        biases estimated before the tilt is known, as it is at the first corner, are off by as much.
+    """
+    _, accel = resting_sd(sensors, (0.0, 0.0, 0.0), (0.0, 0.0, -STANDARD_GRAVITY))
+    return math.sqrt(2.0) * STANDARD_GRAVITY * float(max(accel[:2]) / STANDARD_GRAVITY) ** 2
+
+
+def on_foot(made: Proposal) -> Proposal:
+    """Replace the proposal for a vehicle by that for a unit on a shoe.
+
+    Parameters
+    ----------
+    made : Proposal
+
+    Returns
+    -------
+    Proposal
+
+    Raises
+    ------
+    DataError
+        The log has no accelerometers, or the unit is never stationary in it.
+    """
+    if ACCEL[0] not in made.imu.columns:
+        raise DataError(
+            "navigation.no-accelerometers",
+            file=source_of(made.imu),
+            quantity="accel",
+        )
+    stand = first_stand(made.imu)
+    if stand is None:
+        raise DataError(
+            "navigation.never-stationary",
+            file=source_of(made.imu),
+            quantity="accel",
+            stepped=STEPPED,
+        )
+    begin, rest = stand
+    late = begin - float(index_of(made.imu)[0])
+    length = math.floor(10.0 * min(0.5 * rest, LONGEST)) / 10.0
+    length = max(length, LEAST) if not late else rest
+    # This noise is the motion of a foot, not the sensor's. Errors that depend on rate and force are
+    # largest on a foot: a g-sensitivity of 0.1 deg/s/g turns a run by degrees.
+    named = made.table.get("sensors", {}).get("sensor")
+    sensors: dict[str, Any] = {}
+    states = dict(made.table.get("states", {}))
+    if named is not None:
+        known = ImuUncertainty.of_sensor(load_sensor(named))
+        names = states_that_are_stated(known)
+        sensors = {"sensor": named, "states": names}
+        drift = second_order(known)
+        if drift > max(known.accel_drift.triad) and "accel_drift" in names:
+            rounded = float(f"{drift / STANDARD_GRAVITY * 1e6:.2g}")
+            states["accel_drift"] = {"sd_ug": rounded, "correlation_time_s": BENT}
+    log = made.table["log"] | ({"from_s": round(begin, 6)} if late else {})
+    table = {
+        **made.table,
+        "log": log,
+        "sensors": sensors,
+        **({"states": states} if states else {}),
+        "coarse": {
+            "kind": "known_heading",
+            "heading_deg": 0.0,
+            "sd_deg": FROM_START,
+            "duration_s": round(length, 3),
+        },
+        "fine": {"kind": "none"},
+        "filter": {"kind": "error_state", "step_s": STEP},
+        "recorder": {"kind": "full"},
+        "aiding": {
+            **made.table.get("aiding", {}),
+            "stance": dict(STANCE),
+            "standing": dict(STANDING),
+        },
+    }
+    where = "The heading is counted from where the unit then points: north of the answer is there"
+    how = (
+        f"it stands for the first {rest:.3g} s: levelled by half of that. {where}, unless you "
+        "state another"
+    )
+    findings = made.findings
+    if late:
+        how = (
+            f"it begins while it moves: all before its first stance, {late:.3g} s, is left out. It "
+            f"is levelled by {rest:.2g} s of that. {where}, unless you state another"
+        )
+        findings = (
+            *findings,
+            Finding(
+                "navigation.moves-at-start",
+                file=source_of(made.imu),
+                quantity="accel",
+                late=late,
+                rest=rest,
+            ),
+        )
+    return replace(made, table=table, rest=rest, drives=False, how=how, findings=findings)

@@ -1,0 +1,363 @@
+"""Propose a navigation pipeline from a log: sensor, rest, motion and alignment."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.config.alignment import AxesTable, LogTable
+from strapdown.constants import STANDARD_GRAVITY
+from strapdown.errors import ConfigError, Finding
+from strapdown.formats.clocks import on_clock_of
+from strapdown.formats.gnss_files import read_gnss
+from strapdown.formats.gnss_fixes import GnssOptions
+from strapdown.formats.recording import Recording
+from strapdown.navigation.measurements.gnss_clock import time_offset, velocity_delay
+from strapdown.sensors.catalogue import SENSORS, load_sensor
+from strapdown.sensors.uncertainty import ImuUncertainty
+from strapdown.systems.alignment_source import body_record
+from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY_SD
+from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
+from strapdown.tables.checks import index_of, values_of
+
+__all__ = ["CODE_RECEIVER", "Proposal", "propose"]
+
+
+Array = NDArray[np.float64]
+
+#: Windows in which noise is measured, s, and the share taken as the quiet one.
+WINDOW, QUIET = 2.0, 0.05
+#: Ratio to the data-sheet noise beyond which a triad's measured noise is stated instead.
+LOUD = 3.0
+NOISE_KEYS = (
+    ("gyro", "noise_density_deg_per_sqrt_h", math.radians(1.0) / 60.0),
+    ("accel", "noise_density_ug_per_sqrt_hz", 1e-6 * STANDARD_GRAVITY),
+)
+#: Speed below which a vehicle is stationary, and above which its course is observable, m/s.
+STANDS, DRIVES = 0.5, 3.0
+#: Distance between positions, in standard deviations, that proves motion: four of a hundred
+#: thousand pairs of positions at rest exceed it, exp(-APPARENT**2 / 2).
+APPARENT = 4.5
+#: Gyro bias that allows gyrocompassing, and the rest needed for it.
+NORTH, LEAST_REST = math.radians(2.0 / 3600.0), 60.0
+#: Longest rest used for a coarse alignment, s.
+COARSE = 100.0
+#: Standard deviation of the angles that ends an alignment by course, deg.
+WELL = 3.0
+#: Rules that give gross errors zero weight keep their accuracy among them; with its scale this one
+#: cannot reject for ever. Time-correlated errors make innovations small, which does not show a
+#: receiver better than stated.
+RULE = {"kind": "adaptive", "influence": "igg3", "scale": {"lowest": 1.0}}
+#: Fixes without stated standard deviations: a code receiver without corrections.
+CODE_RECEIVER = GnssOptions(unstated_position_sd=5.0, unstated_velocity_sd=0.3)
+#: Standard deviation of the offset between receiver stamps and sensor clock, s: search range.
+OFFSET_SD = 0.2
+#: Estimates of clocks from the motion are used beyond these standard deviations, and a delay
+#: beyond this time, s; the filter estimates an offset to this standard deviation, s.
+SURE, LEAST_DELAY, LEAST_OFFSET_SD = 4.0, 0.01, 0.05
+#: Stamps with an offset come from another clock, and two quartz clocks drift apart by 50 ppm:
+#: a random walk of this many s/√s over 400 s, during which the offset may be unobservable.
+APART = 1e-3
+#: Attributes of fixes with assumed standard deviations, and the keys of these.
+TAKEN = {"position_sd_taken": "position_sd_m", "velocity_sd_taken": "velocity_sd_m_per_s"}
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """Proposed configuration as plain data, with its grounds.
+
+    Attributes
+    ----------
+    table : dict
+        Of a navigation run; questions to the user have no key.
+    recording : Recording
+    imu : DataFrame
+        Imu table, body axes.
+    gnss : DataFrame or None
+        Gnss table, on the clock of the samples.
+    rest : float, s
+        How long the vehicle is stationary at the start, as far as known.
+    noise : tuple of float, (2,), or None
+        Of the gyros in rad/s/√Hz, of the accelerometers in m/s²/√Hz, while it is quiet.
+    guessed : bool
+        Whether the sensor is only the one of the catalogue with the nearest noise.
+    drives : bool
+        Whether it drives fast enough for a course, by the fixes.
+    how : str
+        Reason for the alignment, in words.
+    findings : tuple of Finding
+        Findings of reading.
+    """
+
+    table: dict[str, Any]
+    recording: Recording
+    imu: pd.DataFrame
+    gnss: pd.DataFrame | None
+    rest: float
+    noise: tuple[float, ...] | None
+    guessed: bool
+    drives: bool
+    how: str
+    findings: tuple[Finding, ...]
+
+
+def propose(
+    log: LogTable,
+    *,
+    axes: str | None = None,
+    gnss: Path | None = None,
+    sensor: str | None = None,
+    site: tuple[float, float, float] | None = None,
+    heading_deg: float | None = None,
+    fixes_as: GnssOptions | None = None,
+) -> Proposal:
+    """Propose how to navigate with a log and its fixes.
+
+    Parameters
+    ----------
+    log : LogTable
+        With a path that can be opened.
+    axes : str, optional
+        Orientation of the sensor's axes, as `AxesTable.axes`.
+    gnss : Path, optional
+    sensor : str, optional
+        A sensor of the catalogue, or a file; the one with the nearest noise, if not given.
+    site : tuple of float, optional
+        Latitude and longitude in deg, height in m; that of the fixes, or of the log, if not given.
+    heading_deg : float, optional
+        Heading of the body at the start.
+    fixes_as : GnssOptions, optional
+        How to read the fixes; as those of a code receiver, if not given.
+
+    Returns
+    -------
+    Proposal
+
+    Raises
+    ------
+    DataError, ConfigError
+        A file cannot be read; the message names file, row and remedy.
+    """
+    recording, imu, findings = body_record(log, AxesTable(axes=axes))
+    table: dict[str, Any] = {"log": log.model_dump(exclude_none=True), "axes": {"axes": axes}}
+    fixes = None
+    if gnss is not None:
+        fixes, shifted = on_clock_of(read_gnss(gnss, fixes_as or CODE_RECEIVER), recording.imu)
+        findings = (*findings, *fixes.attrs["findings"], *([shifted] if shifted else []))
+    scatter = _scatter(imu)
+    # Engine vibration differs between axes; the quietest axis identifies the sensor.
+    noise = None if scatter is None else tuple(scatter.quiet.min(axis=1).tolist())
+    guessed = sensor is None
+    named = sensor or (None if noise is None else _nearest(noise))
+    if named is not None:
+        # For gyrocompassing gyros the rocking of a vehicle is motion, not noise.
+        shaken = {} if _finds_north(named) else _louder(scatter, named)
+        table["sensors"] = {"sensor": named, **shaken}
+    place, start = site, recording.start
+    if not place and start is not None:
+        place = (start.lat_deg, start.lon_deg, start.alt)
+    if place is not None:
+        table["site"] = dict(zip(("lat_deg", "lon_deg", "alt_m"), place, strict=True))
+    rest, drives = _motion(imu, fixes)
+    chosen, how = _alignment(named, rest, drives, heading_deg)
+    table |= chosen
+    if fixes is not None:
+        assert gnss is not None  # whence the fixes are
+        table["aiding"] = {
+            "gnss": {
+                "kind": "gnss",
+                "path": str(gnss),
+                "lever_arm_m": (0.0, 0.0, 0.0),
+                "update_rule": RULE,
+                **{k: fixes.attrs[taken] for taken, k in TAKEN.items() if taken in fixes.attrs},
+                **_clock(fixes, imu, drives),
+            }
+        }
+    return Proposal(table, recording, imu, fixes, rest, noise, guessed, drives, how, findings)
+
+
+@dataclass(frozen=True, eq=False)
+class Scatter:
+    """Noise densities of a record, axis by axis.
+
+    Attributes
+    ----------
+    quiet : ndarray, (2, 3)
+        Of gyros in rad/s/√Hz and accelerometers in m/s²/√Hz, while it is quiet.
+    usual : ndarray, (2, 3)
+        Median, vibration included.
+    """
+
+    quiet: Array
+    usual: Array
+
+
+def _scatter(imu: pd.DataFrame) -> Scatter | None:
+    """Noise densities; None where the record has none, or is too short."""
+    time = index_of(imu)
+    if ACCEL[0] not in imu.columns or len(time) < 64:
+        return None
+    step = float(np.median(np.diff(time)))
+    size = max(16, round(WINDOW / step))
+    count = len(time) // size
+    if count < 3:
+        return None
+    quiet, usual = np.empty((2, 2, 3))
+    for k, columns in enumerate((GYRO, ACCEL)):
+        # Second differences remove rotation and acceleration: of white noise they have six times
+        # its variance.
+        second = np.diff(values_of(imu, columns), n=2, axis=0)
+        second = second[: (len(second) // size) * size].reshape(-1, size, 3)
+        sd = np.sqrt(np.square(second).mean(axis=1) / 6.0) * math.sqrt(step)
+        quiet[k], usual[k] = np.quantile(sd, QUIET, axis=0), np.median(sd, axis=0)
+    return Scatter(quiet, usual) if quiet.min() > 0.0 else None
+
+
+def _louder(scatter: Scatter | None, sensor: str | None) -> dict[str, dict[str, Any]]:
+    """Noise to state instead of the data sheet's, of triads with far larger vibration."""
+    if scatter is None or sensor is None:
+        return {}
+    known = ImuUncertainty.of_sensor(load_sensor(sensor))
+    out: dict[str, dict[str, Any]] = {}
+    for k, (triad, key, unit) in enumerate(NOISE_KEYS):
+        sheet = np.asarray(getattr(known, triad).axis("noise_density"))
+        if (scatter.usual[k] > LOUD * sheet).any():
+            stated = np.maximum(scatter.usual[k], sheet) / unit
+            out[triad] = {key: tuple(float(f"{x:.2g}") for x in stated)}
+    return out
+
+
+def _nearest(noise: tuple[float, ...]) -> str:
+    """Sensor of the catalogue with the nearest noise, by ratios."""
+    best, least = "", math.inf
+    for name in SENSORS:
+        try:
+            known = ImuUncertainty.of_sensor(load_sensor(name))
+        except ConfigError:
+            continue  # it lacks a triad
+        densities = (
+            max(known.gyro.axis("noise_density")),
+            max(known.accel.axis("noise_density")),
+        )
+        far = sum(math.log(a / b) ** 2 for a, b in zip(noise, densities, strict=True))
+        if far < least:
+            best, least = name, far
+    return best
+
+
+def _motion(imu: pd.DataFrame, fixes: pd.DataFrame | None) -> tuple[float, bool]:
+    """Length of the initial rest, and whether the vehicle then is fast enough for a course."""
+    time = index_of(imu)
+    if fixes is None:
+        return float(time[-1] - time[0]), False
+    at = index_of(fixes)
+    within = (at >= time[0]) & (at <= time[-1])
+    if within.sum() < 2:
+        return 0.0, False
+    begins, fastest = _moving(fixes[within])
+    rest = float((at[within][begins] if begins is not None else time[-1]) - time[0])
+    return max(rest, 0.0), fastest > DRIVES
+
+
+def _moving(fixes: pd.DataFrame) -> tuple[int | None, float]:
+    """Begin of the first motion, and the greatest significant speed over ground.
+
+    Where the receiver measures no speed: the distance between two positions minus that explained
+    by their errors, over 1, 2, 4 … steps, since one step may be shorter than the errors.
+    """
+    measured = np.isfinite(values_of(fixes, VELOCITY_SD)).all(axis=1)
+    speed = np.linalg.norm(values_of(fixes, VELOCITY_COLUMNS)[:, :2], axis=1)[measured]
+    moving = np.flatnonzero(measured)[speed > STANDS]
+    begins = int(moving[0]) if moving.size else None
+    fastest = float(speed.max(initial=0.0))
+    if measured.all():
+        return begins, fastest
+    time = index_of(fixes)
+    lat, lon, _ = np.radians(values_of(fixes, GEODETIC)).T
+    sd = values_of(fixes, POSITION_SD)[:, :2].max(axis=1)
+    steps = 1
+    while steps < len(time):
+        north = (lat[steps:] - lat[:-steps]) * 6.37e6
+        east = (lon[steps:] - lon[:-steps]) * 6.37e6 * np.cos(lat[steps:])
+        blur = APPARENT * np.hypot(sd[steps:], sd[:-steps])
+        least = (np.hypot(north, east) - blur) / (time[steps:] - time[:-steps])
+        fastest = max(fastest, float(least.max()))
+        moving = np.flatnonzero(least > STANDS)
+        # Motion found over a shorter span is found by a longer one with some of the rest before it.
+        if moving.size and (begins is None or moving[0] + steps <= begins):
+            begins = int(moving[0])
+        steps *= 2
+    return begins, fastest
+
+
+def _clock(fixes: pd.DataFrame, imu: pd.DataFrame, drives: bool) -> dict[str, float]:
+    """Delays of the receiver's velocities and stamps, where the motion makes them observable."""
+    late = velocity_delay(fixes)
+    delay = 0.0 if late is None or late.delay < SURE * late.sd else late.delay
+    found = time_offset(fixes, imu, delay)
+    out = {"velocity_delay_s": round(delay, 3)} if delay > LEAST_DELAY else {}
+    if found is None:
+        return out | ({"time_offset_sd_s": OFFSET_SD} if drives else {})
+    sd = max(2.0 * found.sd, LEAST_OFFSET_SD)
+    out |= {"time_offset_s": round(found.offset, 3), "time_offset_sd_s": round(sd, 3)}
+    if abs(found.offset) > SURE * found.sd:
+        out["time_offset_drift_s_per_sqrt_s"] = APART
+    return out
+
+
+def _alignment(
+    sensor: str | None, rest: float, drives: bool, heading_deg: float | None
+) -> tuple[dict[str, Any], str]:
+    """Coarse and fine alignment for such a record, and why."""
+    if heading_deg is not None:
+        coarse = {"kind": "known_heading", "heading_deg": heading_deg, "sd_deg": 2.0}
+        length = min(max(rest, 1.0), 10.0)
+        return (
+            {"coarse": {**coarse, "duration_s": length}, "fine": {"kind": "none"}},
+            f"levelled by {length:g} s, with the heading that is stated",
+        )
+    if rest >= LEAST_REST and sensor is not None and _finds_north(sensor):
+        coarse_s = float(math.floor(min(COARSE, rest / 3.0)))
+        fine_s = float(math.floor(min(rest, 600.0) - coarse_s))
+        return (
+            {
+                "coarse": {"kind": "inertial_frame", "duration_s": coarse_s},
+                "fine": {"kind": "filter", "duration_s": fine_s},
+            },
+            f"it stands for {rest:.4g} s, and its gyros can find north",
+        )
+    if drives:
+        return (
+            {
+                "coarse": {
+                    "kind": "gnss_course",
+                    "window_s": 60.0,
+                    "until_heading_sd_deg": WELL,
+                    "until_tilt_sd_deg": _tilt(sensor),
+                },
+                "fine": {"kind": "none"},
+            },
+            "by its course, once it drives: its forward axis is taken to point where it goes",
+        )
+    return (
+        {"coarse": {"kind": "known_heading", "duration_s": 10.0}, "fine": {"kind": "none"}},
+        "neither a rest with gyros that find north, nor a drive with fixes: the heading is asked",
+    )
+
+
+def _tilt(sensor: str | None) -> float:
+    """Tilt for an alignment by course, deg: accelerometer bias over g."""
+    if sensor is None:
+        return WELL
+    bias = max(ImuUncertainty.of_sensor(load_sensor(sensor)).accel.axis("bias"))
+    return max(WELL, float(math.ceil(2.0 * math.degrees(bias / STANDARD_GRAVITY))))
+
+
+def _finds_north(sensor: str) -> bool:
+    return max(ImuUncertainty.of_sensor(load_sensor(sensor)).gyro.axis("bias")) <= NORTH

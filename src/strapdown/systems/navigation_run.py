@@ -1,0 +1,546 @@
+"""Navigation run from its specification to all results of a report."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, field, replace
+from functools import partial
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from strapdown.alignment.alignment import Alignment, Site
+from strapdown.alignment.fine import FineResult
+from strapdown.bundle.seal import Seal, check_destination
+from strapdown.config.choice import SLOTS, make_choice
+from strapdown.config.navigation import (
+    CoarseModeSpec,
+    FineModeSpec,
+    NavigationSpec,
+    StartTable,
+    WithholdTable,
+    aids_of,
+)
+from strapdown.config.navigation_file import navigation_spec
+from strapdown.config.navigation_modules import given_of, make_aids, make_filter, sensors_of
+from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
+from strapdown.errors import Finding
+from strapdown.evaluation.control_points import ControlPointScore, score_control_points
+from strapdown.evaluation.trajectory_differences import (
+    DifferenceSummary,
+    summarise_differences,
+    trajectory_differences,
+)
+from strapdown.nav_state import NavState
+from strapdown.navigation.integrity import IntegrityReport, assess_integrity
+from strapdown.navigation.modes import (
+    CoarseMode,
+    Command,
+    FineMode,
+    KnownStart,
+    Mode,
+    Navigation,
+    Until,
+)
+from strapdown.navigation.navigator import Navigator, with_states
+from strapdown.navigation.outage_test import SETTLED, Withheld, score_withholding, spans_to_withhold
+from strapdown.navigation.pipeline import NavigationPipeline
+from strapdown.navigation.preprocessing import GapPolicy, ImuPreprocessor, ends_of
+from strapdown.navigation.record import NavigationRecord, Span
+from strapdown.navigation.recorder import Recorder
+from strapdown.navigation.replay import PipelineRun, run_batch
+from strapdown.progress import Progress, silent
+from strapdown.results.inputs import InputFiles
+from strapdown.sensors.uncertainty import ImuUncertainty
+from strapdown.systems.inputs import NOWHERE, Memory, input_files, moved_inputs, moved_paths
+from strapdown.systems.navigation_checks import channel_findings, look_through, saturated_findings
+from strapdown.systems.navigation_source import (
+    NavigationSource,
+    in_file,
+    read_navigation_source,
+    said_of_file,
+)
+from strapdown.systems.one_thread import one_thread
+from strapdown.tables import EULER, GEODETIC, VELOCITY
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["Drive", "NavigationRun", "make_chain", "run_navigation", "withheld_aid"]
+
+
+#: Runs a pipeline over samples and tables, with a recorder and a progress callback.
+Drive = Callable[..., PipelineRun]
+
+#: Shares of a whole run at which its pipeline begins and ends.
+BEGUN, ENDED = 0.15, 0.8
+#: Length of a chunk of the record, and interval of progress reports, s.
+CHUNK = 20.0
+_AT_ONCE = partial(run_batch, chunk=CHUNK)
+#: Least interval between the trajectory rows compared with the truth, s: errors change slowly
+#: relative to the accuracy of the truth.
+APART = 0.1
+
+
+@one_thread()
+def run_navigation(
+    spec: NavigationSpec,
+    file: Path | None = None,
+    progress: Progress = silent,
+    drive: Drive = _AT_ONCE,
+) -> NavigationRun:
+    """Read a record and its measurements, align, and navigate.
+
+    Parameters
+    ----------
+    spec : NavigationSpec
+        With absolute paths.
+    file : Path, optional
+        Configuration file, listed as an input.
+    progress : callable, optional
+        Called with a stage and the share that is done.
+    drive : callable, optional
+        Runs the pipeline, called as `run_batch`: paced, or with earlier results. The numbers must
+        equal those of `run_batch`.
+
+    Returns
+    -------
+    NavigationRun
+
+    Raises
+    ------
+    ConfigError
+        A file does not exist, or an option is invalid.
+    DataError
+        A record cannot be read or is not sufficient for navigation; the message names file, row,
+        quantity and remedy.
+    DivergenceError
+        The state left the range of the mechanization.
+    """
+    progress("reading", 0.02)
+    source = read_navigation_source(spec)
+    progress("looking through", 0.1)
+    sensors = sensors_of(spec)
+    tables = (source.imu, *source.tables.values())
+    with said_of_file(*tables):
+        looked = look_through(spec, source.imu, source.tables)
+        # Simulated errors are as specified; but the motion may exceed the range of the sensors.
+        if spec.log is None:
+            channels = saturated_findings(source.imu, sensors)
+        else:
+            channels = channel_findings(source.imu, sensors, spec.start)
+    looked, channels = in_file(looked, *tables), in_file(channels, *tables)
+    chain = make_chain(spec, sensors)
+    recorder: Recorder = make_choice(spec.recorder, SLOTS["recorder"], given_of(spec))
+
+    def told(mode: str, share: float) -> None:
+        progress(mode, BEGUN + (ENDED - BEGUN) * share)
+
+    progress("aligning" if spec.start is None else "navigating", BEGUN)
+    with said_of_file(*tables):
+        run = drive(chain, source.imu, source.tables, recorder, told)
+    progress("comparing", ENDED)
+    told_by = run.smoothed or run.record
+    differences, errors = _against_truth(told_by.trajectory, source, spec)
+    forward_differences = None
+    if run.smoothed is not None:
+        forward_differences, _ = _against_truth(run.record.trajectory, source, spec)
+    points = None
+    if source.points is not None:
+        points = score_control_points(
+            told_by.trajectory, source.points, find_ellipsoid(spec.ellipsoid)
+        )
+
+    def after(stage: str, share: float) -> None:
+        progress(stage, ENDED + 0.02 * share)
+
+    withheld: tuple[Withheld, ...] = ()
+    if spec.withhold is not None:
+        begun, end = (float(run.record.trajectory.index[0]), float(source.imu.index[-1]))
+        withheld = score_withholding(
+            chain,
+            source.imu,
+            source.tables,
+            withheld_aid(spec),
+            _test_outages(spec.withhold, begun, end),
+            begun,
+            after,
+        )
+    trust = assess_integrity(
+        chain,
+        make_filter(spec, sensors),
+        source.imu,
+        source.tables,
+        run,
+        (spec.trust.heading_limit_deg, spec.trust.heading_red_deg),
+        spec.trust.repeat,
+        after,
+    )
+    files = () if file is None else (input_files("configuration", str(file), (file,)),)
+    aligned = {one.mode: one for one in run.aligned}
+    coarse, fine = aligned.get("coarse"), aligned.get("fine")
+    findings = [
+        *source.findings,
+        *channels,
+        *looked,
+        *(f for one in run.aligned for f in one.alignment.findings),
+        *(() if fine is None or fine.fine is None else fine.fine.findings),
+    ]
+    return NavigationRun(
+        spec=spec,
+        source=source,
+        ellipsoid=find_ellipsoid(spec.ellipsoid),
+        sensors=sensors,
+        coarse=None if coarse is None else coarse.alignment,
+        fine=None if fine is None else fine.fine,
+        record=told_by,
+        forward=None if run.smoothed is None else run.record,
+        differences=differences,
+        errors=errors,
+        forward_differences=forward_differences,
+        points=points,
+        withheld=withheld,
+        trust=trust,
+        inputs=(*files, *source.inputs),
+        findings=tuple(dict.fromkeys(findings)),
+    )
+
+
+def withheld_aid(spec: NavigationSpec) -> str:
+    """Name of the measurement whose fixes a specification withholds."""
+    assert spec.withhold is not None
+    named = spec.withhold.aid
+    return named or next(name for name, aid in aids_of(spec).items() if aid.kind == "gnss")
+
+
+def _test_outages(asked: WithholdTable, begun: float, end: float) -> Sequence[Span]:
+    """Spans of the GNSS outage test of a run from `begun` to `end`."""
+    if asked.spans_s:
+        return [Span(f"{e - b:g} s", b, e) for b, e in asked.spans_s]
+    first = begun + SETTLED if asked.from_s is None else asked.from_s
+    return [
+        span
+        for length in asked.lengths_s
+        for span in spans_to_withhold(first, end, length, asked.places)
+    ]
+
+
+def _against_truth(
+    trajectory: pd.DataFrame, source: NavigationSource, spec: NavigationSpec
+) -> tuple[pd.DataFrame | None, DifferenceSummary | None]:
+    if source.truth is None:
+        return None, None
+    # Rows at a constant interval, from the last one back.
+    time = trajectory.index.to_numpy(dtype=np.float64)
+    step = float(np.median(np.diff(time))) if len(time) > 1 else APART
+    each = max(1, round(APART / step)) if step > 0.0 else 1
+    kept = trajectory.iloc[np.arange(len(time) - 1, -1, -each)[::-1]]
+    kept.attrs = dict(trajectory.attrs)
+    differences = trajectory_differences(kept, source.truth, find_ellipsoid(spec.ellipsoid))
+    return differences, summarise_differences(differences)
+
+
+# The run as data.
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class NavigationRun:
+    """Result of a navigation run; in memory until `save` writes it.
+
+    Attributes
+    ----------
+    spec : NavigationSpec
+        With every option of every module.
+    source : NavigationSource
+    ellipsoid : Ellipsoid
+    sensors : ImuUncertainty
+    coarse : Alignment or None
+    fine : FineResult or None
+    record : NavigationRecord
+        Smoothed, if specified.
+    forward : NavigationRecord or None
+        Filter solution of a smoothed run.
+    differences : DataFrame or None
+        From the truth, where it is known (`trajectory_differences`), ten times a second at most.
+    errors : DifferenceSummary or None
+        Of these.
+    forward_differences : DataFrame or None
+        Of the filter solution of a smoothed run.
+    points : ControlPointScore or None
+        The path at its control points.
+    withheld : tuple of Withheld
+        Test outages and their errors.
+    trust : IntegrityReport
+    inputs : tuple of InputFiles
+    findings : tuple of Finding
+    memory : Memory
+        Tables that are given in memory; files of the bundle.
+    """
+
+    spec: NavigationSpec
+    source: NavigationSource
+    ellipsoid: Ellipsoid
+    sensors: ImuUncertainty
+    coarse: Alignment | None
+    fine: FineResult | None
+    record: NavigationRecord
+    forward: NavigationRecord | None
+    differences: pd.DataFrame | None
+    errors: DifferenceSummary | None
+    forward_differences: pd.DataFrame | None
+    points: ControlPointScore | None
+    withheld: tuple[Withheld, ...]
+    trust: IntegrityReport
+    inputs: tuple[InputFiles, ...]
+    findings: tuple[Finding, ...]
+    memory: Memory = field(default=Memory({}))
+
+    @property
+    def filtered(self) -> NavigationRecord:
+        """Filter solution: the estimate at each instant without later measurements."""
+        return self.forward or self.record
+
+    @property
+    def filtered_differences(self) -> pd.DataFrame | None:
+        """Differences of the filter solution from the truth."""
+        return self.differences if self.forward is None else self.forward_differences
+
+    @property
+    def trajectory(self) -> pd.DataFrame:
+        """Trajectory table by time in s; smoothed if the run is.
+
+        ``lat lon`` in deg, ``alt`` in m over the ellipsoid, ``VN VE VD`` in m/s, ``roll pitch
+        heading`` in deg.
+        """
+        return self.record.trajectory
+
+    @property
+    def sd(self) -> pd.DataFrame:
+        """Standard deviations by time: ``north east down`` m, ``VN VE VD`` m/s, angles deg."""
+        return self.record.sd
+
+    @property
+    def innovations(self) -> Mapping[str, pd.DataFrame]:
+        """By name of the observation (``gnss.position``): innovation, variance, weight."""
+        return self.record.innovations
+
+    @property
+    def sensor_errors(self) -> pd.DataFrame:
+        """Estimates of sensor and measurement errors by time, in SI (`record.units`)."""
+        return self.record.sensors
+
+    @property
+    def integrity(self) -> IntegrityReport:
+        """Whether heading and bounds can be trusted, and the first inconsistency."""
+        return self.trust
+
+    def to_pandas(self) -> pd.DataFrame:
+        """The trajectory with its standard deviations, at their common instants.
+
+        Returns
+        -------
+        DataFrame
+            Columns of `trajectory`, and those of `sd` with the suffix ``_sd``.
+        """
+        return self.trajectory.join(self.sd.add_suffix("_sd"), how="inner")
+
+    def plot(self, kind: str = "plan") -> Figure:
+        """Draw one chart of the report.
+
+        Parameters
+        ----------
+        kind : str
+            ``plan``, ``bound``, ``height``, ``velocity``, ``attitude``, or the name of an
+            observation of `innovations`.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Its ``axes`` are the panels. Independent of windows and global state.
+
+        Raises
+        ------
+        ConfigError
+            The chart does not exist for this run.
+        """
+        from strapdown.report.navigation_view import plot
+
+        return plot(self, kind)
+
+    def save(
+        self,
+        out: str | Path,
+        *,
+        report: bool = True,
+        force: bool = False,
+        progress: Progress = silent,
+    ) -> Seal:
+        """Write the run as a sealed bundle, which `verify` runs again.
+
+        Parameters
+        ----------
+        out : str or Path
+            New folder. Tables given in memory become input files in it.
+        report : bool
+            Whether to write its pages and figures as well.
+        force : bool
+            Overwrite an existing bundle.
+        progress : callable, optional
+            Called with a stage and the completed fraction.
+
+        Returns
+        -------
+        Seal
+
+        Raises
+        ------
+        ConfigError
+            `out` exists and may not be overwritten.
+        DataError
+            An input file has changed since it was read.
+        """
+        from strapdown.report.navigation import write_navigation
+
+        check_destination(Path(out), force)
+        with self.memory.as_files() if self.memory.tables else nullcontext(NOWHERE) as folder:
+            run = self.in_folder(NOWHERE, folder)
+            return write_navigation(run, out, report=report, force=force, progress=progress)
+
+    def in_folder(self, old: Path, new: Path) -> NavigationRun:
+        """Return the run with its inputs in memory moved from one folder to another."""
+        if not self.memory.tables or old == new:
+            return self
+        return replace(
+            self,
+            spec=navigation_spec(moved_paths(self.spec.plain(), old, new)),
+            inputs=moved_inputs(self.inputs, old, new, copied=True),
+        )
+
+    def __repr__(self) -> str:
+        time, smoothed = self.trajectory.index, "" if self.forward is None else ", smoothed"
+        last = self.sd.iloc[-1]
+        return (
+            f"<NavigationRun {self.source.name}: {time[-1] - time[0]:.6g} s{smoothed}; at the end "
+            f"sd north {last['north']:.3g} m, east {last['east']:.3g} m, heading "
+            f"{last['heading']:.3g}°; {len(self.findings)} findings>"
+        )
+
+    def _repr_html_(self) -> str:
+        rows = self.to_pandas().iloc[[0, -1]]
+        shown = rows[[*GEODETIC, *VELOCITY, *EULER, "north_sd", "east_sd", "heading_sd"]]
+        found = "".join(f"<li>{escape(str(f))}</li>" for f in self.findings)
+        return (
+            f"<div><b>{escape(repr(self)[1:-1])}</b></div>{shown.to_html(float_format='{:.6g}'.format)}"
+            f"<ul>{found}</ul>"
+        )
+
+
+# The pipeline of a configuration.
+
+
+Three = tuple[float, float, float]
+
+
+def make_chain(spec: NavigationSpec, sensors: ImuUncertainty) -> NavigationPipeline:
+    """Build the pipeline of a specification.
+
+    Parameters
+    ----------
+    spec : NavigationSpec
+        Its pipeline takes samples and tables in body axes and on one clock.
+    sensors : ImuUncertainty
+
+    Returns
+    -------
+    NavigationPipeline
+
+    Raises
+    ------
+    ConfigError
+        A module refuses an option, or parts are incompatible.
+    """
+    given = given_of(spec)
+    aids = make_aids(spec)
+    options = make_choice(spec.filter, SLOTS["filter"], given)
+    navigator = Navigator(
+        with_states(make_filter(spec, sensors), aids),
+        aids,
+        options.mark_interval,
+        make_choice(spec.damping, SLOTS["damping"], given),
+        make_choice(spec.smoother, SLOTS["smoother"], given),
+    )
+    prefilter = None
+    if spec.prefilter.kind != "none":
+        prefilter = make_choice(spec.prefilter, SLOTS["prefilter"], given)
+    gaps = spec.gaps
+    site, site_sd, velocity_sd = None, (1.0, 1.0, 1.0), (0.1, 0.1, 0.1)
+    if spec.site is not None:
+        site = Site(
+            spec.site.lat_deg, spec.site.lon_deg, spec.site.alt_m, find_ellipsoid(spec.ellipsoid)
+        )
+        site_sd = _three(spec.site.position_sd_m)
+        velocity_sd = _three(spec.site.velocity_sd_m_per_s)
+    return NavigationPipeline(
+        navigator=navigator,
+        intake=ImuPreprocessor(
+            prefilter=prefilter,
+            gaps=GapPolicy(gaps.usual, gaps.coast_s, gaps.beyond),
+            ends=ends_of(sensors),
+        ),
+        modes=_modes(spec),
+        start=None if spec.start is None else _known(spec.start),
+        sensors=sensors,
+        site=site,
+        commands=tuple(Command(one.time_s, one.mode) for one in spec.commands),
+        site_sd=site_sd,
+        velocity_sd=velocity_sd,
+    )
+
+
+def _modes(spec: NavigationSpec) -> tuple[Mode, ...]:
+    given = given_of(spec)
+    modes: list[Mode] = []
+    coarse = make_choice(spec.coarse, SLOTS["coarse"], given)
+    if coarse is not None:
+        window = math.inf if spec.coarse.window_s is None else spec.coarse.window_s
+        modes.append(CoarseMode("coarse", _until(spec.coarse), way=coarse, window=window))
+    fine = make_choice(spec.fine, SLOTS["fine"], given)
+    if fine is not None:
+        modes.append(FineMode("fine", _until(spec.fine), fine))
+    return (*modes, Navigation())
+
+
+def _until(mode: CoarseModeSpec | FineModeSpec) -> Until:
+    return Until(
+        duration=math.inf if mode.duration_s is None else mode.duration_s,
+        heading_sd_deg=mode.until_heading_sd_deg,
+        tilt_sd_deg=mode.until_tilt_sd_deg,
+    )
+
+
+def _known(start: StartTable) -> KnownStart:
+    return KnownStart(
+        NavState.from_degrees(
+            start.lat_deg,
+            start.lon_deg,
+            start.alt_m,
+            v_n=start.v_ned_m_per_s,
+            roll_deg=start.roll_deg,
+            pitch_deg=start.pitch_deg,
+            heading_deg=start.heading_deg,
+        ),
+        position_sd=_three(start.position_sd_m),
+        velocity_sd=_three(start.velocity_sd_m_per_s),
+        attitude_sd_deg=(start.tilt_sd_deg, start.tilt_sd_deg, start.heading_sd_deg),
+        at_first_sample=True,
+    )
+
+
+def _three(value: float | Three) -> Three:
+    x, y, z = (float(v) for v in np.broadcast_to(value, 3))
+    return x, y, z

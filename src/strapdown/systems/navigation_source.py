@@ -1,0 +1,371 @@
+"""Input of a navigation run: body-axis samples, measurement tables and reference."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.config.choice import SLOTS
+from strapdown.config.navigation import (
+    AidSpec,
+    NavigationSpec,
+    ReceiverTable,
+    aids_of,
+    receivers_of,
+)
+from strapdown.ellipsoids import find_ellipsoid
+from strapdown.errors import ConfigError, DataError, DivergenceError, Finding
+from strapdown.formats.aid_table import read_aid_table
+from strapdown.formats.clocks import on_clock_of
+from strapdown.formats.control_points import read_control_points
+from strapdown.formats.gnss_files import files_of_fixes, read_gnss
+from strapdown.formats.gnss_fixes import GnssOptions
+from strapdown.formats.recording import StatedStart
+from strapdown.formats.trajectory_readers import files_of_trajectory, read_trajectory
+from strapdown.navigation.measurements.measurement import TabulatedMeasurement
+from strapdown.results.inputs import InputFiles, Reading
+from strapdown.sensors.catalogue import load_sensor
+from strapdown.sensors.error_chain import child, normal
+from strapdown.systems.alignment_source import body_record
+from strapdown.systems.inputs import input_files, sensor_file
+from strapdown.tables import GEODETIC, GNSS, POSITION_SD, VELOCITY_SD, gnss_table
+from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
+from strapdown.tables.checks import index_of, source_of, values_of
+
+if TYPE_CHECKING:
+    from strapdown.simulation.earth_motion import EarthMotion
+
+__all__ = [
+    "COLUMN_UNITS",
+    "NavigationSource",
+    "in_file",
+    "read_aid",
+    "read_navigation_source",
+    "said_of_file",
+    "simulated_fixes",
+]
+
+
+#: Random stream of the fixes under a simulation's seed; those of the sensors count from zero.
+_FIXES = 1000
+
+
+@dataclass(frozen=True, eq=False)
+class NavigationSource:
+    """Input of a navigation run.
+
+    Attributes
+    ----------
+    name, what : str
+    imu : DataFrame
+        Imu table, body axes, of the span that is used.
+    tables : mapping of str to DataFrame
+        By name of the measurement.
+    truth : DataFrame or None
+        Trajectory table: of the simulation, or the given reference.
+    truth_name : str
+        In words, to follow "error against".
+    points : DataFrame or None
+        Control points (`read_control_points`), on the clock of the samples.
+    start : StatedStart or None
+        Position and attitude stated in the file.
+    readings : tuple of Reading
+    inputs : tuple of InputFiles
+    findings : tuple of Finding
+    """
+
+    name: str
+    what: str
+    imu: pd.DataFrame
+    tables: Mapping[str, pd.DataFrame]
+    truth: pd.DataFrame | None
+    truth_name: str
+    points: pd.DataFrame | None
+    start: StatedStart | None
+    readings: tuple[Reading, ...]
+    inputs: tuple[InputFiles, ...]
+    findings: tuple[Finding, ...]
+
+
+def read_navigation_source(spec: NavigationSpec) -> NavigationSource:
+    """Read the log, the measurements and the reference of a specification, or simulate them.
+
+    Parameters
+    ----------
+    spec : NavigationSpec
+        With absolute paths.
+
+    Returns
+    -------
+    NavigationSource
+
+    Raises
+    ------
+    DataError, ConfigError
+        An input cannot be used; the message names file, row and remedy.
+    """
+    tables: dict[str, pd.DataFrame] = {}
+    inputs: list[InputFiles] = []
+    findings: list[Finding] = []
+    for name, aid in aids_of(spec).items():
+        if aid.path is not None:
+            tables[name] = read_aid(aid)
+            findings += tables[name].attrs.get("findings", ())
+            inputs.append(input_files(f"aid-{name}", aid.path, files_of_fixes(aid.path)))
+    truth = None
+    if spec.truth is not None:
+        truth = read_trajectory(spec.truth.path)
+        findings += truth.attrs["findings"]
+        inputs.append(input_files("truth", spec.truth.path, files_of_trajectory(spec.truth.path)))
+    points = None
+    if spec.control_points is not None:
+        given = spec.control_points
+        points = read_control_points(given.path, given.columns)
+        findings += points.attrs["findings"]
+        inputs.append(input_files("control-points", given.path, (Path(given.path),)))
+    inputs += sensor_file(spec.sensors.sensor)
+    if spec.log is None and spec.simulation is None:
+        raise ConfigError("navigation.samples-come-while-runs-no", quantity="live")
+    if spec.log is None:
+        return _simulated(spec, tables, truth, points, inputs, findings)
+    recording, imu, of_log = body_record(spec.log, spec.axes)
+    for name, table in tables.items():
+        tables[name], shifted = on_clock_of(table, recording.imu)
+        findings += [] if shifted is None else [shifted]
+    if points is not None:
+        points, shifted = on_clock_of(points, recording.imu)
+        findings += [] if shifted is None else [shifted]
+    if truth is not None:
+        truth, shifted = on_clock_of(truth, recording.imu)
+        findings += [] if shifted is None else [shifted]
+    return NavigationSource(
+        name=recording.name,
+        what="recorded log",
+        imu=imu,
+        tables=tables,
+        truth=truth,
+        truth_name="" if spec.truth is None else Path(spec.truth.path).name,
+        points=points,
+        start=recording.start,
+        readings=recording.readings,
+        inputs=(input_files("log", spec.log.path, recording.files), *inputs),
+        findings=(*of_log, *findings),
+    )
+
+
+def _simulated(
+    spec: NavigationSpec,
+    tables: Mapping[str, pd.DataFrame],
+    truth: pd.DataFrame | None,
+    points: pd.DataFrame | None,
+    inputs: list[InputFiles],
+    findings: list[Finding],
+) -> NavigationSource:
+    from strapdown.simulation import simulate_imu
+    from strapdown.systems.trajectory_source import make_motion, with_key
+
+    asked = spec.simulation
+    assert asked is not None  # one of the two is there
+    sensor = asked.sensor or spec.sensors.sensor
+    assert sensor is not None  # checked with the specification
+    with with_key(f"{spec.name}.toml"):
+        motion = make_motion(asked.motion, find_ellipsoid(spec.ellipsoid))
+        imu, _ = simulate_imu(
+            motion,
+            load_sensor(sensor).draw(asked.seed),
+            rate=asked.rate_hz,
+            sampling=asked.sampling,
+            seed=asked.seed,
+            source=spec.name,
+        )
+        made = {
+            name: simulated_fixes(
+                motion, one, child(asked.seed, _FIXES, zlib.crc32(name.encode())), name
+            )
+            for name, one in receivers_of(spec).items()
+        }
+    if asked.sensor != spec.sensors.sensor:
+        inputs = [*inputs, *sensor_file(asked.sensor)]
+    exact = motion.trajectory(imu.index.to_numpy(dtype=np.float64), source=spec.name)
+    return NavigationSource(
+        name=spec.name,
+        what=f"simulated, {Path(sensor).stem}, seed {asked.seed}",
+        imu=imu,
+        tables={**tables, **made},
+        truth=exact if truth is None else truth,
+        truth_name="the exact truth",
+        points=points,
+        start=None,
+        readings=(),
+        inputs=tuple(inputs),
+        findings=tuple(findings),
+    )
+
+
+# The file of a measurement, as its table.
+
+
+#: Units of the columns of measurements, as in `read_aid_table`; columns without an entry here or
+#: in the measurement keep their unit.
+COLUMN_UNITS = {
+    "speed": "m/s",
+    "height": "m",
+    "heading": "deg",
+    "vx": "m/s",
+    "vy": "m/s",
+    "vz": "m/s",
+}
+
+
+def read_aid(given: AidSpec) -> pd.DataFrame:
+    """Read the table of a measurement.
+
+    Parameters
+    ----------
+    given : AidSpec
+        With a path.
+
+    Returns
+    -------
+    DataFrame
+        By the time in the file; ``attrs`` hold its clock, ``source`` and ``findings``.
+
+    Raises
+    ------
+    DataError, ConfigError
+        The file cannot be used; the message names file, row and remedy.
+    """
+    assert given.path is not None  # checked with the specification
+    entry = SLOTS["aiding"].entries[given.kind]
+    assert issubclass(entry, TabulatedMeasurement)
+    if set(entry.columns) == set(GNSS):
+        return read_gnss(
+            given.path,
+            GnssOptions(
+                columns=given.columns,
+                position_sd=given.position_sd_m,
+                velocity_sd=given.velocity_sd_m_per_s,
+                repair=given.repair,
+            ),
+        )
+    units = {c: COLUMN_UNITS.get(c.removesuffix("_sd"), "") for c in entry.columns}
+    units |= dict(getattr(entry, "units", {}))
+    return read_aid_table(given.path, units, names=given.columns, repair=given.repair)
+
+
+# Fixes of a simulated receiver, with specified outages and outliers.
+
+
+Array = NDArray[np.float64]
+
+# Random streams under the seed; those of the receiver itself count from zero.
+_STRUCK, _WAY = 100, 101
+
+
+def simulated_fixes(
+    motion: EarthMotion, asked: ReceiverTable, seed: np.random.SeedSequence, name: str
+) -> pd.DataFrame:
+    """Simulate a receiver along a motion.
+
+    Parameters
+    ----------
+    motion : EarthMotion
+    asked : ReceiverTable
+    seed : SeedSequence
+        Seed of all random numbers.
+    name : str
+        Name of the measurement, for messages.
+
+    Returns
+    -------
+    DataFrame
+        Gnss table without the fixes of outages; outliers state the precision of the others.
+    """
+    from strapdown.simulation.gnss import GnssReceiver, moved_places, simulate_gnss
+
+    receiver = GnssReceiver(
+        rate=asked.rate_hz,
+        position_noise=asked.position_noise_m,
+        position_drift=asked.position_drift_m,
+        correlation_time=asked.correlation_time_s,
+        velocity_noise=asked.velocity_noise_m_per_s,
+        antenna=asked.antenna_m,
+        time_offset=asked.time_offset_s,
+        on_excess="unaffected",
+    )
+    table = simulate_gnss(motion, receiver, seed=seed, source=name)
+    time = index_of(table)
+    place, velocity = values_of(table, GEODETIC), values_of(table, VELOCITY_COLUMNS)
+    place_sd, velocity_sd = values_of(table, POSITION_SD), values_of(table, VELOCITY_SD)
+    if asked.outlier_share > 0.0:
+        chance = np.random.Generator(np.random.PCG64(child(seed, _STRUCK))).random(len(time))
+        struck = chance < asked.outlier_share
+        way = normal(seed, _WAY, len(time), axes=6)
+        for part in (way[:, :3], way[:, 3:]):
+            part /= np.linalg.norm(part, axis=1, keepdims=True)
+        off = asked.outlier_size * struck[:, None] * way
+        place = moved_places(place, off[:, :3] * place_sd, motion.ellipsoid)
+        velocity = velocity + off[:, 3:] * velocity_sd
+    if not asked.velocity:
+        velocity_sd = np.full_like(velocity_sd, np.inf)
+    kept = np.ones(len(time), dtype=np.bool_)
+    for begin, end in asked.outages_s:
+        kept &= (time < begin) | (time > end)
+    return gnss_table(
+        time[kept], place[kept], velocity[kept], place_sd[kept], velocity_sd[kept], source=name
+    )
+
+
+# Findings with table rows converted to file rows.
+
+
+def in_file(findings: Iterable[Finding], *tables: pd.DataFrame) -> tuple[Finding, ...]:
+    """Convert rows of findings from table to file.
+
+    Parameters
+    ----------
+    findings : iterable of Finding
+        Their rows count from 1 in a table.
+    *tables : DataFrame
+        Tables whose ``attrs`` may hold ``first_row``: the file row of their first row, or None
+        where rows between were omitted.
+
+    Returns
+    -------
+    tuple of Finding
+        Without a row where it is not known.
+    """
+    known = {t.attrs.get("source"): t.attrs["first_row"] for t in tables if "first_row" in t.attrs}
+    out = []
+    for one in findings:
+        if one.row is not None and one.file in known:
+            first = known[one.file]
+            one = one.replace(row=None if first is None else first + one.row - 1)
+        out.append(one)
+    return tuple(out)
+
+
+@contextmanager
+def said_of_file(*tables: pd.DataFrame) -> Iterator[None]:
+    """Errors raised within name file rows, and at least the first table's file."""
+    try:
+        yield
+    except DivergenceError as error:
+        said = error.finding
+        if said.file is not None or not tables:
+            raise
+        raise error.replaced(file=source_of(tables[0])) from None
+    except DataError as error:
+        said = error.finding
+        (moved,) = in_file((said,), *tables)
+        if moved == said:
+            raise
+        raise error.replaced(row=moved.row) from None

@@ -1,0 +1,767 @@
+"""Drift prediction from its specification to all results of a report."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.config.choice import SLOTS, make_choice
+from strapdown.config.coast import CoastSpec, CoastStartTable
+from strapdown.config.navigation import NavigationSpec, aids_of
+from strapdown.config.navigation_modules import sensors_of
+from strapdown.constants import DEG_PER_HOUR, MICRO_G
+from strapdown.errors import ConfigError, Finding
+from strapdown.estimation.covariance import Joseph
+from strapdown.estimation.error_filter import ErrorFilter
+from strapdown.estimation.error_model import RotationVectorModel
+from strapdown.estimation.sensor_blocks import stated_states
+from strapdown.evaluation.plane_bound import PLANE_95, plane_bound
+from strapdown.increments import motion_increments
+from strapdown.mechanization import NorthEastDown
+from strapdown.nav_state import NavState
+from strapdown.navigation.measurements.gnss import Gnss
+from strapdown.navigation.measurements.measurement import Measurement
+from strapdown.navigation.navigator import Navigator, NavigatorState, with_states
+from strapdown.navigation.outage import (
+    QUANTITIES,
+    Forecast,
+    courses,
+    forecast,
+    physical,
+    variances,
+    with_physical,
+)
+from strapdown.navigation.outage_test import (
+    SETTLED,
+    WithheldRun,
+    WithheldScore,
+    blinded,
+    score_of,
+    spans_to_withhold,
+    withheld_runs,
+)
+from strapdown.navigation.pipeline import NavigationPipeline, PipelineState
+from strapdown.navigation.record import NavigationChunk, Span
+from strapdown.navigation.recorder import record_of
+from strapdown.progress import Progress, silent
+from strapdown.results.inputs import InputFiles
+from strapdown.sensors.catalogue import load_sensor
+from strapdown.sensors.triad_errors import ImuErrors
+from strapdown.sensors.uncertainty import ImuUncertainty, stated_imu
+from strapdown.simulation import simulate_imu
+from strapdown.simulation.aiding_sensors import instants, velocity_of_point
+from strapdown.simulation.earth_motion import EarthMotion, Origin
+from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
+from strapdown.simulation.path_motion import Limits, Manoeuvre
+from strapdown.simulation.vehicles import Accelerate, Straight, Turn, car
+from strapdown.systems.inputs import check_part, input_files, sensor_file
+from strapdown.systems.navigation_run import make_chain
+from strapdown.systems.navigation_source import NavigationSource, read_navigation_source
+from strapdown.systems.one_thread import one_thread
+from strapdown.tables import ACCEL, GYRO
+from strapdown.tables.aiding import odometer_table
+from strapdown.tables.checks import index_of, values_of
+
+__all__ = [
+    "CoastResult",
+    "Drift",
+    "RecordedCoast",
+    "coast_navigator",
+    "coast_of_run",
+    "forecast_of_sensor",
+    "run_coast",
+    "sensor_of",
+    "stated_motion",
+]
+
+
+@dataclass(frozen=True, eq=False)
+class CoastResult:
+    """Result of a drift prediction.
+
+    Attributes
+    ----------
+    spec : CoastSpec
+    navigation : NavigationSpec or None
+        The run with outages; None for a sensor along a stated motion.
+    name, what : str
+        Sensor or record, in words.
+    sensors : ImuUncertainty
+    forecast : Forecast
+    recorded : RecordedCoast or None
+    stays : tuple of str
+        Remaining measurements.
+    inputs : tuple of InputFiles
+    findings : tuple of Finding
+    """
+
+    spec: CoastSpec
+    navigation: NavigationSpec | None
+    name: str
+    what: str
+    sensors: ImuUncertainty
+    forecast: Forecast
+    recorded: RecordedCoast | None
+    stays: tuple[str, ...]
+    inputs: tuple[InputFiles, ...]
+    findings: tuple[Finding, ...]
+
+
+@one_thread()
+def run_coast(
+    spec: CoastSpec,
+    navigation: NavigationSpec | None = None,
+    file: Path | None = None,
+    progress: Progress = silent,
+) -> CoastResult:
+    """Predict the drift in an outage; for a navigation run, also measure it.
+
+    Parameters
+    ----------
+    spec : CoastSpec
+        With absolute paths.
+    navigation : NavigationSpec, optional
+        The run whose receivers are removed; without one, a sensor along a stated motion.
+    file : Path, optional
+        Configuration file of the run, listed as an input.
+    progress : callable, optional
+        Called with a stage and the share that is done.
+
+    Returns
+    -------
+    CoastResult
+
+    Raises
+    ------
+    ConfigError
+        No sensor is stated, the motion is invalid, or the outage does not fit into the run.
+    DataError
+        The record of the run cannot be read.
+    """
+    if navigation is None:
+        if spec.sensor is None:
+            raise ConfigError("outage.nothing-says-sensor", quantity="sensor")
+        sensors = sensor_of(spec.sensor)
+        sensor = load_sensor(spec.sensor)
+        return CoastResult(
+            spec,
+            None,
+            sensor.name,
+            sensor.title,
+            sensors,
+            forecast_of_sensor(spec, sensors, progress),
+            None,
+            tuple(type(spec.aiding).model_fields),
+            sensor_file(spec.sensor),
+            (),
+        )
+    progress("reading", 0.02)
+    source = read_navigation_source(navigation)
+    recorded = coast_of_run(spec, navigation, source, progress)
+    files = () if file is None else (input_files("configuration", str(file), (file,)),)
+    return CoastResult(
+        spec,
+        navigation,
+        source.name,
+        source.what,
+        sensors_of(navigation),
+        recorded.forecast,
+        recorded,
+        recorded.stays,
+        (*files, *source.inputs),
+        tuple(source.findings),
+    )
+
+
+# Drift of a navigation run during outages of its receivers, predicted and measured.
+
+
+Array = NDArray[np.float64]
+
+#: Length of a chunk until navigation begins, s.
+CHUNK = 2.0
+#: Number of instants of an error cone.
+INSTANTS = 120
+
+
+@dataclass(frozen=True, eq=False)
+class Drift:
+    """Predicted and measured drift of one outage.
+
+    Attributes
+    ----------
+    span : Span
+    variance : mapping of str to ndarray, (m,)
+        By quantity, predicted, at the cone's instants.
+    bound : ndarray, (m,), m
+        95 % bound of the horizontal position.
+    time : ndarray, (n,), s
+        Time of the withheld fixes since the begin.
+    along, across, down : ndarray, (n,), m
+        Computed minus fix; along and across the course.
+    inside : ndarray of bool, (n,)
+        Whether it is within the 95 % ellipse, including the noise of the fix.
+    """
+
+    span: Span
+    variance: dict[str, Array]
+    bound: Array
+    time: Array
+    along: Array
+    across: Array
+    down: Array
+    inside: NDArray[np.bool_]
+
+    @property
+    def horizontal(self) -> Array:
+        """Length of the horizontal drift, (n,), m."""
+        return np.asarray(np.hypot(self.along, self.across))
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedCoast:
+    """Result of the outages of a run.
+
+    Attributes
+    ----------
+    forecast : Forecast
+        Of the outage with the median bound at its end.
+    time : ndarray, (m,), s
+        Instants of the cone, since the begin of an outage.
+    variance : mapping of str to ndarray, (m,)
+        By quantity: the mean over the outages.
+    bound : ndarray, (m,), m
+        Root mean square of their 95 % bounds.
+    drifts : tuple of Drift
+        In order of time; without fixes if the run has no receiver.
+    stays : tuple of str
+        Names of the remaining measurements.
+    """
+
+    forecast: Forecast
+    time: Array
+    variance: dict[str, Array]
+    bound: Array
+    drifts: tuple[Drift, ...]
+    stays: tuple[str, ...]
+
+
+def coast_of_run(
+    spec: CoastSpec,
+    navigation: NavigationSpec,
+    source: NavigationSource,
+    progress: Progress = silent,
+) -> RecordedCoast:
+    """Navigate over a record with outages of its receivers at even intervals.
+
+    Parameters
+    ----------
+    spec : CoastSpec
+    navigation : NavigationSpec
+    source : NavigationSource
+    progress : callable, optional
+
+    Returns
+    -------
+    RecordedCoast
+
+    Raises
+    ------
+    ConfigError
+        An outage does not fit into the run, begins outside the run, or includes a new alignment.
+    DataError
+        Navigation never begins.
+    """
+    chain = make_chain(navigation, sensors_of(navigation))
+    # Measurements after an outage do not affect the solution during it.
+    chain = replace(chain, navigator=replace(chain.navigator, smoother=None))
+    receivers = [name for name, aid in aids_of(navigation).items() if aid.kind == "gnss"]
+    stays = tuple(name for name in aids_of(navigation) if name not in receivers)
+    time, values = index_of(source.imu), values_of(source.imu, [*GYRO, *ACCEL])
+    state = chain.begin(source.imu.attrs["sampling"], source.name)
+    for aid, table in source.tables.items():
+        state = chain.tell(state, aid, table)
+    begun, at = state, 0
+    while begun.navigator is None and at < len(time):
+        state = begun
+        progress("aligning", 0.1)
+        first, at = at, int(np.searchsorted(time, time[at] + CHUNK, side="right"))
+        begun, _ = chain.advance(state, time[first:at], values[first:at], at == len(time))
+    ends = [float(index_of(source.tables[name])[-1]) for name in receivers]
+    spans = _spans(spec, source, float(begun.time), min([float(time[-1]), *ends]), receivers)
+    blind = chain
+    for name in receivers:
+        blind = replace(blind, navigator=blinded(blind.navigator, name))
+    runs: list[tuple[WithheldRun, Drift]] = []
+    grid = np.linspace(0.0, spec.outage_s, INSTANTS + 1)
+    scored = receivers[0] if receivers else None
+    for number, run in enumerate(withheld_runs(chain, blind, begun, time[at:], values[at:], spans)):
+        progress(f"outage {number + 1} of {len(spans)}", 0.1 + 0.4 * number / len(spans))
+        runs.append((run, _drift(blind.navigator, run, spans[run.number], scored, grid)))
+    order = sorted(range(len(runs)), key=lambda k: float(runs[k][1].bound[-1]))
+    middle, _ = runs[order[len(order) // 2]]
+    rows = slice(at + middle.rows.start, at + middle.rows.stop)
+    foretold = _foretold(
+        chain,
+        middle.state,
+        (time[rows], values[rows]),
+        receivers,
+        spec.outage_s,
+        bool(stays),
+        lambda stage, share: progress(stage, 0.5 + 0.25 * share),
+    )
+    drifts = tuple(drift for _, drift in runs)
+    return RecordedCoast(
+        forecast=foretold,
+        time=grid,
+        variance={q: np.mean([d.variance[q] for d in drifts], axis=0) for q in QUANTITIES},
+        bound=np.sqrt(np.mean([d.bound**2 for d in drifts], axis=0)),
+        drifts=drifts,
+        stays=stays,
+    )
+
+
+def _spans(
+    spec: CoastSpec, source: NavigationSource, begun: float, end: float, receivers: list[str]
+) -> tuple[Span, ...]:
+    """The outages, on the clock of the samples."""
+    first = begun + SETTLED
+    check_part(spec.from_s, spec.to_s, spec.duration_s)
+    if spec.at_s is not None:
+        if not first - SETTLED <= spec.at_s <= end - spec.outage_s:
+            raise ConfigError(
+                "outage.outage-not-within-run-navigation"
+                if end - spec.outage_s > begun
+                else "outage.outage-not-within-run-navigation-2",
+                file=source.name,
+                quantity="--at",
+                outage_s=spec.outage_s,
+                at_s=spec.at_s,
+                begun=begun,
+                end=end,
+                end_2=end - spec.outage_s,
+            )
+        return (Span("outage", spec.at_s, spec.at_s + spec.outage_s),)
+    log = float(index_of(source.imu)[0]) if spec.from_s is None else spec.from_s
+    to = spec.to_s if spec.duration_s is None else log + spec.duration_s
+    within = (max(first, log), end if to is None else min(end, to))
+    if within != (first, end) and within[1] - within[0] < spec.outage_s <= end - first:
+        raise ConfigError(
+            "outage.outage-longer-than-between",
+            file=source.name,
+            quantity="--from, --to, --duration",
+            outage_s=spec.outage_s,
+            within=max(within[1] - within[0], 0.0),
+            within_2=within[0],
+            within_3=within[1],
+            first=first,
+            end=end,
+        )
+    room = end - first
+    if room < spec.outage_s:
+        raise ConfigError(
+            "outage.outage-longer-than-run-navigation"
+            if room > 1.0
+            else "outage.outage-longer-than-run-navigation-2",
+            file=source.name,
+            quantity="--outage",
+            outage_s=spec.outage_s,
+            room=max(room, 0.0),
+            first=first,
+            end=end,
+            room_2=room,
+        )
+    places = spec.places if receivers else 1
+    return spans_to_withhold(*within, spec.outage_s, places)
+
+
+def _drift(
+    navigator: Navigator, run: WithheldRun, span: Span, scored: str | None, grid: Array
+) -> Drift:
+    """Predicted and measured drift of an outage."""
+    if run.state.navigator is None or run.through.navigator is None:
+        raise _aligns_anew(span.begin, span.end)
+    record = record_of(navigator, run.pieces)
+    marks = record.sd.index.to_numpy(dtype=np.float64)
+    course = courses(record.trajectory, marks)
+    on_grid = grid + span.begin
+    variance = {
+        q: np.interp(on_grid, marks, v) for q, v in variances(record.covariance, course).items()
+    }
+    bound = np.interp(on_grid, marks, plane_bound(record.covariance))
+    if scored is None:
+        none = np.empty(0)
+        return Drift(span, variance, bound, none, none, none, none, np.empty(0, dtype=np.bool_))
+    score: WithheldScore = score_of(run.pieces, scored, span)
+    way = courses(record.trajectory, score.time)
+    c, s = np.cos(way), np.sin(way)
+    north, east, down = score.error.T
+    return Drift(
+        span,
+        variance,
+        bound,
+        score.time - span.begin,
+        c * north + s * east,
+        -s * north + c * east,
+        down,
+        score.distance <= PLANE_95,
+    )
+
+
+def _aligns_anew(begin: float, end: float) -> ConfigError:
+    return ConfigError(
+        "outage.does-not-navigate-alone-after", quantity="--at", begin=begin, end=end
+    )
+
+
+def _foretold(
+    chain: NavigationPipeline,
+    state: PipelineState,
+    samples: tuple[Array, Array],
+    receivers: list[str],
+    outage: float,
+    aided: bool,
+    progress: Progress,
+) -> Forecast:
+    """Forecast from a state of a run over the samples that follow it."""
+    begin = state.navigator
+    assert begin is not None
+    # The receiver's measurements are not even compared.
+    queues = {
+        name: replace(queue, time=queue.time[:0], values=queue.values[:0])
+        if name in receivers
+        else queue
+        for name, queue in begin.queues.items()
+    }
+
+    def go(navigator: Navigator, start: NavigatorState) -> tuple[NavigationChunk, ...]:
+        one = replace(chain, navigator=navigator)
+        end, piece = one.advance(replace(state, navigator=start), *samples)
+        if end.navigator is None:
+            raise _aligns_anew(state.time, end.time)
+        return (*piece.navigation, navigator.finish(end.navigator))
+
+    start = replace(begin, queues=queues)
+    return forecast(chain.navigator, start, go, outage, aided=aided, progress=progress)
+
+
+# Predict the drift of a sensor along a stated motion.
+
+
+#: Sample rate of a stated motion, Hz. Without errors, samples are exact at any sufficient rate.
+RATE = 50.0
+#: Standard deviations after an alignment: m, m/s, deg, deg.
+ALIGNED = (10.0, 0.1, 0.5, 5.0)
+#: Rate and standard deviation of a remaining odometer, Hz and m/s.
+ODOMETER_RATE, ODOMETER_SD = 2.0, 0.03
+RECEIVER = "fixes"
+#: Rows of the physical errors that each key of a start replaces, and the factor to SI.
+STATED: dict[str, tuple[str, float]] = {
+    "position_sd_m": ("position", 1.0),
+    "velocity_sd_m_per_s": ("velocity", 1.0),
+    "tilt_sd_deg": ("tilt", math.radians(1.0)),
+    "heading_sd_deg": ("heading", math.radians(1.0)),
+    "gyro_bias_sd_deg_per_h": ("gyro_bias", 1.0 / DEG_PER_HOUR),
+    "accel_bias_sd_ug": ("accel_bias", 1.0 / MICRO_G),
+}
+CORE = {
+    "position": slice(0, 3),
+    "velocity": slice(3, 6),
+    "tilt": slice(6, 8),
+    "heading": slice(8, 9),
+}
+
+
+def sensor_of(name: str) -> ImuUncertainty:
+    """Return the uncertainty of a sensor.
+
+    Parameters
+    ----------
+    name : str
+        Name in the catalogue, or path of a file.
+
+    Raises
+    ------
+    ConfigError
+        The sensor is unknown, or its bias or noise is not stated.
+    """
+    sensor = load_sensor(name)
+    for triad in ("gyro", "accel"):
+        if triad not in {figure.key.partition(".")[0] for figure in sensor.sources}:
+            raise ConfigError(
+                "outage.sensor-without-gyros"
+                if triad == "gyro"
+                else "outage.sensor-without-accelerometers",
+                quantity="sensor",
+                name=sensor.name,
+            )
+    return stated_imu(sensor, {}, {})
+
+
+def coast_navigator(spec: CoastSpec, sensors: ImuUncertainty, fixes: bool) -> Navigator:
+    """Return the navigator of a forecast.
+
+    Parameters
+    ----------
+    spec : CoastSpec
+    sensors : ImuUncertainty
+    fixes : bool
+        Whether a receiver is among its measurements.
+
+    Returns
+    -------
+    Navigator
+    """
+    names = type(spec.aiding).model_fields
+    aids: tuple[Measurement, ...] = tuple(
+        make_choice(
+            getattr(spec.aiding, kind), SLOTS["aiding"], {"name": kind, "ellipsoid": "wgs84"}
+        )
+        for kind in names
+    )
+    filter_ = ErrorFilter(
+        NorthEastDown(),
+        RotationVectorModel(
+            gyro_noise=sensors.gyro.axis("noise_density"),
+            accel_noise=sensors.accel.axis("noise_density"),
+            sensors=stated_states(sensors),
+        ),
+        Joseph(),
+    )
+    filter_ = with_states(filter_, aids)
+    return Navigator(filter_, (*aids, Gnss(name=RECEIVER)) if fixes else aids)
+
+
+def forecast_of_sensor(
+    spec: CoastSpec, sensors: ImuUncertainty, progress: Progress = silent
+) -> Forecast:
+    """Predict the drift of a sensor along a stated motion.
+
+    A filter runs over a drive with fixes, and from there over the outage. Samples and fixes are
+    those of the truth: the result is the covariance, which includes their errors.
+
+    Parameters
+    ----------
+    spec : CoastSpec
+    sensors : ImuUncertainty
+    progress : callable, optional
+
+    Returns
+    -------
+    Forecast
+
+    Raises
+    ------
+    ConfigError
+        The motion is not possible.
+    """
+    motion, begin = stated_motion(spec)
+    progress("the motion", 0.1)
+    perfect = ImuErrors()
+    imu, _ = simulate_imu(motion, perfect, rate=RATE, sampling="mean")
+    made = motion_increments(imu)
+    time, rows = index_of(made), made.to_numpy(dtype=np.float64)
+    driven = begin > 0.0
+    before = coast_navigator(spec, sensors, fixes=driven)
+    state = before.begin(_first(motion), _aligned(before, sensors))
+    for name, table in _tables(spec, motion, begin, driven).items():
+        state = before.tell(state, name, table)
+    progress("the drive before", 0.2)
+    first = int(np.searchsorted(time, begin + 0.5 / RATE)) if driven else 0
+    if first:
+        state, _ = before.advance(state, time[:first], rows[:first])
+    navigator = replace(before, aids=tuple(a for a in before.aids if a.name != RECEIVER))
+    queues = {k: v for k, v in state.queues.items() if k != RECEIVER}
+    state = _stated(replace(state, queues=queues), navigator, spec.start)
+
+    def go(one: Navigator, start: NavigatorState) -> tuple[NavigationChunk, ...]:
+        end, piece = one.advance(start, time[first:], rows[first:])
+        return piece, one.finish(end)
+
+    return forecast(
+        navigator,
+        state,
+        go,
+        spec.outage_s,
+        aided=bool(navigator.aids),
+        progress=lambda stage, share: progress(stage, 0.3 + 0.45 * share),
+    )
+
+
+def _first(motion: EarthMotion) -> NavState:
+    """True state at time zero."""
+    row = motion.trajectory([0.0]).iloc[0]
+    return NavState.from_degrees(
+        row["lat"],
+        row["lon"],
+        row["alt"],
+        v_n=(row["VN"], row["VE"], row["VD"]),
+        roll_deg=row["roll"],
+        pitch_deg=row["pitch"],
+        heading_deg=row["heading"],
+    )
+
+
+def _aligned(navigator: Navigator, sensors: ImuUncertainty) -> Array:
+    """Covariance after an alignment, with sensors by their data sheets."""
+    position, velocity, tilt, heading = ALIGNED
+    core = np.repeat([position, velocity, math.radians(tilt)], 3)
+    core[8] = math.radians(heading)
+    sds = np.concatenate([core, navigator.filter.model.stacked.sd])
+    return np.diag(np.square(sds))
+
+
+def _stated(state: NavigatorState, navigator: Navigator, start: CoastStartTable) -> NavigatorState:
+    """Replace errors by stated ones, uncorrelated with all others."""
+    P = physical(navigator, state).copy()
+    for key, (name, factor) in STATED.items():
+        value = getattr(start, key)
+        if value is None:
+            continue
+        rows = CORE.get(name) or navigator.filter.model.columns_of[name]
+        P[rows, :] = P[:, rows] = 0.0
+        P[rows, rows] = np.eye(rows.stop - rows.start) * (factor * value) ** 2
+    return with_physical(navigator, state, P)
+
+
+def _tables(
+    spec: CoastSpec, motion: EarthMotion, begin: float, driven: bool
+) -> dict[str, pd.DataFrame]:
+    """Error-free tables of receivers and odometers."""
+    out: dict[str, pd.DataFrame] = {}
+    if driven:
+        receiver = GnssReceiver(
+            rate=1.0,
+            on_excess="unaffected",
+            stated_position_sd=spec.start.fix_position_sd_m,
+            stated_velocity_sd=spec.start.fix_velocity_sd_m_per_s,
+        )
+        fixes = simulate_gnss(motion, receiver)
+        out[RECEIVER] = fixes[fixes.index <= begin + 1e-6]
+    if "odometer" in type(spec.aiding).model_fields:
+        asked = spec.aiding.odometer  # type: ignore[attr-defined]
+        at = instants(motion, ODOMETER_RATE)[1:]
+        forward = velocity_of_point(motion, at, asked.lever_arm_m)[:, 0]
+        out["odometer"] = odometer_table(at, forward, ODOMETER_SD)
+    return out
+
+
+# Stated motion: a drive with fixes, in which the filter converges, and the outage.
+
+
+#: Drive with fixes: m/s, mean m/s² of a change of speed, m.
+SPEED, GENTLE, RADIUS = 12.0, 1.0, 25.0
+#: Least time at constant speed before the outage, s.
+SETTLING = 12.0
+#: Duration of a turn's onset and end, s.
+RAMP = 1.0
+#: Limits of a stated motion, those of a fast aircraft, m/s².
+LIMITS = Limits(acceleration=100.0, lateral=100.0, climb_deg=20.0)
+
+
+def stated_motion(spec: CoastSpec) -> tuple[EarthMotion, float]:
+    """Return the motion of a forecast, and the begin of the outage.
+
+    Before it, for `aided_s`, a car drives around blocks to the left and to the right, with changes
+    of speed, which makes heading, tilts and biases observable. It ends with the heading at which
+    the outage begins.
+
+    Parameters
+    ----------
+    spec : CoastSpec
+
+    Returns
+    -------
+    motion : EarthMotion
+    begin : float, s
+
+    Raises
+    ------
+    ConfigError
+        The motion exceeds 100 m/s².
+    """
+    asked, outage = spec.motion, spec.outage_s
+    before, begin = _drive(spec.start.aided_s, asked.speed_m_per_s)
+    motion = car(
+        Origin(asked.lat_deg, 10.0, 100.0),
+        [(f"drive {k + 1}", one) for k, one in enumerate([*before, *_coasting(spec)])],
+        heading_deg=asked.heading_deg,
+        speed=0.0 if before else asked.speed_m_per_s,
+        limits=LIMITS,
+    )
+    return replace(motion, duration=begin + outage), begin
+
+
+def _drive(length: float, speed: float) -> tuple[list[Manoeuvre], float]:
+    """Maneuvers before the outage, and their duration; empty if no drive is specified."""
+    if length == 0.0:
+        return [], 0.0
+    turn = math.radians(90.0) * RADIUS / SPEED + RAMP
+    block: list[tuple[Manoeuvre, float]] = []
+    for sign in (1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0):
+        block += [
+            (Straight(6.0), 6.0),
+            (Accelerate(0.5 * SPEED, 6.0), 6.0),
+            (Accelerate(SPEED, 6.0), 6.0),
+            (Turn(sign * 90.0, RADIUS, RAMP), turn),
+        ]
+    round_ = sum(t for _, t in block)
+    done: list[tuple[Manoeuvre, float]] = [
+        (Straight(5.0), 5.0),
+        (Accelerate(SPEED, 12.0), 12.0),
+    ]
+    change = max(abs(speed - SPEED) / GENTLE, 1.0)
+    rounds = max(1, round((length - 30.0 - change) / round_))
+    done += block * rounds
+    done += [(Accelerate(speed, change), change)]
+    # Whole seconds, so that samples and fixes coincide with the begin of the outage.
+    took = sum(t for _, t in done)
+    whole = math.ceil(took + SETTLING)
+    return [*(one for one, _ in done), Straight(whole - took)], float(whole)
+
+
+def _coasting(spec: CoastSpec) -> list[Manoeuvre]:
+    """Maneuvers during the outage."""
+    asked, outage = spec.motion, spec.outage_s
+    speed, rate = asked.speed_m_per_s, asked.turn_rate_deg_per_s
+    to = asked.to_speed_m_per_s
+    if rate != 0.0:
+        if speed == 0.0 or to is not None:
+            raise ConfigError(
+                "outage.turn-goes-speed-above-zero"
+                if to is not None
+                else "outage.body-stands-makes-no-turn",
+                quantity="--turn-rate",
+            )
+        if speed * abs(math.radians(rate)) > LIMITS.lateral:
+            most = math.degrees(LIMITS.lateral / speed)
+            raise ConfigError(
+                "outage.take-more-than-side",
+                quantity="--turn-rate",
+                rate=rate,
+                speed=speed,
+                lateral=LIMITS.lateral,
+                most=most,
+            )
+        # With its ramps the turn is as long as the outage, and a second more.
+        radius = speed / abs(math.radians(rate))
+        return [Turn(rate * outage, radius, RAMP)]
+    if to is not None and to != speed:
+        least = 15.0 / 8.0 * abs(to - speed) / LIMITS.acceleration
+        if outage < least:
+            raise ConfigError(
+                "outage.takes-more-than",
+                quantity="--to-speed",
+                speed=speed,
+                to=to,
+                outage=outage,
+                acceleration=LIMITS.acceleration,
+                least=least,
+            )
+        return [Accelerate(to, outage)]
+    return [Straight(outage)]

@@ -1,1 +1,0 @@
-"""System C: one navigation pipeline for simulations, recorded logs and live samples."""

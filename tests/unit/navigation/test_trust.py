@@ -1,0 +1,188 @@
+"""A run judged: its heading by a second reckoning, and the run without what does not agree."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from strapdown.config.navigation_file import navigation_spec
+from strapdown.config.navigation_modules import make_filter, sensors_of
+from strapdown.navigation.heading_integrity import SURE
+from strapdown.navigation.heading_witness import hear_witnesses, witnesses_of
+from strapdown.report.navigation import write_navigation
+from strapdown.systems.navigation_run import make_chain, run_navigation
+
+LIMIT = 3.0
+
+
+def drive(
+    *, error=0.0, sd=1.0, manoeuvres=True, outliers=0.0, trust=None, aids=True, compass=None, laps=1
+):
+    """A car at 12 m/s with a heading at the start that is off by so many degrees."""
+    straight = [{"do": "straight", "duration_s": 90.0}]
+    bends = [
+        {"do": "straight", "duration_s": 15.0},
+        {"do": "turn_left", "angle_deg": 90.0, "radius_m": 60.0},
+        {"do": "straight", "duration_s": 20.0},
+        {"do": "turn_right", "angle_deg": 60.0, "radius_m": 60.0},
+        {"do": "straight", "duration_s": 30.0},
+    ]
+    receiver = {"rate_hz": 1.0, "position_noise_m": 0.5, "velocity_noise_m_per_s": 0.05}
+    table = {
+        "simulation": {
+            "rate_hz": 50.0,
+            "seed": 5,
+            "motion": {
+                "kind": "car",
+                "lat_deg": 48.0,
+                "lon_deg": 11.0,
+                "alt_m": 500.0,
+                "heading_deg": 20.0,
+                "speed_m_per_s": 12.0,
+                "manoeuvres": bends * laps if manoeuvres else straight,
+            },
+            "gnss": {"rtk": {**receiver, "outlier_share": outliers}} if aids else {},
+        },
+        "sensors": {"sensor": "stim300"},
+        "start": {
+            "lat_deg": 48.0,
+            "lon_deg": 11.0,
+            "alt_m": 500.0,
+            "v_ned_m_per_s": [12.0 * np.cos(np.radians(20.0)), 12.0 * np.sin(np.radians(20.0)), 0],
+            "roll_deg": 0.0,
+            "pitch_deg": 0.0,
+            "heading_deg": 20.0 + error,
+            "position_sd_m": 1.0,
+            "heading_sd_deg": sd,
+        },
+        "aiding": {"rtk": {"kind": "gnss"}} if aids else {},
+        "trust": trust or {},
+        "output": {"figures": False},
+    }
+    if compass is not None:
+        table["aiding"]["compass"] = {"kind": "heading", "path": str(compass)}
+    table["start"]["v_ned_m_per_s"] = [float(v) for v in table["start"]["v_ned_m_per_s"]]
+    return navigation_spec(table)
+
+
+def errors(result):
+    """Light and error of the heading of each second."""
+    light = result.trust.light.table
+    known = result.differences
+    error = np.interp(light.index, known.index, known["heading"])
+    return light["light"].to_numpy(), error
+
+
+@pytest.fixture(scope="module")
+def sound():
+    return run_navigation(drive(error=0.7))
+
+
+def test_a_sound_drive_is_green_after_its_first_bend(sound):
+    light, error = errors(sound)
+    assert (np.abs(error[light == 0]) < LIMIT).all()
+    # The first bend begins at 15 s and lasts 8 s.
+    assert (light[:14] != 0).all()
+    # Between two bends the gyros of this class carry it for a quarter of a minute.
+    assert np.mean(light[15:] == 0) > 0.7
+    assert sound.trust.first is None
+    assert sound.trust.repeated is None
+
+
+def test_without_a_manoeuvre_a_start_is_borne_out_by_nothing():
+    result = run_navigation(drive(error=6.0, manoeuvres=False))
+    light, error = errors(result)
+    # The bound of the run itself believes a heading that is off by 6 deg.
+    assert np.sum(result.trust.light.table["bound"] < LIMIT) > 20
+    assert (np.abs(error) > LIMIT).mean() > 0.9
+    assert (light != 0).all()
+    advice = result.trust.advice[-1]
+    best, after = advice.options[0]
+    assert best.aside or best.forward
+    # By what a change of velocity of 9.8 m/s tells with fixes of 0.05 m/s: half a degree.
+    assert after < 1.0 < advice.sd
+
+
+def test_a_wrong_start_is_never_green_while_it_is_wrong():
+    result = run_navigation(drive(error=9.0))
+    light, error = errors(result)
+    wrong = np.abs(error) > LIMIT
+    assert wrong.sum() > 10
+    assert not (wrong & (light == 0)).any()
+
+
+def test_what_was_wrong_with_a_run_does_not_pass_to_a_later_witness(tmp_path):
+    """A compass off by 8° makes tilts and biases wrong that the second witness would begin with."""
+    truth = run_navigation(drive(laps=3, trust={"repeat": False})).source.truth.iloc[::50]
+    compass = tmp_path / "compass.csv"
+    told = pd.DataFrame({"heading_deg": (truth["heading"] + 8.0) % 360.0, "heading_sd_deg": 0.5})
+    told.rename_axis("time_s").to_csv(compass)
+    spec = drive(laps=3, error=8.0, compass=compass, trust={"repeat": False})
+    result = run_navigation(spec)
+    source, record, sensors = result.source, result.record, sensors_of(spec)
+    made = witnesses_of(
+        make_filter(spec, sensors),
+        make_chain(spec, sensors),
+        source.imu,
+        source.tables,
+        record,
+        result.trust.consistency,
+    )
+    known = result.differences
+    off = [
+        (np.interp(one.time, known.index, known["heading"]) - one.difference) / one.sd
+        for one in hear_witnesses(made, record, LIMIT / 3.0)
+        if one.since > 30.0
+    ]
+    off = np.abs(np.concatenate(off))
+    assert len(off) > 30
+    # What a witness bounds with 99 % may be beyond that now and then: one error lasts for seconds.
+    assert np.mean(off < SURE) > 0.9
+
+
+def test_gross_errors_are_left_out_of_the_repeated_run():
+    result = run_navigation(drive(outliers=0.1))
+    first, repeated = result.trust.first, result.trust.repeated
+    assert first.kind == "gross"
+    assert first.aid == "rtk"
+    assert repeated.change.code == "navigation.rerun-without-gross-errors"
+    known = result.source.truth
+
+    def rms(record):
+        rows = record.trajectory
+        north = 6.37e6 * np.radians(rows["lat"] - np.interp(rows.index, known.index, known["lat"]))
+        return float(np.sqrt(np.mean(north**2)))
+
+    # The filter has no robust rule: a fix that is 25 m off moves it by metres.
+    assert rms(repeated.record) < 0.5 * rms(result.record)
+
+
+def test_repeating_can_be_turned_off():
+    result = run_navigation(drive(outliers=0.1, trust={"repeat": False}))
+    assert result.trust.first is not None
+    assert result.trust.repeated is None
+
+
+def test_without_fixes_nothing_bears_a_heading_out():
+    result = run_navigation(drive(aids=False))
+    assert result.trust.unwitnessed[0].code == "navigation.no-receiver-fixes"
+    assert result.trust.light.share("green") == 0.0
+
+
+def test_the_files_say_what_was_judged(sound, tmp_path):
+    write_navigation(sound, tmp_path / "out")
+    told = json.loads((tmp_path / "out" / "verdict.json").read_text(encoding="utf-8"))
+    light = sound.trust.light
+    assert told["heading"]["share"]["green"] == light.share("green")
+    assert told["answer"].startswith("You can trust the place to ")
+    table = pd.read_csv(tmp_path / "out" / "heading_light.csv", comment="#")
+    assert len(table) == len(light.table)
+    assert (table["light"] == "green").mean() == light.share("green")
+    page = (tmp_path / "out" / "verdict.html").read_text(encoding="utf-8")
+    assert 'href="report.html"' in page
+    assert f"{len(sound.trust.consistency)} observations looked at" in page
+    report = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert 'href="verdict.html"' in report

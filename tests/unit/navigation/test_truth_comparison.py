@@ -1,0 +1,171 @@
+"""A trajectory with errors that are drawn from its covariance, against the truth it came of."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from strapdown import rotation
+from strapdown.errors import DataError
+from strapdown.mechanization import NorthEastDown
+from strapdown.mechanization.state_error import state_error
+from strapdown.nav_state import NavState
+from strapdown.navigation.truth_comparison import (
+    compare_with_places,
+    compare_with_truth,
+    state_errors,
+)
+from strapdown.simulation.earth_motion import Origin
+from strapdown.simulation.spline_motion import SineVelocityMotion
+from strapdown.tables import trajectory_table
+
+MOTION = SineVelocityMotion(
+    60.0, Origin(55.0, 37.0, 150.0), (5.0, -3.0, 0.0), (8.0, 8.0, 0.3), 30.0
+)
+SD = np.r_[[2.0, 3.0, 1.0], [0.1, 0.2, 0.1], np.radians([0.1, 0.1, 1.0])]
+USED = NorthEastDown()
+
+
+def state_of(row, time):
+    return NavState.from_degrees(
+        row["lat"],
+        row["lon"],
+        row["alt"],
+        v_n=row[["VN", "VE", "VD"]].to_numpy(),
+        roll_deg=row["roll"],
+        pitch_deg=row["pitch"],
+        heading_deg=row["heading"],
+        time=time,
+    )
+
+
+def with_errors(time, errors):
+    """Trajectory that is wrong by errors, in the axes of its own states."""
+    rows = []
+    for (_, row), t, error in zip(MOTION.trajectory(time).iterrows(), time, errors, strict=True):
+        state = USED.begin(state_of(row, t))
+        # Level axes of the two states are the same to a millionth of a radian.
+        s = USED.nav_state(USED.correct(state, -error), t)
+        lat, lon = np.degrees([s.lat, s.lon])
+        rows.append([lat, lon, s.alt, *s.v_n, *rotation.euler_from_quaternion(s.q_nb)])
+    rows = np.array(rows)
+    return trajectory_table(time, rows[:, :3], rows[:, 3:6], rows[:, 6:])
+
+
+@pytest.fixture(scope="module")
+def run():
+    rng = np.random.default_rng(3)
+    time = np.arange(0.0, 60.01, 0.1)
+    correlation = np.eye(9)
+    correlation[0, 8] = correlation[8, 0] = 0.7
+    P = correlation * np.outer(SD, SD)
+    errors = rng.multivariate_normal(np.zeros(9), P, len(time))
+    return time, errors, P, with_errors(time, errors)
+
+
+def test_errors_are_those_of_filters(run):
+    time, errors, _, trajectory = run
+    truth = MOTION.trajectory(time)
+    found = state_errors(trajectory, truth)
+    for k in (0, 17, 333):
+        one = state_error(state_of(trajectory.iloc[k], 0.0), state_of(truth.iloc[k], 0.0))
+        # Of 9-digit angles: 1e-9 m, and rounding of half turns.
+        assert found[k] == pytest.approx(one, abs=2e-9)
+    # Level axes of two states some metres apart differ by a millionth of a radian.
+    assert np.abs(found - errors).max() < 1e-4
+
+
+@pytest.mark.parametrize("rate", [None, 0.05, 0.07])
+def test_squares_and_shares_against_a_truth_of_any_rate(run, rate):
+    time, errors, P, trajectory = run
+    marks = time[::10]
+    truth = MOTION if rate is None else MOTION.trajectory(np.arange(0.0, 60.0, rate))
+    out = compare_with_truth(trajectory, marks, np.broadcast_to(P, (len(marks), 9, 9)), truth)
+    count = len(marks) if rate is None else np.sum(marks <= np.arange(0.0, 60.0, rate)[-1])
+    assert len(out.time) == count
+    e = errors[::10][:count]
+    # Interpolation over 0.07 s: velocity to h²/8 of a jerk of 0.4 m/s³, 2e-4 m/s of 0.1.
+    assert out.errors == pytest.approx(e, abs=4e-4)
+    squares = np.einsum("ni,ij,nj->n", e, np.linalg.inv(P), e)
+    assert out.nees["all"].to_numpy() == pytest.approx(squares, rel=0.03, abs=0.05)
+    assert out.freedom == {
+        "all": 9,
+        "position": 3,
+        "velocity": 3,
+        "attitude": 3,
+        "horizontal": 2,
+    }
+    # 60 independent errors: a share of 0.95 has a standard deviation of 0.028; four of them.
+    assert all(share > 0.83 for share in out.inside.values())
+    assert bool(out.findings) == (rate == 0.07)
+    table = out.table
+    assert table.loc["east", "rms"] == pytest.approx(np.sqrt(np.mean(e[:, 1] ** 2)), rel=1e-3)
+    assert table.loc["psi_D", "max"] == pytest.approx(np.degrees(np.abs(e[:, 8]).max()), rel=1e-2)
+    assert table.loc["horizontal", "max"] == pytest.approx(np.hypot(*e[:, :2].T).max(), rel=1e-3)
+    assert table.loc["VN", "sd"] == pytest.approx(0.1)
+
+
+def test_a_covariance_of_a_tenth_is_outside(run):
+    time, _, P, trajectory = run
+    marks = time[::10]
+    out = compare_with_truth(
+        trajectory, marks, np.broadcast_to(0.1 * P, (len(marks), 9, 9)), MOTION
+    )
+    assert out.inside["all"] < 0.1
+    assert out.inside["horizontal"] < 0.5
+
+
+def test_what_the_run_has_no_state_of_is_left_out(run):
+    time, _, P, trajectory = run
+    marks = time[::10]
+    P = P.copy()
+    P[2] = P[:, 2] = 0.0
+    out = compare_with_truth(trajectory, marks, np.broadcast_to(P, (len(marks), 9, 9)), MOTION)
+    assert out.freedom["all"] == 8
+    assert out.freedom["position"] == 2
+    assert np.isnan(out.table.loc["down", "inside"])
+
+
+def test_a_mark_between_samples_is_of_the_row_after_it(run):
+    _, errors, P, trajectory = run
+    marks = np.array([1.04, 1.06, 2.0])
+    out = compare_with_truth(trajectory, marks, np.stack([P, 2.0 * P, 3.0 * P]), MOTION)
+    # Of two marks before one row the later tells of it.
+    assert list(out.time) == pytest.approx([1.1, 2.0])
+    assert out.covariance[0] == pytest.approx(2.0 * P)
+    assert out.errors[0] == pytest.approx(errors[11], abs=1e-4)
+
+
+def test_places_alone_with_their_own_errors_and_their_antenna(run):
+    time, errors, P, trajectory = run
+    arm = np.array([2.0, -1.0, -1.5])
+    at = time[5::10]
+    truth = MOTION.trajectory(at)
+    q = rotation.quaternion_from_euler(truth[["roll", "pitch", "heading"]].to_numpy())
+    moved = rotation.rotate(q, arm)
+    places = truth[["lat", "lon", "alt"]].copy()
+    places["lat"] += moved[:, 0] / 111_323.0
+    places["lon"] += moved[:, 1] / (111_323.0 * np.cos(np.radians(55.0))) * (1.0 - 0.0023)
+    places["alt"] -= moved[:, 2]
+    places[["north_sd", "east_sd", "down_sd"]] = 0.5
+    out = compare_with_places(
+        trajectory, time, np.broadcast_to(P, (len(time), 9, 9)), places, antenna=arm
+    )
+    # The attitude of the trajectory turns the arm: 1 deg of 2.2 m; the scale above is rough by
+    # less than 1 % of the arm.
+    assert np.abs(out.errors[:, :3] - errors[5::10, :3]).max() < 0.2
+    assert np.isnan(out.errors[:, 3:]).all()
+    assert set(out.freedom) == {"all", "position", "horizontal"}
+    # Its own variance, and what a rotation of 0.1 deg of level makes of the arm.
+    assert out.covariance[0][2, 2] == pytest.approx(1.0 + 0.25, abs=0.01)
+    assert out.inside["position"] > 0.83
+    assert np.isnan(out.table.loc["VN", "rms"])
+
+
+def test_nothing_in_common_is_said(run):
+    time, _, P, trajectory = run
+    later = MOTION.trajectory(np.arange(0.0, 10.0, 0.1))
+    later.index = later.index + 1000.0
+    for compare in (compare_with_truth, compare_with_places):
+        with pytest.raises(DataError, match="no instant in common"):
+            compare(trajectory, time[::10], np.broadcast_to(P, (61, 9, 9)), later)

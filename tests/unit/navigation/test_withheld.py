@@ -1,0 +1,105 @@
+"""Fixes that are withheld are not used, and the score by them is the error by the truth."""
+
+from __future__ import annotations
+
+import sys
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+import town_drive as town
+from strapdown.errors import ConfigError
+from strapdown.navigation.outage_test import (
+    score_withheld,
+    scores_table,
+    spans_to_withhold,
+    without_spans,
+)
+from strapdown.navigation.record import Span
+
+LENGTH = 20.0
+NOISE = 0.01
+
+
+@cache
+def fixes():
+    return town.fixes(position_noise=NOISE, velocity_noise=0.03)
+
+
+@cache
+def scored(arm=town.ARM):
+    navigator, state = town.begun(town.gnss(lever_arm=arm))
+    spans = spans_to_withhold(60.0, 180.0, LENGTH)
+    return score_withheld(navigator, state, *town.increments(), "gnss", fixes(), spans)
+
+
+def test_spans_are_spread_from_the_begin_to_the_end():
+    spans = spans_to_withhold(100.0, 200.0, 20.0, 5)
+    assert [s.begin for s in spans] == [100.0, 120.0, 140.0, 160.0, 180.0]
+    assert [s.end for s in spans] == [120.0, 140.0, 160.0, 180.0, 200.0]
+    assert [s.begin for s in spans_to_withhold(0.0, 10.0, 4.0, 1)] == [3.0]
+    with pytest.raises(ConfigError, match="do not fit"):
+        spans_to_withhold(0.0, 10.0, 12.0)
+
+
+def test_the_score_of_a_span_is_the_error_of_a_run_without_its_fixes():
+    for score in scored()[1:2]:
+        navigator, state = town.begun(town.gnss())
+        table = without_spans(fixes(), [score.span])
+        piece = town.run(navigator, state, table)[1]
+        at = np.searchsorted(piece.time, score.time - 1e-9)
+        # Antenna and sensors are off by the same but for the arm, by a heading of 0.3 deg; the fix
+        # by its noise. The steps are not cut at fixes that are not there: 50 Hz and 2 Hz fall
+        # together, so that they are not cut at all.
+        apart = town.off(piece)[at] - score.error
+        assert np.abs(apart).max() < 5.0 * NOISE + 1.3 * np.radians(0.3)
+        assert score.largest > 10.0 * NOISE
+
+
+def test_errors_are_within_their_bounds_as_often_as_they_should_be():
+    table = scores_table(scored())
+    # Five of 95 %: two outside are as improbable as 2 %.
+    assert (table["distance"] < 2.45).sum() >= 4
+    assert table["distance"].max() > 0.1
+    assert (table["error"] < table["bound"]).equals(table["distance"] < np.sqrt(-2 * np.log(0.05)))
+    assert (table["fixes"] == 2 * LENGTH).all()
+
+
+def test_each_span_is_by_itself():
+    navigator, state = town.begun(town.gnss())
+    whole = scored()
+    again = score_withheld(
+        navigator, state, *town.increments(), "gnss", fixes(), [whole[3].span, whole[1].span]
+    )
+    assert (again[0].error == whole[3].error).all()
+    assert (again[1].error == whole[1].error).all()
+
+
+def test_rows_within_spans_are_left_out_and_the_source_is_kept():
+    table = fixes()
+    left = without_spans(table, [Span("a", 50.0, 60.0), Span("b", 100.0, 101.0)])
+    gone = table.index.difference(left.index)
+    assert len(gone) == 20 + 2
+    assert left.attrs == table.attrs
+    with pytest.raises(ConfigError, match="nothing to withhold"):
+        without_spans(table, [Span("a", 500.0, 600.0)])
+    with pytest.raises(ConfigError, match="every row"):
+        without_spans(table, [Span("a", 0.0, 600.0)])
+
+
+@pytest.mark.parametrize(
+    ("name", "span", "words"),
+    [
+        ("gps", (60.0, 70.0), "no aid 'gps'"),
+        ("gnss", (175.0, 190.0), "not within the record"),
+        ("gnss", (60.1, 60.2), "no fixes"),
+    ],
+)
+def test_what_cannot_be_withheld_is_refused(name, span, words):
+    navigator, state = town.begun(town.gnss())
+    with pytest.raises(ConfigError, match=words):
+        score_withheld(navigator, state, *town.increments(), name, fixes(), [Span("a", *span)])

@@ -1,0 +1,79 @@
+"""What is proposed for a receiver whose clock is not that of the sensors."""
+
+from __future__ import annotations
+
+import sys
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+import town_drive as town
+from strapdown.navigation.measurements.gnss import Gnss
+from strapdown.sensors.triad_errors import ImuErrors
+from strapdown.simulation import simulate_imu
+from strapdown.systems.navigation_proposal import APART, _clock
+from strapdown.tables import VELOCITY_SD, gnss_table
+
+RECEIVER = {"rate": 4.0, "position_noise": 0.02, "velocity_noise": 0.03}
+DRIFT = "time_offset_drift_s_per_sqrt_s"
+#: How two quartz clocks run apart.
+RATE = 50e-6
+
+
+@cache
+def imu():
+    return simulate_imu(town.motion(), ImuErrors(), rate=50.0, sampling="mean")[0]
+
+
+def stamped(offset, rate=0.0):
+    """Fixes by a clock that is so much ahead of the sensors' and runs so much faster."""
+    table = town.fixes(**RECEIVER)
+    time = table.index.to_numpy()
+    return gnss_table(
+        time + offset + rate * (time - time[0]),
+        *np.split(table.to_numpy()[:, :9], 3, axis=1),
+        table[VELOCITY_SD].to_numpy(),
+        source="receiver.csv",
+    )
+
+
+def test_clocks_that_are_apart_run_apart():
+    found = _clock(stamped(0.4), imu(), True)
+    assert found["time_offset_s"] == round(found["time_offset_s"], 3)
+    assert abs(found["time_offset_s"] - 0.4) < 3.0 * found["time_offset_sd_s"]
+    assert found[DRIFT] == APART
+
+
+def test_of_one_clock_nothing_drifts():
+    found = _clock(stamped(0.0), imu(), True)
+    assert abs(found["time_offset_s"]) < 0.05
+    assert DRIFT not in found
+
+
+def offset_at_the_end(walk, rate):
+    """Estimate less truth of the offset, and its standard deviation."""
+    aid = Gnss(
+        name="gnss",
+        lever_arm=town.ARM,
+        time_offset=0.4,
+        time_offset_sd=0.05,
+        time_offset_drift=walk,
+    )
+    navigator, state = town.begun(aid)
+    state = navigator.tell(state, "gnss", stamped(0.4, rate))
+    state, piece = navigator.advance(state, *town.increments())
+    last = piece.marks[-1]
+    k = navigator.filter.model.columns_of["gnss.time_offset"].start - 9
+    span = last.time - piece.marks[0].time
+    # The state is what is assumed less what is true.
+    return -last.sensors[k] - rate * span, last.sensors_sd[k]
+
+
+def test_what_is_proposed_follows_quartz_and_spoils_little_without_it():
+    for rate in (RATE, -RATE, 0.0):
+        error, sd = offset_at_the_end(APART, rate)
+        assert abs(error) < 3.0 * sd, rate
+        assert sd < 0.01
