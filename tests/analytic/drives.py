@@ -15,7 +15,7 @@ from strapdown.estimation.error_model import QuaternionModel, RotationVectorMode
 from strapdown.estimation.sensor_blocks import accel_bias, gauss_markov, gyro_bias
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown, WanderAzimuth
-from strapdown.mechanization.state_error import state_error
+from strapdown.mechanization.mechanization import state_error
 from strapdown.nav_state import NavState
 from strapdown.navigation.filter_options import DAMPINGS
 from strapdown.navigation.navigator import Navigator, with_states

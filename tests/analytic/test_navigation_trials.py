@@ -22,7 +22,7 @@ from strapdown.estimation.robust import (
 )
 from strapdown.evaluation.truth_comparison import band_of_mean, normalised_squares
 from strapdown.mechanization import NorthEastDown, run_mechanization
-from strapdown.mechanization.state_error import state_error
+from strapdown.mechanization.mechanization import state_error
 
 sys.path.insert(0, str(Path(__file__).parent))
 

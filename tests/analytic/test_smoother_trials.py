@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from strapdown.evaluation.truth_comparison import band_of_mean, normalised_squares
-from strapdown.mechanization.state_error import state_error
+from strapdown.mechanization.mechanization import state_error
 from strapdown.nav_state import NavState
 from strapdown.navigation.recorder import FullRecorder
 from strapdown.navigation.smoother import RauchTungStriebel

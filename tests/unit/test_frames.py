@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from strapdown import earth, frames, rotation
-from strapdown._kernels import geodetic as kernel
+from strapdown._kernels import earth as kernel
 from strapdown.ellipsoids import ELLIPSOIDS
 from strapdown.errors import DataError
 

@@ -19,7 +19,14 @@ import math
 from numba import njit
 
 from strapdown._kernels.earth import gravity_around
-from strapdown._kernels.rotation import dcm_from_quat, quat_from_rotvec, quat_multiply
+from strapdown._kernels.rotation import (
+    DEGREES,
+    dcm_from_quat,
+    euler_degrees_from_quat,
+    quat_from_rotvec,
+    quat_multiply,
+    wrap_pi,
+)
 
 # Places in the state: radians, m, m/s, quaternion body to level, sine and cosine of the latitude
 # (turned with the level from step to step, which spares computing them), the radius of the prime
@@ -390,4 +397,19 @@ def reverse_increments(increments, out):
             ux * dt - increments[i, 7],
             uy * dt - increments[i, 8],
             uz * dt - increments[i, 9],
+        )
+
+
+# Histories of navigation as rows of a Trajectory table.
+
+
+@njit(cache=True)
+def trajectory_rows(history, out):
+    """Latitude, longitude in deg, height, velocity, roll, pitch and heading in deg."""
+    for k in range(history.shape[0]):
+        out[k, 0], out[k, 1] = history[k, 0] * DEGREES, wrap_pi(history[k, 1]) * DEGREES
+        for j in range(2, 6):
+            out[k, j] = history[k, j]
+        out[k, 6], out[k, 7], out[k, 8] = euler_degrees_from_quat(
+            history[k, 6], history[k, 7], history[k, 8], history[k, 9]
         )

@@ -426,18 +426,8 @@ def post_fit(influence: Influence, b: float, kappa: float) -> float:
     then lies on the far side of F, no step goes past the root, and a slope that is not positive
     means that there is none.
 
-    Parameters
-    ----------
-    influence : Influence
-    b : float
-        Residual before the fit, >= 0.
-    kappa : float
-        Variance of the prediction over that of the observation, >= 0.
-
-    Returns
-    -------
-    float
-        From 0 to b.
+    `b`: residual before the fit, >= 0. `kappa`: variance of the prediction over that of the
+    observation, >= 0. Returns from 0 to b.
     """
     best, least = b, math.inf
     lo = 0.0
@@ -637,22 +627,9 @@ class AdaptiveScale:
     ) -> ScaleState:
         """Return the scale state after an observation.
 
-        Parameters
-        ----------
-        state : ScaleState
-            Before it.
-        nu : float
-            Innovation.
-        s : float
-            Variance of the prediction, ``h P h'``.
-        r : float
-            Variance of the observation as stated, without the factor.
-        weight : float
-            Weight by the rule; 0 is a rejection.
-
-        Returns
-        -------
-        ScaleState
+        `state`: before it. `nu`: innovation. `s`: variance of the prediction, ``h P h'``. `r`:
+        variance of the observation as stated, without the factor. `weight`: weight by the rule; 0
+        is a rejection.
         """
         rejected = state.rejected + 1 if weight == 0.0 else 0
         own = math.exp(state.log_square) * r
@@ -711,18 +688,8 @@ class AdaptiveRule:
     def after(self, scales: Scales, seen: Innovations, R: NDArray[np.float64]) -> Scales:
         """Return the scale state after an observation.
 
-        Parameters
-        ----------
-        scales : tuple of ScaleState
-            Before it.
-        seen : Innovations
-            Innovations of the observation.
-        R : ndarray, (l,)
-            Its stated variances.
-
-        Returns
-        -------
-        tuple of ScaleState
+        `scales`: before it. `seen`: innovations of the observation. `R` ((l,)): its stated
+        variances.
         """
         return tuple(
             self.scale.after(one, nu, s - r, r, weight)

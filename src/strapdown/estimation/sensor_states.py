@@ -79,16 +79,7 @@ class Stacked(NamedTuple):
 
 
 def stack(blocks: tuple[SensorStates, ...]) -> Stacked:
-    """Stack blocks, as kernels take them.
-
-    Parameters
-    ----------
-    blocks : tuple of SensorStates
-
-    Returns
-    -------
-    Stacked
-    """
+    """Stack blocks, as kernels take them."""
     size = sum(len(one.block) for one in blocks)
     gyro, accel = np.zeros((2, COUPLING, 3, size))
     decay, drive, sd = np.zeros((3, size))

@@ -10,8 +10,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.formats.arrays import told_by_file_rows
 from strapdown.formats.clocks import GPS, RELATIVE, Clock, unrolled, with_clock
-from strapdown.formats.table_rows import told_by_file_rows
 from strapdown.tables import gnss_table
 from strapdown.tables.checks import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
 
@@ -106,21 +106,9 @@ class Fixes:
 def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
     """Convert fixes to a Gnss table, or report their fault.
 
-    Parameters
-    ----------
-    fixes : Fixes
-    options : GnssOptions
-
-    Returns
-    -------
-    DataFrame
-        A Gnss table; ``attrs`` has its clock (`clocks`) and its `findings`.
-
-    Raises
-    ------
-    DataError
-        A stamp or position is not a number, time does not advance, a standard deviation is
-        zero, negative or not stated, or as `gnss_table`.
+    Returns a Gnss table; ``attrs`` has its clock (`clocks`) and its `findings`. DataError: a stamp
+    or position is not a number, time does not advance, a standard deviation is zero, negative or
+    not stated, or as `gnss_table`.
     """
     count = fixes.time.size
     asked, taken = options.position_sd, {}

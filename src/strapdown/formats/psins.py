@@ -50,10 +50,6 @@ def detect(path: Path) -> bool:
 def read(path: Path) -> RawLog:
     """Read the increments of a strapdown unit.
 
-    Parameters
-    ----------
-    path : Path
-
     Returns
     -------
     RawLog

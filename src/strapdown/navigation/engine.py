@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown._kernels.error_loop import BEYOND
-from strapdown._kernels.smoothing_rows import (
+from strapdown._kernels.filter_loop import BEYOND
+from strapdown._kernels.smoothing import (
     BEGIN,
     CORE,
     COVARIANCE,

@@ -18,11 +18,11 @@ from strapdown.config import CrashSimulationSpec
 from strapdown.crash.pdof import pdof
 from strapdown.errors import ConfigError
 from strapdown.formats.crash_record import QUANTITIES, CrashChannel, CrashRecord
-from strapdown.formats.mme_writer import write_mme
-from strapdown.formats.recorder_csv import (
+from strapdown.formats.crash_writers import (
     ACCEL_HEADINGS,
     GYRO_HEADINGS,
     TIME,
+    write_mme,
     write_path_csv,
     write_recorder_csv,
 )

@@ -35,10 +35,7 @@ _MOST = 1_000_000
 def instants(motion: EarthMotion, rate: float) -> Array:
     """Return the instants ``k / rate`` within a motion, (n,), s.
 
-    Raises
-    ------
-    ConfigError
-        The instants are fewer than two, or too many.
+    ConfigError: the instants are fewer than two, or too many.
     """
     count = math.floor(rate * motion.duration * (1.0 + 1e-12)) + 1
     if not 2 <= count <= _MOST:
@@ -132,19 +129,7 @@ def simulate_barometer(
 ) -> pd.DataFrame:
     """Simulate barometric heights over a motion.
 
-    Parameters
-    ----------
-    motion : EarthMotion
-    barometer : PressureHeight
-    seed : int or SeedSequence
-        Of noise and walk.
-    source : str, optional
-        Name for messages.
-
-    Returns
-    -------
-    DataFrame
-        Barometer table at the instants ``k / rate``.
+    `seed`: of noise and walk. Returns barometer table at the instants ``k / rate``.
     """
     time = instants(motion, barometer.rate)
     height = place_of_point(motion, time, barometer.point)[:, 2]
@@ -198,20 +183,8 @@ def simulate_body_velocity(
 ) -> pd.DataFrame:
     """Simulate the velocities of an instrument over a motion.
 
-    Parameters
-    ----------
-    motion : EarthMotion
-        Motion of the inertial sensors.
-    log : VelocityLog
-    seed : int or SeedSequence
-        Of the noise.
-    source : str, optional
-        Name for messages.
-
-    Returns
-    -------
-    DataFrame
-        BodyVelocity table at the instants ``k / rate``.
+    `motion`: motion of the inertial sensors. `seed`: of the noise. Returns BodyVelocity table at
+    the instants ``k / rate``.
     """
     time = instants(motion, log.rate)
     velocity = velocity_of_point(motion, time, log.point)
@@ -259,19 +232,7 @@ def simulate_heading(
 ) -> pd.DataFrame:
     """Simulate the headings of a compass over a motion.
 
-    Parameters
-    ----------
-    motion : EarthMotion
-    compass : Compass
-    seed : int or SeedSequence
-        Of the noise.
-    source : str, optional
-        Name for messages.
-
-    Returns
-    -------
-    DataFrame
-        Heading table at the instants ``k / rate``; 0 to 360 deg.
+    `seed`: of the noise. Returns heading table at the instants ``k / rate``; 0 to 360 deg.
     """
     time = instants(motion, compass.rate)
     angle = math.radians(compass.axis_deg)
@@ -325,20 +286,8 @@ def simulate_odometer(
 ) -> pd.DataFrame:
     """Simulate the speeds of a wheel over a motion.
 
-    Parameters
-    ----------
-    motion : EarthMotion
-        Motion of the inertial sensors.
-    wheel : WheelSpeed
-    seed : int or SeedSequence
-        Of the noise.
-    source : str, optional
-        Name for messages.
-
-    Returns
-    -------
-    DataFrame
-        Odometer table at the instants ``k / rate``.
+    `motion`: motion of the inertial sensors. `seed`: of the noise. Returns odometer table at the
+    instants ``k / rate``.
     """
     time = instants(motion, wheel.rate)
     velocity = velocity_of_point(motion, time, wheel.point)

@@ -72,16 +72,7 @@ class Coning(FlatMotion):
             raise ConfigError("simulation.no-direction", quantity="axis", axis=self.axis)
 
     def rate(self, time: ArrayLike) -> Array:
-        """Body rate.
-
-        Parameters
-        ----------
-        time : array_like, (n,), s
-
-        Returns
-        -------
-        ndarray, (n, 3), rad/s
-        """
+        """Body rate; (n, 3), rad/s."""
         u, v, n = self._triad()
         cos, sin = self._cycle(time)
         side = self._omega * np.sin(self._beta)
@@ -89,16 +80,7 @@ class Coning(FlatMotion):
         return rate
 
     def angle(self, time: ArrayLike) -> Array:
-        """Integral of the body rate from time zero, in closed form.
-
-        Parameters
-        ----------
-        time : array_like, (n,), s
-
-        Returns
-        -------
-        ndarray, (n, 3), rad
-        """
+        """Integral of the body rate from time zero, in closed form; (n, 3), rad."""
         u, v, n = self._triad()
         cos, sin = self._cycle(time)
         t = np.asarray(time, dtype=np.float64)[:, None]
@@ -107,16 +89,7 @@ class Coning(FlatMotion):
         return angle
 
     def attitude(self, time: ArrayLike) -> Array:
-        """Exact attitude.
-
-        Parameters
-        ----------
-        time : array_like, (n,), s
-
-        Returns
-        -------
-        ndarray, (n, 4)
-        """
+        """Exact attitude; (n, 4)."""
         u, v, _ = self._triad()
         cos, sin = self._cycle(time)
         tilt = rotation.quaternion_from_rotation_vector(self._beta * (cos * u + sin * v))

@@ -76,20 +76,9 @@ class CrashCase:
     def chosen(self, names: Sequence[str] = ()) -> tuple[CaseRecorder, ...]:
         """Select recorders by name.
 
-        Parameters
-        ----------
-        names : sequence of str
-            Names, in any letter case; ``all`` for every recorder; if empty, the usual ones.
-
-        Returns
-        -------
-        tuple of CaseRecorder
-            In the order of the case.
-
-        Raises
-        ------
-        ConfigError
-            A name is unknown, or a recorder uses the gyro of another that is not selected.
+        `names`: names, in any letter case; ``all`` for every recorder; if empty, the usual ones.
+        Returns in the order of the case. ConfigError: a name is unknown, or a recorder uses the
+        gyro of another that is not selected.
         """
         known = {r.design.name: r for r in self.recorders}
         wanted = [n.upper() for n in names] or list(self.usual)

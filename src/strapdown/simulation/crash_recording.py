@@ -269,15 +269,7 @@ ACCEL_ERRORS, GYRO_ERRORS, ACCEL_NOISE, GYRO_NOISE, MOUNTING, TRIGGER, WARM_UP, 
 def draw_truth(design: RecorderDesign, root: Seed) -> RecorderTruth:
     """Draw errors, mounting and trigger error of one recorder.
 
-    Parameters
-    ----------
-    design : RecorderDesign
-    root : int or SeedSequence
-        Seed of the recorder; each part has its own stream below it.
-
-    Returns
-    -------
-    RecorderTruth
+    `root`: seed of the recorder; each part has its own stream below it.
     """
     accelerometers = []
     for k, triad in enumerate(design.accelerometers):

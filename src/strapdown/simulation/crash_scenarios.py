@@ -41,24 +41,10 @@ def side_impact(
 ) -> CrashScenario:
     """Side impact by another car while driving.
 
-    Parameters
-    ----------
-    entry_speed : float, m/s
-    change : float, m/s
-        Velocity change along the force.
-    direction_deg : float, deg
-        Direction the force comes from; -90 is the left.
-    arm : float, m
-        Arm of the force about the center of mass; positive yaws the car to the right.
-    length : float, s
-        Length of the pulse.
-    roll_deg : float, deg
-        Toward the striking car, which hits below the center of mass; in 0.2 s, and back in 0.4 s.
-    setting : Setting, optional
-
-    Returns
-    -------
-    CrashScenario
+    `entry_speed` (m/s). `change` (m/s): velocity change along the force. `direction_deg` (deg):
+    direction the force comes from; -90 is the left. `arm` (m): arm of the force about the center of
+    mass; positive yaws the car to the right. `length` (s): length of the pulse. `roll_deg` (deg):
+    toward the striking car, which hits below the center of mass; in 0.2 s, and back in 0.4 s.
     """
     course = CrashCourse(setting or Setting())
     course.approach(entry_speed)
@@ -97,21 +83,9 @@ def rear_impact(
 ) -> CrashScenario:
     """Rear impact while rolling slowly.
 
-    Parameters
-    ----------
-    entry_speed, change : float, m/s
-        Speed, and its increase.
-    offset : float, m
-        Offset of the force to the right of the center of mass; positive yaws the car to the left.
-    length : float, s
-        Length of the pulse.
-    pitch_deg : float, deg
-        The nose rises in 0.2 s and comes back in 0.4 s.
-    setting : Setting, optional
-
-    Returns
-    -------
-    CrashScenario
+    `entry_speed`, `change` (m/s): speed, and its increase. `offset` (m): offset of the force to the
+    right of the center of mass; positive yaws the car to the left. `length` (s): length of the
+    pulse. `pitch_deg` (deg): the nose rises in 0.2 s and comes back in 0.4 s.
     """
     course = CrashCourse(setting or Setting())
     course.approach(entry_speed)
@@ -148,19 +122,9 @@ def two_impacts(
 ) -> CrashScenario:
     """Front-left impact, then a right-rear impact while the car yaws.
 
-    Parameters
-    ----------
-    entry_speed : float, m/s
-    first, second : float, m/s
-        Velocity changes: from -20 deg in 110 ms with an arm of 0.35 m, and from 130 deg in 90 ms
-        with an arm of -0.3 m.
-    between : float, s
-        From the end of the first pulse to the start of the second.
-    setting : Setting, optional
-
-    Returns
-    -------
-    CrashScenario
+    `entry_speed` (m/s). `first`, `second` (m/s): velocity changes: from -20 deg in 110 ms with an
+    arm of 0.35 m, and from 130 deg in 90 ms with an arm of -0.3 m. `between` (s): from the end of
+    the first pulse to the start of the second.
     """
     course = CrashCourse(setting or Setting())
     course.approach(entry_speed)
@@ -195,24 +159,11 @@ def rollover(
 ) -> CrashScenario:
     """Skid sideways into a curb that trips the car: the first half turn of a rollover.
 
-    Parameters
-    ----------
-    entry_speed : float, m/s
-    change : float, m/s
-        Lateral speed removed by the curb in 0.15 s.
-    skid_deg : float, deg
-        Heading change in the preceding 1.2 s; negative is to the left, so that the right wheels
-        strike. Friction brakes meanwhile.
-    height : float, m
-        Height of the center of mass over the curb: the roll rate is ``change height/k²``.
-    lift : float, m/s
-        Upward velocity from the blow, removed by gravity and by the wheels still in contact.
-    setting : Setting, optional
-
-    Returns
-    -------
-    CrashScenario
-        Still rolling at the end.
+    `entry_speed` (m/s). `change` (m/s): lateral speed removed by the curb in 0.15 s. `skid_deg`
+    (deg): heading change in the preceding 1.2 s; negative is to the left, so that the right wheels
+    strike. Friction brakes meanwhile. `height` (m): height of the center of mass over the curb: the
+    roll rate is ``change height/k²``. `lift` (m/s): upward velocity from the blow, removed by
+    gravity and by the wheels still in contact. Returns still rolling at the end.
     """
     course = CrashCourse(setting or Setting())
     course.approach(entry_speed)
@@ -260,18 +211,8 @@ def hard_braking(
 ) -> CrashScenario:
     """Brake to a stop as hard as tires can.
 
-    Parameters
-    ----------
-    entry_speed : float, m/s
-    deceleration : float, m/s²
-        Constant except for 0.2 s at both ends.
-    pitch_deg : float, deg
-        While braking; it builds up and decays in 0.4 s.
-    setting : Setting, optional
-
-    Returns
-    -------
-    CrashScenario
+    `entry_speed` (m/s). `deceleration` (m/s²): constant except for 0.2 s at both ends. `pitch_deg`
+    (deg): while braking; it builds up and decays in 0.4 s.
     """
     if not (entry_speed > 0.0 and 0.0 < deceleration < math.inf):
         raise ConfigError(
@@ -309,19 +250,9 @@ def pothole(
 ) -> CrashScenario:
     """Drive one wheel through a pothole.
 
-    Parameters
-    ----------
-    entry_speed : float, m/s
-    depth : float, m
-        Drop of the center of mass in 60 ms. The edge throws it back in 70 ms and removes 0.15 m/s
-        of speed in 40 ms.
-    roll_deg : float, deg
-        Meanwhile; positive for a wheel on the right.
-    setting : Setting, optional
-
-    Returns
-    -------
-    CrashScenario
+    `entry_speed` (m/s). `depth` (m): drop of the center of mass in 60 ms. The edge throws it back
+    in 70 ms and removes 0.15 m/s of speed in 40 ms. `roll_deg` (deg): meanwhile; positive for a
+    wheel on the right.
     """
     course = CrashCourse(setting or Setting())
     course.approach(entry_speed)
@@ -346,16 +277,8 @@ def kerb(
 ) -> CrashScenario:
     """Drive over a curb, head on: front wheels, then rear wheels 2.7 m later.
 
-    Parameters
-    ----------
-    entry_speed : float, m/s
-    height : float, m
-        Height of the curb. Each axle lifts the middle by half that in 0.12 s and removes 0.3 m/s.
-    setting : Setting, optional
-
-    Returns
-    -------
-    CrashScenario
+    `entry_speed` (m/s). `height` (m): height of the curb. Each axle lifts the middle by half that
+    in 0.12 s and removes 0.3 m/s.
     """
     if not 0.0 < entry_speed < math.inf:
         raise ConfigError(
@@ -385,17 +308,8 @@ def door_slam(
 ) -> CrashScenario:
     """Slam a door of the parked car.
 
-    Parameters
-    ----------
-    speed : float, m/s
-        Lateral speed of the body out and back, all within 50 ms.
-    roll_deg : float, deg
-        Toward the door in 50 ms, and back in 150 ms.
-    setting : Setting, optional
-
-    Returns
-    -------
-    CrashScenario
+    `speed` (m/s): lateral speed of the body out and back, all within 50 ms. `roll_deg` (deg):
+    toward the door in 50 ms, and back in 150 ms.
     """
     course = CrashCourse(setting or Setting())
     course.approach(0.0)
@@ -425,16 +339,8 @@ YAW_GYRATION = 1.90
 def blow(direction_deg: float, change: float) -> Triple:
     """Velocity change in vehicle axes for a given principal direction of force.
 
-    Parameters
-    ----------
-    direction_deg : float, deg
-        Principal direction of force: 0 from the front, positive clockwise.
-    change : float, m/s
-
-    Returns
-    -------
-    tuple of float, m/s
-        Forward, right, down.
+    `direction_deg` (deg): principal direction of force: 0 from the front, positive clockwise.
+    `change` (m/s). Returns m/s, forward, right, down.
     """
     angle = math.radians(direction_deg)
     # A component at the rounding level of pi is set to zero.
@@ -448,24 +354,11 @@ def velocity_change(
 ) -> float:
     """Velocity change of a vehicle in a plane impact against a rigid object.
 
-    Parameters
-    ----------
-    closing_speed : float, m/s
-        Speed of the center of mass along the force.
-    arm : float, m
-        Arm of the force about the center of mass.
-    restitution : float
-        Separation speed over approach speed, at the contact and along the force.
-    gyration_squared : float, m²
-        Yaw moment of inertia over mass.
+    `closing_speed` (m/s): speed of the center of mass along the force. `arm` (m): arm of the force
+    about the center of mass. `restitution`: separation speed over approach speed, at the contact
+    and along the force. `gyration_squared` (m²): yaw moment of inertia over mass. Returns m/s, ``V0
+    (1 + e)/(1 + d²/k²)``.
 
-    Returns
-    -------
-    float, m/s
-        ``V0 (1 + e)/(1 + d²/k²)``.
-
-    Notes
-    -----
     An impulse P changes the velocity by P/m and the yaw rate by ``P d/(m k²)``, hence the contact
     speed along it by ``P/m (1 + d²/k²)``; the restitution sets this to ``(1 + e) V0``.
     """
@@ -487,20 +380,9 @@ def strike(
 ) -> Triple:
     """Add one blow, with the yaw rate that its arm gives, and advance to its end.
 
-    Parameters
-    ----------
-    course : CrashCourse
-    direction_deg, change
-        As `blow`.
-    arm : float, m
-        Arm of the force about the center of mass; positive yaws the vehicle to the right.
-    length : float, s
-    gyration_squared : float, m²
-
-    Returns
-    -------
-    tuple of float, m/s
-        Velocity change: forward, right, down.
+    `direction_deg`, `change`: as `blow`. `arm` (m): arm of the force about the center of mass;
+    positive yaws the vehicle to the right. `length` (s). `gyration_squared` (m²). Returns m/s,
+    velocity change: forward, right, down.
     """
     delta_v = blow(direction_deg, change)
     course.push(length, delta_v, (0.0, 0.0, yaw_rate_change(change, arm, gyration_squared)))
@@ -523,23 +405,9 @@ def pole_impact(
 ) -> CrashScenario:
     """Off-center frontal pole impact, which yaws the car about the pole.
 
-    Parameters
-    ----------
-    entry_speed : float, m/s
-    offset : float, m
-        Offset of the pole to the right of the center of mass: the car then yaws to the right.
-    restitution : float
-    gyration_squared : float, m²
-        In yaw.
-    length : float, s
-        Length of the pulse.
-    pitch_deg : float, deg
-        Nose-down pitch, reached in 0.2 s and reversed in 0.4 s.
-    setting : Setting, optional
-
-    Returns
-    -------
-    CrashScenario
+    `entry_speed` (m/s). `offset` (m): offset of the pole to the right of the center of mass: the
+    car then yaws to the right. `gyration_squared` (m²): in yaw. `length` (s): length of the pulse.
+    `pitch_deg` (deg): Nose-down pitch, reached in 0.2 s and reversed in 0.4 s.
     """
     course = CrashCourse(setting or Setting())
     course.approach(entry_speed)
@@ -614,19 +482,10 @@ def oblique_impact(
 ) -> CrashScenario:
     """Impact of a front corner on a rigid object.
 
-    Parameters
-    ----------
-    entry_speed : float, m/s
-    direction_deg : float, deg
-        Direction the force comes from: 0 front, positive right; within 80 deg of the front.
-    arm : float, m
-        Arm of the force about the center of mass; positive yaws the car to the right.
-    restitution, length, pitch_deg, setting
-        As `pole_impact`.
-
-    Returns
-    -------
-    CrashScenario
+    `entry_speed` (m/s). `direction_deg` (deg): direction the force comes from: 0 front, positive
+    right; within 80 deg of the front. `arm` (m): arm of the force about the center of mass;
+    positive yaws the car to the right. `restitution`, `length`, `pitch_deg`, `setting`: as
+    `pole_impact`.
     """
     if not abs(direction_deg) <= 80.0:
         raise ConfigError(

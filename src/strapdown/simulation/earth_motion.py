@@ -124,50 +124,26 @@ class EarthMotion(ABC):
     def rate(self, time: ArrayLike) -> Array:
         """Body rate relative to inertial space.
 
-        Parameters
-        ----------
-        time : array_like, (n,), s
-
-        Returns
-        -------
-        ndarray, (n, 3), rad/s
-            ``w_nb + C_nb^T (w_ie + w_en)``.
+        Returns (n, 3), rad/s, ``w_nb + C_nb^T (w_ie + w_en)``.
         """
         return self._feel(time)[0]
 
     def specific_force(self, time: ArrayLike) -> Array:
         """Specific force in body axes.
 
-        Parameters
-        ----------
-        time : array_like, (n,), s
-
-        Returns
-        -------
-        ndarray, (n, 3), m/s²
-            ``C_nb^T (v' + (2 w_ie + w_en) x v - g_n)`` with the ellipsoid's normal gravity.
+        Returns (n, 3), m/s², ``C_nb^T (v' + (2 w_ie + w_en) x v - g_n)`` with the ellipsoid's
+        normal gravity.
         """
         return self._feel(time)[1]
 
     def angular_acceleration(self, time: ArrayLike) -> Array:
         """Time derivative of the body rate relative to inertial space.
 
-        Parameters
-        ----------
-        time : array_like, (n,), s
-
-        Returns
-        -------
-        ndarray, (n, 3), rad/s²
-            Derivatives of the components of `rate` in body axes, including the rotation and change
-            of the Earth's rate and the transport rate along the course.
-
-        Raises
-        ------
-        ConfigError
-            The motion does not provide the second derivative of its attitude.
+        Returns (n, 3), rad/s², derivatives of the components of `rate` in body axes, including the
+        rotation and change of the Earth's rate and the transport rate along the course.
+        ConfigError: the motion does not provide the second derivative of its attitude.
         """
-        from strapdown._kernels.earth_motion import swing
+        from strapdown._kernels.earth import swing
 
         k = self.kinematics(_instants(time))
         if k.swinging is None:
@@ -192,14 +168,8 @@ class EarthMotion(ABC):
     def angle(self, time: ArrayLike) -> Array:
         """Integral of the body rate from time zero.
 
-        Parameters
-        ----------
-        time : array_like, (n,), s
-
-        Returns
-        -------
-        ndarray, (n, 3), rad
-            Within 1e-14 rad per panel, plus rounding (`rate_integral.integrate_rate`).
+        Returns (n, 3), rad, within 1e-14 rad per panel, plus rounding
+        (`rate_integral.integrate_rate`).
         """
         return self._integral(time)
 
@@ -210,16 +180,7 @@ class EarthMotion(ABC):
     def trajectory(self, time: ArrayLike, source: str | None = None) -> pd.DataFrame:
         """Position, velocity and attitude.
 
-        Parameters
-        ----------
-        time : array_like, (n,), s
-        source : str, optional
-            Name for messages.
-
-        Returns
-        -------
-        DataFrame
-            Trajectory table. Longitude is continuous, not wrapped at 180 deg.
+        Returns trajectory table. Longitude is continuous, not wrapped at 180 deg.
         """
         t = _instants(time)
         k = self.kinematics(t)
@@ -229,7 +190,7 @@ class EarthMotion(ABC):
         return trajectory_table(t, place, k.velocity, _euler(k), source=source)
 
     def _feel(self, time: ArrayLike) -> tuple[Array, Array]:
-        from strapdown._kernels.earth_motion import feel
+        from strapdown._kernels.earth import feel
 
         k = self.kinematics(_instants(time))
         place = self.origin.place(k.moved)

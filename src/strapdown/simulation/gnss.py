@@ -440,23 +440,9 @@ def inject_gnss_faults(
 ) -> pd.DataFrame:
     """Inject faults into a Gnss table.
 
-    Parameters
-    ----------
-    table : DataFrame
-        Not changed.
-    faults : sequence of GnssFault
-        Applied in order: a later fault acts on the output of an earlier one.
-    seed : int
-        Seed of the random draws; each fault has its own stream.
-
-    Returns
-    -------
-    DataFrame
-
-    Raises
-    ------
-    ConfigError
-        An interval contains no fix, or an outage removes all fixes.
+    `table`: not changed. `faults`: applied in order: a later fault acts on the output of an earlier
+    one. `seed`: seed of the random draws; each fault has its own stream. ConfigError: an interval
+    contains no fix, or an outage removes all fixes.
     """
     out = table
     for k, fault in enumerate(faults):

@@ -59,41 +59,21 @@ class Gesture(FlatMotion):
             )
 
     def rate(self, time: ArrayLike) -> Array:
-        """Body rate.
-
-        Parameters
-        ----------
-        time : array_like, (n,), s
-
-        Returns
-        -------
-        ndarray, (n, 3), rad/s
-        """
+        """Body rate; (n, 3), rad/s."""
         angles, rates, _ = self._turned(time)
         return euler_body_rate(angles, rates)
 
     def angle(self, time: ArrayLike) -> Array:
         """Integral of the body rate from time zero.
 
-        Parameters
-        ----------
-        time : array_like, (n,), s
-            Before zero and after the end the integral is held constant.
-
-        Returns
-        -------
-        ndarray, (n, 3), rad
-            Within 1e-14 rad, plus rounding (`rate_integral.integrate_rate`); exactly constant at
-            rest.
+        `time` ((n,), s): before zero and after the end the integral is held constant. Returns (n,
+        3), rad, within 1e-14 rad, plus rounding (`rate_integral.integrate_rate`); exactly constant
+        at rest.
         """
         return self._integral(time)
 
     def attitude(self, time: ArrayLike) -> Array:
         """Exact attitude.
-
-        Parameters
-        ----------
-        time : array_like, (n,), s
 
         Returns
         -------
@@ -135,15 +115,6 @@ def gesture(poses: Sequence[Sequence[float]], duration: float) -> Gesture:
     poses : sequence of (time, roll, pitch, heading, north, east, down)
         s, deg, m; rising times.
     duration : float, s
-
-    Returns
-    -------
-    Gesture
-
-    Raises
-    ------
-    ConfigError
-        As `Track` and `Gesture`.
     """
     times, *columns = (tuple(float(x) for x in column) for column in zip(*poses, strict=True))
     roll, pitch, heading, north, east, down = (Track(times, values) for values in columns)

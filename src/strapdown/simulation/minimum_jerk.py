@@ -15,19 +15,9 @@ Array = NDArray[np.float64]
 def minimum_jerk(x: Array) -> tuple[Array, Array, Array]:
     """Unit move ``10 x³ - 15 x⁴ + 6 x⁵`` and its first two derivatives with respect to `x`.
 
-    Parameters
-    ----------
-    x : ndarray
-        Elapsed fraction of the move; at rest outside [0, 1].
+    `x`: elapsed fraction of the move; at rest outside [0, 1]. Returns `value`, `first`, `second`:
+    exactly 0, 0, 0 where ``x <= 0`` and exactly 1, 0, 0 where ``x >= 1``; all three are continuous.
 
-    Returns
-    -------
-    value, first, second : ndarray
-        Exactly 0, 0, 0 where ``x <= 0`` and exactly 1, 0, 0 where ``x >= 1``; all three are
-        continuous.
-
-    Notes
-    -----
     Flash and Hogan (1985), J. Neurosci. 5(7), 1688-1703: the move between two rests with the least
     mean square third derivative. Its largest rate is 15/8 of its mean rate.
     """
@@ -87,15 +77,8 @@ class Track:
     def evaluate(self, time: ArrayLike) -> tuple[Array, Array, Array]:
         """Value and its first two time derivatives.
 
-        Parameters
-        ----------
-        time : array_like, (n,), s
-
-        Returns
-        -------
-        value, first, second : ndarray, (n,)
-            Unit of the values, that per s and per s². At rest the value is bit-identical to the
-            given one, and both derivatives are exactly zero.
+        Returns `value`, `first`, `second` ((n,)): unit of the values, that per s and per s². At
+        rest the value is bit-identical to the given one, and both derivatives are exactly zero.
         """
         t = np.asarray(time, dtype=np.float64)
         times, values = np.asarray(self.times), np.asarray(self.values)

@@ -19,19 +19,10 @@ Quaternion = tuple[float, float, float, float]
 def euler_attitude(angles: Array, q_nb: Quaternion) -> Array:
     """Attitude of a body rotated by 3-2-1 angles from an initial attitude.
 
-    Parameters
-    ----------
-    angles : ndarray, (n, 3), deg
-        Roll, pitch, heading, relative to the initial attitude; any number of turns, and no
-        singularity at pitch ±90 deg.
-    q_nb : tuple of float
-        Initial attitude, scalar first.
-
-    Returns
-    -------
-    ndarray, (n, 4)
-        ``q_nb Rz(heading) Ry(pitch) Rx(roll)``, continuous in sign. Whole turns reproduce the
-        attitude to the last bit, except for that sign.
+    `angles` ((n, 3), deg): roll, pitch, heading, relative to the initial attitude; any number of
+    turns, and no singularity at pitch ±90 deg. `q_nb`: initial attitude, scalar first. Returns (n,
+    4), ``q_nb Rz(heading) Ry(pitch) Rx(roll)``, continuous in sign. Whole turns reproduce the
+    attitude to the last bit, except for that sign.
     """
     # 360 deg is not a binary fraction of pi, but whole turns can be removed without rounding.
     turns = np.rint(angles / 360.0)
@@ -45,20 +36,9 @@ def euler_attitude(angles: Array, q_nb: Quaternion) -> Array:
 def euler_body_rate(angles: Array, rates: Array) -> Array:
     """Body rate from the rates of the 3-2-1 angles.
 
-    Parameters
-    ----------
-    angles : ndarray, (n, 3), deg
-        Roll, pitch, heading.
-    rates : ndarray, (n, 3), deg/s
-        Their derivatives.
+    `angles` ((n, 3), deg): roll, pitch, heading. `rates` ((n, 3), deg/s): their derivatives.
+    Returns (n, 3), rad/s, exactly zero where all three rates are zero.
 
-    Returns
-    -------
-    ndarray, (n, 3), rad/s
-        Exactly zero where all three rates are zero.
-
-    Notes
-    -----
     ``ω = [φ' - ψ' sin θ, θ' cos φ + ψ' sin φ cos θ, ψ' cos φ cos θ - θ' sin φ]``, the inverse of
     Alexiev (2021), Eqs. (8)-(10). Valid at every pitch.
     """
@@ -77,18 +57,10 @@ def euler_body_rate(angles: Array, rates: Array) -> Array:
 def euler_body_acceleration(angles: Array, rates: Array, accelerations: Array) -> Array:
     """Time derivative of the body rate from 3-2-1 angles and their derivatives.
 
-    Parameters
-    ----------
-    angles : ndarray, (n, 3), deg
-        Roll, pitch, heading.
-    rates, accelerations : ndarray, (n, 3), deg/s and deg/s²
-        Their first and second derivatives.
-
-    Returns
-    -------
-    ndarray, (n, 3), rad/s²
-        Derivative of the components of `euler_body_rate` in body axes, at every pitch; exactly zero
-        where all derivatives are zero.
+    `angles` ((n, 3), deg): roll, pitch, heading. `rates`, `accelerations` ((n, 3), deg/s and
+    deg/s²): their first and second derivatives. Returns (n, 3), rad/s², derivative of the
+    components of `euler_body_rate` in body axes, at every pitch; exactly zero where all derivatives
+    are zero.
     """
     roll, pitch = np.radians(angles[:, 0]), np.radians(angles[:, 1])
     d_roll, d_pitch, d_heading = np.radians(rates).T
@@ -121,14 +93,7 @@ class FlatMotion:
     def specific_force(self: _Accelerated, time: ArrayLike) -> Array:
         """Specific force in body axes.
 
-        Parameters
-        ----------
-        time : array_like, (n,), s
-
-        Returns
-        -------
-        ndarray, (n, 3), m/s²
-            ``C_nb^T (a_n - g_n)`` with standard gravity straight down.
+        Returns (n, 3), m/s², ``C_nb^T (a_n - g_n)`` with standard gravity straight down.
         """
         upward = self.acceleration(time) - np.array([0.0, 0.0, STANDARD_GRAVITY])
         return rotation.rotate(rotation.conjugate(self.attitude(time)), upward)
@@ -210,16 +175,7 @@ class PulseMotion(FlatMotion):
     q_nb: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
 
     def rate(self, time: ArrayLike) -> Array:
-        """Body rate at each instant.
-
-        Parameters
-        ----------
-        time : array_like, (n,), s
-
-        Returns
-        -------
-        ndarray, (n, 3), rad/s
-        """
+        """Body rate at each instant; (n, 3), rad/s."""
         t = np.asarray(time, dtype=np.float64)
         out = np.zeros((t.size, 3))
         for p in self.pulses:
@@ -228,16 +184,7 @@ class PulseMotion(FlatMotion):
         return out
 
     def angle(self, time: ArrayLike) -> Array:
-        """Integral of the body rate from time zero.
-
-        Parameters
-        ----------
-        time : array_like, (n,), s
-
-        Returns
-        -------
-        ndarray, (n, 3), rad
-        """
+        """Integral of the body rate from time zero; (n, 3), rad."""
         t = np.asarray(time, dtype=np.float64)
         out = np.zeros((t.size, 3))
         for p in self.pulses:

@@ -83,16 +83,7 @@ class MountedMotion:
         return rotation.rotate(self._to_sensor, self.motion.angular_acceleration(time))
 
     def specific_force(self, time: ArrayLike) -> Array:
-        """Specific force in sensor axes.
-
-        Parameters
-        ----------
-        time : array_like, (n,), s
-
-        Returns
-        -------
-        ndarray, (n, 3), m/s²
-        """
+        """Specific force in sensor axes; (n, 3), m/s²."""
         t = _instants(time)
         force = self.motion.specific_force(t)
         if self.ringing or any(self.mounting.position):
@@ -107,16 +98,7 @@ class MountedMotion:
     def trajectory(self, time: ArrayLike, source: str | None = None) -> pd.DataFrame:
         """Position and velocity of the sensors, and attitude of their axes.
 
-        Parameters
-        ----------
-        time : array_like, (n,), s
-        source : str, optional
-            Name for messages.
-
-        Returns
-        -------
-        DataFrame
-            Trajectory table; positions are accurate to 5e-9 m.
+        Returns trajectory table; positions are accurate to 5e-9 m.
         """
         t = _instants(time)
         point = self._point(t)
@@ -133,21 +115,9 @@ class MountedMotion:
     def kinematics_from(self, time: ArrayLike, *, epoch: float = 0.0) -> PointKinematics:
         """Position, velocity and acceleration including ringing, as `point_kinematics`.
 
-        Parameters
-        ----------
-        time : array_like, (n,), s
-        epoch : float, s
-            Instant at which the local-level axes are fixed at the vehicle's origin.
-
-        Returns
-        -------
-        PointKinematics
-            For the sensors; ``q_nv`` is that of the vehicle.
-
-        Raises
-        ------
-        ConfigError
-            The epoch is outside the motion.
+        `epoch` (s): instant at which the local-level axes are fixed at the vehicle's origin.
+        Returns for the sensors; ``q_nv`` is that of the vehicle. ConfigError: the epoch is outside
+        the motion.
         """
         return in_axes_of(self.motion, self._point(_instants(time)), epoch)
 

@@ -228,20 +228,9 @@ def rocking_stand(
     Parameters
     ----------
     duration : float, s
-    origin : Origin
     roll_deg, pitch_deg, heading_deg : float, deg
         Mean angles.
     roll_waves, pitch_waves, heading_waves : sequence of Wave, deg
-    ellipsoid : Ellipsoid
-
-    Returns
-    -------
-    PathMotion
-
-    Raises
-    ------
-    ConfigError
-        As `PathMotion`.
     """
     return PathMotion(
         duration,
@@ -342,24 +331,10 @@ def lay_course(
 ) -> tuple[float, Track, Track, Track]:
     """Build tracks from a list of maneuvers.
 
-    Parameters
-    ----------
-    manoeuvres : sequence of (str, Manoeuvre)
-        Each with its name for messages.
-    speed : float, m/s
-        At time zero, along the path.
-    limits : Limits
-
-    Returns
-    -------
-    duration : float, s
-    speed, turn_rate, climb : Track
-        m/s, deg/s, deg; from time zero.
-
-    Raises
-    ------
-    ConfigError
-        The list is empty, or a maneuver is infeasible; the message gives its number, from 1.
+    `manoeuvres`: each with its name for messages. `speed` (m/s): at time zero, along the path.
+    Returns `duration` (s); `speed`, `turn_rate`, `climb`: m/s, deg/s, deg; from time zero.
+    ConfigError: the list is empty, or a maneuver is infeasible; the message gives its number, from
+    1.
     """
     if not 0.0 <= speed < math.inf:
         raise ConfigError("simulation.vehicle-cannot-begin", quantity="speed", speed=speed)
@@ -422,15 +397,7 @@ class Wave:
 def sum_waves(waves: Sequence[Wave], time: Array) -> tuple[Array, Array, Array]:
     """Sum of waves and its first two time derivatives.
 
-    Parameters
-    ----------
-    waves : sequence of Wave
-    time : ndarray, (n,), s
-
-    Returns
-    -------
-    value, first, second : ndarray, (n,)
-        Zero without waves.
+    `time` ((n,), s). Returns `value`, `first`, `second` ((n,)): zero without waves.
     """
     value, first, second = np.zeros(time.size), np.zeros(time.size), np.zeros(time.size)
     for wave in waves:
@@ -450,20 +417,10 @@ def sum_waves(waves: Sequence[Wave], time: Array) -> tuple[Array, Array, Array]:
 
 
 def integrate_track(track: Track, time: Array) -> Array:
-    """Integral of a track from its first time.
+    """Integral of a track from its first time; (n,), unit of the track times s.
 
-    Parameters
-    ----------
-    track : Track
-    time : ndarray, (n,), s
-        Not before the track's first time.
+    `time` ((n,), s): not before the track's first time.
 
-    Returns
-    -------
-    ndarray, (n,), unit of the track times s
-
-    Notes
-    -----
     The integral of the minimum-jerk quintic is ``5/2 x^4 - 3 x^5 + x^6``, one half over the whole.
     """
     times, values = np.asarray(track.times), np.asarray(track.values)

@@ -42,32 +42,15 @@ def integrate_velocity(
 ) -> PlaceIntegral:
     """Integrate a piecewise smooth velocity over the ellipsoid.
 
-    Parameters
-    ----------
-    velocity : callable
-        (n,) instants in s to (n, 3) m/s: north, east, down.
-    breaks : sequence of float, s
-        Instants where it or a derivative may jump; the first is zero, the last the end.
-    origin : Origin
-    ellipsoid : Ellipsoid
+    `velocity`: (n,) instants in s to (n, 3) m/s: north, east, down. `breaks` (s): instants where it
+    or a derivative may jump; the first is zero, the last the end. Returns within 1e-10 m per panel,
+    plus rounding. ConfigError: the vehicle comes within 1 deg of a pole.
 
-    Returns
-    -------
-    PlaceIntegral
-        Within 1e-10 m per panel, plus rounding.
-
-    Raises
-    ------
-    ConfigError
-        The vehicle comes within 1 deg of a pole.
-
-    Notes
-    -----
     ``lat' = v_N/(R_M(lat) + h)``, ``lon' = v_E/((R_N(lat) + h) cos lat)``, ``h' = -v_D``, by Picard
     iteration: each iteration integrates the rates at the previous positions, as Legendre series
     over panels, until the change is within rounding.
     """
-    from strapdown._kernels.earth_motion import place_rates
+    from strapdown._kernels.earth import place_rates
 
     parameters = ellipsoid.parameters()
     place: PlaceIntegral | None = None

@@ -42,16 +42,7 @@ class RateIntegral:
     series: Array
 
     def __call__(self, time: ArrayLike) -> Array:
-        """Integral from the first edge; constant beyond both ends.
-
-        Parameters
-        ----------
-        time : array_like, (n,), s
-
-        Returns
-        -------
-        ndarray, (n, 3), rad
-        """
+        """Integral from the first edge; constant beyond both ends; (n, 3), rad."""
         from strapdown._kernels.piecewise import legendre_sums
 
         t = np.clip(np.asarray(time, dtype=np.float64), self.edges[0], self.edges[-1])
@@ -63,19 +54,9 @@ class RateIntegral:
 def integrate_rate(rate: Callable[[ArrayLike], Array], breaks: Sequence[float]) -> RateIntegral:
     """Integrate a piecewise smooth rate.
 
-    Parameters
-    ----------
-    rate : callable
-        (n,) instants in s to (n, 3) rates in rad/s.
-    breaks : sequence of float, s
-        Instants where the rate or a derivative may jump; the first and the last are the ends.
+    `rate`: (n,) instants in s to (n, 3) rates in rad/s. `breaks` (s): instants where the rate or a
+    derivative may jump; the first and the last are the ends.
 
-    Returns
-    -------
-    RateIntegral
-
-    Notes
-    -----
     Sixteen Gauss-Legendre nodes per panel give the Legendre coefficients c_j of the rate. The
     integral of P_n over any part of a panel of half-length h is at most 2h/(2n+1), so the first
     omitted term contributes at most ``2h |c_16| / 33``. Where ``2h |c| / 29`` of the last two terms

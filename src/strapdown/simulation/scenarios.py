@@ -176,14 +176,6 @@ SCENARIOS: dict[str, Scenario] = {
 def find_scenario(name: str) -> Scenario:
     """Return the scenario with that name.
 
-    Parameters
-    ----------
-    name : str
-
-    Returns
-    -------
-    Scenario
-
     Raises
     ------
     ConfigError

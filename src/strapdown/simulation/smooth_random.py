@@ -87,14 +87,7 @@ class SmoothRandom(FlatMotion):
     def rate(self, time: ArrayLike) -> Array:
         """Body rate.
 
-        Parameters
-        ----------
-        time : array_like, (n,), s
-
-        Returns
-        -------
-        ndarray, (n, 3), rad/s
-            Exactly zero at rest.
+        Returns (n, 3), rad/s, exactly zero at rest.
         """
         angles, rates, _ = self._evaluate(time, self._angle_series)
         return euler_body_rate(angles, rates)
@@ -102,24 +95,13 @@ class SmoothRandom(FlatMotion):
     def angle(self, time: ArrayLike) -> Array:
         """Integral of the body rate from time zero.
 
-        Parameters
-        ----------
-        time : array_like, (n,), s
-            Before zero and after the end the integral is held constant.
-
-        Returns
-        -------
-        ndarray, (n, 3), rad
-            Within 1e-14 rad, plus rounding (`rate_integral.integrate_rate`).
+        `time` ((n,), s): before zero and after the end the integral is held constant. Returns (n,
+        3), rad, within 1e-14 rad, plus rounding (`rate_integral.integrate_rate`).
         """
         return self._integral(time)
 
     def attitude(self, time: ArrayLike) -> Array:
         """Exact attitude.
-
-        Parameters
-        ----------
-        time : array_like, (n,), s
 
         Returns
         -------

@@ -87,20 +87,7 @@ class SplineMotion(EarthMotion):
     ) -> SplineMotion:
         """Make a motion through the positions and attitudes of a Trajectory table.
 
-        Parameters
-        ----------
-        trajectory : DataFrame
-            Its velocities are not used. Time is counted from its first row.
-        ellipsoid : Ellipsoid
-
-        Returns
-        -------
-        SplineMotion
-
-        Raises
-        ------
-        DataError, ConfigError
-            As `tables.check_trajectory`, and as the class.
+        `trajectory`: its velocities are not used. Time is counted from its first row.
         """
         check_trajectory(trajectory)
         stamps = np.asarray(trajectory.index, dtype=np.float64)
@@ -129,7 +116,7 @@ class SplineMotion(EarthMotion):
 
     def kinematics(self, time: Array) -> Kinematics:
         """State at given instants; as `EarthMotion.kinematics`."""
-        from strapdown._kernels.earth_motion import velocities
+        from strapdown._kernels.earth import velocities
 
         moved, first, second = self._course(time)
         velocity, acceleration = np.empty(moved.shape), np.empty(moved.shape)
@@ -161,7 +148,7 @@ class SplineMotion(EarthMotion):
 
     def _look(self) -> None:
         """Check that the spline between the positions is a feasible motion."""
-        from strapdown._kernels.earth_motion import velocities
+        from strapdown._kernels.earth import velocities
 
         part = np.linspace(0.0, 1.0, _LOOKS, endpoint=False)
         looks = (self.time[:-1, None] + np.diff(self.time)[:, None] * part).ravel()
@@ -287,17 +274,9 @@ class Spline:
 def quintic(time: ArrayLike, values: ArrayLike) -> Spline:
     """Quintic spline through values, with zero third and fourth derivatives at the ends.
 
-    Parameters
-    ----------
-    time : array_like, (n,), s
-        Two or more, increasing.
-    values : array_like, (n, m)
-
-    Returns
-    -------
-    Spline
-        With continuous fourth derivative: the curve through the values with the least mean square
-        third derivative. Two values give a straight line.
+    `time` ((n,), s): two or more, increasing. `values` ((n, m)). Returns with continuous fourth
+    derivative: the curve through the values with the least mean square third derivative. Two values
+    give a straight line.
     """
     from scipy.interpolate import make_interp_spline
 
@@ -339,11 +318,6 @@ def through_waypoints(
         Alternative to times: mean speed along the straight line from each waypoint to the next.
     most_acceleration : float, m/s²
         Largest acceleration allowed on the spline.
-    ellipsoid : Ellipsoid
-
-    Returns
-    -------
-    SplineMotion
 
     Raises
     ------
@@ -401,17 +375,9 @@ def _times(places: Array, speeds: Sequence[float], ellipsoid: Ellipsoid) -> Arra
 def along_velocity(velocity: Array, acceleration: Array) -> tuple[Array, Array]:
     """3-2-1 angles, and their rates, of a body without roll and with its nose along the velocity.
 
-    Parameters
-    ----------
-    velocity : ndarray, (n, 3), m/s
-        North, east, down; the horizontal component must not be zero.
-    acceleration : ndarray, (n, 3), m/s²
-        Derivatives of the velocity components.
-
-    Returns
-    -------
-    angles, rates : ndarray, (n, 3), deg and deg/s
-        Roll, pitch (positive in a climb), heading within ±180.
+    `velocity` ((n, 3), m/s): north, east, down; the horizontal component must not be zero.
+    `acceleration` ((n, 3), m/s²): derivatives of the velocity components. Returns `angles`, `rates`
+    ((n, 3), deg and deg/s): roll, pitch (positive in a climb), heading within ±180.
     """
     north, east, down = velocity.T
     d_north, d_east, d_down = acceleration.T

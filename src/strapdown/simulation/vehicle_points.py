@@ -84,24 +84,8 @@ class MovingPoint:
 def moving_point(motion: EarthMotion, arm: Arm, time: Array) -> MovingPoint:
     """Kinematics of a point at the end of a lever arm.
 
-    Parameters
-    ----------
-    motion : EarthMotion
-        Motion of the vehicle's origin; must provide angular acceleration.
-    arm : Arm
-    time : ndarray, (n,), s
+    `motion`: motion of the vehicle's origin; must provide angular acceleration. `time` ((n,), s).
 
-    Returns
-    -------
-    MovingPoint
-
-    Raises
-    ------
-    ConfigError
-        As `EarthMotion.angular_acceleration`.
-
-    Notes
-    -----
     With the arm r, the body rate w and its derivative relative to inertial space, and primes for
     derivatives of components in vehicle axes, the specific force increases by ``r'' + 2 w x r' + w'
     x r + w x (w x r) + G(O) - G(S)``, exactly. G is gravitation, gravity minus the centrifugal
@@ -141,27 +125,12 @@ def point_kinematics(
     The gravity-free velocity change between two instants is the difference of two rows of
     `velocity`.
 
-    Parameters
-    ----------
-    motion : EarthMotion
-        Motion of the vehicle's origin.
-    position : array_like, (3,), m
-        Position of the point in vehicle axes (forward, right, down), from the vehicle's origin.
-    time : array_like, (n,), s
-    epoch : float, s
-        Instant at which the local-level axes are fixed at the vehicle's origin.
-
-    Returns
-    -------
-    PointKinematics
-        Positions accurate to 5e-9 m, two conversions of Earth-centered coordinates; the rest to
-        rounding.
-
-    Raises
-    ------
-    ConfigError
-        The position is not three finite numbers, the epoch is outside the motion, or as
-        `EarthMotion.angular_acceleration`.
+    `motion`: motion of the vehicle's origin. `position` ((3,), m): position of the point in vehicle
+    axes (forward, right, down), from the vehicle's origin. `time` ((n,), s). `epoch` (s): instant
+    at which the local-level axes are fixed at the vehicle's origin. Returns positions accurate to
+    5e-9 m, two conversions of Earth-centered coordinates; the rest to rounding. ConfigError: the
+    position is not three finite numbers, the epoch is outside the motion, or as
+    `EarthMotion.angular_acceleration`.
     """
     t = np.ascontiguousarray(np.asarray(time, dtype=np.float64))
     return in_axes_of(motion, moving_point(motion, rigid_arm(position, t.size), t), epoch)
@@ -172,22 +141,10 @@ def point_path(
 ) -> pd.DataFrame:
     """Exact path of a point of a rigid vehicle.
 
-    Parameters
-    ----------
-    motion, position, time, epoch
-        As `point_kinematics`.
-
-    Returns
-    -------
-    DataFrame
-        Index ``time``, s; columns ``north east down``, m, ``VN VE VD``, m/s, and
-        ``roll pitch heading``, deg, of the vehicle, all in local-level axes at the vehicle's origin
-        at the epoch. Local level 100 m away is rotated by 16 µrad.
-
-    Raises
-    ------
-    ConfigError
-        As `point_kinematics`.
+    `motion`, `position`, `time`, `epoch`: as `point_kinematics`. Returns index ``time``, s; columns
+    ``north east down``, m, ``VN VE VD``, m/s, and ``roll pitch heading``, deg, of the vehicle, all
+    in local-level axes at the vehicle's origin at the epoch. Local level 100 m away is rotated by
+    16 µrad.
     """
     k = point_kinematics(motion, position, time, epoch=epoch)
     values = np.hstack([k.position, k.velocity, rotation.euler_from_quaternion(k.q_nv)])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from strapdown import earth, rotation
-from strapdown._kernels.steady_motion import steady_motion
+from strapdown._kernels.sums import steady_motion
 from strapdown.aiding.aid import View
 from strapdown.aiding.gnss import Gnss
 from strapdown.errors import ConfigError, DataError

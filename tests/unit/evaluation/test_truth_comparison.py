@@ -13,7 +13,7 @@ from strapdown.evaluation.truth_comparison import (
     state_errors,
 )
 from strapdown.mechanization import NorthEastDown
-from strapdown.mechanization.state_error import state_error
+from strapdown.mechanization.mechanization import state_error
 from strapdown.nav_state import NavState
 from strapdown.simulation.earth_motion import Origin
 from strapdown.simulation.spline_motion import SineVelocityMotion

@@ -27,9 +27,8 @@ from strapdown.constants import MAD_TO_SD
 from strapdown.dsp.running_integral import running_integral
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
 from strapdown.errors import ConfigError, DataError, DivergenceError, Finding
-from strapdown.formats.aid_table import read_aid_table
+from strapdown.formats.aid_table import read_aid_table, read_control_points
 from strapdown.formats.clocks import on_clock_of
-from strapdown.formats.control_points import read_control_points
 from strapdown.formats.gnss_files import files_of_fixes, read_gnss
 from strapdown.formats.gnss_fixes import GnssOptions
 from strapdown.formats.recording import StatedStart

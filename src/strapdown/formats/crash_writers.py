@@ -10,13 +10,15 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.constants import GYRO_UNITS
 from strapdown.errors import DataError
-from strapdown.formats.crash_record import QUANTITIES, CrashChannel, CrashRecord
-from strapdown.formats.crash_text import clean
+from strapdown.formats import csv
+from strapdown.formats.crash_record import QUANTITIES, CrashChannel, CrashRecord, clean
 from strapdown.formats.mme_codes import FILTERS, LENGTH, NO_CLASS, decode_mme
-from strapdown.formats.mme_file import (
+from strapdown.formats.mme_reader import (
     AXIS_NOTE,
     BODY_NOTE,
     CHANGE_NOTE,
@@ -24,10 +26,19 @@ from strapdown.formats.mme_file import (
     SAMPLING_NOTE,
     even_stamps,
 )
+from strapdown.tables import ACCEL, EULER, GYRO, NED, POSITION_SD, VELOCITY
+
+__all__ = [
+    "ACCEL_HEADINGS",
+    "GYRO_HEADINGS",
+    "TIME",
+    "write_mme",
+    "write_path_csv",
+    "write_recorder_csv",
+]
+
 
 Array = NDArray[np.float64]
-
-__all__ = ["write_mme"]
 
 NOVALUE = "NOVALUE"
 _DIMENSIONS = {
@@ -294,3 +305,41 @@ def _lines(head: Mapping[str, str]) -> bytes:
 def _number(value: float) -> str:
     """Format a number with the fewest digits that reproduce it exactly."""
     return repr(float(value))
+
+
+# Recorder exports: one text table per triad or path, with units in the headings.
+
+
+TIME = "time [s]"
+ACCEL_HEADINGS = ("ax [m/s2]", "ay [m/s2]", "az [m/s2]")
+GYRO_HEADINGS = ("wx [deg/s]", "wy [deg/s]", "wz [deg/s]")
+
+
+def write_recorder_csv(path: Path, table: pd.DataFrame) -> None:
+    """Write one triad of a recorder.
+
+    `table`: index ``time``, s; columns ``accel_x accel_y accel_z``, m/s², or ``gyro_x gyro_y
+    gyro_z``, rad/s. Accelerations and stamps are reproduced to the last bit; rates, written in
+    deg/s, within rounding.
+    """
+    turns = set(GYRO) <= set(table.columns)
+    values = table[GYRO if turns else ACCEL].to_numpy(dtype=np.float64)
+    if turns:
+        values = values / GYRO_UNITS["deg/s"]
+    headings = GYRO_HEADINGS if turns else ACCEL_HEADINGS
+    columns = {TIME: table.index.to_numpy(dtype=np.float64)}
+    columns |= {name: values[:, k] for k, name in enumerate(headings)}
+    csv.write(path, columns, {})
+
+
+def write_path_csv(path: Path, table: pd.DataFrame) -> None:
+    """Write the path of a point.
+
+    `table`: index ``time``, s; columns ``north east down`` and, if available, ``north_sd east_sd
+    down_sd``, m, ``VN VE VD``, m/s, and ``roll pitch heading``, deg.
+    """
+    columns = {TIME: table.index.to_numpy(dtype=np.float64)}
+    for names, unit in ((NED, "m"), (POSITION_SD, "m"), (VELOCITY, "m/s"), (EULER, "deg")):
+        there = [name for name in names if name in table.columns]
+        columns |= {f"{n} [{unit}]": table[n].to_numpy(dtype=np.float64) for n in there}
+    csv.write(path, columns, {})

@@ -1,4 +1,4 @@
-"""Channel files of ISO MME: header with the channel code, samples and stamps."""
+"""Tests in ISO MME (ISO/TS 13499) as crash records: folder, header, index, channels."""
 
 from __future__ import annotations
 
@@ -12,11 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.constants import TIME_UNITS
-from strapdown.errors import DataError
+from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
-from strapdown.formats.crash_record import CrashChannel
-from strapdown.formats.crash_text import LONGEST_NAME, clean
-from strapdown.formats.crash_units import factor_of, unit_of
+from strapdown.formats.crash_record import (
+    LONGEST_NAME,
+    CrashChannel,
+    CrashRecord,
+    clean,
+    factor_of,
+    unique,
+    unit_of,
+)
 from strapdown.formats.mme_codes import DIMENSIONS, NO_CLASS, MmeCode, decode_mme
 from strapdown.tables import SAMPLINGS
 
@@ -25,8 +31,10 @@ __all__ = [
     "MmeHeader",
     "channel_of",
     "clock_of",
+    "detect",
     "even_stamps",
     "is_bad",
+    "read",
     "read_header",
     "read_mme_file",
     "read_number",
@@ -34,6 +42,255 @@ __all__ = [
     "stamps_of",
     "text_of",
 ]
+
+
+MOST_FILES = 20_000
+_NUMBERED = re.compile(r"\.(\d{3,4})$")
+_LISTED = re.compile(r"name of channel (\d+)")
+_TITLES = ("title", "type of the test", "laboratory test ref. number", "test name")
+
+
+def detect(path: Path) -> bool:
+    """Whether the path is a test header, or a folder that holds one."""
+    if path.is_dir():
+        return any(p.suffix.lower() == ".mme" for p in path.iterdir())
+    return path.suffix.lower() == ".mme"
+
+
+def read(path: Path) -> CrashRecord:
+    """Read a test; samples are read when a channel is used.
+
+    Parameters
+    ----------
+    path : Path
+        The ``.mme`` file, or the folder that holds it.
+
+    Raises
+    ------
+    DataError
+        There is no header, or more than one; there is no channel; or a header is damaged.
+    """
+    head = _head(path)
+    header = read_header(head)
+    findings: list[Finding] = []
+    objects = _objects(header)
+    index, listed = _index(head, findings)
+    numbered = _numbered(head, findings)
+    absent = [n for n in listed if n not in numbered]
+    if absent:
+        shown = ", ".join(f"{n:03d}" for n in absent[:12]) + (" …" if len(absent) > 12 else "")
+        findings.append(
+            Finding(
+                "io.listed-channels-not-folder",
+                severity="note",
+                file=index.name if index else head.name,
+                quantity="channels",
+                count=len(absent),
+                count_2=len(listed),
+                value_shown=shown,
+            )
+        )
+    if not numbered:
+        raise DataError("io.test-no-channel-files", file=head.name, quantity="channels")
+    files = [read_mme_file(p, listed.get(n, ""), objects) for n, p in sorted(numbered.items())]
+    names = unique([f.code or f.path.name for f in files])
+    others = {
+        f.code.upper(): (n, f) for n, f in reversed(list(zip(names, files, strict=True))) if f.code
+    }
+    facts = _facts(header, findings)
+    findings += [f for file in files for f in _told(file, listed)]
+    return CrashRecord(
+        path=path,
+        format="mme",
+        title=next((t for k in _TITLES if (t := header.text(k))), clean(head.stem)),
+        facts=facts,
+        channels=tuple(channel_of(f, n, others) for n, f in zip(names, files, strict=True)),
+        files=(head, *([index] if index else []), *(f.path for f in files)),
+        findings=tuple(findings),
+    )
+
+
+def _head(path: Path) -> Path:
+    if not path.is_dir():
+        return path
+    heads = sorted(p for p in path.iterdir() if p.suffix.lower() == ".mme" and p.is_file())
+    if len(heads) != 1:
+        held = ", ".join(clean(p.name, LONGEST_NAME) for p in heads[:6])
+        raise DataError(
+            "io.folder-holds-tests" if heads else "io.no-mme-file",
+            file=path.resolve().name,
+            count=len(heads),
+            held=held,
+        )
+    return heads[0]
+
+
+def _folders(head: Path) -> list[Path]:
+    """List the folders that may hold channels: Channel, and that of the header."""
+    beside = head.parent
+    named = sorted(p for p in beside.iterdir() if p.name.lower() == "channel" and p.is_dir())
+    return [*named, beside]
+
+
+def _inside(path: Path, head: Path) -> bool:
+    """Whether a file is in the folder of the test, not linked from elsewhere."""
+    return path.resolve().is_relative_to(head.parent.resolve())
+
+
+def _left_out(path: Path) -> Finding:
+    return Finding("io.left-out-link-file-outside", file=clean(path.name, LONGEST_NAME))
+
+
+def _index(head: Path, findings: list[Finding]) -> tuple[Path | None, dict[int, str]]:
+    """Read the channel index: its path, and the code of each channel number."""
+    found = [
+        p
+        for folder in _folders(head)
+        for p in sorted(folder.iterdir())
+        if p.suffix.lower() == ".chn" and p.is_file()
+    ]
+    same = [p for p in found if p.stem.lower() == head.stem.lower()] or found
+    if not same:
+        findings.append(
+            Finding(
+                "io.no-index-channels-chn-files",
+                file=head.name,
+                quantity="channels",
+                severity="note",
+            )
+        )
+        return None, {}
+    index = same[0]
+    if not _inside(index, head):
+        findings.append(_left_out(index))
+        return None, {}
+    header = read_header(index)
+    listed = {
+        int(m[1]): clean(value.split("/")[0], LONGEST_NAME)
+        for key, (value, _) in header.values.items()
+        if (m := _LISTED.fullmatch(key)) and len(m[1]) <= 5
+    }
+    promised = header.number("number of channels")
+    if promised is not None and promised != len(listed):
+        findings.append(
+            Finding(
+                "io.promises-channels-lists",
+                file=index.name,
+                row=header.line("number of channels"),
+                quantity="number of channels",
+                promised=promised,
+                count=len(listed),
+            )
+        )
+    return index, listed
+
+
+def _numbered(head: Path, findings: list[Finding]) -> dict[int, Path]:
+    """Find the channel files by their number."""
+    for folder in _folders(head):
+        found = [p for p in sorted(folder.iterdir()) if _NUMBERED.search(p.name) and p.is_file()]
+        same = [p for p in found if p.stem.lower() == head.stem.lower()]
+        stems = sorted({p.stem for p in found})
+        tests = {p.stem.lower() for p in head.parent.iterdir() if p.suffix.lower() == ".mme"}
+        if not same and (len(stems) > 1 or any(s.lower() in tests for s in stems)):
+            shown = ", ".join(clean(s, 40) for s in stems[:6])
+            raise DataError(
+                "io.channels-other-tests-none-name",
+                file=head.name,
+                quantity="channels",
+                value_shown=shown,
+            )
+        kept: dict[int, Path] = {}
+        for path in (same or found)[:MOST_FILES]:
+            if not _inside(path, head):
+                findings.append(_left_out(path))
+                continue
+            kept.setdefault(int(path.suffix[1:]), path)
+        if kept:
+            return kept
+    return {}
+
+
+def _objects(header: MmeHeader) -> int:
+    stated = header.number("number of test objects")
+    return 1 if stated is None or stated < 1 else int(min(stated, 99))
+
+
+def _facts(header: MmeHeader, findings: list[Finding]) -> dict[str, str]:
+    facts = {clean(key, LONGEST_NAME): header.text(key) for key in header.values}
+    spoken = {
+        "test": "laboratory test ref. number",
+        "date": "date of the test",
+        "laboratory": "laboratory name",
+    }
+    facts |= {name: header.text(key) for name, key in spoken.items()}
+    if _objects(header) == 1:
+        # The header's quantities are in SI units.
+        for name, key in (
+            ("mass_kg", "mass test object 1"),
+            ("speed_m_per_s", "velocity test object 1"),
+        ):
+            try:
+                value = header.number(key)
+            except DataError as error:
+                # Unusable data of the vehicle only affects the report: keep the record.
+                fault = error.finding
+                findings.append(
+                    Finding(
+                        "io.left-out-unusable",
+                        file=fault.file,
+                        row=fault.row,
+                        quantity=fault.quantity,
+                        reason=fault,
+                    )
+                )
+                continue
+            if value is not None:
+                facts[name] = f"{value:.10g}"
+        facts["vehicle"] = header.text("name of test object 1")
+    return {k: v for k, v in facts.items() if v}
+
+
+def _told(file: MmeFile, listed: dict[int, str]) -> list[Finding]:
+    told = []
+    name = clean(file.path.name, LONGEST_NAME)
+    number = int(file.path.suffix[1:])
+    if file.known is None:
+        told.append(
+            Finding(
+                "io.channel-code-malformed" if file.code else "io.channel-code-missing",
+                file=name,
+                row=file.header.line("channel code"),
+                quantity="channel code",
+                word=file.code,
+            )
+        )
+    if is_bad(file):
+        told.append(
+            Finding(
+                "io.laboratory-gives-status",
+                file=name,
+                row=file.header.line("data status"),
+                quantity=f"channel {file.code or name}",
+                text=file.header.text("data status"),
+            )
+        )
+    indexed = listed.get(number, "")
+    if indexed and file.code and indexed.upper() != file.code.upper():
+        told.append(
+            Finding(
+                "io.index-file-says-taken",
+                file=name,
+                row=file.header.line("channel code"),
+                quantity="channel code",
+                indexed=indexed,
+                word=file.code,
+            )
+        )
+    return told
+
+
+# Channel files of ISO MME: header with the channel code, samples and stamps.
 
 
 Array = NDArray[np.float64]
@@ -62,22 +319,7 @@ class MmeFile:
 def read_mme_file(path: Path, indexed: str, objects: int) -> MmeFile:
     """Read the header of a channel file.
 
-    Parameters
-    ----------
-    path : Path
-    indexed : str
-        Code from the index; empty if the index lacks it.
-    objects : int
-        Number of test objects.
-
-    Returns
-    -------
-    MmeFile
-
-    Raises
-    ------
-    DataError
-        As `read_header`.
+    `indexed`: code from the index; empty if the index lacks it. `objects`: number of test objects.
     """
     header = read_header(path)
     code = header.text("channel code") or indexed
@@ -87,10 +329,7 @@ def read_mme_file(path: Path, indexed: str, objects: int) -> MmeFile:
 def clock_of(file: MmeFile, others: Mapping[str, tuple[str, MmeFile]]) -> str:
     """Return the code of the channel that holds the stamps; empty if they are even.
 
-    Raises
-    ------
-    DataError
-        The test does not have that channel, or the header does not name it.
+    DataError: the test does not have that channel, or the header does not name it.
     """
     kind = file.header.text("reference channel").lower()
     named = file.header.text("reference channel name")
@@ -200,23 +439,9 @@ _REMARKS = (
 def channel_of(file: MmeFile, name: str, others: Mapping[str, tuple[str, MmeFile]]) -> CrashChannel:
     """Make a channel of a crash record from a channel file.
 
-    Parameters
-    ----------
-    file : MmeFile
-    name : str
-        Unique in the record.
-    others : dict of str to (str, MmeFile)
-        Channels of the test by their code in capitals, each with its name; one may hold the
-        stamps of another.
-
-    Returns
-    -------
-    CrashChannel
-
-    Raises
-    ------
-    DataError
-        A field of the header is not a number.
+    `name`: unique in the record. `others`: channels of the test by their code in capitals, each
+    with its name; one may hold the stamps of another. DataError: a field of the header is not a
+    number.
     """
     header, known = file.header, file.known
     text = header.text("unit")
@@ -399,10 +624,7 @@ class MmeHeader:
     def number(self, key: str) -> float | None:
         """Return the value of a key as a number, with or without a unit after it.
 
-        Raises
-        ------
-        DataError
-            The value is not a number.
+        DataError: the value is not a number.
         """
         text = self.text(key)
         if not text:
@@ -418,10 +640,7 @@ class MmeHeader:
 def text_of(path: Path, longest: int = LARGEST) -> str:
     """Read a text file of the test, in UTF-8 or Windows-1252.
 
-    Raises
-    ------
-    DataError
-        The file is not text, or far too large.
+    DataError: the file is not text, or far too large.
     """
     if path.stat().st_size > LARGEST:
         raise DataError("io.bytes-more-than-channel", file=path.name, st_size=path.stat().st_size)
@@ -438,18 +657,8 @@ def text_of(path: Path, longest: int = LARGEST) -> str:
 def read_header(path: Path) -> MmeHeader:
     """Read the header of a file of the test.
 
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    MmeHeader
-
-    Raises
-    ------
-    DataError
-        The file is empty, not text, or a line is neither ``key :value`` nor the first sample.
+    DataError: the file is empty, not text, or a line is neither ``key :value`` nor the first
+    sample.
     """
     values: dict[str, tuple[str, int]] = {}
     more: dict[str, list[str]] = {}
@@ -492,24 +701,10 @@ def read_number(text: str) -> float | None:
 
 
 def read_samples(path: Path, header: MmeHeader, quantity: str) -> Array:
-    """Read the samples of a channel, one per line; NaN for NOVALUE.
+    """Read the samples of a channel, one per line; NaN for NOVALUE; (n,).
 
-    Parameters
-    ----------
-    path : Path
-    header : MmeHeader
-        Header of that file.
-    quantity : str
-        For messages.
-
-    Returns
-    -------
-    ndarray, (n,)
-
-    Raises
-    ------
-    DataError
-        A line is not a number, or the number of samples differs from the header.
+    `header`: header of that file. `quantity`: for messages. DataError: a line is not a number, or
+    the number of samples differs from the header.
     """
     lines = _lines(text_of(path))[header.end :]
     while lines and not lines[-1].strip():
@@ -554,18 +749,10 @@ def read_samples(path: Path, header: MmeHeader, quantity: str) -> Array:
 def even_stamps(first: str, interval: str, count: int) -> Array:
     """Compute stamps of even sampling, each the double nearest to the decimal number.
 
-    Parameters
-    ----------
-    first, interval : str
-        Decimal numbers, s, as in the header.
-    count : int
-
-    Returns
-    -------
-    ndarray, (count,), s
-        If the decimals are integers below 2^53 divided by a power of ten up to 10^22, both of
-        which doubles hold exactly, the quotient is rounded once (IEEE 754). A sum of doubles
-        would be off in the last digit: -0.0499 would not be reproduced.
+    `first`, `interval`: decimal numbers, s, as in the header. Returns (count,), s, if the decimals
+    are integers below 2^53 divided by a power of ten up to 10^22, both of which doubles hold
+    exactly, the quotient is rounded once (IEEE 754). A sum of doubles would be off in the last
+    digit: -0.0499 would not be reproduced.
     """
     start, step = _decimal(first), _decimal(interval)
     k = np.arange(count, dtype=np.int64)

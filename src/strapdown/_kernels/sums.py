@@ -1,6 +1,8 @@
-"""Specific force summed in the body's axes at the first instant, held still in inertial space."""
+"""Motion increments summed over the intervals of a grid of time."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numba import njit
@@ -11,6 +13,43 @@ from strapdown._kernels.rotation import (
     quat_multiply,
     quat_normalise,
 )
+from strapdown._kernels.rotation_vector import cross
+
+#: Places in what is remembered: number of the interval; sums of dt, angle, velocity.
+NUMBER, SUMS = 0, 1
+MEMORY = 8
+# Part of an interval by which a stamp may miss the grid and be on it: stamps are rounded.
+_SLACK = 1e-6
+
+
+@njit(cache=True, error_model="numpy")
+def interval_sums(time, rows, interval, memory, at, means):
+    """Fill the ends of the intervals, and the mean rate and force over each; return their count.
+
+    An interval ends with the first step that reaches or passes a multiple of it. `memory` is
+    changed; its first number is NaN before the first step. `at` (k,) is the place of the step,
+    `means` (k, 6) in the axes of the body at each instant.
+    """
+    count = 0
+    for i in range(time.size):
+        number = math.floor(time[i] / interval + _SLACK)
+        if math.isnan(memory[NUMBER]):
+            memory[NUMBER] = math.floor((time[i] - rows[i, 0]) / interval + _SLACK)
+        for j in range(7):
+            memory[SUMS + j] += rows[i, j]
+        if number > memory[NUMBER]:
+            memory[NUMBER] = number
+            for j in range(6):
+                means[count, j] = memory[SUMS + 1 + j] / memory[SUMS]
+            for j in range(7):
+                memory[SUMS + j] = 0.0
+            at[count] = i
+            count += 1
+    return count
+
+
+# Specific force summed in the body's axes at the first instant, held still in inertial space.
+
 
 # A product of unit quaternions drifts from norm one by 1e-16 a step: this keeps it there.
 NORMALISE_EVERY = 1000
@@ -89,3 +128,34 @@ def legendre_moments(u, values, out):
     for d in range(degrees):
         for j in range(width):
             out[d, j] *= 0.5 * (2 * d + 1)
+
+
+# Rate and force without the shaking: means that fade, in the axes of the body as it turns.
+
+
+#: Numbers that are remembered: rate, force, and whether anything was.
+STEADY = 7
+
+
+@njit(cache=True, error_model="numpy")
+def steady_motion(rows, memory_time, memory, out):
+    """Fill rates and forces, (k, 6), at the ends of steps; `memory` goes on with them.
+
+    The force that is remembered is turned against the turn of the body, so that one that stays in
+    inertial axes, as gravity does, is not changed by a turn.
+    """
+    for i in range(rows.shape[0]):
+        dt = rows[i, 0]
+        px, py, pz = rows[i, 1], rows[i, 2], rows[i, 3]
+        if memory[6] == 0.0:
+            for k in range(6):
+                memory[k] = rows[i, 1 + k] / dt
+            memory[6] = 1.0
+        fx, fy, fz = memory[3], memory[4], memory[5]
+        ax, ay, az = cross(px, py, pz, fx, fy, fz)
+        bx, by, bz = cross(px, py, pz, ax, ay, az)
+        memory[3], memory[4], memory[5] = fx - ax + 0.5 * bx, fy - ay + 0.5 * by, fz - az + 0.5 * bz
+        part = 1.0 - math.exp(-dt / memory_time)
+        for k in range(6):
+            memory[k] += part * (rows[i, 1 + k] / dt - memory[k])
+            out[i, k] = memory[k]
