@@ -22,7 +22,7 @@ from strapdown.navigation.navigator import Navigator, with_states
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation.earth_motion import Origin
 from strapdown.simulation.imu import simulate_imu
-from strapdown.simulation.minimum_jerk import Track
+from strapdown.simulation.motion import Track
 from strapdown.simulation.path_motion import PathMotion
 from strapdown.tables import ACCEL, GYRO, gnss_table, imu_table
 

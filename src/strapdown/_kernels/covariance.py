@@ -1,8 +1,8 @@
-"""A covariance kept as a symmetric matrix: propagation, and one observation after the other.
+"""Covariance of a filter as a symmetric matrix, as U D U' and as W D W': prediction and update.
 
-A step is ``K = P h' / (slope s + r)``, ``x + K moved`` and
-``P <- (1 - slope K h) P (1 - slope K h)' + slope r K K'`` (Joseph), or the same with the gain's
-optimality used up: ``P <- P - slope K (P h')'`` (plain).
+The update by one scalar observation is ``K = P h' / (slope s + r)``, ``x + K moved`` and
+``P <- (1 - slope K h) P (1 - slope K h)' + slope r K K'`` (Joseph), or, relying on an optimal gain,
+``P <- P - slope K (P h')'`` (plain).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numba import njit
 def dense_predict(P, Phi, Q, out):
     """Write ``Phi P Phi' + Q`` to `out`, (n, n), exactly symmetric.
 
-    Zeros of Phi cost nothing. Return -1, or the first state whose variance is no number or
+    Zeros of Phi cost nothing. Return -1, or the first state whose variance is not a number or is
     negative.
     """
     n = P.shape[0]
@@ -72,7 +72,7 @@ def dense_expect(P, d, x, z, H, j, work):
 
 @njit(cache=True, error_model="numpy")
 def plain_take(P, d, x, H, j, work, s, moved, slope, r):
-    """Change P and x by observation j, whose P h' is in ``work[0]``: ``P - slope K (P h')'``."""
+    """Update P and x by observation j, with P h' in ``work[0]``: ``P - slope K (P h')'``."""
     n = P.shape[0]
     g = work[0]
     gain = moved_state(x, g, s, moved, slope, r)
@@ -85,7 +85,7 @@ def plain_take(P, d, x, H, j, work, s, moved, slope, r):
 
 @njit(cache=True, error_model="numpy")
 def joseph_take(P, d, x, H, j, work, s, moved, slope, r):
-    """Change P and x by observation j, whose P h' is in ``work[0]``: Joseph's form.
+    """Update P and x by observation j, with P h' in ``work[0]``: Joseph's form.
 
     As two changes of rank one (Bierman 1977, Section V.4): ``M = P - slope K (P h')'``, then
     ``M - slope (M h') K' + slope r K K'``. Multiplied out it would again rely on the gain.
@@ -118,9 +118,9 @@ def joseph_take(P, d, x, H, j, work, s, moved, slope, r):
 
 @njit(cache=True, error_model="numpy")
 def dense_update(P, x, z, H, R, joseph, told):
-    """Take every observation in full; fill `told`: innovations and ``h P h' + R``.
+    """Process every observation in full; fill `told`: innovations and ``h P h' + R``.
 
-    Return -1, or the first observation that cannot be used; P and x are then spoiled.
+    Return -1, or the first invalid observation; P and x are then undefined.
     """
     nu, s = told[0], told[1]
     work = np.empty((3, P.shape[0]))
@@ -136,12 +136,12 @@ def dense_update(P, x, z, H, R, joseph, told):
     return -1
 
 
-# What one scalar observation does to an estimate, whatever form its covariance has.
+# Common to all forms: innovation and correction of the state by one scalar observation.
 
 
 @njit(cache=True, error_model="numpy", inline="always")
 def expected(x, z, H, j):
-    """Observation j less its prediction."""
+    """Observation j minus its prediction."""
     nu = z[j]
     for i in range(x.shape[0]):
         nu -= H[j, i] * x[i]
@@ -150,9 +150,9 @@ def expected(x, z, H, j):
 
 @njit(cache=True, error_model="numpy", inline="always")
 def moved_state(x, g, s, moved, slope, r):
-    """Move x by ``K moved`` and return what makes K of ``g = P h'``: ``1 / (slope s + r)``.
+    """Move x by ``K moved`` and return the factor from ``g = P h'`` to K: ``1 / (slope s + r)``.
 
-    What is known exactly is not moved by an observation that is exact as well.
+    An exactly known state is not moved by an exact observation.
     """
     total = slope * s + r
     gain = 1.0 / total if total != 0.0 else 0.0
@@ -168,9 +168,9 @@ def moved_state(x, g, s, moved, slope, r):
 
 
 EPSILON = 2.0**-52
-# What rounding leaves of a variance of one that is fully explained, in n roundings.
+# Rounding error, of n roundings, of a unit variance that is fully explained.
 NOTHING = 8.0
-# Further from semidefinite, as a correlation, is no rounding of who made the matrix.
+# A correlation further from semidefinite is an error of the matrix, not rounding.
 INDEFINITE = 1e-9
 
 
@@ -178,9 +178,9 @@ INDEFINITE = 1e-9
 def semidefinite_factor(P, G, d):
     """Write columns G, (n, n), and weights d, (n,), of ``P = G diag(d) G'``; return their number.
 
-    Cholesky's factors with the largest remaining correlation as the pivot, which is stable for a
-    matrix of any rank: without pivoting a small pivot that is mostly rounding would spoil
-    all that follow. Where P is not finite or indefinite, return -1 - state. P is symmetric.
+    Cholesky's factorization with the largest remaining correlation as the pivot, which is stable
+    for any rank: without pivoting a small pivot that is mostly rounding would spoil all that
+    follow. Return -1 - state where P is not finite or indefinite. P is symmetric.
     """
     n = P.shape[0]
     C, sd, per_sd = np.zeros((n, n)), np.empty(n), np.zeros(n)
@@ -258,8 +258,8 @@ def udu_matrix(ud, out):
 def mwgs(W, d, out):
     """Turn ``W diag(d) W'``, W (n, N), into U and D: modified weighted Gram-Schmidt.
 
-    W is spoiled. D is a sum of squares times d: not negative where d is not (Bierman, VI.4).
-    What is left of a row that others explain to rounding is nothing: D is 0, and no direction.
+    W is overwritten. D is a sum of squares times d: not negative where d is not (Bierman, VI.4).
+    A row that others explain to rounding leaves D = 0 and no direction.
     """
     n, size = W.shape
     weighted, whole = np.empty(size), np.empty(n)
@@ -300,7 +300,7 @@ def mwgs(W, d, out):
 def stacked(ud, Phi, Q, observations):
     """Return ``[Phi U, G]``, its weights, and the rank of Q (or -1 - state where it is indefinite).
 
-    There is room for the columns of observations at the end, which are zero.
+    Zero columns at the end leave room for observations.
     """
     n = ud.shape[0]
     G, noise = np.empty((n, n)), np.empty(n)
@@ -347,10 +347,7 @@ def not_finite(ud):
     return -1
 
 
-# Observations taken into factors of a covariance: Bierman's U-D update and Chernodarov's W-D.
-#
-# Both make the step ``K = P h' / (slope s + r)``, ``x + K moved``,
-# ``P <- (1 - slope K h) P (1 - slope K h)' + slope r K K'``.
+# Updates of the factors: Bierman's U-D and Chernodarov's W-D, equivalent to Joseph's form.
 
 
 @njit(cache=True, error_model="numpy")
@@ -374,17 +371,17 @@ def ud_expect(ud, d, x, z, H, j, work):
 
 @njit(cache=True, error_model="numpy")
 def ud_take(ud, d, x, H, j, work, s, moved, slope, r):
-    """Change U, D and x by observation j (Bierman 1977, Section V.3).
+    """Update U, D and x by observation j (Bierman 1977, Section V.3).
 
-    With a slope other than one it is the update with the variance r / slope, written so that a
-    slope of zero, which changes no covariance, and a negative one need no other formula.
+    A slope other than one is the update with the variance r / slope, written so that a zero slope,
+    which changes no covariance, and a negative one need no other formula.
     """
     n = ud.shape[0]
     f, v, bend, g = work[0], work[1], work[2], work[3]
     before = r
     for k in range(n):
         after = before + slope * f[k] * v[k]
-        # Until something of the state is seen, an exact observation has nothing to say.
+        # An exact observation adds nothing until the state is observed.
         bend[k] = -slope * f[k] / before if before != 0.0 else 0.0
         if after != 0.0:
             ud[k, k] *= before / after
@@ -401,9 +398,9 @@ def ud_take(ud, d, x, H, j, work, s, moved, slope, r):
 
 @njit(cache=True, error_model="numpy")
 def ud_update(ud, x, z, H, R, told):
-    """Take every observation in full; fill `told`: innovations and ``h P h' + R``.
+    """Process every observation in full; fill `told`: innovations and ``h P h' + R``.
 
-    Return -1, or the first observation that cannot be used; U, D and x are then spoiled.
+    Return -1, or the first invalid observation; U, D and x are then undefined.
     """
     nu, s = told[0], told[1]
     work = np.empty((4, ud.shape[0]))
@@ -457,7 +454,7 @@ def wd_expect(W, d, x, z, H, j, work):
 
 @njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 def wd_take(W, d, x, H, j, work, s, moved, slope, r):
-    """Change W, d and x by observation j: ``W <- [W - slope K f, K]``, ``d <- [d, slope r]``.
+    """Update W, d and x by observation j: ``W <- [W - slope K f, K]``, ``d <- [d, slope r]``.
 
     Eqs. (12)-(14) of Chernodarov (2009), of which (14) is printed without the deflation of W.
     """
@@ -485,16 +482,16 @@ def wd_take(W, d, x, H, j, work, s, moved, slope, r):
 
 @njit(cache=True, error_model="numpy")
 def wd_finish(W, d, out):
-    """Write the U and D of ``W d W'`` to `out` (Eq. 15); return -1 or a bad state."""
+    """Write the U and D of ``W d W'`` to `out` (Eq. 15); return -1 or the invalid state."""
     mwgs(W, d, out)
     return not_finite(out)
 
 
 @njit(cache=True, error_model="numpy")
 def wd_epoch(ud, Phi, Q, predicted, x, z, H, R, told, out):
-    """Begin, take every observation in full, and finish.
+    """Begin, process every observation in full, and finish.
 
-    Return -1, or the first observation that cannot be used; or -2 - state for a bad prediction.
+    Return -1, or the first invalid observation; or -2 - state for an invalid prediction.
     """
     nu, s = told[0], told[1]
     W, d, bad = wd_begin(ud, Phi, Q, predicted, z.shape[0])

@@ -1,9 +1,9 @@
-"""How small errors of the start and of the increments grow along a path, to first order.
+"""Errors of a crash path: first-order growth of small errors, and perturbed runs.
 
 An error is nine numbers: a rotation vector in local level, with ``C_true = (I + [phi x]) C``
-(Tadic and Vukajlovic 2016, Eqs. (20), (21)), velocity and place. Over a path of seconds the
-Earth's rate and the change of gravity with the place do not matter to it, and are left out: what
-they do to an error is 1e-4 of it a second.
+(Tadic and Vukajlovic 2016, Eqs. (20), (21)), velocity and position. Over a path of seconds the
+Earth's rate and the change of gravity with position are neglected: their effect is 1e-4 of an error
+per second.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from strapdown._kernels.rotation import quat_from_rotvec, quat_multiply
 
 @njit(cache=True, error_model="numpy")
 def grow_errors(attitude, rows, start, theta, force, out):
-    """Grow the errors of p unknowns.
+    """Propagate the errors of p unknowns.
 
-    `attitude` is (k, 3, 3), body to level at the start of each step; `rows` are motion
-    increments; `start` is (p, 9); `theta` and `force` (p, 3, k) are what an unknown does to the
-    angle and to the velocity of each step, body axes of its start; `out` is (p, k + 1, 9).
+    `attitude` is (k, 3, 3), body to level at the start of each step; `rows` are motion increments;
+    `start` is (p, 9); `theta` and `force` (p, 3, k) are the effects of an unknown on the angle and
+    the velocity of each step, body axes of its start; `out` is (p, k + 1, 9).
     """
     steps = rows.shape[0]
     for p in range(start.shape[0]):
@@ -52,7 +52,7 @@ def grow_errors(attitude, rows, start, theta, force, out):
 
 @njit(cache=True, error_model="numpy")
 def grow_noise(attitude, rows, theta, force, start, out):
-    """Grow the covariance of what is independent from step to step.
+    """Propagate the covariance of noise that is independent from step to step.
 
     `theta` and `force` (3, k) are standard deviations of the noise of each step; `start` (9, 9)
     is the covariance at the start; `out` is (k + 1, 9, 9).
@@ -110,21 +110,21 @@ def _turned(c, x, y, z):
     )
 
 
-# Many runs of one record, each with its own errors put on the increments and on the start.
+# Runs of one record, each with its own errors of the increments and of the start.
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def perturbed_runs(
     state, rows, nominal, start, effects, used, noise_sd, draws, noise, earth, options, out
 ):
-    """Navigate once for each row of `draws`; returns how many runs were whole.
+    """Navigate once for each row of `draws`; returns the number of complete runs.
 
-    `state` is the kernel's at the start, `rows` the increments (k, 10), `nominal` the states
-    that follow from them, with the first (k + 1, 10). One standard deviation of unknown p puts
-    `start[p]` (rotation vector in level, velocity, metres north, east, down) on the start and
-    `effects[p]` (6, k) on angle and velocity of each step, where `used[p]` (6) says that there is
-    any. `noise_sd` (6, k) times `noise` (n, 6, k) comes on top. `out` (n, k + 1, 9) takes what a
-    run differs by from the nominal one, as in `error_growth`.
+    `state` is the kernel's at the start, `rows` the increments (k, 10), `nominal` the resulting
+    states, beginning with the first (k + 1, 10). One standard deviation of unknown p adds
+    `start[p]` (rotation vector in level, velocity, meters north, east, down) to the start and
+    `effects[p]` (6, k) to angle and velocity of each step, where `used[p]` (6) is set. `noise_sd`
+    (6, k) times `noise` (n, 6, k) is added. `out` (n, k + 1, 9) takes the difference of a run from
+    the nominal one, as in `grow_errors`.
     """
     steps, unknowns = rows.shape[0], start.shape[0]
     added = np.empty((6, steps))

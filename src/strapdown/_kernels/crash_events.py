@@ -23,15 +23,15 @@ TRIGGERED, AXIS = 11, 12
 PEAK, PEAK_TIME, LATER, LATER_TIME = 13, 14, 15, 16
 # Largest change within the trigger's window: size, axis, instant of its end.
 MOST, MOST_AXIS, MOST_TIME = 17, 18, 19
-# Wakes that came to nothing; how the last one, now over, would be told.
+# Number of wakes without an event; description of the last one.
 WOKEN, KEPT = 20, 21
-# Crossings: forward, right, resultant, acceleration, end; and the four of the one that was kept.
+# Crossings: forward, right, resultant, acceleration, end; and the four of the one kept.
 MARK = 6  # instant, slope, power of the weights, length, share of forward and of right
 MARKS = 22
 FORWARD, RIGHT, RESULTANT, FELT, END = range(5)
 KEPT_MARKS = MARKS + 5 * MARK
 KEPT_PEAK = KEPT_MARKS + 4 * MARK
-# The largest change before the episode: what leads to an event is part of it.
+# The largest change before the episode, which belongs to the event that it leads to.
 KEPT_MOST = KEPT_PEAK + 2
 SIZE = KEPT_MOST + 3
 
@@ -54,7 +54,7 @@ def begin(state, time):
 
 @njit(cache=True)
 def mark(state, which, rows, head, tail, at, window, mean, x, y):
-    """Keep what a crossing of a window's change needs for its instant and uncertainty."""
+    """Store the parts of a window's crossing that give its instant and uncertainty."""
     if which == FORWARD:
         cx, cy = 1.0, 0.0
     elif which == RIGHT:
@@ -65,7 +65,7 @@ def mark(state, which, rows, head, tail, at, window, mean, x, y):
     i = MARKS + which * MARK
     start = max(at - window, state[BEGIN])
     first = tail if at - window >= state[BEGIN] else 1
-    # Rows before a record's first that is still held are never needed: the window is shorter.
+    # Rows before the first one held are never needed: the window is shorter.
     state[i] = at
     state[i + 1] = abs(cx * x[1] + cy * y[1])
     state[i + 2] = power(rows, head, max(first, 1), start, at, mean)
@@ -76,7 +76,7 @@ def mark(state, which, rows, head, tail, at, window, mean, x, y):
 
 @njit(cache=True)
 def forget(state):
-    """Drop the marks and the peak of an episode."""
+    """Clear the marks and the peak of an episode."""
     for i in range(MARKS, MARKS + 4 * MARK):
         state[i] = math.nan
     state[PENDING] = math.nan
@@ -106,7 +106,7 @@ def felt(rows, k, options):
 
 @njit(cache=True)
 def close(state, end, rows, head, mean):
-    """End an event: the next may not count what this one did."""
+    """End an event: the next may not count its part of the window."""
     state[FLOOR] = end
     state[FLOOR + 1] = value(rows, head, end, 0, mean)[0]
     state[FLOOR + 2] = value(rows, head, end, 1, mean)[0]
@@ -115,13 +115,10 @@ def close(state, end, rows, head, mean):
 
 @njit(cache=True)
 def advance(state, options, rows, count):
-    """Take rows up to `count`; stop after each event that ends.
+    """Process rows up to `count`; stop after each event that ends.
 
-    Returns
-    -------
-    int
-        DONE when no row is left, CLOSED when an event has ended: its marks, trigger and peak
-        are then in the state until `forget`, which the caller owes.
+    Return DONE when no row is left, CLOSED when an event has ended: its marks, trigger and peak are
+    then in the state until the caller calls `forget`.
     """
     mean = options[MEAN] > 0.0
     lateral = options[LATERAL] > 0.0
@@ -161,7 +158,7 @@ def advance(state, options, rows, count):
             sy = (0.0, 0.0, 0.0)
             py = (0.0, 0.0, 0.0)
 
-        # What happens first within the piece.
+        # The first event within the segment.
         what, at = -1, length
         over = excess(sx, sy, length, options[WAKE]) > 0.0
         active = state[ACTIVE] > 0.0
@@ -323,12 +320,10 @@ def _row_of(rows, k, at):
     return k
 
 
-# Change of velocity over a trailing window as a polynomial of time, and where it meets a level.
-#
-# Between samples the acceleration is a line (values at the stamps) or a constant (means), so that
-# the change of velocity over a trailing window is a polynomial of time between breaks: the stamps,
-# and the stamps moved by the length of the window. Crossings are roots of these polynomials, and
-# fall where they fall, not on samples.
+# Between samples the acceleration is a line (values at the stamps) or a constant (means): the
+# change of velocity over a trailing window is a polynomial of time between breaks, which are the
+# stamps, and the stamps moved by the length of the window. Crossings are roots of these
+# polynomials.
 
 
 # Columns of the rows: stamp, acceleration forward and right, velocity since the record began.
@@ -371,7 +366,7 @@ def first_upward(c0, c1, c2, length, level):
             root = math.sqrt(disc)
             # Both forms are the same root; the one that does not cancel is used.
             x = -2.0 * c / (b + root) if b >= 0.0 else (root - b) / (2.0 * a) if a != 0.0 else -1.0
-            # A level that was met at the border of the piece before may lie a rounding behind.
+            # A level met at the previous border may lie a rounding behind.
             if -1e-15 <= x <= length:
                 first = min(first, max(x, 0.0))
     return first
@@ -393,7 +388,7 @@ def largest(c0, c1, c2, length):
 
 @njit(cache=True)
 def excess(x, y, at, level):
-    """By how much the squared resultant of two quadratics is over that of a level."""
+    """Excess of the squared resultant of two quadratics over that of a level."""
     dx = x[0] + at * (x[1] + at * x[2])
     dy = y[0] + at * (y[1] + at * y[2])
     return dx * dx + dy * dy - level * level
@@ -401,7 +396,7 @@ def excess(x, y, at, level):
 
 @njit(cache=True)
 def crossing(x, y, length, level, upward):
-    """Where the resultant crosses a level in [0, length]; it does by its end."""
+    """Instant at which the resultant crosses a level in [0, length]; it does so by its end."""
     if (excess(x, y, 0.0, level) > 0.0) == upward:
         return 0.0
     low, high = 0.0, length
@@ -418,7 +413,7 @@ def crossing(x, y, length, level, upward):
 
 @njit(cache=True)
 def power(rows, head, tail, start, end, mean):
-    """Sum of the squared weights with which the samples make the integral from start to end."""
+    """Sum of the squared weights of the samples in the integral from start to end."""
     total, carry = 0.0, 0.0
     for k in range(tail, head + 1):
         step = rows[k, T] - rows[k - 1, T]

@@ -1,8 +1,7 @@
-"""Ellipsoidal Earth: radii of curvature, normal gravity, rates of the local level.
+"""Ellipsoidal Earth: radii, normal gravity, rates, coordinates, and true sensor inputs.
 
-An ellipsoid comes as a float64 array whose places are named here. ``s`` and ``c`` are sine and
-cosine of the geodetic latitude; vectors are north, east, down. The loops at the end take
-latitudes in rad.
+An ellipsoid is a float64 array with the indices below. ``s`` and ``c`` are sine and cosine of the
+geodetic latitude; vectors are north, east, down; angles in rad, lengths in m.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from numba import njit
 
 from strapdown._kernels.rotation import dcm_from_quat
 
-# Places in the array of an ellipsoid: semi-major axis in m, first eccentricity squared, normal
+# Indices of the array of an ellipsoid: semi-major axis in m, first eccentricity squared, normal
 # gravity at the equator in m/s², Somigliana's k, rate of rotation in rad/s, flattening, and the
 # ratio of centrifugal acceleration to gravity at the equator.
 A, E2, GAMMA, K, RATE, F, M = 0, 1, 2, 3, 4, 5, 6
@@ -78,7 +77,7 @@ def gravity_parts(s2, alt, w, curvature, a, e2, gamma, k, f, m):
 
 @njit(cache=True, error_model="numpy", inline="always")
 def gravity_around(s, c, alt, w, curvature, a, e2, gamma, k, f, m):
-    """Normal gravity at a place and how it changes around it, north and down: `gravity_parts`.
+    """Normal gravity at a position and its gradient, north and down: `gravity_parts`.
 
     Returns the north and down components in m/s²; the change of each with latitude and with
     height; and half the second derivative of the down component with height.
@@ -87,7 +86,7 @@ def gravity_around(s, c, alt, w, curvature, a, e2, gamma, k, f, m):
     slope, down, steep, loss, bend = gravity_parts(s2, alt, w, curvature, a, e2, gamma, k, f, m)
     sc = s * c
     return (
-        # From zero, so that on the surface there is no zero with a minus.
+        # Added to zero, to avoid a negative zero on the surface.
         0.0 - sc * slope * alt,
         down,
         -(c * c - s2) * slope * alt,
@@ -185,10 +184,8 @@ def transport_rates(lats, alts, velocities, ellipsoid, out):
         )
 
 
-# Geodetic coordinates, Earth-centred coordinates, and the axes of the local level between them.
-#
-# Angles in rad, lengths in m; ``a`` is the semi-major axis and ``e2`` the first eccentricity
-# squared of the ellipsoid.
+# Geodetic and Earth-centered coordinates; ``a`` is the semi-major axis and ``e2`` the first
+# eccentricity squared of the ellipsoid.
 
 
 @njit(cache=True)
@@ -241,7 +238,7 @@ def ned_from_ecef(lat, lon):
 
 @njit(cache=True)
 def displacement(lat, lon, alt, lat0, lon0, alt0, a, e2):
-    """Straight line to a place from another, in north-east-down of the place; to 1e-9 m."""
+    """Straight line to a position from another, in north-east-down at the former; to 1e-9 m."""
     s, c = math.sin(lat), math.cos(lat)
     s_lon, c_lon = math.sin(lon), math.cos(lon)
     x, y, z = ecef_from_geodetic(s, c, s_lon, c_lon, alt, a, e2)
@@ -269,15 +266,12 @@ def quats_ned_from_ecef(lats, lons, out):
         out[i, 0], out[i, 1], out[i, 2], out[i, 3] = ned_from_ecef(lats[i], lons[i])
 
 
-# What sensors on a vehicle feel on an ellipsoidal Earth that turns.
-#
-# Rows: latitude and longitude in rad and height in m; vectors north, east, down; an ellipsoid as in
-# `earth`.
+# True inputs of sensors on a vehicle. Position rows: latitude and longitude in rad, height in m.
 
 
 @njit(cache=True)
 def place_rates(place, velocity, p, out):
-    """Fill the rates of latitude, longitude and height, (n, 3), of a velocity."""
+    """Fill the rates of latitude, longitude and height, (n, 3), for given velocities."""
     for i in range(place.shape[0]):
         s, c = math.sin(place[i, 0]), math.cos(place[i, 0])
         meridian, transverse = radii(s, p[A], p[E2])
@@ -288,7 +282,7 @@ def place_rates(place, velocity, p, out):
 
 @njit(cache=True)
 def velocities(place, first, second, p, velocity, acceleration):
-    """Fill velocity and its derivative by time from the derivatives of the place, (n, 3) each.
+    """Fill velocity and its time derivative from the derivatives of the position, (n, 3) each.
 
     The radii change with latitude: ``dR_N/dlat = e2 s c R_N^3/a^2`` and
     ``dR_M/dlat = 3 e2 s c R_M R_N^2/a^2``.

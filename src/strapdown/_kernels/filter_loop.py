@@ -1,8 +1,7 @@
-"""A mechanization and the covariance of its errors, over the steps between two epochs.
+"""Filter loop: a mechanization and the covariance of its errors, over steps and GNSS fixes.
 
-Steps are taken together to groups of up to a given time; the mechanization goes from step to step,
-the covariance from group to group. What is left of a group when a piece of a log ends is kept,
-so that a log may be cut anywhere.
+Steps are grouped up to a given time: the mechanization advances step by step, the covariance group
+by group. An open group is kept at the end of a chunk, so that a log may be cut anywhere.
 """
 
 from __future__ import annotations
@@ -46,16 +45,16 @@ from strapdown._kernels.wander import V as V_W
 
 # Forms of a covariance: the matrix, by two updates; its factors, by two.
 JOSEPH, PLAIN, UD, WD = 0, 1, 2, 3
-# What became of a call: all is done; a covariance is to be noted; the mechanization diverged; the
-# covariance is none; the rows for a smoother are full.
+# Status of a call: done; a covariance is due to be recorded; the mechanization diverged; the
+# covariance is invalid; the rows for a smoother are full.
 ALL, NOTE, DIVERGED, BAD, FULL = 0, 1, 2, 3, 4
-# Places in the times of a loop: of the covariance, of the newest step.
+# Indices of the times of a loop: of the covariance, of the newest step.
 AT_COVARIANCE, AT_STEP = 0, 1
-# A group ends before it is longer than this many steps of its time.
+# Largest ratio of a group's length to its nominal time.
 BEYOND = 1.000001
 
 
-# A call hands over what belongs together:
+# Arguments that belong together:
 # - kinds: (mechanization, form, whether the height is held);
 # - model: (terms of gyros, terms of accelerometers, decay, drive, noise of gyros
 #   and of accelerometers (3,), earth, options);
@@ -63,8 +62,8 @@ BEYOND = 1.000001
 #   without errors), which go on in place;
 # - group: (rows of the history, the first at its start; increments), of what is not closed yet;
 # - room: arrays to work in.
-# Where a run is to be smoothed, every growth is put to rows of `notes` (`smoothing_rows`), of which
-# `noted` are filled; where it is not, `notes` has none.
+# For a smoother every propagation goes into the rows of `notes` (`smoothing`), of which `noted` are
+# filled; otherwise `notes` is empty.
 
 
 @njit(**GIVEN)
@@ -102,13 +101,13 @@ def growth_of_group(kinds, model, states, group, count, room):
 
 @njit(**GIVEN)
 def matrix_over_group(states, room):
-    """Take a covariance that is a matrix over a group; return -1, or the first state gone bad."""
+    """Propagate a covariance matrix over a group; return -1, or the first invalid state."""
     return grown_covariance(states[2], room[1], room[2])
 
 
 @njit(cache=True, error_model="numpy")
 def factors_over_group(states, room):
-    """Take the factors of a covariance over a group; return -1, or the first state gone bad."""
+    """Propagate the factors of a covariance over a group; return -1, or the first invalid state."""
     _, growth, _, _, _, whole, added, after = room
     unfold_growth(growth, whole, added)
     bad = udu_predict(states[2], whole, added, after)
@@ -133,10 +132,10 @@ def begin_group(states, group, count, room):
 
 @njit(cache=True, error_model="numpy")
 def close_group(kinds, model, states, group, count, room, notes, noted):
-    """Take the covariance over the steps of a group.
+    """Propagate the covariance over the steps of a group.
 
-    The covariance is (n, n), as its form has it: the matrix, or its factors. Return -1, or the
-    first state gone bad, and how many rows are filled now.
+    The covariance is (n, n), a matrix or its factors. Return -1, or the first invalid state, and
+    the number of filled rows.
     """
     if count == 0:
         return -1, noted
@@ -168,11 +167,11 @@ def over_steps(
     notes,
     noted,
 ):
-    """Go over steps; return what became of it, steps made, those of the open group, rows filled.
+    """Advance over steps; return the status, steps made, those of the open group, rows filled.
 
     `time` are the ends of the steps, `rows` their increments; `history` takes a row after each.
-    A call ends before its steps where a group was closed at `note_at` or later. After the room of
-    `close_group` come arrays for errors of readings, (7, 3) each, and heights, which are none.
+    The call ends early where a group was closed at `note_at` or later. After the arrays of
+    `close_group`, `room` has errors of readings, (7, 3) each, and empty heights.
     """
     gyro_terms, accel_terms, _, _, _, _, earth, options = model
     state, _, _, sensors, times, newest = states
@@ -221,20 +220,20 @@ def over_steps(
     return ALL, made, count, noted
 
 
-# The loop of `error_loop` with fixes of a satellite receiver whose errors are its noise alone.
+# The loop with fixes of a GNSS receiver whose errors are white noise.
 
 
-# Of a fix: what it is of, three numbers, three variances.
+# Layout of a fix: kind, three numbers, three variances.
 CODE, VALUE, VARIANCE = 0, 1, 4
-# What an observation tells: innovation, its expected variance, weight.
+# Record of an observation: innovation, its expected variance, weight.
 TOLD = 3
-# An observation that is none; beside what became of a call in `error_loop`.
+# Status of an invalid observation.
 BAD_FIX = 5
 
 
 @njit(cache=True, error_model="numpy")
 def swept(which, state, earth, gyro_terms, last, c, x, y, w, speed, h):
-    """Add to a velocity, and to its dependence on the errors, what an arm adds; level axes.
+    """Add the effect of a lever arm to a velocity and to its sensitivity to the errors; level axes.
 
     ``W x r`` of the arm r = (x, y, w), with ``W = C w_ib - w_ie`` the rate of the body relative to
     the Earth; `c` is C_lb, `last` the newest increment.
@@ -273,9 +272,9 @@ def swept(which, state, earth, gyro_terms, last, c, x, y, w, speed, h):
 
 @njit(cache=True, error_model="numpy")
 def meet_fix(which, state, earth, gyro_terms, last, arm, of_place, fix, turn, z, h, H, R):
-    """Fill the observation of a fix of an antenna: computed less measured, north, east, down.
+    """Fill the observation of an antenna's fix: computed - measured, north, east, down.
 
-    `arm` is that of the antenna, body axes; `h` is room to work in, as large as H.
+    `arm` is that of the antenna, body axes; `h` is a work array as large as H.
     """
     q_at, v_at = (Q_WB, V_W) if which == WANDER else (Q_NB, V_N)
     lat, lon, alt = level_place(which, state, turn)
@@ -314,7 +313,7 @@ def meet_fix(which, state, earth, gyro_terms, last, arm, of_place, fix, turn, z,
 
 @njit(cache=True, error_model="numpy")
 def take_off(which, state, sensors, earth, x):
-    """Take an estimate off a state and add it to those of the sensors."""
+    """Remove an estimate from a state and add it to the sensor errors."""
     if which == WANDER:
         wander_correct(state, x[:9], earth)
     else:
@@ -328,7 +327,7 @@ def take_off(which, state, sensors, earth, x):
 
 @njit(cache=True, error_model="numpy")
 def mark(form, same_axes, covariance, sensors, turn, P, marked, marked_sensors, marked_sd):
-    """Fill a mark: covariance of nine in north-east-down, estimates, and their deviations."""
+    """Fill a snapshot: covariance of nine errors in NED, estimates, standard deviations."""
     if form >= UD:
         udu_matrix(covariance, P)
     else:
@@ -382,12 +381,11 @@ def over_fixes(
     marked_sensors,
     marked_sd,
 ):
-    """Go over steps and fixes, to the end of either, where so many steps are made already.
+    """Advance over steps and fixes, to the end of either, after the given number of steps.
 
-    `rows` are changed where a fix cuts a step. Return what became of it, the steps made, those of
-    the open group, the fixes taken, and the rows filled for a smoother; where a covariance is to be
-    noted, or these rows are full, it ends as `over_steps`.
-    An instant within `same` seconds of another is the same.
+    `rows` are changed where a fix cuts a step. Return the status, the steps made, those of the open
+    group, the fixes processed, and the rows filled for a smoother. The call ends early as
+    `over_steps`, or where these rows are full. Instants within `same` seconds count as one.
     """
     which, form, _ = kinds
     state, at_covariance, covariance, sensors, times, last = states

@@ -1,9 +1,9 @@
-"""What a filter needs to know of a state, whatever axes its mechanization has.
+"""Level rows: the state of any mechanization as a filter needs it, and corrections of it.
 
-Level axes l are those in which a mechanization keeps its velocity: north-east-down, or the axes
-of a wander azimuth (up is then +z). A row holds the quaternion body to level, the velocity relative
-to the Earth in level axes, the unit vector of the Earth's axis (towards the north pole) in level
-axes, the height, and the rate of the level relative to the Earth in level axes.
+Level axes l are those of a mechanization's velocity: north-east-down, or the axes of a wander
+azimuth (up is then +z). A row holds the quaternion body to level, the velocity relative to the
+Earth in level axes, the unit vector of the Earth's axis (towards the north pole) in level axes, the
+height, and the rate of the level relative to the Earth in level axes.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ LEVEL = 14
 
 @njit(cache=True, error_model="numpy", inline="always")
 def curvatures(sine, alt, a, e2):
-    """Curvature of the level surface across the meridian, and what the meridian adds.
+    """Curvature of the level surface across the meridian, and the excess along the meridian.
 
     The normal turns by ``across r + along k (k . r)`` over a horizontal displacement r, where k is
     the horizontal part of the Earth's axis (cos lat long): regular at the poles.
@@ -62,7 +62,7 @@ def curvatures(sine, alt, a, e2):
     return across, e2 * prime * w2 * across / (meridian + alt)
 
 
-# North-east-down as a filter sees it, and errors taken off its state.
+# North-east-down.
 
 
 @njit(**GIVEN)
@@ -85,11 +85,11 @@ def ned_levels(history, earth, out):
 
 @njit(**GIVEN)
 def ned_correct(row, error, earth):
-    """Take an error off the place, velocity and attitude of a row of a history, in place.
+    """Remove an error from position, velocity and attitude of a row of a history, in place.
 
-    `error` holds, in level axes of the row, how far its place is from the true one, in m; the
-    difference of the velocities as vectors, in m/s; and the rotation vector ``psi`` of the attitude
-    relative to the Earth, ``C_row = exp([psi x]) C_true``, in rad.
+    `error`, computed - true in level axes of the row: position in m; velocity as a vector in m/s;
+    and the rotation vector ``psi`` of the attitude relative to the Earth, ``C_row = exp([psi x])
+    C_true``, in rad.
     """
     a, e2 = earth[A], earth[E2]
     s, c, alt = math.sin(row[LAT]), math.cos(row[LAT]), row[NED_ALT]
@@ -113,24 +113,24 @@ def ned_correct(row, error, earth):
 
 @njit(**GIVEN)
 def ned_correct_rows(rows, errors, earth):
-    """Take an error off each row, in place."""
+    """Remove an error from each row, in place."""
     for i in range(rows.shape[0]):
         ned_correct(rows[i], errors[i], earth)
 
 
-# A wander azimuth from north-east-down and back, and as a filter sees it.
+# Wander azimuth, and its conversion from and to north-east-down.
 
 
-# Nearer to a pole than this, in rad, a quaternion does not know the longitude.
+# Closer to a pole than this, in rad, a quaternion does not determine the longitude.
 AT_POLE = 4e-16
 ROOT = math.sqrt(0.5)
 
 
 @njit(cache=True)
 def wander_from_geodetic(lat, lon, angle):
-    """Quaternion q_ew of a place and a wander angle, in rad.
+    """Quaternion q_ew of a position and a wander angle, in rad.
 
-    A turn about the Earth's axis, one by the colatitude, and one about zeta, multiplied out.
+    The product of rotations about the Earth's axis, by the colatitude, and about zeta.
     """
     half = 0.25 * math.pi - 0.5 * lat
     # As a sine it is zero at the south pole, which a cosine of a rounded right angle is not.
@@ -144,8 +144,8 @@ def wander_from_geodetic(lat, lon, angle):
 def geodetic_from_wander(w, x, y, z):
     """Latitude, longitude and wander angle, in rad.
 
-    At a pole, to rounding, only their sum (north) or difference (south) is known: the wander angle
-    is taken to be zero.
+    At a pole, to rounding, only their sum (north) or difference (south) is defined: the wander
+    angle is then set to zero.
     """
     near, far = math.hypot(w, z), math.hypot(x, y)
     lat = math.atan2((near - far) * (near + far), 2.0 * near * far)
@@ -201,7 +201,7 @@ def wander_places(history, out):
 
 @njit(cache=True)
 def wander_trajectory(history, out):
-    """Rows of a Trajectory table: `trajectory.trajectory_rows`."""
+    """Rows of a Trajectory table, as `ned.trajectory_rows`."""
     places = np.empty((history.shape[0], 10))
     wander_places(history, places)
     for i in range(history.shape[0]):
@@ -260,7 +260,7 @@ def wander_levels(history, earth, out):
 
 @njit(cache=True, error_model="numpy")
 def wander_correct(state, error, earth):
-    """Take an error off a state, in place; `error` as in `ned_level.ned_correct`."""
+    """Remove an error from a state, in place; `error` as in `ned_correct`."""
     a, e2 = earth[A], earth[E2]
     w, x, y, z = state[0], state[1], state[2], state[3]
     px, py, pz = earth_axis(w, x, y, z)
@@ -305,9 +305,9 @@ def wander_correct(state, error, earth):
 
 @njit(cache=True, error_model="numpy")
 def wander_correct_rows(rows, errors, earth):
-    """Take an error off each row of a history, in place."""
+    """Remove an error from each row of a history, in place."""
     state = np.zeros(STATE)
-    # Of the Earth's turn since the start, which only the memory of the kernel needs.
+    # The Earth's turn since the start, which only the kernel's memory needs.
     state[SPIN] = 1.0
     for i in range(rows.shape[0]):
         state[: rows.shape[1]] = rows[i]
@@ -315,7 +315,7 @@ def wander_correct_rows(rows, errors, earth):
         rows[i] = state[: rows.shape[1]]
 
 
-# Where a state of a compiled mechanization is, and how its level axes stand to north-east-down.
+# Position and level axes of the state of either mechanization.
 
 
 # Mechanizations.

@@ -143,8 +143,8 @@ def linear_motion(dt, w0x, w0y, w0z, w1x, w1y, w1z, f0x, f0y, f0z, f1x, f1y, f1z
 def mean_motion(dt, before, w0x, w0y, w0z, w1x, w1y, w1z, f0x, f0y, f0z, f1x, f1y, f1z):
     """Phi, dv, dr of a step with means w1 and f1, after one of length `before` with w0, f0.
 
-    Rate and force run along the lines whose integrals over the two steps are what was measured.
-    A step before it that is unlike it, or of length zero, tells nothing: then they are constant.
+    Rate and force run along the lines whose integrals over the two steps are the measured ones.
+    After a step of very different or zero length they are taken as constant.
     """
     k = 0.0
     if before <= ALIKE * dt and dt <= ALIKE * before:
@@ -239,12 +239,12 @@ def motion_increments_linear(dt, rate, force, mean, out):
         )
 
 
-# Motion increments of polynomials through several samples, to sixth order.
+# Polynomials through several samples, to sixth order.
 #
 # Over a window of 1 to 4 steps rate and force are one polynomial: through the samples at the
-# stamps, or, of means, with their integrals over the steps. A step within the window is its flow
-# alone, by the Magnus series to sixth order (Blanes, Casas and Ros, BIT 40 (2000) 434,
-# Eqs. (3.9), (3.11)) in the algebra of `motion_increments`.
+# stamps, or, for means, with their integrals over the steps. The increments of each step are its
+# flow, by the Magnus series to sixth order (Blanes, Casas and Ros, BIT 40 (2000) 434, Eqs. (3.9),
+# (3.11)) in the algebra above.
 
 
 # The scratch array: Newton's coefficients of up to five samples of six numbers, and the nodes.
@@ -362,7 +362,7 @@ def fit_window(dt, rate, force, mean, first, count, scratch):
 
     Its nodes are the stamps, in units of the window's length. Means are the first divided
     differences of their running sums, so that theirs begin one higher. Coefficient k of the
-    six numbers stands in row k of the scratch array.
+    six numbers is in row k of the scratch array.
     """
     length = 0.0
     for i in range(count):
@@ -503,17 +503,9 @@ def join_blocks(dt, samples, rows, last, out):
     return block
 
 
-# A motion increment cut in two at an instant within its step.
-
-
 @njit(cache=True, error_model="numpy")
 def split_increment(row, part, first, second):
-    """Fill the increments before and after ``part`` seconds of a step; put together they are it.
-
-    The rate is constant over the step; the force, in the axes of its start, is the line that has
-    the velocity and the distance of the step: with ``a + b t`` these are ``a T + b T²/2`` and
-    ``a T²/2 + b T³/6``.
-    """
+    """Fill the increments before and after ``part`` seconds of a step; combined they equal it."""
     whole = row[0]
     share = part / whole
     rest = whole - part

@@ -1,4 +1,4 @@
-"""A sample a call: the record between calls, and a sample as motion increments."""
+"""Mechanizations sample by sample: the record between calls, and one sample as one step."""
 
 from __future__ import annotations
 
@@ -49,9 +49,9 @@ from strapdown._kernels.wander import SINCE as WANDER_SINCE
 TIME, SAMPLES, MEAN, BEFORE, LONGEST, RATE, FORCE = 0, 1, 2, 3, 4, 5, 8
 EARTH, OPTIONS, STATE = 11, 18, 25
 
-# What an update answers besides `DONE`, `POLE`, `DIVERGED` and `LEAP` of the step.
+# Results of an update besides `DONE`, `POLE`, `DIVERGED` and `LEAP` of the step.
 BAD_SAMPLE, BAD_TIME, BAD_START, GAP, BAD_HEIGHT = -1, -2, -3, -4, -5
-# A sample that is good, and the first: there is no step yet.
+# Accepted as the first sample, without a step; accepted with a step.
 FIRST, STEP = 1, 0
 
 
@@ -62,10 +62,10 @@ def usable(x, y, z):
 
 @njit(cache=True, error_model="numpy")
 def look(r, time, gyro, accel, reference):
-    """`STEP`, `FIRST`, or why a sample cannot be taken."""
+    """`STEP`, `FIRST`, or the reason to refuse a sample."""
     if gyro.shape[0] != 3 or accel.shape[0] != 3 or not abs(time) < LARGEST:
         return BAD_SAMPLE
-    # NaN is no reference; a reference is a number, and for a height that is damped by it.
+    # NaN means no reference; a reference must be finite, and requires a damped height.
     if not math.isnan(reference) and (r[OPTIONS] != DAMPED or not abs(reference) < LARGEST):
         return BAD_HEIGHT
     if not (usable(gyro[0], gyro[1], gyro[2]) and usable(accel[0], accel[1], accel[2])):
@@ -120,19 +120,16 @@ def increments_to(r, dt, gyro, accel):
 
 @njit(cache=True, inline="always")
 def keep(r, time, dt, gyro, accel):
-    """Keep a sample that was taken, for the next."""
+    """Store an accepted sample for the next call."""
     r[TIME], r[BEFORE] = time, dt
     r[RATE], r[RATE + 1], r[RATE + 2] = gyro[0], gyro[1], gyro[2]
     r[FORCE], r[FORCE + 1], r[FORCE + 2] = accel[0], accel[1], accel[2]
     r[SAMPLES] += 1.0
 
 
-# North-east-down sample by sample: the same step, one sample a call.
-
-
 @njit(cache=True, error_model="numpy")
 def ned_update(r, time, gyro, accel, reference):
-    """Take one sample; a sample that is refused leaves the record as it was."""
+    """Process one sample; a refused sample leaves the record unchanged."""
     found = look(r, time, gyro, accel, reference)
     if found < STEP:
         return found
@@ -193,12 +190,9 @@ def ned_update(r, time, gyro, accel, reference):
     return DONE
 
 
-# A wander azimuth sample by sample: the same step, one sample a call.
-
-
 @njit(cache=True, error_model="numpy")
 def wander_update(r, time, gyro, accel, reference):
-    """Take one sample; a sample that is refused leaves the record as it was."""
+    """Process one sample; a refused sample leaves the record unchanged."""
     found = look(r, time, gyro, accel, reference)
     if found < STEP:
         return found

@@ -1,4 +1,4 @@
-"""A filter of finite length, read at every so many samples."""
+"""Filters of sampled signals: FIR decimation, recursion, fixed-lag smoother, outliers."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numba import njit
 def fir_decimate(values, weights, first, factor, out):
     """Fill ``out[j] = sum_k weights[k] values[first + j factor + k]``, (m, c).
 
-    Sums are made in one order, so that a record in pieces gives the same bits.
+    Sums are formed in one order, so that a record in chunks gives the same bits.
     """
     for j in range(out.shape[0]):
         at = first + j * factor
@@ -68,18 +68,18 @@ def smooth_fixed_lag(x, P, Phi, Q, lag, count, out):
         out[k, 1] = slope
 
 
-# Samples that their neighbours on both sides contradict: found, and interpolated.
+# Outliers: samples contradicted by their neighbors on both sides are found and interpolated.
 #
 # A run of samples is left out and predicted by the polynomial of degree five through three samples
-# on either side. How far the prediction is off is judged by how far it usually is: the size that a
-# quarter of the same residuals reach over a window before and one behind.
+# on either side. Its residual is compared with the size that a quarter of the same residuals reach
+# over a window before and one behind.
 
 
-# Samples of either side that predict.
+# Samples on either side used for the prediction.
 NODES = 3
-# Samples on either side whose range says how much the signal moves.
+# Samples on either side whose range measures the motion of the signal.
 AROUND = 10
-# Every so many residuals are counted: those between say little else, for they overlap.
+# Stride of the residuals counted: those between overlap with them.
 STRIDE = 3
 # Flags.
 REPLACED, KEPT = 1, 2
@@ -88,21 +88,21 @@ CONFIRMED = 0.5
 # Part of it by which the two lines to a single sample may differ: at a step they do by twice it.
 APART = 0.75
 QUARTER = 4
-# Of the converter's step: rounding alone makes up to 1.6 of it.
+# In steps of the converter: rounding alone makes up to 1.6.
 STEPS = 2.0
-# Where most residuals are below half a step, the channel repeats itself and says what it has to
-# say in the rest: nothing that is below so many steps is an outlier there.
+# Where most residuals are below half a step, the channel repeats values: residuals below so many
+# steps are not outliers there.
 REPEATS, COARSE = 2.0, 30.0
-# Part of two readings by which they may differ and be the same: no converter has 30 bits, and
-# readings that were scaled and turned are right to fewer.
+# Relative difference of equal readings: no converter has 30 bits, and scaled and rotated readings
+# are exact to fewer.
 ROUNDING = 1e-9
-# At an end of the record, where one window must do, it scatters more.
+# At an end of the record, with one window, the scatter is larger.
 ONE_SIDE = 1.5
 
 
 @njit(cache=True, error_model="numpy")
 def predicted(x, i, m, weights):
-    """Value at one place of the run of m samples that begins at i."""
+    """Predicted value at one position of the run of m samples that begins at i."""
     return (
         weights[0] * x[i - 3]
         + weights[1] * x[i - 2]
@@ -115,7 +115,7 @@ def predicted(x, i, m, weights):
 
 @njit(cache=True, error_model="numpy")
 def residuals(raw, low, high, i, m, weights, out):
-    """Fill what sample i of runs of m is off its prediction, for each start."""
+    """Fill the residual of sample i from the prediction of runs of m, for each start."""
     a, b, c, d, e, f = weights[0], weights[1], weights[2], weights[3], weights[4], weights[5]
     for j in range(low, high):
         out[j] = raw[j + i] - (
@@ -130,7 +130,7 @@ def residuals(raw, low, high, i, m, weights, out):
 
 @njit(cache=True, error_model="numpy")
 def usually_below(left, row, low, high, value):
-    """Whether a quarter of them or fewer reach the value in size; told as soon as it is known."""
+    """Whether at most a quarter of them reach the value in size; decided as soon as possible."""
     most = (high - low + STRIDE - 1) // STRIDE // QUARTER
     for k in range(low, high, STRIDE):
         if abs(left[row, k]) >= value:
@@ -142,7 +142,7 @@ def usually_below(left, row, low, high, value):
 
 @njit(cache=True, error_model="numpy")
 def stands_out(left, row, i, low, high, guard, window, value):
-    """Whether a residual is that large against its like on both sides, or the one that is there."""
+    """Whether a residual is large against its like on both sides, or the one that exists."""
     least = window // 2
     a, b = max(low, i - guard - window + 1), i - guard + 1
     c, d = i + guard, min(high, i + guard + window)
@@ -158,7 +158,7 @@ def stands_out(left, row, i, low, high, guard, window, value):
 
 @njit(cache=True, error_model="numpy", inline="always")
 def in_window(left, row, i, high, guard, window, factor):
-    """Whether a residual may stand out of the window behind it; for sure not, if not."""
+    """Whether a residual may stand out of the window behind it; if not, certainly not."""
     if i + guard + window > high:
         return True
     value = abs(left[row, i]) / factor
@@ -219,7 +219,7 @@ def is_run(x, left, i, m, low, high, weights, allowed, guard, window, factor, st
     small = min(abs(first), abs(last))
     if small <= STEPS * step:
         return False
-    # What is nearer to the samples around it than its prediction is stands out of nothing.
+    # A sample closer to its neighbors than its prediction is no outlier.
     middle = middle_of_nodes(x, i, m)
     if abs(x[i] - middle) <= abs(x[i] - first - middle) or abs(x[j] - middle) <= abs(
         x[j] - last - middle
@@ -275,8 +275,8 @@ def replace_outliers(
     """Judge the samples from begin to before stop; work and flags are changed in place.
 
     ``state`` is the converter's step, or minus the least difference so far where it is to be
-    found, then start and length of the last run. A run may reach beyond stop. Returns where to go
-    on.
+    determined, then start and length of the last run. A run may reach beyond stop. Returns the next
+    sample.
     """
     n, runs = raw.shape[0], weights.shape[0]
     low, high = NODES, n - runs - NODES + 1
@@ -295,7 +295,7 @@ def replace_outliers(
         step = abs(state[0])
         found = 0
         line = work[i] - 2.0 * work[i - 1] + work[i - 2]
-        # Most samples are settled without a call: by the residuals that are there already.
+        # Most samples are settled without a call, by the residuals already there.
         as_it_came = low < i < high - 1 and i >= state[1] + state[2] + NODES
         for m in range(min(runs, n - NODES - i), 0, -1):
             if as_it_came:
@@ -313,7 +313,7 @@ def replace_outliers(
         if found:
             fill_run(work, i, found, weights)
             flags[i : i + found] = REPLACED
-            # What was said of the samples before was said with these in it.
+            # Earlier judgments included these samples.
             before, length = int(state[1]), int(state[2])
             if length > 0 and before + length + NODES > i:
                 work[before : before + length] = raw[before : before + length]

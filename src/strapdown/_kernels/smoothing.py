@@ -1,9 +1,10 @@
-"""A fixed-interval smoother's way back over what a filter kept: growths and updates.
+"""Fixed-interval smoother: the backward pass over the recorded history of a filter.
 
-It carries the adjoint pair (l, L) back: what the data from an instant on tell of the errors then,
-``estimate = P l``, and how much less is unknown for it, ``P - P L P``, with the filter's covariance
-P of that instant. Over a growth ``l = Phi' l``, ``L = Phi' L Phi``: nothing is inverted, whatever
-the noise was. Over an update the filter's covariance before it is, in units of its deviations.
+It carries the adjoint pair (l, L) back: the information of all later data on the errors,
+``estimate = P l``, and the reduction of their covariance, ``P - P L P``, with the filter's
+covariance P of that instant. Over a propagation ``l = Phi' l``, ``L = Phi' L Phi``: nothing is
+inverted, whatever the noise was. Over an update the filter's covariance before it is inverted, in
+units of its standard deviations.
 """
 
 from __future__ import annotations
@@ -18,22 +19,22 @@ from strapdown._kernels.given_arrays import GIVEN
 from strapdown._kernels.growth import LANES as GROWTH_LANES
 from strapdown._kernels.level import level_place
 
-# Numbers that are reckoned together: rows of matrices are padded to a multiple of it, with zeros.
+# Vector width: rows of matrices are padded with zeros to a multiple of it.
 LANES = 8
-# A pivot, of 1, below which a direction is taken to be known exactly: rounding of a covariance that
-# was made by thousands of operations is some 1e-14 of it.
+# Pivot, relative to 1, below which a direction counts as exactly known: thousands of operations
+# leave a rounding error of some 1e-14 in a covariance.
 EXACT = 1e-12
 
 
 @njit(cache=True)
 def padded(n):
-    """Columns of a matrix to work in, of n errors."""
+    """Columns of a work matrix for n errors."""
     return (n + LANES - 1) // LANES * LANES
 
 
 @njit(cache=True, error_model="numpy")
 def inverse(P, out):
-    """Fill the inverse of a covariance; zero for what it says is known exactly."""
+    """Fill the inverse of a covariance; zero for exactly known directions."""
     n = P.shape[0]
     sd, lower = np.empty(n), np.zeros((n, n))
     for i in range(n):
@@ -95,7 +96,7 @@ def product(A, B, n, out):
 
 @njit(**GIVEN, fastmath={"reassoc", "contract"})
 def sandwich(A, S, n, half, out):
-    """Fill ``A S A'``, symmetric S, (n, n) within padded matrices; `half` is room to work in."""
+    """Fill ``A S A'``, symmetric S, (n, n) within padded matrices; `half` is a work array."""
     product(A, S, n, half)
     for i in range(n):
         for j in range(i, n):
@@ -136,7 +137,7 @@ def estimate_of(row, told, n, out):
 
 @njit(**GIVEN, fastmath={"contract"})
 def told_before_growth(core, decay, told, new):
-    """Change l to ``Phi' l``; vectors are padded."""
+    """Replace l by ``Phi' l``; vectors are padded."""
     for p in range(0, told.shape[0], LANES):
         for j in range(LANES):
             new[p + j] = decay[p + j] * told[p + j]
@@ -150,7 +151,7 @@ def told_before_growth(core, decay, told, new):
 
 @njit(**GIVEN, fastmath={"contract"})
 def less_before_growth(core, decay, less, n, half):
-    """Change L to ``Phi' L Phi``, exactly symmetric; matrices are padded, `half` is room."""
+    """Replace L by ``Phi' L Phi``, exactly symmetric; padded matrices, `half` to work in."""
     for i in range(n):
         a0, a1, a2 = less[i, 0], less[i, 1], less[i, 2]
         a3, a4, a5 = less[i, 3], less[i, 4], less[i, 5]
@@ -183,7 +184,7 @@ def less_before_growth(core, decay, less, n, half):
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
 def before_update(row, P, told, less, room):
-    """Take the adjoint pair over an update with the covariance P after it."""
+    """Carry the adjoint pair back over an update with the covariance P after it."""
     n = P.shape[0]
     before, weight, A, half, added, new = room
     unpack(row, begin_of_move(n), before)
@@ -258,24 +259,23 @@ def smooth_back(rows, n, told, less, wanted, estimates, covariances):
 # removed.
 
 
-# Of a row: how the errors grew to it; what was observed at it; or that a filter begins with it, of
-# which nothing before it is told.
+# Kinds of rows: propagation, update, begin of a filter (independent of all before it).
 GROWTH, UPDATE, BEGIN = 0, 1, 2
-# Rows of a transition that are more than a decay.
+# Rows of a transition with more than a decay.
 CORE = 9
-# Places in a row.
+# Indices of a row.
 TIME, KIND, TURN, COVARIANCE = 0, 1, 2, 11
 
 
 @njit(cache=True)
 def begin_of_move(n):
-    """Where in a row of n errors the covariance after it has ended."""
+    """Index in a row of n errors after the covariance."""
     return COVARIANCE + n * (n + 1) // 2
 
 
 @njit(cache=True)
 def begin_of_taken(n):
-    """Where in a row of an update the covariance before it has ended."""
+    """Index in an update's row after the covariance before it."""
     return begin_of_move(n) + n * (n + 1) // 2
 
 
@@ -287,7 +287,7 @@ def row_width(n):
 
 @njit(**GIVEN)
 def unpack(row, at, out):
-    """Fill a symmetric matrix from its upper half, row by row, which begins at a place of a row."""
+    """Fill a symmetric matrix from its upper half, row by row, from an index of a row on."""
     n = out.shape[0]
     for i in range(n):
         for j in range(i, n):
@@ -297,7 +297,7 @@ def unpack(row, at, out):
 
 @njit(**GIVEN)
 def pack(matrix, row, at):
-    """Put the upper half of a symmetric matrix, row by row, to a place of a row."""
+    """Write the upper half of a symmetric matrix, row by row, from an index of a row on."""
     n = matrix.shape[0]
     for i in range(n):
         for j in range(i, n):
@@ -307,7 +307,7 @@ def pack(matrix, row, at):
 
 @njit(cache=True, error_model="numpy")
 def pack_covariance(factored, covariance, P, row, at):
-    """Put a covariance, or what it is of its factors, to a place of a row; P is room to work in."""
+    """Write a covariance, a matrix or factors, from an index of a row on; P to work in."""
     if factored:
         udu_matrix(covariance, P)
         pack(P, row, at)
@@ -317,7 +317,7 @@ def pack_covariance(factored, covariance, P, row, at):
 
 @njit(cache=True, error_model="numpy")
 def head_row(which, factored, states, time, kind, P, row):
-    """Fill the time, the kind, the turn and the covariance of a row: P, (n, n), is room."""
+    """Fill time, kind, rotation and covariance of a row; P, (n, n), to work in."""
     turn = row[TURN:COVARIANCE].reshape(3, 3)
     # Of either mechanization the turn is its own transpose.
     level_place(which, states[0], turn)
@@ -327,7 +327,7 @@ def head_row(which, factored, states, time, kind, P, row):
 
 @njit(cache=True, error_model="numpy")
 def move_by_growth(growth, row, n):
-    """Fill what is of a growth (`growth.growth_of_step`) alone in a row of n errors."""
+    """Fill the part of a propagation (`growth.growth_of_step`) in a row of n errors."""
     phi, _, _, tail, _ = growth
     at = begin_of_move(n)
     for i in range(CORE):

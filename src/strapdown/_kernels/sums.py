@@ -1,4 +1,4 @@
-"""Motion increments summed over the intervals of a grid of time."""
+"""Running sums of motion increments: over intervals, in inertial axes, and fading means."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from strapdown._kernels.rotation import (
 )
 from strapdown._kernels.rotation_vector import cross
 
-#: Places in what is remembered: number of the interval; sums of dt, angle, velocity.
+#: Indices of the memory: number of the interval; sums of dt, angle, velocity.
 NUMBER, SUMS = 0, 1
 MEMORY = 8
-# Part of an interval by which a stamp may miss the grid and be on it: stamps are rounded.
+# Part of an interval within which a stamp counts as on the grid: stamps are rounded.
 _SLACK = 1e-6
 
 
@@ -27,7 +27,7 @@ def interval_sums(time, rows, interval, memory, at, means):
     """Fill the ends of the intervals, and the mean rate and force over each; return their count.
 
     An interval ends with the first step that reaches or passes a multiple of it. `memory` is
-    changed; its first number is NaN before the first step. `at` (k,) is the place of the step,
+    changed; its first number is NaN before the first step. `at` (k,) is the index of the step,
     `means` (k, 6) in the axes of the body at each instant.
     """
     count = 0
@@ -48,7 +48,7 @@ def interval_sums(time, rows, interval, memory, at, means):
     return count
 
 
-# Specific force summed in the body's axes at the first instant, held still in inertial space.
+# Specific force summed in the body's axes at the first instant, fixed in inertial space.
 
 
 # A product of unit quaternions drifts from norm one by 1e-16 a step: this keeps it there.
@@ -60,10 +60,10 @@ def inertial_sums(rows, last, turned, fallen, velocity, times, turns, pushes):
     """Sum motion increments; rows (n, 10) are dt, phi, dv, dr, and last (m,) ends m nodes.
 
     fallen (n + 1, 3) is the second integral of the force at every stamp, and turned (n + 1, 4)
-    the body's attitude. At the end of each node: velocity (m, 3), the first integral. Of each
+    the body's attitude. At the end of each node: velocity (m, 3), the first integral. For each
     node: times (m, 3, 3), the integral of C; turns and pushes (m, 3, 3, 3), the sums of
-    C[:, i] phi[j] and C[:, i] dv[j]: what an error of axis i that is proportional to the input
-    of axis j adds.
+    C[:, i] phi[j] and C[:, i] dv[j]: the effect of an error of axis i proportional to the input of
+    axis j.
     """
     w, x, y, z = 1.0, 0.0, 0.0, 0.0
     v = np.zeros(3)
@@ -130,19 +130,19 @@ def legendre_moments(u, values, out):
             out[d, j] *= 0.5 * (2 * d + 1)
 
 
-# Rate and force without the shaking: means that fade, in the axes of the body as it turns.
+# Fading means of rate and force, without vibration, in body axes.
 
 
-#: Numbers that are remembered: rate, force, and whether anything was.
+#: Length of the memory: rate, force, and whether it is set.
 STEADY = 7
 
 
 @njit(cache=True, error_model="numpy")
 def steady_motion(rows, memory_time, memory, out):
-    """Fill rates and forces, (k, 6), at the ends of steps; `memory` goes on with them.
+    """Fill rates and forces, (k, 6), at the ends of steps; `memory` continues with them.
 
-    The force that is remembered is turned against the turn of the body, so that one that stays in
-    inertial axes, as gravity does, is not changed by a turn.
+    The remembered force is turned against the turn of the body, so that a force constant in
+    inertial axes, as gravity is, does not change in a turn.
     """
     for i in range(rows.shape[0]):
         dt = rows[i, 0]

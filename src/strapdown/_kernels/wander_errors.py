@@ -49,9 +49,10 @@ def curvature_slopes(sine, alt, a, e2, across, along):
 
 @njit(cache=True, error_model="numpy")
 def add_gravity_slopes(level, earth, by_p):
-    """Add the derivatives of gravity, components in w, by the Earth's axis.
+    """Add the derivatives of gravity, components in w, with respect to the Earth's axis.
 
-    On the ellipsoid it is along -zeta; above, it has a part along the horizontal part of the axis.
+    On the ellipsoid gravity is along -zeta; above, it has a part along the horizontal part of the
+    axis.
     """
     sine, alt = level[AXIS + 2], level[ALT]
     w = 1.0 / math.sqrt(1.0 - earth[E2] * sine * sine)
@@ -113,8 +114,7 @@ def wander_dynamics(
 ):
     """Fill the first nine rows of F, (9, 9 + k); arguments as of `psi_model.psi_dynamics`.
 
-    The three last are room to work in, (3, 3) each. With a height that is held the vertical
-    velocity is known.
+    The last three are work arrays, (3, 3) each. With a held height the vertical velocity is known.
     """
     wx, wy, wz = level[OMEGA_EL], level[OMEGA_EL + 1], level[OMEGA_EL + 2]
     spin = earth[RATE]
@@ -177,7 +177,7 @@ def wander_transitions(
 ):
     """Fill the transition and the covariance of noise, as `psi_model.psi_transitions`.
 
-    `gyro` and `accel` are terms; `matrix` (15, 3) and `level` (one row) are room to work in, too.
+    `gyro` and `accel` are terms; `matrix` (15, 3) and `level` (one row) are work arrays.
     """
     n = phi.shape[0]
     for i in range(n):
@@ -215,11 +215,11 @@ def wander_transitions(
         at = end
 
 
-# What the variables of `wander_errors` are of the components of quaternions, and physically.
+# The variables in components of quaternions, and as physical errors.
 
 
-#: Places of the states: velocity, components of q_ib, components of q_ew; and of the variables
-#: that are nothing physical, after the core: the norms.
+#: Indices of the states: velocity, components of q_ib, components of q_ew; and of the variables
+#: without physical meaning, after the core: the norms.
 VELOCITY, BODY, PLACE, STATES = 0, 3, 7, 11
 NORM_BODY, NORM_PLACE = CORE, CORE + 1
 
@@ -261,16 +261,16 @@ def invert_columns(columns, out):
 
 @njit(cache=True)
 def turn_gauge(level, turn, out):
-    """Add to `out` (3,) what a turn of the level axes about zeta adds to velocity's components."""
+    """Add to `out` (3,) the change of the velocity components by a turn about zeta."""
     out[0] += turn * level[V_L + 1]
     out[1] -= turn * level[V_L]
 
 
 @njit(cache=True)
 def fix_gauge(level, phi):
-    """Take the turn of the level axes about zeta out of rows of variables, in place.
+    """Remove the turn of the level axes about zeta from rows of variables, in place.
 
-    The same errors with other axes of the truth: those without it.
+    The same errors, expressed in other axes of the truth.
     """
     for j in range(phi.shape[1]):
         turn_gauge(level, -phi[THETA + 2, j], phi[DV : DV + 3, j])

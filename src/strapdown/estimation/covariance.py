@@ -158,9 +158,6 @@ class FullUpdate:
         return Step(nu, 1.0, r, 1.0)
 
 
-# Observations of a filter.
-
-
 @dataclass(frozen=True, eq=False)
 class Observation:
     """Computed − observed, with its sensitivity to the physical errors.
@@ -579,9 +576,6 @@ class Chernodarov(BiermanThornton):
         if row >= 0:
             raise bad_prediction(row, Phi, Q)
         return out, x, innovations
-
-
-# Covariance forms by name.
 
 
 COVARIANCES: dict[str, type[CovarianceForm]] = {

@@ -323,9 +323,6 @@ def symmetric(P: Array) -> Array:
     return 0.5 * (P + P.T)
 
 
-# State of a filter between steps.
-
-
 @dataclass(frozen=True, eq=False)
 class FilterState:
     """State of a filter between steps.

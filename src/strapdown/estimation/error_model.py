@@ -383,9 +383,6 @@ def _checked(mechanization: Mechanization) -> Mechanization:
     return mechanization
 
 
-# Error models by name.
-
-
 ERROR_MODELS: dict[str, type[ErrorModel]] = {
     "rotation_vector": RotationVectorModel,
     "quaternions": QuaternionModel,

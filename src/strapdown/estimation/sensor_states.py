@@ -98,9 +98,6 @@ def _terms(coupling: Array) -> Array:
     return np.column_stack([places.astype(np.float64), values]).reshape(-1, 4)
 
 
-# Names, units and positions of the states of a filter.
-
-
 @dataclass(frozen=True)
 class StateBlock:
     """States that belong together.

@@ -1,4 +1,4 @@
-"""Measurements of an odometer, a barometer and similar, from a table with named columns."""
+"""Aiding measurements from tables with named columns, and surveyed control points."""
 
 from __future__ import annotations
 
@@ -202,9 +202,6 @@ def _refuse_or_say(
             reason=fault,
         )
     )
-
-
-# Control points: surveyed positions of a body at given times, in a local level frame.
 
 
 #: Columns, m.

@@ -1,4 +1,4 @@
-"""Named arrays from binary files, laid out as columns."""
+"""Columns of numbers: named arrays from binary files, conversion from text, rows of errors."""
 
 from __future__ import annotations
 
@@ -146,9 +146,6 @@ def _text(value: Any) -> str | None:
     return str(value)
 
 
-# Conversion of columns to numbers; errors name the row.
-
-
 def numbers(raw: RawLog, column: Column, quantity: str) -> NDArray[Any]:
     """Return the values of a column as numbers.
 
@@ -197,9 +194,6 @@ def ticks_of(raw: RawLog, column: Column) -> tuple[NDArray[Any], bool]:
         )
     stamps = dates.dt.tz_localize(None).to_numpy().astype("datetime64[ns]")
     return stamps.astype(np.int64), True
-
-
-# Translation of errors from table rows to file rows.
 
 
 @contextmanager

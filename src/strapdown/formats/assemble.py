@@ -145,9 +145,6 @@ def _readings_of_triad(
     return readings
 
 
-# Time of a log: unit, stamps and clock.
-
-
 def stamps_of_log(
     raw: RawLog,
     found: dict[str, Column],
@@ -232,9 +229,6 @@ def clock_of_log(raw: RawLog, found: dict[str, Column], stamps: Stamps, dated: b
     return Clock(name, origin)
 
 
-# Sampling of the rates: instantaneous or mean.
-
-
 def sampling_of_rates(raw: RawLog, options: ReadOptions, findings: list[Finding]) -> str:
     """Return the sampling stated by the user, else by the file, else instantaneous.
 
@@ -258,8 +252,6 @@ def sampling_of_rates(raw: RawLog, options: ReadOptions, findings: list[Finding]
         )
     return asked
 
-
-# Plausibility of a log's numbers.
 
 PLAUSIBILITY_AXES = "xyz"
 
@@ -361,9 +353,6 @@ def report_absurd(
                     reading=reading,
                 )
             )
-
-
-# Rows of a log in which every used value is a number.
 
 
 def finite_rows(

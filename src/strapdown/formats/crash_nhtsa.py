@@ -1,4 +1,4 @@
-"""Crash tests of the NHTSA database as crash records."""
+"""Crash tests of the NHTSA database as crash records and tables."""
 
 from __future__ import annotations
 

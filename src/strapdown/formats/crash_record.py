@@ -1,4 +1,4 @@
-"""Common form of all crash records: channels in SI units, with the metadata of the file."""
+"""Crash records: channels in SI units with metadata; their names, units and attributes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stamps of a crash record in seconds: unit, order, origin; faults name their row."""
+"""Stamps of crash records in seconds, and mean accelerations from velocity changes."""
 
 from __future__ import annotations
 

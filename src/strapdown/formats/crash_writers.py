@@ -1,7 +1,4 @@
-"""Writer of crash records in ISO MME (ISO/TS 13499): one test object, readable by any of its tools.
-
-Files do not state when or where they were written: date fields are NOVALUE.
-"""
+"""Writers of crash records: ISO MME (ISO/TS 13499), and text tables of recorders and paths."""
 
 from __future__ import annotations
 

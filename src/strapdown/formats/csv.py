@@ -520,9 +520,6 @@ def _array(column: Any) -> NDArray[Any]:
     return np.array([None if v is None else str(v) for v in column.to_pylist()], dtype=object)
 
 
-# Times of day as stamps: 13:05:58.200, with or without a date before it.
-
-
 _TIME = re.compile(
     r"(?:\d{1,2}[./-]\d{1,2}[./-]\d{2,4}[ T]+)?(\d{1,2}):([0-5]\d):([0-5]\d)(?:[.,:](\d{1,9}))?"
 )

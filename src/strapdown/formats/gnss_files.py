@@ -1,4 +1,4 @@
-"""GNSS fixes from files: one reader per format, and the registry of readers."""
+"""GNSS fixes from files: the registry of readers, and tables with column names."""
 
 from __future__ import annotations
 

@@ -149,9 +149,6 @@ def first_of(rows: NDArray[np.int64]) -> int | None:
     return int(rows[0]) if int(rows[-1]) - int(rows[0]) == len(rows) - 1 else None
 
 
-# --- time and position ------------------------------------------------------------------
-
-
 def _time(fixes: Fixes, options: GnssOptions) -> tuple[Array, NDArray[np.bool_]]:
     """Unwrap stamps across the end of a week; select rows later than all before."""
     time = fixes.time
@@ -230,9 +227,6 @@ def _say_left_out(fixes: Fixes, keep: NDArray[np.bool_], code: str) -> None:
                 count=out.size,
             )
         )
-
-
-# --- standard deviations ----------------------------------------------------------------
 
 
 def _velocity(fixes: Fixes, asked: Sd | None, count: int) -> tuple[Array, Array]:

@@ -238,9 +238,6 @@ def _time(
     return np.asarray(WEEK * (weeks - first) + seconds), int(first)
 
 
-# --- positions and velocities -----------------------------------------------------------
-
-
 def _stack(named: dict[str, Array], names: list[str]) -> Array | None:
     return np.column_stack([named[n] for n in names]) if all(n in named for n in names) else None
 

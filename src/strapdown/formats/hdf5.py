@@ -1,4 +1,4 @@
-"""HDF5 files, including MATLAB v7.3."""
+"""HDF5 and MATLAB files; MATLAB v7.3 is HDF5."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ _HEADER = b"MATLAB 5.0 MAT-file, written by strapdown"
 
 def detect_matlab(path: Path) -> bool:
     """Whether the name is that of a MATLAB file and the content is not HDF5."""
-    return path.is_file() and path.suffix.lower() == ".mat" and not detect_matlab(path)
+    return path.is_file() and path.suffix.lower() == ".mat" and not detect(path)
 
 
 def read_matlab(path: Path) -> RawLog:

@@ -1,4 +1,4 @@
-"""Checks of the statements of a log and its user against the numbers."""
+"""Checks of the statements of a log and its user against the numbers; sums as means."""
 
 from __future__ import annotations
 

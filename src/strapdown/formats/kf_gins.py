@@ -172,7 +172,7 @@ def read_fixes(path: Path, options: GnssOptions) -> Fixes:
 
     DataError: the number of columns differs, a value is not a number, or the data are inertial.
     """
-    if detect_fixes(path):
+    if detect(path):
         raise DataError("io.these-increments-inertial-sensors-not", file=path.name)
     raw = csv.read(path)
     names = WITH_VELOCITY if len(raw.columns) == len(WITH_VELOCITY) else NAMES

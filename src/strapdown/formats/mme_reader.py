@@ -1,4 +1,4 @@
-"""Tests in ISO MME (ISO/TS 13499) as crash records: folder, header, index, channels."""
+"""Tests in ISO MME (ISO/TS 13499) as crash records: folder, header, index, channel files."""
 
 from __future__ import annotations
 
@@ -411,9 +411,6 @@ def stamps_of(
         return even_stamps(first, header.text("sampling interval").split()[0], count)
 
     return even
-
-
-# One channel of an ISO MME test: decoded header, and samples read on demand.
 
 
 #: Prefixes of comments in which our writer states data that the standard has no field for.

@@ -420,9 +420,6 @@ def row_error(file: Path, line: int, section: str, found: int, needed: int) -> D
     )
 
 
-# One channel of a crash test of the NHTSA database: its header row and its samples.
-
-
 KMH = 1.0 / 3.6
 #: Units of the database, with the SI unit and the factor. Only unambiguous units are listed;
 #: others are refused when their channel is read.

@@ -1,4 +1,4 @@
-"""NumPy archives (``.npz``)."""
+"""NumPy archives (``.npz``), arrays (``.npy``), and folders of arrays; none is executed."""
 
 from __future__ import annotations
 

@@ -75,9 +75,6 @@ def read(path: Path) -> RawLog:
     return _matrix(path, lines, ended, findings) or csv.parse(data, path.name, (path,))
 
 
-# --- the log of a SIMU ------------------------------------------------------------------
-
-
 def _simu(path: Path, lines: Lines, ended: bool, findings: list[Finding]) -> RawLog:
     attitude, place, scales = (_header(path.name, lines, k) for k in range(3))
     start = _start(path.name, attitude, place, (lines[0][0], lines[1][0]))
@@ -178,9 +175,6 @@ def _counts(
     return block, rows
 
 
-# --- plain matrices ---------------------------------------------------------------------
-
-
 def _matrix(path: Path, lines: Lines, ended: bool, findings: list[Finding]) -> RawLog | None:
     """Return increments in rad and m/s with their time, if plausible; else None."""
     if len(lines) < 3 or any(len(line.split()) != 7 for _, line in lines[:3]):
@@ -209,9 +203,6 @@ def _matrix(path: Path, lines: Lines, ended: bool, findings: list[Finding]) -> R
         )
     )
     return _log(path, time, block[:, :6], rows, AXES if up else None, findings, None)
-
-
-# --- both -------------------------------------------------------------------------------
 
 
 def _block(

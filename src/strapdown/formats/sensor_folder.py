@@ -1,4 +1,4 @@
-"""Folders and zip archives with one text table per sensor, as ``gyro.csv`` and ``accel.csv``."""
+"""Folders and zip archives with one text table per sensor, and access to their members."""
 
 from __future__ import annotations
 

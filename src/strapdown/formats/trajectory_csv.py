@@ -1,4 +1,4 @@
-"""Trajectories and their differences as text tables, with units in the column names."""
+"""Trajectories and their differences as text tables with units, and as Parquet."""
 
 from __future__ import annotations
 
@@ -171,9 +171,6 @@ def write_decimals(
                 stream.write("".join(form % tuple(row) for row in rows.tolist()).encode())
             else:
                 stream.write(text[:written].data)
-
-
-# Trajectories as Parquet: the columns of the CSV, all numbers to the last bit.
 
 
 def write_parquet(

@@ -1,4 +1,4 @@
-"""Trajectories as GeoJSON (RFC 7946)."""
+"""Trajectories for maps: GeoJSON (RFC 7946) and KML, thinned and split at the date line."""
 
 from __future__ import annotations
 

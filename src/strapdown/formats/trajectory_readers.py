@@ -1,4 +1,4 @@
-"""Readers of trajectory files."""
+"""Readers of trajectory files: their columns, and the consistency of their content."""
 
 from __future__ import annotations
 

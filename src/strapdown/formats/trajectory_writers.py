@@ -1,4 +1,4 @@
-"""Writers of trajectories: one function per format, and the registry of writers."""
+"""Writers of trajectories: the registry, and the format of the TUM RGB-D benchmark."""
 
 from __future__ import annotations
 

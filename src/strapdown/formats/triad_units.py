@@ -1,4 +1,4 @@
-"""Units of gyro, accelerometer and magnetometer: stated, named, or inferred."""
+"""Units and axes of gyro, accelerometer and magnetometer: stated, named, or inferred."""
 
 from __future__ import annotations
 
@@ -138,8 +138,6 @@ def _stated_unit(
     return None
 
 
-# Values of gyro, accelerometer and magnetometer as in a file.
-
 # Unusable triads are dropped, except the gyro, which suffices for an attitude.
 OPTIONAL = ("accel", "mag")
 
@@ -192,9 +190,6 @@ def left_out(raw: RawLog, triad: str, error: DataError) -> Finding:
         quantity=triad,
         reason=error.finding,
     )
-
-
-# Mapping of sensor axes to body axes.
 
 
 @dataclass(frozen=True)

@@ -387,9 +387,6 @@ def refuse_step(
     )
 
 
-# Checks of the reference heights of a damped height.
-
-
 #: Height options: free (by the sensors), held, damped by a reference.
 HEIGHTS = ("free", "held", "damped")
 
@@ -423,9 +420,6 @@ def reference_heights(height: str, heights: ArrayLike | None, steps: int) -> Arr
             quantity="heights",
         )
     return reference
-
-
-# Difference of two navigation states.
 
 
 def state_error(state: NavState, truth: NavState, ellipsoid: Ellipsoid = WGS84) -> Array:

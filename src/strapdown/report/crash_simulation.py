@@ -37,8 +37,8 @@ from strapdown.simulation.crash_cases import (
     find_case,
     record_case,
 )
-from strapdown.simulation.exact_answers import ExactAnswers
-from strapdown.simulation.recorder_design import TriadDesign
+from strapdown.simulation.crash_recording import TriadDesign
+from strapdown.simulation.mounted_motion import ExactAnswers
 from strapdown.tables import ACCEL, GYRO
 
 __all__ = [

@@ -323,7 +323,7 @@ def path_from_cameras(
 ) -> pd.DataFrame:
     """Triangulate the path of a marker from two views.
 
-    `tracks_top`, `tracks_side`: as returned by `cameras.film`. `cameras`: cameras of the first and
+    `tracks_top`, `tracks_side`: as returned by `film`. `cameras`: cameras of the first and
     the second tracks, as calibrated. `marker`: marker to triangulate. `central` (px): radius about
     the image center beyond which readings are not used, because the residual distortion grows with
     its cube. Returns index ``time``, s, of the frames of the first camera at which both see the

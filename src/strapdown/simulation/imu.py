@@ -111,7 +111,7 @@ def sample_gyro(
 
     `time` ((n,), s): equally spaced, within the motion. `sampling` ({'instantaneous', 'mean'}).
     `seed`: seed of the triad. `straight` (rad/s): largest deviation from a straight line between
-    two samples at which the low-pass treats the rate as linear (`between_samples.low_passed`); zero
+    two samples at which the low-pass treats the rate as linear (`low_passed`); zero
     disables this. `specific_force` ((n, 3), m/s²): specific force in body axes, if already
     computed.
     """

@@ -14,10 +14,15 @@ from numpy.typing import NDArray
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import ConfigError
-from strapdown.simulation.earth_motion import EarthMotion, Kinematics, Origin, check_duration
-from strapdown.simulation.minimum_jerk import STILL, Track
-from strapdown.simulation.motion import euler_attitude, euler_body_rate
-from strapdown.simulation.place_integral import PlaceIntegral, integrate_velocity
+from strapdown.simulation.earth_motion import (
+    EarthMotion,
+    Kinematics,
+    Origin,
+    PlaceIntegral,
+    check_duration,
+    integrate_velocity,
+)
+from strapdown.simulation.motion import STILL, Track, euler_attitude, euler_body_rate
 
 Array = NDArray[np.float64]
 
@@ -361,9 +366,6 @@ def check_length(value: float, name: str = "duration") -> None:
         raise ConfigError("simulation.not-above-zero", quantity=name, value=value)
 
 
-# Oscillations of a coordinate as sums of sines.
-
-
 @dataclass(frozen=True)
 class Wave:
     """``amplitude sin(2 pi t/period + phase)``.
@@ -411,9 +413,6 @@ def sum_waves(waves: Sequence[Wave], time: Array) -> tuple[Array, Array, Array]:
         first += omega * level
         second -= omega * omega * high
     return value, first, second
-
-
-# Integral of a track, in closed form.
 
 
 def integrate_track(track: Track, time: Array) -> Array:

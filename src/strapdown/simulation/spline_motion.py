@@ -18,11 +18,12 @@ from strapdown.simulation.earth_motion import (
     EarthMotion,
     Kinematics,
     Origin,
+    PlaceIntegral,
     check_duration,
+    integrate_velocity,
 )
 from strapdown.simulation.motion import euler_attitude, euler_body_rate
 from strapdown.simulation.path_motion import MOST_PITCH
-from strapdown.simulation.place_integral import PlaceIntegral, integrate_velocity
 from strapdown.tables import EULER, check_trajectory, places_of
 
 Array = NDArray[np.float64]
@@ -248,9 +249,6 @@ def _unwrapped(angles: Array) -> Array:
     return np.asarray(np.r_[angles[:1], angles[1:] - 360.0 * turns])
 
 
-# Quintic splines with their derivatives.
-
-
 _DEGREE = 5  # continuous to the fourth derivative
 
 
@@ -293,9 +291,6 @@ def quintic(time: ArrayLike, values: ArrayLike) -> Spline:
     # Taylor coefficients at the left end of each segment, highest power first.
     powers = [spline(knots[:-1], nu=k) / math.factorial(k) for k in range(_DEGREE, -1, -1)]
     return Spline(knots, np.ascontiguousarray(np.stack(powers, axis=1)))
-
-
-# A path through waypoints, at given times or speeds.
 
 
 def through_waypoints(
@@ -369,9 +364,6 @@ def _times(places: Array, speeds: Sequence[float], ellipsoid: Ellipsoid) -> Arra
     return np.array(times)
 
 
-# Attitude of a vehicle whose nose points along its velocity.
-
-
 def along_velocity(velocity: Array, acceleration: Array) -> tuple[Array, Array]:
     """3-2-1 angles, and their rates, of a body without roll and with its nose along the velocity.
 
@@ -393,8 +385,6 @@ def along_velocity(velocity: Array, acceleration: Array) -> tuple[Array, Array]:
     ]
     return np.degrees(angles).T, np.degrees(rates).T
 
-
-# Velocity as a mean plus a sine in each of north, east and down.
 
 Triple = tuple[float, float, float]
 # Shortest period as a fraction of the duration: limits the integral to a few hundred megabytes.

@@ -10,13 +10,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from aided_drives import drive, error_now, gnss_of, navigator_of, run
-from strapdown.aiding.barometer import Barometer
-from strapdown.aiding.gnss import Gnss
-from strapdown.aiding.heading import Heading
-from strapdown.aiding.standstill import ZeroRate, ZeroVelocity
-from strapdown.aiding.vehicle import BodyVelocity, NoSlip, Odometer
-from strapdown.simulation.aiding_sensors import (
+from tests.aiding_sensors import (
     Compass,
     PressureHeight,
     VelocityLog,
@@ -26,6 +20,13 @@ from strapdown.simulation.aiding_sensors import (
     simulate_heading,
     simulate_odometer,
 )
+
+from aided_drives import drive, error_now, gnss_of, navigator_of, run
+from strapdown.aiding.barometer import Barometer
+from strapdown.aiding.gnss import Gnss
+from strapdown.aiding.heading import Heading
+from strapdown.aiding.standstill import ZeroRate, ZeroVelocity
+from strapdown.aiding.vehicle import BodyVelocity, NoSlip, Odometer
 
 SEEDS = range(5)
 LOST = 40.0

@@ -11,15 +11,7 @@ from scipy.stats import chi2
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from aided_drives import GYRO_BIAS, drive, estimate, gnss_of, navigator_of, run
-from strapdown import rotation
-from strapdown.aiding.barometer import Barometer
-from strapdown.aiding.gnss import Gnss
-from strapdown.aiding.heading import Heading
-from strapdown.aiding.standstill import ZeroRate, ZeroVelocity
-from strapdown.aiding.vehicle import BodyVelocity, NoSlip, Odometer
-from strapdown.errors import ConfigError
-from strapdown.simulation.aiding_sensors import (
+from tests.aiding_sensors import (
     Compass,
     PressureHeight,
     VelocityLog,
@@ -29,6 +21,15 @@ from strapdown.simulation.aiding_sensors import (
     simulate_heading,
     simulate_odometer,
 )
+
+from aided_drives import GYRO_BIAS, drive, estimate, gnss_of, navigator_of, run
+from strapdown import rotation
+from strapdown.aiding.barometer import Barometer
+from strapdown.aiding.gnss import Gnss
+from strapdown.aiding.heading import Heading
+from strapdown.aiding.standstill import ZeroRate, ZeroVelocity
+from strapdown.aiding.vehicle import BodyVelocity, NoSlip, Odometer
+from strapdown.errors import ConfigError
 
 RUNS = 20
 UNTIL = 66.0

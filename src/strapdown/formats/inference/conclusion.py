@@ -1,4 +1,4 @@
-"""An inference from numbers, with its probability and evidence."""
+"""Inference from numbers: conclusions; clock and stamps; accelerometer units from gravity."""
 
 from __future__ import annotations
 

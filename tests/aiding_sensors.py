@@ -7,82 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
-from strapdown.errors import ConfigError
-from strapdown.sensors.antenna import antenna_motion
 from strapdown.sensors.error_chain import Seed, child, normal, random_walk
 from strapdown.sensors.triad_errors import ZERO, Triad
 from strapdown.simulation.earth_motion import EarthMotion
+from strapdown.simulation.gnss import instants, motion_of_point, velocity_of_point
 from strapdown.tables import (
-    GEODETIC,
-    VELOCITY,
     barometer_table,
     body_velocity_table,
     heading_table,
     odometer_table,
 )
-
-__all__ = ["check_numbers", "instants", "place_of_point", "velocity_of_point"]
-
-
-Array = NDArray[np.float64]
-
-_MOST = 1_000_000
-
-
-def instants(motion: EarthMotion, rate: float) -> Array:
-    """Return the instants ``k / rate`` within a motion, (n,), s.
-
-    ConfigError: the instants are fewer than two, or too many.
-    """
-    count = math.floor(rate * motion.duration * (1.0 + 1e-12)) + 1
-    if not 2 <= count <= _MOST:
-        raise ConfigError(
-            "simulation.hz-gives-rows",
-            quantity="rate",
-            rate=rate,
-            count=count,
-            duration=motion.duration,
-            most=_MOST,
-        )
-    return np.minimum(np.arange(count) / rate, motion.duration)
-
-
-def place_of_point(motion: EarthMotion, time: Array, arm: ArrayLike) -> Array:
-    """Return the position of a body point, (n, 3): latitude, longitude in deg, height in m."""
-    return _point(motion, time, arm)[0]
-
-
-def velocity_of_point(motion: EarthMotion, time: Array, arm: ArrayLike) -> Array:
-    """Return the velocity of a body point relative to the Earth, body axes, (n, 3), m/s."""
-    return rotation.rotate(rotation.conjugate(motion.attitude(time)), _point(motion, time, arm)[1])
-
-
-def check_numbers(sensor: object, *names: str, above: bool = False) -> None:
-    """Raise for attributes that are not finite, negative, or (with `above`) zero."""
-    for name in names:
-        value = np.asarray(getattr(sensor, name), dtype=np.float64)
-        if not np.isfinite(value).all() or (value < 0.0).any() or (above and (value == 0.0).any()):
-            raise ConfigError(
-                "simulation.sensor-not-positive" if above else "simulation.sensor-negative",
-                quantity=name,
-                value=getattr(sensor, name),
-            )
-
-
-def _point(motion: EarthMotion, time: Array, arm: ArrayLike) -> tuple[Array, Array]:
-    truth = motion.trajectory(time)
-    return antenna_motion(
-        truth[GEODETIC].to_numpy(dtype=np.float64),
-        truth[VELOCITY].to_numpy(dtype=np.float64),
-        motion.attitude(time),
-        motion.rate(time),
-        arm,
-        ellipsoid=motion.ellipsoid,
-    )
-
 
 # Barometer with noise and a wandering bias.
 
@@ -106,11 +42,6 @@ class PressureHeight:
         Random walk of the bias.
     point : triad, m
         Position of the barometer relative to the motion's reference point, body axes.
-
-    Raises
-    ------
-    ConfigError
-        A number is out of range.
     """
 
     rate: float = 10.0
@@ -118,10 +49,6 @@ class PressureHeight:
     bias: float = 0.0
     walk: float = 5.0
     point: Triad = ZERO
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "rate", "noise", above=True)
-        check_numbers(self, "walk")
 
 
 def simulate_barometer(
@@ -132,7 +59,7 @@ def simulate_barometer(
     `seed`: of noise and walk. Returns barometer table at the instants ``k / rate``.
     """
     time = instants(motion, barometer.rate)
-    height = place_of_point(motion, time, barometer.point)[:, 2]
+    height = motion_of_point(motion, time, barometer.point)[0][:, 2]
     density = barometer.walk / math.sqrt(_HOUR)
     steps = np.diff(time, prepend=time[0] - 1.0 / barometer.rate)
     walk = random_walk(child(seed, _WALK), steps, (density, 0.0, 0.0), mean=False)[:, 0]
@@ -161,11 +88,6 @@ class VelocityLog:
         Position of the instrument relative to the motion's reference point, body axes.
     angles_deg : triad, deg
         Roll, pitch, yaw of the body axes in the instrument axes (`aiding.vehicle_axes`).
-
-    Raises
-    ------
-    ConfigError
-        A number is out of range.
     """
 
     rate: float = 2.0
@@ -173,9 +95,6 @@ class VelocityLog:
     scale: float = 0.0
     point: Triad = ZERO
     angles_deg: Triad = ZERO
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "rate", "noise", above=True)
 
 
 def simulate_body_velocity(
@@ -211,20 +130,12 @@ class Compass:
     misalignment_deg : float, deg
     axis_deg : float, deg
         Direction of the axis in the body, from forward to the right.
-
-    Raises
-    ------
-    ConfigError
-        A number is out of range.
     """
 
     rate: float = 5.0
     noise_deg: float = 1.0
     misalignment_deg: float = 0.0
     axis_deg: float = 0.0
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "rate", "noise_deg", above=True)
 
 
 def simulate_heading(
@@ -264,11 +175,6 @@ class WheelSpeed:
         Position of the wheel relative to the motion's reference point, body axes.
     angles_deg : triad, deg
         Roll, pitch, yaw of the body axes in the vehicle axes (`aiding.vehicle_axes`).
-
-    Raises
-    ------
-    ConfigError
-        A number is out of range.
     """
 
     rate: float = 10.0
@@ -276,9 +182,6 @@ class WheelSpeed:
     scale: float = 0.0
     point: Triad = ZERO
     angles_deg: Triad = ZERO
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "rate", "noise", above=True)
 
 
 def simulate_odometer(
