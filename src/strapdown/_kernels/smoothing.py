@@ -213,7 +213,7 @@ def smooth_back(rows, n, told, less, wanted, estimates, covariances):
 
     Parameters
     ----------
-    rows : ndarray, (k, `smoothing_rows.row_width`)
+    rows : ndarray, (k, `row_width`)
     n : int
         Number of errors.
     told, less : ndarray, (`padded`,) and (n, `padded`)

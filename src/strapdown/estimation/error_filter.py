@@ -45,7 +45,7 @@ Array = NDArray[np.float64]
 
 # Relative excess of a noise over its known part, so that the difference stays positive
 # semidefinite: for a noise of deficient rank, as that of a quaternion's four numbers, rounding of
-# the whole, 2e-16, must be negligible beside it (`_kernels.factors.INDEFINITE`).
+# the whole, 2e-16, must be negligible beside it (`_kernels.covariance.INDEFINITE`).
 ROUNDING = 1e-5
 # Position of the rotation among the physical errors.
 ROTATION = slice(6, 9)
@@ -435,7 +435,7 @@ LARGE = math.radians(0.8)
 # Positions of both tilts among the physical errors.
 TILTS = slice(6, 8)
 # Blocks of states that act as a bias of the accelerometers, in order of preference.
-LARGE_TILT_BIASES = ("accel_bias", "accel_drift")
+ACCEL_BIASES = ("accel_bias", "accel_drift")
 
 
 def is_large(P: Array) -> bool:
@@ -472,7 +472,7 @@ def unlearnt_force(
     derived here.
     """
     layout = filter_.model.layout
-    names = [name for name in LARGE_TILT_BIASES if name in layout]
+    names = [name for name in ACCEL_BIASES if name in layout]
     if not is_large(before) or not names:
         return None
     used = filter_.mechanization

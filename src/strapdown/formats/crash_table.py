@@ -505,7 +505,7 @@ def read_text_table(
     """Read a text table whose header may be below the first line.
 
     Returns : `units` are those of the row of units, if there is one; : metadata of columns from
-    comments, as from `crash_attributes.attributes_of`; : title in a comment, or empty; : the other
+    comments, as from `crash_record.attributes_of`; : title in a comment, or empty; : the other
     lines above the table, where recorders write rate, range and axes.
     """
     if path.stat().st_size > LARGEST:

@@ -45,7 +45,7 @@ def write_geojson(
     name : str
     options : TrajectoryFileOptions, optional
         With `epoch`, dates are added to the times. More than `most_points` rows are thinned to
-        those that preserve the path best (`trajectory_thinning.thin`).
+        those that preserve the path best (`thin`).
 
     Raises
     ------
@@ -71,7 +71,7 @@ def write_geojson(
     features = [_end(trajectory, 0, "start", title, chosen)]
     if len(trajectory) > 1:
         features = [
-            _path(trajectory, thinned, title, chosen),
+            _path_feature(trajectory, thinned, title, chosen),
             *features,
             _end(trajectory, -1, "end", title, chosen),
         ]
@@ -87,7 +87,7 @@ def _position(point: Array) -> list[float]:
     return [round(v, d) + 0.0 for v, d in zip(point.tolist(), (9, 9, 4), strict=True)]
 
 
-def _path(
+def _path_feature(
     trajectory: pd.DataFrame, thinned: Thinned, name: str, options: TrajectoryFileOptions
 ) -> dict[str, Any]:
     kept = trajectory.iloc[thinned.rows]
@@ -175,7 +175,7 @@ def write_kml(
     options : TrajectoryFileOptions, optional
         With `epoch`, a track with dates (``gx:Track``, Google's extension) is written in
         addition to the path. More than `most_points` rows are thinned to those that preserve
-        the path best (`trajectory_thinning.thin`).
+        the path best (`thin`).
 
     Raises
     ------
@@ -210,7 +210,7 @@ def write_kml(
         _STYLE,
     ]
     if len(points) > 1:
-        lines += _path_trajectory_kml(points)
+        lines += _path_placemark(points)
         if chosen.epoch is not None:
             lines += _track(points, [chosen.date(t) for t in time.tolist()])
     ends = [("start", 0)] + ([("end", -1)] if len(points) > 1 else [])
@@ -247,7 +247,7 @@ def _plain(value: float, decimals: int) -> str:
     return text or "0"
 
 
-def _path_trajectory_kml(points: Array) -> list[str]:
+def _path_placemark(points: Array) -> list[str]:
     parts = [
         [
             "<LineString><altitudeMode>absolute</altitudeMode><coordinates>",
