@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
 from strapdown.ellipsoids import WGS84, Ellipsoid
@@ -207,7 +207,7 @@ def instants(motion: EarthMotion, rate: float) -> Array:
     return np.minimum(np.arange(count) / rate, motion.duration)
 
 
-def motion_of_point(motion: EarthMotion, time: Array, arm: TriadLike) -> tuple[Array, Array]:
+def motion_of_point(motion: EarthMotion, time: Array, arm: ArrayLike) -> tuple[Array, Array]:
     """Position (deg, deg, m) and velocity (NED, m/s) of a body point, (n, 3) each."""
     truth = motion.trajectory(time)
     return antenna_motion(
@@ -220,7 +220,7 @@ def motion_of_point(motion: EarthMotion, time: Array, arm: TriadLike) -> tuple[A
     )
 
 
-def velocity_of_point(motion: EarthMotion, time: Array, arm: TriadLike) -> Array:
+def velocity_of_point(motion: EarthMotion, time: Array, arm: ArrayLike) -> Array:
     """Velocity of a body point relative to the Earth, in body axes, (n, 3), m/s."""
     velocity = motion_of_point(motion, time, arm)[1]
     return rotation.rotate(rotation.conjugate(motion.attitude(time)), velocity)

@@ -49,7 +49,7 @@ def _motion(table: dict[str, Any]) -> Motion:
         pulses = ({**p, "axis": "xyz".index(p["axis"])} for p in table["pulses"])
         return PulseMotion(tuple(Pulse(**p) for p in pulses), duration)
     if "tracks" in table:
-        tracks = {name: Track(*map(tuple, rows)) for name, rows in table["tracks"].items()}
+        tracks: dict[str, Any] = {k: Track(*map(tuple, v)) for k, v in table["tracks"].items()}
         return Gesture(duration, **tracks)
     if "poses" in table:
         return gesture(table["poses"], duration)
