@@ -57,9 +57,8 @@ def ratios() -> Iterator[Ratio]:
 def _path() -> Any:
     """Path of a simulated pole impact from its entry on, with everything that is not known."""
     from strapdown.crash.entry import Entry
-    from strapdown.simulation.crash_recording import record_crash
-    from strapdown.simulation.crash_scenarios import find_crash
-    from strapdown.simulation.recorder_design import paper_units
+    from strapdown.simulation.crash_motion import find_crash
+    from strapdown.simulation.crash_recording import paper_units, record_crash
     from strapdown.systems.crash_reconstruction import reconstruct_crash
 
     crash = find_crash("pole")

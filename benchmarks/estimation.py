@@ -115,11 +115,11 @@ def compiled() -> dict[str, Any]:
     """Epochs one after the other without Python between them; P = 1 is its own factors."""
     from numba import njit
 
-    from strapdown._kernels import covariance, factored_update, factors
+    from strapdown._kernels import covariance
 
     dense_predict, dense_update = covariance.dense_predict, covariance.dense_update
-    udu_predict, ud_update = factors.udu_predict, factored_update.ud_update
-    wd_epoch = factored_update.wd_epoch
+    udu_predict, ud_update = covariance.udu_predict, covariance.ud_update
+    wd_epoch = covariance.wd_epoch
 
     @njit  # type: ignore[untyped-decorator]
     def joseph(count, Phi, Q, x, z, H, R, state):  # type: ignore[no-untyped-def]

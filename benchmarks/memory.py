@@ -11,7 +11,8 @@ from benchmarks.measure import Ratio
 
 
 def ratios() -> Iterator[Ratio]:
-    from strapdown import bench_attitude, read_log, simulate
+    from strapdown import read_log, simulate
+    from strapdown.systems.attitude_bench import bench_attitude
 
     with TemporaryDirectory() as folder:
         seal = simulate("alexiev-fig2c", Path(folder) / "log", rate=20_000, formats=["npz"])

@@ -24,9 +24,8 @@ from strapdown.report.chart import (
 )
 from strapdown.report.svg_chart import draw
 from strapdown.simulation import point_kinematics
-from strapdown.simulation.crash_recording import record_crash
-from strapdown.simulation.crash_scenarios import find_crash
-from strapdown.simulation.recorder_design import paper_units
+from strapdown.simulation.crash_motion import find_crash
+from strapdown.simulation.crash_recording import paper_units, record_crash
 from strapdown.systems.crash_reconstruction import reconstruct_crash
 from strapdown.tables import NED, VELOCITY
 

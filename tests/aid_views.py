@@ -16,7 +16,7 @@ from strapdown.nav_state import NavState
 from strapdown.navigation.measurements.measurement import View
 from strapdown.sensors.antenna import antenna_motion
 from strapdown.simulation import Origin
-from strapdown.simulation.minimum_jerk import Track
+from strapdown.simulation.motion import Track
 from strapdown.simulation.path_motion import PathMotion
 
 #: Errors of the inertial sensors, beside those of an aid.

@@ -14,7 +14,7 @@ from strapdown.estimation.error_model import RotationVectorModel
 from strapdown.estimation.sensor_blocks import accel_bias, gyro_bias
 from strapdown.increments import motion_increments
 from strapdown.mechanization import MECHANIZATIONS
-from strapdown.mechanization.state_error import state_error
+from strapdown.mechanization.mechanization import state_error
 from strapdown.nav_state import NavState
 from strapdown.navigation.navigator import Navigator, with_states
 from strapdown.simulation import ImuErrors, Origin, PathMotion, Track, TriadErrors, simulate_imu

@@ -15,13 +15,9 @@ from strapdown.simulation import (
     RecorderTruth,
     Ringing,
     Setting,
-    frontal_impact,
-    oblique_impact,
+    crash_scenario,
     paper_units,
-    pole_impact,
-    rear_impact,
     record_crash,
-    side_impact,
 )
 
 Draw = Callable[[np.random.Generator], CrashScenario]
@@ -40,9 +36,10 @@ def _setting(rng: np.random.Generator) -> Setting:
 
 
 def _pole(rng: np.random.Generator) -> CrashScenario:
-    return pole_impact(
-        rng.uniform(5.0, 12.0),
-        rng.uniform(-0.6, 0.6),
+    return crash_scenario(
+        "pole",
+        entry_speed=rng.uniform(5.0, 12.0),
+        offset=rng.uniform(-0.6, 0.6),
         restitution=rng.uniform(0.05, 0.2),
         length=rng.uniform(0.09, 0.14),
         pitch_deg=rng.uniform(-3.0, 0.0),
@@ -51,8 +48,9 @@ def _pole(rng: np.random.Generator) -> CrashScenario:
 
 
 def _frontal(rng: np.random.Generator) -> CrashScenario:
-    return frontal_impact(
-        rng.uniform(8.0, 16.0),
+    return crash_scenario(
+        "frontal",
+        entry_speed=rng.uniform(8.0, 16.0),
         restitution=rng.uniform(0.05, 0.2),
         length=rng.uniform(0.09, 0.13),
         pitch_deg=rng.uniform(-4.0, 0.0),
@@ -61,9 +59,10 @@ def _frontal(rng: np.random.Generator) -> CrashScenario:
 
 
 def _oblique(rng: np.random.Generator) -> CrashScenario:
-    return oblique_impact(
-        rng.uniform(8.0, 15.0),
-        rng.choice([-1.0, 1.0]) * rng.uniform(15.0, 50.0),
+    return crash_scenario(
+        "oblique",
+        entry_speed=rng.uniform(8.0, 15.0),
+        direction_deg=rng.choice([-1.0, 1.0]) * rng.uniform(15.0, 50.0),
         arm=rng.uniform(-0.4, 0.4),
         restitution=rng.uniform(0.05, 0.2),
         length=rng.uniform(0.10, 0.14),
@@ -73,10 +72,11 @@ def _oblique(rng: np.random.Generator) -> CrashScenario:
 
 
 def _side(rng: np.random.Generator) -> CrashScenario:
-    return side_impact(
-        rng.uniform(4.0, 12.0),
-        rng.uniform(4.0, 9.0),
-        rng.choice([-1.0, 1.0]) * rng.uniform(70.0, 110.0),
+    return crash_scenario(
+        "side",
+        entry_speed=rng.uniform(4.0, 12.0),
+        change=rng.uniform(4.0, 9.0),
+        direction_deg=rng.choice([-1.0, 1.0]) * rng.uniform(70.0, 110.0),
         arm=rng.uniform(-0.4, 0.4),
         length=rng.uniform(0.08, 0.11),
         roll_deg=rng.uniform(-4.0, 4.0),
@@ -85,9 +85,10 @@ def _side(rng: np.random.Generator) -> CrashScenario:
 
 
 def _rear(rng: np.random.Generator) -> CrashScenario:
-    return rear_impact(
-        rng.uniform(1.0, 6.0),
-        rng.uniform(4.0, 8.0),
+    return crash_scenario(
+        "rear",
+        entry_speed=rng.uniform(1.0, 6.0),
+        change=rng.uniform(4.0, 8.0),
         offset=rng.uniform(-0.4, 0.4),
         length=rng.uniform(0.10, 0.14),
         pitch_deg=rng.uniform(0.0, 2.5),

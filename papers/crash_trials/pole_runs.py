@@ -38,8 +38,8 @@ from strapdown.simulation import (
     Ringing,
     Setting,
     TriadDesign,
+    crash_scenario,
     point_kinematics,
-    pole_impact,
     record_crash,
     sample_accelerometer,
     sample_gyro,
@@ -390,7 +390,7 @@ def ringing_at_200_hz(
         m: distance at 750 ms from the true place of the rigid vehicle. What a low-pass does to the
         crash itself is the row without ringing; its delay is taken off as in any record.
     """
-    crash = scenario or pole_impact(setting=Setting(stand=2.6, towing=5.0, after=0.85))
+    crash = scenario or crash_scenario("pole", setting=Setting(stand=2.6, towing=5.0, after=0.85))
     cases: list[tuple[str, str, str, float, tuple[float, float, float] | None, float]] = [
         (NO_RINGING, *sampler, None, 0.0) for sampler in SAMPLERS
     ]
@@ -417,7 +417,7 @@ def perfect_sensors(
         As `ringing_at_200_hz`.
     ringing : Ringing, optional
     """
-    crash = scenario or pole_impact(setting=Setting(stand=2.6, towing=5.0, after=0.85))
+    crash = scenario or crash_scenario("pole", setting=Setting(stand=2.6, towing=5.0, after=0.85))
     return _error(crash, "instantaneous", math.inf, () if ringing is None else (ringing,))
 
 

@@ -22,7 +22,7 @@ from papers.reproduction import (
     amount,
 )
 from papers.tadic.experiment import AXES, CHOSEN, IMUS, LABS, PLATFORMS, Experiment, Experiments
-from strapdown.simulation import Ringing, Setting, pole_impact
+from strapdown.simulation import Ringing, Setting, crash_scenario
 from strapdown.tables import NED
 
 
@@ -173,7 +173,7 @@ class Rung:
 
 def rung() -> tuple[Rung, ...]:
     """Quadratic mean over some instants between two samples at which the ringing begins."""
-    crash = pole_impact(setting=Setting(stand=2.6, towing=5.0, after=0.85))
+    crash = crash_scenario("pole", setting=Setting(stand=2.6, towing=5.0, after=0.85))
     found = []
     for name, shape in RINGINGS.items():
         starts = [crash.start + (k + 0.5) / PHASES * INTERVAL for k in range(PHASES)]
@@ -184,7 +184,7 @@ def rung() -> tuple[Rung, ...]:
 
 def silent() -> float:
     """The same without ringing, m."""
-    crash = pole_impact(setting=Setting(stand=2.6, towing=5.0, after=0.85))
+    crash = crash_scenario("pole", setting=Setting(stand=2.6, towing=5.0, after=0.85))
     return float(np.linalg.norm(perfect_sensors(scenario=crash)))
 
 

@@ -31,8 +31,8 @@ from strapdown.simulation import (
     ExactAnswers,
     GnssReceiver,
     Setting,
+    crash_scenario,
     paper_units,
-    pole_impact,
     record_crash,
     simulate_gnss,
 )
@@ -461,7 +461,7 @@ def tied(runs: int = RECORDS) -> Tied:
 
     A wrong speed shifts the path and does nothing else to it: the witness's follows.
     """
-    crash = pole_impact(setting=Setting(stand=1.0, coast=2.0, after=LATER))
+    crash = crash_scenario("pole", setting=Setting(stand=1.0, coast=2.0, after=LATER))
     design = next(d for d in paper_units() if d.name == "IMU1")
     rows = []
     for seed in range(runs):

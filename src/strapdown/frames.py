@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
-from strapdown._kernels import geodetic as kernel
+from strapdown._kernels import earth as kernel
 from strapdown.earth import refuse, rows
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import DataError

@@ -101,25 +101,9 @@ class NavState:
     ) -> NavState:
         """Make a state from angles in degrees.
 
-        Parameters
-        ----------
-        lat_deg, lon_deg : float, deg
-            Geodetic, north and east positive.
-        alt : float, m
-            Over the ellipsoid.
-        v_n : array_like, (3,), m/s
-            North, east, down.
-        roll_deg, pitch_deg, heading_deg : float, deg
-        time : float, s
-
-        Returns
-        -------
-        NavState
-
-        Raises
-        ------
-        DataError
-            As the class; a latitude over 90 deg has its own message.
+        `lat_deg`, `lon_deg` (deg): geodetic, north and east positive. `alt` (m): over the
+        ellipsoid. `v_n` ((3,), m/s): north, east, down. `roll_deg`, `pitch_deg`, `heading_deg`
+        (deg). `time` (s).
         """
         angles = (lat_deg, lon_deg, roll_deg, pitch_deg, heading_deg)
         for name, value in zip(("lat_deg", "lon_deg", *EULER), angles, strict=True):
@@ -150,20 +134,7 @@ class NavState:
     def from_trajectory(cls, trajectory: pd.DataFrame, row: int = 0) -> NavState:
         """Return a state from a row of a Trajectory table.
 
-        Parameters
-        ----------
-        trajectory : DataFrame
-        row : int
-            Position of the row; negative from the end.
-
-        Returns
-        -------
-        NavState
-
-        Raises
-        ------
-        DataError
-            As `tables.check_trajectory`; the row does not exist.
+        `row`: position of the row; negative from the end.
         """
         check_trajectory(trajectory)
         rows = len(trajectory)

@@ -14,7 +14,7 @@ from strapdown.estimation.error_model import QuaternionModel, RotationVectorMode
 from strapdown.estimation.sensor_blocks import accel_bias, gauss_markov, gyro_bias
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown, WanderAzimuth
-from strapdown.mechanization.state_error import state_error
+from strapdown.mechanization.mechanization import state_error
 from strapdown.nav_state import NavState
 from strapdown.navigation.filter_options import DAMPINGS
 from strapdown.navigation.measurements.gnss import Gnss
@@ -22,7 +22,7 @@ from strapdown.navigation.navigator import Navigator, with_states
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation.earth_motion import Origin
 from strapdown.simulation.imu import simulate_imu
-from strapdown.simulation.minimum_jerk import Track
+from strapdown.simulation.motion import Track
 from strapdown.simulation.path_motion import PathMotion
 from strapdown.tables import ACCEL, GYRO, gnss_table, imu_table
 

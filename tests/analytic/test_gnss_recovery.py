@@ -12,9 +12,10 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from tests.gnss_faults import Frozen, Outage, Outliers, WrongSd, inject_gnss_faults
+
 import town_drive as town
 from strapdown.estimation.robust import AdaptiveRule, Hampel, RobustUpdate, Tukey
-from strapdown.simulation.gnss import Frozen, Outage, Outliers, WrongSd, inject_gnss_faults
 
 SETTLED = 30.0
 OUTAGE = (60.0, 120.0)

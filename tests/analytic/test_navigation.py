@@ -27,10 +27,10 @@ from strapdown.simulation import (
     SineVelocityMotion,
     StationaryMotion,
     Wave,
-    place_integral,
     rocking_stand,
     simulate_imu,
 )
+from strapdown.simulation import earth_motion as place_integral
 from strapdown.tables import motion_increments_table
 
 DAY = 86_400.0

@@ -21,7 +21,7 @@ from strapdown.estimation.robust import (
     Tukey,
 )
 from strapdown.mechanization import NorthEastDown, run_mechanization
-from strapdown.mechanization.state_error import state_error
+from strapdown.mechanization.mechanization import state_error
 from strapdown.navigation.truth_comparison import band_of_mean, normalised_squares
 
 sys.path.insert(0, str(Path(__file__).parent))

@@ -19,7 +19,7 @@ from strapdown.simulation import (
     point_kinematics,
     simulate_imu,
 )
-from strapdown.simulation.crash_scenarios import pole_impact, rear_impact, side_impact
+from strapdown.simulation.crash_motion import crash_scenario
 
 POLE = CRASHES["pole"]
 END = POLE.start + 0.113
@@ -37,7 +37,7 @@ def test_its_numbers_are_those_stated():
     change = POLE.delta_v[0][0]
     assert change == pytest.approx(-V0 * (1 + RESTITUTION) / (1 + OFFSET**2 / K2), rel=1e-15)
     assert change == pytest.approx(-7.20, abs=0.005)
-    flat = pole_impact(pitch_deg=0.0)
+    flat = crash_scenario("pole", pitch_deg=0.0)
     rate = flat.motion.kinematics(np.array([END])).turning[0]
     assert math.degrees(rate[2]) == pytest.approx(87.0, abs=0.15)
     peak = POLE.motion.kinematics(np.array([POLE.start + 0.5 * 0.113])).acceleration[0]
@@ -45,7 +45,7 @@ def test_its_numbers_are_those_stated():
 
 
 def test_restitution_and_angular_momentum_hold():
-    flat = pole_impact(pitch_deg=0.0)
+    flat = crash_scenario("pole", pitch_deg=0.0)
     k = flat.motion.kinematics(np.array([flat.start, END]))
     speed, yaw = k.velocity[:, 0], k.turning[:, 2]
     # Along the force, at the contact beside the centre of mass, where it was when it began.
@@ -62,7 +62,10 @@ def test_restitution_and_angular_momentum_hold():
 
 @pytest.mark.parametrize(
     ("crash", "length", "change", "arm"),
-    [(side_impact(roll_deg=0.0), 0.090, 7.0, 0.3), (rear_impact(pitch_deg=0.0), 0.120, 6.7, -0.2)],
+    [
+        (crash_scenario("side", roll_deg=0.0), 0.090, 7.0, 0.3),
+        (crash_scenario("rear", pitch_deg=0.0), 0.120, 6.7, -0.2),
+    ],
 )
 def test_a_blow_beside_the_centre_of_mass_turns_by_its_arm(crash, length, change, arm):
     k = crash.motion.kinematics(np.array([crash.start, crash.start + length]))
@@ -71,7 +74,7 @@ def test_a_blow_beside_the_centre_of_mass_turns_by_its_arm(crash, length, change
 
 
 def test_points_of_the_car_change_their_velocity_by_the_yaw_rate():
-    flat = pole_impact(pitch_deg=0.0)
+    flat = crash_scenario("pole", pitch_deg=0.0)
     t = np.array([flat.start, END])
     centre = point_kinematics(flat.motion, (0.0, 0.0, 0.0), t, epoch=flat.start)
     beside = point_kinematics(flat.motion, (-0.6, 0.5, -0.2), t, epoch=flat.start)
@@ -91,7 +94,9 @@ def test_perfect_sensors_at_200_hz_come_within_a_millimetre(position, phase):
     # What linear interpolation loses: the second derivative of the force jumps by 4 pi² D/T³ =
     # 2e5 m/s⁴ at both edges, which a sample's phase x turns into h³ B_3(x)/6 of it, 2e-4 m/s:
     # 0.15 mm of 0.75 s at each edge. The arm adds 0.6 m times the same of the turning rate.
-    crash = pole_impact(setting=Setting(stand=0.1 + phase * 0.005, towing=1e3, coast=0.1))
+    crash = crash_scenario(
+        "pole", setting=Setting(stand=0.1 + phase * 0.005, towing=1e3, coast=0.1)
+    )
     motion = MountedMotion(crash.motion, Mounting(position))
     imu, _ = simulate_imu(motion, ImuErrors(), rate=200.0)
     imu = imu[(imu.index >= crash.start - 0.1) & (imu.index <= crash.start + 0.75)]

@@ -17,7 +17,7 @@ from strapdown import frames, rotation
 from strapdown._kernels import wander as kernel
 from strapdown.ellipsoids import ELLIPSOIDS, WGS84
 from strapdown.mechanization import NorthEastDown, WanderAzimuth, run_mechanization
-from strapdown.mechanization.state_error import state_error
+from strapdown.mechanization.mechanization import state_error
 from strapdown.nav_state import NavState
 from strapdown.simulation import Origin, SineVelocityMotion, StationaryMotion
 from strapdown.tables import MOTION

@@ -19,9 +19,8 @@ from strapdown.dsp.channel_class import cfc_filter
 from strapdown.errors import StrapdownError
 from strapdown.sensors.crash_unit import RecordedTriad
 from strapdown.sensors.synchronise import synchronise
-from strapdown.simulation.crash_recording import record_crash
-from strapdown.simulation.crash_scenarios import find_crash
-from strapdown.simulation.recorder_design import paper_units
+from strapdown.simulation.crash_motion import find_crash
+from strapdown.simulation.crash_recording import paper_units, record_crash
 
 LOW, HIGH, GYRO = 0, 1, 2
 DESIGNS = {design.name: design for design in paper_units()}

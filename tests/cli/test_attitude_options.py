@@ -9,7 +9,7 @@ import pytest
 from strapdown import simulate
 from strapdown.formats.log_writers import LOG_WRITERS
 from strapdown.simulation import ImuErrors, simulate_imu
-from strapdown.simulation.hand_motions import Handling
+from strapdown.simulation.attitude_motions import Handling
 
 pytestmark = pytest.mark.usefixtures("sketched")
 

@@ -13,6 +13,17 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from tests.aiding_sensors import (
+    Compass,
+    PressureHeight,
+    VelocityLog,
+    WheelSpeed,
+    simulate_barometer,
+    simulate_body_velocity,
+    simulate_heading,
+    simulate_odometer,
+)
+
 from aid_views import SITUATIONS, Moment, difference_columns, moment_of, view_of
 from aided_drives import drive, gnss_of, increments_of, navigator_of, run
 from strapdown import rotation
@@ -28,16 +39,6 @@ from strapdown.navigation.measurements.measurement import (
 )
 from strapdown.navigation.measurements.standstill import ZeroRate, ZeroVelocity
 from strapdown.navigation.measurements.vehicle import BodyVelocity, NoSlip, Odometer
-from strapdown.simulation.aiding_sensors import (
-    Compass,
-    PressureHeight,
-    VelocityLog,
-    WheelSpeed,
-    simulate_barometer,
-    simulate_body_velocity,
-    simulate_heading,
-    simulate_odometer,
-)
 from strapdown.tables import (
     barometer_table,
     body_velocity_table,

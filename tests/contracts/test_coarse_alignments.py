@@ -14,7 +14,7 @@ from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.simulation import Origin, simulate_imu
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
-from strapdown.simulation.minimum_jerk import Track
+from strapdown.simulation.motion import Track
 from strapdown.simulation.path_motion import PathMotion
 from strapdown.tables import GYRO, QUATERNION
 

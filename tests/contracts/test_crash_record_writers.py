@@ -13,7 +13,7 @@ from strapdown.formats.crash_json import write_crash_json
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.formats.crash_records import read_crash_record
 from strapdown.formats.crash_table import write_crash_csv
-from strapdown.formats.mme_writer import write_mme
+from strapdown.formats.crash_writers import write_mme
 
 KEPT = ("quantity", "axis", "unit", "sampling", "place", "body", "low_pass", "full_scale")
 

@@ -16,7 +16,7 @@ from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.formats.crash_records import read_crash_record
 from strapdown.formats.crash_table import write_crash_csv
 from strapdown.formats.crash_triad import triad_of_channels
-from strapdown.formats.mme_writer import write_mme
+from strapdown.formats.crash_writers import write_mme
 
 TIME = np.arange(12) * 1e-3
 RECORD = CrashRecord(

@@ -32,7 +32,8 @@ from runs import RUNS  # noqa: E402
 TAG = "v0.1.0"
 COMMIT = "c278776f81b4dde3ec5a767f4ebd2ad7b37b0f29"
 # 0.1 compiled four files of kernels with relaxed arithmetic, whose last bits depend on whether they
-# were compiled or loaded from the cache. It is recorded with the same formulas compiled strictly, with one rounding (`fma`) where the W-D update cancels.
+# were compiled or loaded from the cache. It is recorded with the same formulas compiled strictly,
+# with one rounding (`fma`) where the W-D update cancels.
 STRICT = HERE / "strict_kernels.patch"
 WORK = ROOT / ".record"
 # Of the longest run, several times over, on a machine that is busy and compiles first.

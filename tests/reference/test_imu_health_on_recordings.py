@@ -12,10 +12,10 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 
 import raw_recordings
+from tests.sensor_faults import Dead, DropOut, Stuck, inject_faults
 
 from strapdown.formats import read_log
 from strapdown.sensors.imu_health import check_imu_channels
-from strapdown.simulation.sensor_faults import Dead, DropOut, Stuck, inject_faults
 from strapdown.tables import ACCEL, GYRO, imu_table
 
 TRIALS = (

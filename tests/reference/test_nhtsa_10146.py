@@ -24,8 +24,8 @@ from strapdown.crash.indices.thiv import thiv
 from strapdown.crash.severity import find_severity_model
 from strapdown.crash.severity_model import injury_risk
 from strapdown.dsp.channel_class import cfc_filter
+from strapdown.formats.crash_nhtsa import accelerations, imu_of
 from strapdown.formats.nhtsa import read_nhtsa
-from strapdown.formats.nhtsa_select import accelerations, imu_of
 from strapdown.increments import motion_increments
 from strapdown.mechanization.ned import NorthEastDown
 from strapdown.mechanization.run import run_mechanization

@@ -237,7 +237,7 @@ REFUSED = [
     (lambda: earth.gravity(0.0, 2e6), "not continued farther than 1000 km"),
     (lambda: earth.gravity([1.0, 2.0], [1.0, 2.0, 3.0]), "do not go together"),
     (lambda: earth.transport_rate(90.0, 0.0, [1.0, 0.0, 0.0]), "no direction at a pole"),
-    (lambda: earth.transport_rate(0.0, 0.0, [1.0, 0.0]), r"its shape is \(2\)"),
+    (lambda: earth.transport_rate(0.0, 0.0, [1.0, 0.0]), r"its shape is \(2,\)"),
     (lambda: earth.transport_rate(0.0, 0.0, [1.0, math.nan, 0.0]), "v_n_east: not a finite"),
 ]
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from strapdown import earth, frames, rotation
-from strapdown._kernels import geodetic as kernel
+from strapdown._kernels import earth as kernel
 from strapdown.ellipsoids import ELLIPSOIDS
 from strapdown.errors import DataError
 
@@ -221,7 +221,7 @@ REFUSED = [
     ),
     (lambda: frames.ecef_from_geodetic([0.0, 361.0, 0.0]), "lon_deg: a longitude of more than"),
     (lambda: frames.ecef_from_geodetic([0.0, 0.0, 6.4e9]), "alt: not a height over the ellipsoid"),
-    (lambda: frames.ecef_from_geodetic([0.0, 0.0]), r"place: shape \(2\) does not end in \(3,\)"),
+    (lambda: frames.ecef_from_geodetic([0.0, 0.0]), r"place: shape \(2,\) does not end in \(3,\)"),
     (lambda: frames.geodetic_from_ecef([6.4e6, NAN, 0.0]), "y: not a finite number"),
     (lambda: frames.geodetic_from_ecef([[6.4e6, 0, 0], [0, 0, 0]]), "row 2, position: not within"),
     (lambda: frames.geodetic_from_ecef([1e200, 0.0, 0.0]), "position: not within"),

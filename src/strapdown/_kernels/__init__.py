@@ -1,12 +1,10 @@
 """Compiled kernels: SI units and radians, float64, C-contiguous; each formula once.
 
-Importing this package imports numba, so everything above imports it only where it is about to
-compute.
+Importing this package imports numba, so modules above import it only where they compute.
 
-Numba keeps compiled code on disk, and looks only at the file of a function to tell whether it
-is still good: after a change in a file that it calls, it would go on returning old results.
-The kernels are therefore kept in a folder of their own whose name is the digest of all their
-sources. NUMBA_CACHE_DIR goes before it.
+Numba keeps compiled code on disk, and checks only the file of a function for changes: after a
+change in a file that it calls, it would return old results. The kernels are therefore cached in a
+folder named after the digest of all their sources. NUMBA_CACHE_DIR takes precedence.
 """
 
 import hashlib
@@ -27,8 +25,8 @@ def cache_folder() -> str:
     return str(base / "strapdown" / f"kernels-{digest.hexdigest()[:16]}")
 
 
-# Numba reads the setting where a function is decorated, which is while these are imported;
-# afterwards it is again what it was, for whoever else uses numba in this process.
+# Numba reads the setting where a function is decorated, during these imports; afterwards it is
+# restored for other users of numba in this process.
 _before = _config.CACHE_DIR
 try:
     if not _before:
@@ -37,7 +35,7 @@ try:
         if _source.stem != "arithmetic":
             import_module(f"strapdown._kernels.{_source.stem}")
 except RuntimeError:
-    # Path.home() without a home; numba then chooses a place of its own.
+    # Path.home() without a home; numba then chooses a folder of its own.
     pass
 finally:
     _config.CACHE_DIR = _before

@@ -1,10 +1,9 @@
-"""The same formulas in another arithmetic: single precision, or counted.
+"""The kernels' formulas in another arithmetic: single precision, or counted.
 
 The kernels are written once, in double precision. An embedded processor runs them in single
-precision, and a designer asks how many operations they take. Both are answered by the very
-source of the kernels, read and changed in two ways: for single precision each constant and each
-conversion becomes ``np.float32``, so that numba compiles every operation as one on floats;
-for counting they run as plain Python on numbers that count what is done to them.
+precision, and a designer needs the number of operations. Both are made from the sources of the
+kernels: for single precision each constant and each conversion becomes ``np.float32``, so that
+numba compiles every operation on floats; for counting they run as plain Python on counting numbers.
 """
 
 from __future__ import annotations
@@ -25,9 +24,6 @@ SOURCES = ("rotation", "increments", "attitude", "rotation_vector")
 PACKAGE = "strapdown._kernels"
 SINGLE = "_strapdown_single"
 LARGEST_SINGLE = 3e38
-
-
-# --- single precision --------------------------------------------------------------------
 
 
 class _InSingle(ast.NodeTransformer):
@@ -132,9 +128,6 @@ def _write(path: Path, text: str) -> None:
 
 def _source(name: str) -> str:
     return Path(__file__).with_name(f"{name}.py").read_text(encoding="utf-8")
-
-
-# --- counted -----------------------------------------------------------------------------
 
 
 class Counted:

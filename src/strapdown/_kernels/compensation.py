@@ -1,4 +1,4 @@
-"""Errors of the sensors taken off motion increments."""
+"""Removal of sensor errors from motion increments."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from numba import njit
 from strapdown._kernels.given_arrays import GIVEN
 from strapdown._kernels.rotation_vector import cross
 
-#: Each takes the errors of what the one before left of the inputs.
+#: Iterations; each evaluates the errors at the inputs found by the previous one.
 ROUNDS = 5
 
 
 @njit(**GIVEN)
 def errors_of_states(terms, states, out):
-    """Fill (7, 3): what states of couplings, given by their terms, add to a triad's readings."""
+    """Fill (7, 3): the effect of coupling states, given by their terms, on a triad's readings."""
     for i in range(7):
         for j in range(3):
             out[i, j] = 0.0
@@ -24,7 +24,7 @@ def errors_of_states(terms, states, out):
 
 @njit(cache=True, error_model="numpy", inline="always")
 def reading(errors, varies, rate, force):
-    """Error of a triad: its constant part, and what rate and force add."""
+    """Error of a triad: its constant part, and the parts proportional to rate and force."""
     x, y, z = errors[0, 0], errors[0, 1], errors[0, 2]
     if varies:
         for m in range(3):
@@ -46,12 +46,12 @@ def changes(errors):
 
 @njit(cache=True, error_model="numpy", inline="always")
 def of_inputs(gyro, of_gyros, accel, of_accels, rate, force):
-    """Errors of both triads with true inputs, of the inputs that they measured.
+    """Errors of both triads with true inputs, from the measured inputs.
 
-    A scale factor is of the true input, which is the reading less the error itself. Taken of the
-    reading, a bias and a scale factor of an input that stays would not make up for each other as
-    they do in the covariance: the part that nothing tells would be seen, and a filter that corrects
-    it would correct itself, ever faster. Errors of 5 % are found to 1e-6 of the input.
+    A scale factor multiplies the true input, which is the reading less the error itself. Applied to
+    the reading, a bias and a scale factor of a constant input would not compensate each other as
+    they do in the covariance: the unobservable part would be seen, and a filter that corrects it
+    would diverge. Errors of 5 % are found to 1e-6 of the input.
     """
     dx, dy, dz, ex, ey, ez = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for _ in range(ROUNDS if of_gyros or of_accels else 1):
@@ -74,11 +74,11 @@ def true_inputs(readings, gyro, accel, out):
 
 @njit(**GIVEN)
 def compensate(rows, gyro, accel, out):
-    """Fill increments without errors (7, 3) of gyros and accelerometers (`errors_of_states`).
+    """Fill increments without the errors (7, 3) of gyros and accelerometers (`errors_of_states`).
 
-    To first order in the errors: over a step the body turns by phi, so that a constant error of
-    force e adds ``(e + phi x e / 2) dt`` to the velocity in the axes of the start, and one of rate
-    d turns it by half of what it turns the body.
+    To first order in the errors: over a step the body turns by phi, so that a constant force error
+    e adds ``(e + phi x e / 2) dt`` to the velocity in the axes of the start, and a rate error d
+    turns it by half of its turn of the body.
     """
     of_gyros, of_accels = changes(gyro), changes(accel)
     for i in range(rows.shape[0]):

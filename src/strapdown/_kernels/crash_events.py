@@ -6,20 +6,6 @@ import math
 
 from numba import njit
 
-from strapdown._kernels.window_change import (
-    AX,
-    AY,
-    VX,
-    T,
-    change,
-    crossing,
-    excess,
-    first_upward,
-    largest,
-    power,
-    value,
-)
-
 # Options.
 MEAN, TRIGGER, LONG, WAKE, SHORT, SIDE, QUIET, LEVEL, LATERAL = range(9)
 OPTIONS = 9
@@ -37,15 +23,15 @@ TRIGGERED, AXIS = 11, 12
 PEAK, PEAK_TIME, LATER, LATER_TIME = 13, 14, 15, 16
 # Largest change within the trigger's window: size, axis, instant of its end.
 MOST, MOST_AXIS, MOST_TIME = 17, 18, 19
-# Wakes that came to nothing; how the last one, now over, would be told.
+# Number of wakes without an event; description of the last one.
 WOKEN, KEPT = 20, 21
-# Crossings: forward, right, resultant, acceleration, end; and the four of the one that was kept.
+# Crossings: forward, right, resultant, acceleration, end; and the four of the one kept.
 MARK = 6  # instant, slope, power of the weights, length, share of forward and of right
 MARKS = 22
 FORWARD, RIGHT, RESULTANT, FELT, END = range(5)
 KEPT_MARKS = MARKS + 5 * MARK
 KEPT_PEAK = KEPT_MARKS + 4 * MARK
-# The largest change before the episode: what leads to an event is part of it.
+# The largest change before the episode, which belongs to the event that it leads to.
 KEPT_MOST = KEPT_PEAK + 2
 SIZE = KEPT_MOST + 3
 
@@ -68,7 +54,7 @@ def begin(state, time):
 
 @njit(cache=True)
 def mark(state, which, rows, head, tail, at, window, mean, x, y):
-    """Keep what a crossing of a window's change needs for its instant and uncertainty."""
+    """Store the parts of a window's crossing that give its instant and uncertainty."""
     if which == FORWARD:
         cx, cy = 1.0, 0.0
     elif which == RIGHT:
@@ -79,7 +65,7 @@ def mark(state, which, rows, head, tail, at, window, mean, x, y):
     i = MARKS + which * MARK
     start = max(at - window, state[BEGIN])
     first = tail if at - window >= state[BEGIN] else 1
-    # Rows before a record's first that is still held are never needed: the window is shorter.
+    # Rows before the first one held are never needed: the window is shorter.
     state[i] = at
     state[i + 1] = abs(cx * x[1] + cy * y[1])
     state[i + 2] = power(rows, head, max(first, 1), start, at, mean)
@@ -90,7 +76,7 @@ def mark(state, which, rows, head, tail, at, window, mean, x, y):
 
 @njit(cache=True)
 def forget(state):
-    """Drop the marks and the peak of an episode."""
+    """Clear the marks and the peak of an episode."""
     for i in range(MARKS, MARKS + 4 * MARK):
         state[i] = math.nan
     state[PENDING] = math.nan
@@ -120,7 +106,7 @@ def felt(rows, k, options):
 
 @njit(cache=True)
 def close(state, end, rows, head, mean):
-    """End an event: the next may not count what this one did."""
+    """End an event: the next may not count its part of the window."""
     state[FLOOR] = end
     state[FLOOR + 1] = value(rows, head, end, 0, mean)[0]
     state[FLOOR + 2] = value(rows, head, end, 1, mean)[0]
@@ -129,13 +115,10 @@ def close(state, end, rows, head, mean):
 
 @njit(cache=True)
 def advance(state, options, rows, count):
-    """Take rows up to `count`; stop after each event that ends.
+    """Process rows up to `count`; stop after each event that ends.
 
-    Returns
-    -------
-    int
-        DONE when no row is left, CLOSED when an event has ended: its marks, trigger and peak
-        are then in the state until `forget`, which the caller owes.
+    Return DONE when no row is left, CLOSED when an event has ended: its marks, trigger and peak are
+    then in the state until the caller calls `forget`.
     """
     mean = options[MEAN] > 0.0
     lateral = options[LATERAL] > 0.0
@@ -175,7 +158,7 @@ def advance(state, options, rows, count):
             sy = (0.0, 0.0, 0.0)
             py = (0.0, 0.0, 0.0)
 
-        # What happens first within the piece.
+        # The first event within the segment.
         what, at = -1, length
         over = excess(sx, sy, length, options[WAKE]) > 0.0
         active = state[ACTIVE] > 0.0
@@ -335,3 +318,111 @@ def _row_of(rows, k, at):
     while k > 1 and rows[k - 1, T] >= at:
         k -= 1
     return k
+
+
+# Between samples the acceleration is a line (values at the stamps) or a constant (means): the
+# change of velocity over a trailing window is a polynomial of time between breaks, which are the
+# stamps, and the stamps moved by the length of the window. Crossings are roots of these
+# polynomials.
+
+
+# Columns of the rows: stamp, acceleration forward and right, velocity since the record began.
+T, AX, AY, VX, VY = range(5)
+WIDTH = 5
+
+NEVER = 1e300
+
+
+@njit(cache=True)
+def value(rows, k, at, axis, mean):
+    """Velocity, acceleration and its slope at an instant of the step that ends with row k."""
+    step = rows[k, T] - rows[k - 1, T]
+    since = at - rows[k - 1, T]
+    before = rows[k, AX + axis] if mean else rows[k - 1, AX + axis]
+    slope = (rows[k, AX + axis] - before) / step
+    accel = before + slope * since
+    return rows[k - 1, VX + axis] + 0.5 * (before + accel) * since, accel, slope
+
+
+@njit(cache=True)
+def change(rows, head, tail, at, window, floor, velocity, axis, mean):
+    """Change of velocity over a trailing window that ends at an instant: a quadratic of time."""
+    v, a, m = value(rows, head, at, axis, mean)
+    if at - window < floor:
+        return v - velocity, a, 0.5 * m
+    v0, a0, m0 = value(rows, tail, at - window, axis, mean)
+    return v - v0, a - a0, 0.5 * (m - m0)
+
+
+@njit(cache=True)
+def first_upward(c0, c1, c2, length, level):
+    """First instant in [0, length] at which the size of a quadratic grows through a level."""
+    first = NEVER
+    for sign in (-1.0, 1.0):
+        a, b, c = sign * c2, sign * c1, sign * c0 - level
+        disc = b * b - 4.0 * a * c
+        # The root at which it rises is the one with slope +sqrt(disc).
+        if disc > 0.0:
+            root = math.sqrt(disc)
+            # Both forms are the same root; the one that does not cancel is used.
+            x = -2.0 * c / (b + root) if b >= 0.0 else (root - b) / (2.0 * a) if a != 0.0 else -1.0
+            # A level met at the previous border may lie a rounding behind.
+            if -1e-15 <= x <= length:
+                first = min(first, max(x, 0.0))
+    return first
+
+
+@njit(cache=True)
+def largest(c0, c1, c2, length):
+    """Largest size of a quadratic in [0, length], and where."""
+    at, most = 0.0, abs(c0)
+    end = abs(c0 + length * (c1 + length * c2))
+    if end > most:
+        at, most = length, end
+    if c2 != 0.0:
+        x = -0.5 * c1 / c2
+        if 0.0 < x < length and abs(c0 + x * (c1 + x * c2)) > most:
+            at, most = x, abs(c0 + x * (c1 + x * c2))
+    return most, at
+
+
+@njit(cache=True)
+def excess(x, y, at, level):
+    """Excess of the squared resultant of two quadratics over that of a level."""
+    dx = x[0] + at * (x[1] + at * x[2])
+    dy = y[0] + at * (y[1] + at * y[2])
+    return dx * dx + dy * dy - level * level
+
+
+@njit(cache=True)
+def crossing(x, y, length, level, upward):
+    """Instant at which the resultant crosses a level in [0, length]; it does so by its end."""
+    if (excess(x, y, 0.0, level) > 0.0) == upward:
+        return 0.0
+    low, high = 0.0, length
+    for _ in range(200):
+        middle = 0.5 * (low + high)
+        if middle <= low or middle >= high:
+            break
+        if (excess(x, y, middle, level) > 0.0) == upward:
+            high = middle
+        else:
+            low = middle
+    return high
+
+
+@njit(cache=True)
+def power(rows, head, tail, start, end, mean):
+    """Sum of the squared weights of the samples in the integral from start to end."""
+    total, carry = 0.0, 0.0
+    for k in range(tail, head + 1):
+        step = rows[k, T] - rows[k - 1, T]
+        u = max(start - rows[k - 1, T], 0.0) / step
+        w = min(end - rows[k - 1, T], step) / step
+        if mean:
+            total += (step * (w - u)) ** 2
+        else:
+            left = step * ((w - 0.5 * w * w) - (u - 0.5 * u * u))
+            total += (carry + left) ** 2
+            carry = 0.5 * step * (w * w - u * u)
+    return total + carry * carry

@@ -17,21 +17,10 @@ WIDTH = 40
 def decimal_text(values, decimals, separator, text):
     """Write rows of numbers, each column with its number of decimals.
 
-    Parameters
-    ----------
-    values : ndarray, (n, m)
-    decimals : ndarray of int64, (m,)
-        0 to 15.
-    separator : int
-        Code of the letter between numbers; after the last of a row stands a line feed.
-    text : ndarray of uint8, (n m WIDTH,) or more
-        Out.
-
-    Returns
-    -------
-    int
-        Letters written; -1 where a number times ``10^decimals`` is no whole number that a double
-        holds.
+    `values` (n, m); `decimals` (m,), int64, 0 to 15; `separator`, the code of the letter between
+    numbers (a line feed ends a row); `text`, uint8, (n m WIDTH,) or more, is filled. Returns the
+    letters written, or -1 where a number times ``10^decimals`` is not an integer that a double
+    holds.
     """
     n, m = values.shape
     at = 0

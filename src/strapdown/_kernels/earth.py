@@ -1,17 +1,19 @@
-"""Ellipsoidal Earth: radii of curvature, normal gravity, rates of the local level.
+"""Ellipsoidal Earth: radii, normal gravity, rates, coordinates, and true sensor inputs.
 
-An ellipsoid comes as a float64 array whose places are named here. ``s`` and ``c`` are sine and
-cosine of the geodetic latitude; vectors are north, east, down. The loops at the end take
-latitudes in rad.
+An ellipsoid is a float64 array with the indices below. ``s`` and ``c`` are sine and cosine of the
+geodetic latitude; vectors are north, east, down; angles in rad, lengths in m.
 """
 
 from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
 
-# Places in the array of an ellipsoid: semi-major axis in m, first eccentricity squared, normal
+from strapdown._kernels.rotation import dcm_from_quat
+
+# Indices of the array of an ellipsoid: semi-major axis in m, first eccentricity squared, normal
 # gravity at the equator in m/s², Somigliana's k, rate of rotation in rad/s, flattening, and the
 # ratio of centrifugal acceleration to gravity at the equator.
 A, E2, GAMMA, K, RATE, F, M = 0, 1, 2, 3, 4, 5, 6
@@ -75,7 +77,7 @@ def gravity_parts(s2, alt, w, curvature, a, e2, gamma, k, f, m):
 
 @njit(cache=True, error_model="numpy", inline="always")
 def gravity_around(s, c, alt, w, curvature, a, e2, gamma, k, f, m):
-    """Normal gravity at a place and how it changes around it, north and down: `gravity_parts`.
+    """Normal gravity at a position and its gradient, north and down: `gravity_parts`.
 
     Returns the north and down components in m/s²; the change of each with latitude and with
     height; and half the second derivative of the down component with height.
@@ -84,7 +86,7 @@ def gravity_around(s, c, alt, w, curvature, a, e2, gamma, k, f, m):
     slope, down, steep, loss, bend = gravity_parts(s2, alt, w, curvature, a, e2, gamma, k, f, m)
     sc = s * c
     return (
-        # From zero, so that on the surface there is no zero with a minus.
+        # Added to zero, to avoid a negative zero on the surface.
         0.0 - sc * slope * alt,
         down,
         -(c * c - s2) * slope * alt,
@@ -180,3 +182,190 @@ def transport_rates(lats, alts, velocities, ellipsoid, out):
         out[i, 0], out[i, 1], out[i, 2] = transport_rate(
             s, c, velocities[i, 0], velocities[i, 1], meridian + alts[i], transverse + alts[i]
         )
+
+
+# Geodetic and Earth-centered coordinates; ``a`` is the semi-major axis and ``e2`` the first
+# eccentricity squared of the ellipsoid.
+
+
+@njit(cache=True)
+def ecef_from_geodetic(s_lat, c_lat, s_lon, c_lon, alt, a, e2):
+    """Earth-centred, earth-fixed x, y, z: Heiskanen and Moritz 1967, Eq. (5-3)."""
+    _, transverse = radii(s_lat, a, e2)
+    from_axis = (transverse + alt) * c_lat
+    return from_axis * c_lon, from_axis * s_lon, (transverse * (1.0 - e2) + alt) * s_lat
+
+
+@njit(cache=True)
+def geodetic_from_ecef(x, y, z, a, e2):
+    """Latitude, longitude and height, without iteration: Vermeille, J. Geodesy 76 (2002) 451-454.
+
+    NaN within ``a e2``, 43 km, of the centre, where more than one normal goes through a point.
+    """
+    e4 = e2 * e2
+    p = (x * x + y * y) / (a * a)
+    q = (1.0 - e2) * z * z / (a * a)
+    r = (p + q - e4) / 6.0
+    if not r > 0.0:
+        return math.nan, math.nan, math.nan
+    s = e4 * p * q / (4.0 * r * r * r)
+    t = np.cbrt(1.0 + s + math.sqrt(s * (2.0 + s)))
+    u = r * (1.0 + t + 1.0 / t)
+    v = math.sqrt(u * u + e4 * q)
+    w = e2 * (u + v - q) / (2.0 * v)
+    k = math.sqrt(u + v + w * w) - w
+    d = k * math.hypot(x, y) / (k + e2)
+    normal = math.hypot(d, z)
+    return (
+        2.0 * math.atan2(z, d + normal),
+        math.atan2(y, x),
+        (k + e2 - 1.0) / k * normal,
+    )
+
+
+@njit(cache=True)
+def ned_from_ecef(lat, lon):
+    """Quaternion ``q_ne`` that turns vectors from ECEF to north-east-down axes.
+
+    The conjugate of a turn about z by the longitude, then about y by ``-(lat + 90 deg)``.
+    """
+    half_lon = 0.5 * lon
+    tip = 0.5 * lat + 0.25 * math.pi
+    c_lon, s_lon = math.cos(half_lon), math.sin(half_lon)
+    c_tip, s_tip = math.cos(tip), math.sin(tip)
+    return c_lon * c_tip, -s_lon * s_tip, c_lon * s_tip, -s_lon * c_tip
+
+
+@njit(cache=True)
+def displacement(lat, lon, alt, lat0, lon0, alt0, a, e2):
+    """Straight line to a position from another, in north-east-down at the former; to 1e-9 m."""
+    s, c = math.sin(lat), math.cos(lat)
+    s_lon, c_lon = math.sin(lon), math.cos(lon)
+    x, y, z = ecef_from_geodetic(s, c, s_lon, c_lon, alt, a, e2)
+    x0, y0, z0 = ecef_from_geodetic(
+        math.sin(lat0), math.cos(lat0), math.sin(lon0), math.cos(lon0), alt0, a, e2
+    )
+    x, y, z = x - x0, y - y0, z - z0
+    outward = c_lon * x + s_lon * y
+    return c * z - s * outward, c_lon * y - s_lon * x, -c * outward - s * z
+
+
+@njit(cache=True)
+def places_from_ecef(positions, ellipsoid, out):
+    """Columns latitude, longitude, height of rows x, y, z."""
+    for i in range(positions.shape[0]):
+        out[i, 0], out[i, 1], out[i, 2] = geodetic_from_ecef(
+            positions[i, 0], positions[i, 1], positions[i, 2], ellipsoid[A], ellipsoid[E2]
+        )
+
+
+@njit(cache=True)
+def quats_ned_from_ecef(lats, lons, out):
+    """Rows ``q_ne`` of latitudes and longitudes."""
+    for i in range(lats.size):
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = ned_from_ecef(lats[i], lons[i])
+
+
+# True inputs of sensors on a vehicle. Position rows: latitude and longitude in rad, height in m.
+
+
+@njit(cache=True)
+def place_rates(place, velocity, p, out):
+    """Fill the rates of latitude, longitude and height, (n, 3), for given velocities."""
+    for i in range(place.shape[0]):
+        s, c = math.sin(place[i, 0]), math.cos(place[i, 0])
+        meridian, transverse = radii(s, p[A], p[E2])
+        out[i, 0] = velocity[i, 0] / (meridian + place[i, 2])
+        out[i, 1] = velocity[i, 1] / ((transverse + place[i, 2]) * c)
+        out[i, 2] = -velocity[i, 2]
+
+
+@njit(cache=True)
+def velocities(place, first, second, p, velocity, acceleration):
+    """Fill velocity and its time derivative from the derivatives of the position, (n, 3) each.
+
+    The radii change with latitude: ``dR_N/dlat = e2 s c R_N^3/a^2`` and
+    ``dR_M/dlat = 3 e2 s c R_M R_N^2/a^2``.
+    """
+    for i in range(place.shape[0]):
+        s, c = math.sin(place[i, 0]), math.cos(place[i, 0])
+        d_lat, d_lon, d_alt = first[i, 0], first[i, 1], first[i, 2]
+        meridian, transverse = radii(s, p[A], p[E2])
+        slope = p[E2] * s * c * (transverse / p[A]) * (transverse / p[A]) * d_lat
+        d_meridian = 3.0 * meridian * slope + d_alt
+        d_transverse = transverse * slope + d_alt
+        meridian += place[i, 2]
+        transverse += place[i, 2]
+        velocity[i, 0] = meridian * d_lat
+        velocity[i, 1] = transverse * c * d_lon
+        velocity[i, 2] = -d_alt
+        acceleration[i, 0] = d_meridian * d_lat + meridian * second[i, 0]
+        acceleration[i, 1] = (
+            d_transverse * c - transverse * s * d_lat
+        ) * d_lon + transverse * c * second[i, 1]
+        acceleration[i, 2] = -second[i, 2]
+
+
+@njit(cache=True)
+def feel(place, velocity, acceleration, q_nb, turning, p, rate, force):
+    """Fill what gyros and accelerometers read in body axes, (n, 3) each.
+
+    `acceleration` is the derivative of the velocity's components, `turning` the rate of the body
+    relative to local level in body axes. ``f_n = v' + (2 w_ie + w_en) x v - g_n`` and
+    ``w_ib = w_nb + C_nb^T (w_ie + w_en)``.
+    """
+    for i in range(place.shape[0]):
+        alt = place[i, 2]
+        s, c = math.sin(place[i, 0]), math.cos(place[i, 0])
+        v_n, v_e, v_d = velocity[i, 0], velocity[i, 1], velocity[i, 2]
+        meridian, transverse = radii(s, p[A], p[E2])
+        g_n, g_d = gravity(s, c, alt, p[A], p[E2], p[GAMMA], p[K], p[F], p[M])
+        earth_n, earth_d = earth_rate(s, c, p[RATE])
+        move_n, move_e, move_d = transport_rate(s, c, v_n, v_e, meridian + alt, transverse + alt)
+        x, y, z = 2.0 * earth_n + move_n, move_e, 2.0 * earth_d + move_d
+        f_n = acceleration[i, 0] + (y * v_d - z * v_e) - g_n
+        f_e = acceleration[i, 1] + (z * v_n - x * v_d)
+        f_d = acceleration[i, 2] + (x * v_e - y * v_n) - g_d
+        w_n, w_e, w_d = earth_n + move_n, move_e, earth_d + move_d
+        m = dcm_from_quat(q_nb[i, 0], q_nb[i, 1], q_nb[i, 2], q_nb[i, 3])
+        for j in range(3):
+            force[i, j] = m[j] * f_n + m[3 + j] * f_e + m[6 + j] * f_d
+            rate[i, j] = turning[i, j] + (m[j] * w_n + m[3 + j] * w_e + m[6 + j] * w_d)
+
+
+@njit(cache=True)
+def swing(place, velocity, acceleration, q_nb, turning, swinging, p, out):
+    """Fill the derivative of the body rate relative to inertial space, in body axes, (n, 3).
+
+    `swinging` is the derivative of the components of `turning`; the rest as in `feel`. With
+    ``w_in = w_ie + w_en``, ``w_ib' = w_nb' + C_nb^T w_in' - w_nb x (C_nb^T w_in)``, where w_in'
+    are the derivatives of the components north, east, down, and the radii change as in
+    `velocities`.
+    """
+    for i in range(place.shape[0]):
+        alt, d_alt = place[i, 2], -velocity[i, 2]
+        s, c = math.sin(place[i, 0]), math.cos(place[i, 0])
+        meridian, transverse = radii(s, p[A], p[E2])
+        d_lat = velocity[i, 0] / (meridian + alt)
+        slope = p[E2] * s * c * (transverse / p[A]) * (transverse / p[A]) * d_lat
+        d_meridian = 3.0 * meridian * slope + d_alt
+        d_transverse = transverse * slope + d_alt
+        meridian += alt
+        transverse += alt
+        earth_n, earth_d = earth_rate(s, c, p[RATE])
+        move_n, move_e, move_d = transport_rate(
+            s, c, velocity[i, 0], velocity[i, 1], meridian, transverse
+        )
+        d_move_n = (acceleration[i, 1] - move_n * d_transverse) / transverse
+        d_n = earth_d * d_lat + d_move_n
+        d_e = -(acceleration[i, 0] + move_e * d_meridian) / meridian
+        d_d = -earth_n * d_lat - d_move_n * s / c - move_n * d_lat / (c * c)
+        w_n, w_e, w_d = earth_n + move_n, move_e, earth_d + move_d
+        m = dcm_from_quat(q_nb[i, 0], q_nb[i, 1], q_nb[i, 2], q_nb[i, 3])
+        x = m[0] * w_n + m[3] * w_e + m[6] * w_d
+        y = m[1] * w_n + m[4] * w_e + m[7] * w_d
+        z = m[2] * w_n + m[5] * w_e + m[8] * w_d
+        t_x, t_y, t_z = turning[i, 0], turning[i, 1], turning[i, 2]
+        out[i, 0] = swinging[i, 0] + (m[0] * d_n + m[3] * d_e + m[6] * d_d) - (t_y * z - t_z * y)
+        out[i, 1] = swinging[i, 1] + (m[1] * d_n + m[4] * d_e + m[7] * d_d) - (t_z * x - t_x * z)
+        out[i, 2] = swinging[i, 2] + (m[2] * d_n + m[5] * d_e + m[8] * d_d) - (t_x * y - t_y * x)

@@ -1,13 +1,13 @@
 """From the dynamics of errors to their transition and their noise over a step.
 
 Of n states the first nine, the core, have dynamics F, (9, n); each of the others decays by itself.
-The core is place, velocity and attitude in this order, and the attitude turns by itself: of F the
-blocks (place, attitude), (attitude, place) and (attitude, velocity) are zero.
+The core is position, velocity and attitude in this order; the attitude depends on itself and on the
+sensors alone: the blocks (position, attitude), (attitude, position) and (attitude, velocity) of F
+are zero.
 
-Matrices of the core's rows are kept in panels, (panels, 9 LANES): sixteen columns each, of which
-row i begins at ``16 i`` and unused ones are zero. As these places are known when this is compiled,
-a processor takes several columns at once, in loops that keep their numbers in its registers; that
-is why they are written out.
+Matrices of the core's rows are kept in panels, (panels, 9 LANES): sixteen columns each; row i
+begins at ``16 i`` and unused columns are zero. The fixed size lets the compiler take several
+columns at once in loops that stay in registers; therefore they are written out.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ LANES = 16
 PANEL = CORE * LANES
 # Columns of velocity and attitude, by which white noise enters; the first sensor's.
 VELOCITY, ATTITUDE, SENSORS = 3, 6, 9
-# Sensors that are taken with the core: a bias of each axis of two triads.
+# Sensor states treated with the core: a bias of each axis of two triads.
 WITH_CORE = 6
 
 
@@ -37,9 +37,9 @@ def padded_width(n: int) -> int:
 
 
 def growth_arrays(n: int) -> tuple[Any, ...]:
-    """Room for what `growth_of_step` fills, for n states.
+    """Arrays that `growth_of_step` fills, for n states.
 
-    Panels of the transition and of the lift of noise to the end of the step; per column, in rows
+    Panels of the transition and of the map of noise to the end of the step; per column, in rows
     of LANES, the variance that enters by it; decay of the sensors over the step (k,), and over its
     second half.
     """
@@ -54,7 +54,7 @@ def growth_arrays(n: int) -> tuple[Any, ...]:
 
 
 def growth_room(n: int) -> tuple[Any, ...]:
-    """Arrays to work in, for n states: three of panels, their fading, a covariance in panels."""
+    """Work arrays for n states: three of panels, their fading, a covariance in panels."""
     count = padded_width(n) // LANES
     return (
         np.zeros((count, PANEL)),
@@ -94,7 +94,7 @@ def to_third_order(x, y, z):
 def series(a, one, fading, whole, half):
     """Fill a panel of ``exp(F dt)`` and of ``exp(F dt/2)``, less one, to third order.
 
-    `one` is the panel of F dt, `a` its first panel; `fading` what decay multiplies a column by.
+    `one` is the panel of F dt, `a` its first panel; `fading` is the decay that multiplies a column.
     """
     for j in range(LANES):
         d = fading[j]
@@ -135,12 +135,12 @@ def turn_columns(panel, at, matrix):
 def growth_of_step(f, decay, dt, matrix, gyro_noise, accel_noise, drive, still, growth, room):
     """Fill transition and noise of a step of dynamics f, (9, `padded_width`).
 
-    Of `growth` (`growth_arrays`) the transition takes the core's rows of ``exp(F dt)`` to third
-    order, as drift reaches the place through tilt and velocity, and the exact decay of the others.
-    White noise enters at the middle of the step: its covariance is
-    ``exp(F dt/2) G q G' exp(F dt/2)' dt``, which holds its correlations to second order and is
-    positive semidefinite; of it `growth` takes the factors, lift and variances. `matrix` is C_lb;
-    rows that are `still`, a bit each, take no noise. `room` is of `growth_room`.
+    The transition in `growth` (`growth_arrays`) has the core's rows of ``exp(F dt)`` to third
+    order, as drift reaches the position through tilt and velocity, and the exact decay of the
+    others. White noise enters at the middle of the step: its covariance is ``exp(F dt/2) G q G'
+    exp(F dt/2)' dt``, which holds its correlations to second order and is positive semidefinite;
+    `growth` takes its factors, lift and variances. `matrix` is C_lb; rows in the bits of `still`
+    take no noise. `room` is of `growth_room`.
     """
     phi, lift, weight, tail, own = growth
     one, _, _, fading, _ = room
@@ -166,7 +166,7 @@ def growth_of_step(f, decay, dt, matrix, gyro_noise, accel_noise, drive, still, 
     for j in range(3):
         weight[0, VELOCITY + j] = dt * accel_noise[j] * accel_noise[j]
         weight[0, ATTITUDE + j] = dt * gyro_noise[j] * gyro_noise[j]
-    # Noise that is the same in every axis of the body is so in those of the level.
+    # Noise equal in all body axes is equal in all level axes.
     if accel_noise[0] != accel_noise[1] or accel_noise[1] != accel_noise[2]:
         turn_columns(lift[0], VELOCITY, matrix)
     if gyro_noise[0] != gyro_noise[1] or gyro_noise[1] != gyro_noise[2]:
@@ -262,9 +262,9 @@ def add_column_products(a, b, scale, j, P):
 
 @njit(**GIVEN)
 def grown_covariance(P, growth, room):
-    """Change P to ``Phi P Phi' + Q``, exactly symmetric; `growth` is of `growth_of_step`.
+    """Replace P by ``Phi P Phi' + Q``, exactly symmetric; `growth` is of `growth_of_step`.
 
-    Return -1, or the first state whose variance is no number or negative.
+    Return -1, or the first state whose variance is not a number or is negative.
     """
     phi, lift, weight, tail, own = growth
     _, half, weighted, _, wide = room
@@ -326,7 +326,7 @@ def unfold_growth(growth, Phi, Q):
 
 @njit(**GIVEN)
 def compose_growth(step, added, phi, q, work):
-    """Let a step follow: ``phi <- step phi`` and ``q <- step q step' + added``; all are (n, n).
+    """Append a step: ``phi <- step phi`` and ``q <- step q step' + added``; all are (n, n).
 
     Beyond the core `step` is diagonal.
     """

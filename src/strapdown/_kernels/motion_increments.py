@@ -20,7 +20,16 @@ import math
 
 from numba import njit
 
-from strapdown._kernels.rotation_vector import ALIKE, cross
+from strapdown._kernels.increments import neighbour
+from strapdown._kernels.ned import turn_back
+from strapdown._kernels.rotation import (
+    dcm_from_quat,
+    quat_from_rotvec,
+    quat_multiply,
+    quat_normalise,
+    rotvec_from_quat,
+)
+from strapdown._kernels.rotation_vector import ALIKE, GAUSS_FIRST, GAUSS_LAST, ROOT_15_THIRD, cross
 
 # Below this square of the angle (0.25 rad) the integrals of sin and cos are series, whose first
 # neglected terms are under 1e-17 of the value. Above, they follow from the half angle, and what
@@ -134,8 +143,8 @@ def linear_motion(dt, w0x, w0y, w0z, w1x, w1y, w1z, f0x, f0y, f0z, f1x, f1y, f1z
 def mean_motion(dt, before, w0x, w0y, w0z, w1x, w1y, w1z, f0x, f0y, f0z, f1x, f1y, f1z):
     """Phi, dv, dr of a step with means w1 and f1, after one of length `before` with w0, f0.
 
-    Rate and force run along the lines whose integrals over the two steps are what was measured.
-    A step before it that is unlike it, or of length zero, tells nothing: then they are constant.
+    Rate and force run along the lines whose integrals over the two steps are the measured ones.
+    After a step of very different or zero length they are taken as constant.
     """
     k = 0.0
     if before <= ALIKE * dt and dt <= ALIKE * before:
@@ -228,3 +237,297 @@ def motion_increments_linear(dt, rate, force, mean, out):
                 force[k + 1, 2],
             ),
         )
+
+
+# Polynomials through several samples, to sixth order.
+#
+# Over a window of 1 to 4 steps rate and force are one polynomial: through the samples at the
+# stamps, or, for means, with their integrals over the steps. The increments of each step are its
+# flow, by the Magnus series to sixth order (Blanes, Casas and Ros, BIT 40 (2000) 434, Eqs. (3.9),
+# (3.11)) in the algebra above.
+
+
+# The scratch array: Newton's coefficients of up to five samples of six numbers, and the nodes.
+NODES, ROWS, WIDEST = 5, 6, 6
+
+
+@njit(cache=True, error_model="numpy")
+def bracket(
+    w1x, w1y, w1z, a1x, a1y, a1z, p1x, p1y, p1z, t1, w2x, w2y, w2z, a2x, a2y, a2z, p2x, p2y, p2z, t2
+):
+    """The commutator [1, 2]; its tau is zero."""
+    wx, wy, wz = cross(w1x, w1y, w1z, w2x, w2y, w2z)
+    ax, ay, az = cross(w1x, w1y, w1z, a2x, a2y, a2z)
+    bx, by, bz = cross(w2x, w2y, w2z, a1x, a1y, a1z)
+    px, py, pz = cross(w1x, w1y, w1z, p2x, p2y, p2z)
+    qx, qy, qz = cross(w2x, w2y, w2z, p1x, p1y, p1z)
+    return (
+        wx,
+        wy,
+        wz,
+        ax - bx,
+        ay - by,
+        az - bz,
+        px - qx + a1x * t2 - a2x * t1,
+        py - qy + a1y * t2 - a2y * t1,
+        pz - qz + a1z * t2 - a2z * t1,
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def sixth_order_motion(dt, low, mid, high):
+    """Phi, dv, dr of a step from rate and force, six numbers each, at its points of Gauss."""
+    o = 0.0
+    ax, ay, az, au, av, aw = mid
+    ax, ay, az, au, av, aw = dt * ax, dt * ay, dt * az, dt * au, dt * av, dt * aw
+    m = ROOT_15_THIRD * dt
+    bx, by, bz = m * (high[0] - low[0]), m * (high[1] - low[1]), m * (high[2] - low[2])
+    bu, bv, bw = m * (high[3] - low[3]), m * (high[4] - low[4]), m * (high[5] - low[5])
+    m = 10.0 / 3.0 * dt
+    cx = m * (high[0] - 2.0 * mid[0] + low[0])
+    cy = m * (high[1] - 2.0 * mid[1] + low[1])
+    cz = m * (high[2] - 2.0 * mid[2] + low[2])
+    cu = m * (high[3] - 2.0 * mid[3] + low[3])
+    cv = m * (high[4] - 2.0 * mid[4] + low[4])
+    cw = m * (high[5] - 2.0 * mid[5] + low[5])
+    # The factors of every commutator stand exchanged, because A multiplies from the right.
+    dx, dy, dz, du, dv, dw, dr, ds, dq = bracket(
+        bx, by, bz, bu, bv, bw, o, o, o, o, ax, ay, az, au, av, aw, o, o, o, dt
+    )
+    ex, ey, ez, eu, ev, ew, er, es, eq = bracket(
+        2.0 * cx + dx,
+        2.0 * cy + dy,
+        2.0 * cz + dz,
+        2.0 * cu + du,
+        2.0 * cv + dv,
+        2.0 * cw + dw,
+        dr,
+        ds,
+        dq,
+        o,
+        ax,
+        ay,
+        az,
+        au,
+        av,
+        aw,
+        o,
+        o,
+        o,
+        dt,
+    )
+    m = -1.0 / 60.0
+    gx, gy, gz, gu, gv, gw, gr, gs, gq = bracket(
+        bx + m * ex,
+        by + m * ey,
+        bz + m * ez,
+        bu + m * eu,
+        bv + m * ev,
+        bw + m * ew,
+        m * er,
+        m * es,
+        m * eq,
+        o,
+        dx - 20.0 * ax - cx,
+        dy - 20.0 * ay - cy,
+        dz - 20.0 * az - cz,
+        du - 20.0 * au - cu,
+        dv - 20.0 * av - cv,
+        dw - 20.0 * aw - cw,
+        dr,
+        ds,
+        dq,
+        -20.0 * dt,
+    )
+    k, m = 1.0 / 12.0, 1.0 / 240.0
+    wx, wy, wz = ax + k * cx + m * gx, ay + k * cy + m * gy, az + k * cz + m * gz
+    vx, vy, vz, rx, ry, rz = motion_exponential(
+        wx,
+        wy,
+        wz,
+        au + k * cu + m * gu,
+        av + k * cv + m * gv,
+        aw + k * cw + m * gw,
+        m * gr,
+        m * gs,
+        m * gq,
+        dt,
+    )
+    return wx, wy, wz, vx, vy, vz, rx, ry, rz
+
+
+@njit(cache=True, error_model="numpy")
+def fit_window(dt, rate, force, mean, first, count, scratch):
+    """Newton's polynomial of rate and force over the steps of a window.
+
+    Its nodes are the stamps, in units of the window's length. Means are the first divided
+    differences of their running sums, so that theirs begin one higher. Coefficient k of the
+    six numbers is in row k of the scratch array.
+    """
+    length = 0.0
+    for i in range(count):
+        length += dt[first + i]
+    at = 0.0
+    for i in range(count):
+        scratch[NODES, i] = at / length
+        at += dt[first + i]
+    scratch[NODES, count] = 1.0
+    values, higher, start = count + 1, 0, first
+    if mean:
+        values, higher, start = count, 1, first + 1
+    for i in range(values):
+        for j in range(3):
+            scratch[i, j] = rate[start + i, j]
+            scratch[i, 3 + j] = force[start + i, j]
+    for k in range(1, values):
+        for i in range(values - 1, k - 1, -1):
+            m = 1.0 / (scratch[NODES, i + higher] - scratch[NODES, i - k])
+            for j in range(6):
+                scratch[i, j] = (scratch[i, j] - scratch[i - 1, j]) * m
+    return values
+
+
+@njit(cache=True, error_model="numpy")
+def fitted_values(t, mean, values, scratch):
+    """Rate and force at t of the window's length."""
+    # Newton's products of distances to the nodes, and their derivatives.
+    product, slope = 1.0, 0.0
+    wx, wy, wz, fx, fy, fz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(values):
+        d = t - scratch[NODES, k]
+        slope = slope * d + product
+        k_basis = product
+        if mean:
+            k_basis = slope
+        product *= d
+        wx += k_basis * scratch[k, 0]
+        wy += k_basis * scratch[k, 1]
+        wz += k_basis * scratch[k, 2]
+        fx += k_basis * scratch[k, 3]
+        fy += k_basis * scratch[k, 4]
+        fz += k_basis * scratch[k, 5]
+    return wx, wy, wz, fx, fy, fz
+
+
+@njit(cache=True, error_model="numpy")
+def window_motion(dt, mean, step, values, scratch):
+    """Phi, dv, dr of one step of a window, counted from its first."""
+    left = scratch[NODES, step]
+    length = scratch[NODES, step + 1] - left
+    return sixth_order_motion(
+        dt,
+        fitted_values(left + length * GAUSS_FIRST, mean, values, scratch),
+        fitted_values(left + length * 0.5, mean, values, scratch),
+        fitted_values(left + length * GAUSS_LAST, mean, values, scratch),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def alike(a, b):
+    return a <= ALIKE * b and b <= ALIKE * a
+
+
+@njit(cache=True, error_model="numpy")
+def block_length(dt, start, samples):
+    """Steps of the block that starts here: up to `samples` that are like its first."""
+    count = 1
+    while count < samples and start + count < dt.shape[0] and alike(dt[start + count], dt[start]):
+        count += 1
+    return count
+
+
+@njit(cache=True, error_model="numpy")
+def motion_increments_blocks(dt, rate, force, mean, samples, scratch, out):
+    """Fill out, (n-1, 10), each step with the polynomial of its block.
+
+    A block that a gap or the end of the log cuts short borrows steps before it, if they are
+    like its own.
+    """
+    start = 0
+    while start < dt.shape[0]:
+        count = block_length(dt, start, samples)
+        first = start
+        while first > 0 and start + count - first < samples and alike(dt[first - 1], dt[start]):
+            first -= 1
+        values = fit_window(dt, rate, force, mean, first, start + count - first, scratch)
+        for k in range(start, start + count):
+            motion = window_motion(dt[k], mean, k - first, values, scratch)
+            put_motion(out, k, dt[k], motion)
+        start += count
+
+
+@njit(cache=True, error_model="numpy")
+def motion_increments_neighbours(dt, rate, force, mean, scratch, out):
+    """Fill out, (n-1, 10), each step with the polynomial that its two neighbours share."""
+    for k in range(dt.shape[0]):
+        first, count = k, 1
+        if k > 0 and neighbour(dt[k], dt[k - 1]) > 0.0:
+            first, count = k - 1, 2
+        if k + 1 < dt.shape[0] and neighbour(dt[k], dt[k + 1]) > 0.0:
+            count += 1
+        values = fit_window(dt, rate, force, mean, first, count, scratch)
+        put_motion(out, k, dt[k], window_motion(dt[k], mean, k - first, values, scratch))
+
+
+@njit(cache=True, error_model="numpy")
+def join_blocks(dt, samples, rows, last, out):
+    """Put the rows of each block together into one row of out; return the number of blocks.
+
+    ``last`` becomes the number of the last step of each block. Of two motions one after the
+    other C = C1 C2, dv = dv1 + C1 dv2, dr = dr1 + dv1 t2 + C1 dr2.
+    """
+    start, block = 0, 0
+    while start < dt.shape[0]:
+        count = block_length(dt, start, samples)
+        w, x, y, z = 1.0, 0.0, 0.0, 0.0
+        t, vx, vy, vz, rx, ry, rz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for k in range(start, start + count):
+            c = dcm_from_quat(w, x, y, z)
+            h, dx, dy, dz = rows[k, 0], rows[k, 7], rows[k, 8], rows[k, 9]
+            rx += vx * h + c[0] * dx + c[1] * dy + c[2] * dz
+            ry += vy * h + c[3] * dx + c[4] * dy + c[5] * dz
+            rz += vz * h + c[6] * dx + c[7] * dy + c[8] * dz
+            dx, dy, dz = rows[k, 4], rows[k, 5], rows[k, 6]
+            vx += c[0] * dx + c[1] * dy + c[2] * dz
+            vy += c[3] * dx + c[4] * dy + c[5] * dz
+            vz += c[6] * dx + c[7] * dy + c[8] * dz
+            a, b, d, e = quat_from_rotvec(rows[k, 1], rows[k, 2], rows[k, 3])
+            w, x, y, z = quat_multiply(w, x, y, z, a, b, d, e)
+            w, x, y, z = quat_normalise(w, x, y, z)
+            t += h
+        px, py, pz = rotvec_from_quat(w, x, y, z)
+        put_motion(out, block, t, (px, py, pz, vx, vy, vz, rx, ry, rz))
+        last[block] = start + count - 1
+        start += count
+        block += 1
+    return block
+
+
+@njit(cache=True, error_model="numpy")
+def split_increment(row, part, first, second):
+    """Fill the increments before and after ``part`` seconds of a step; combined they equal it."""
+    whole = row[0]
+    share = part / whole
+    rest = whole - part
+    first[0], second[0] = part, rest
+    for j in range(3):
+        u, s = row[4 + j], row[7 + j]
+        first[1 + j] = share * row[1 + j]
+        second[1 + j] = row[1 + j] - first[1 + j]
+        a = (6.0 * s / whole - 2.0 * u) / whole
+        b = (6.0 * u - 12.0 * s / whole) / (whole * whole)
+        first[4 + j] = part * (a + 0.5 * b * part)
+        first[7 + j] = part * part * (0.5 * a + b * part / 6.0)
+    w, x, y, z = quat_from_rotvec(first[1], first[2], first[3])
+    second[4], second[5], second[6] = turn_back(
+        w, x, y, z, row[4] - first[4], row[5] - first[5], row[6] - first[6]
+    )
+    second[7], second[8], second[9] = turn_back(
+        w,
+        x,
+        y,
+        z,
+        row[7] - first[7] - first[4] * rest,
+        row[8] - first[8] - first[5] * rest,
+        row[9] - first[9] - first[6] * rest,
+    )

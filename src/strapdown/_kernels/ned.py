@@ -1,15 +1,14 @@
 """Navigation in local north-east-down on the ellipsoid: one step, and its loops.
 
-Let the axes be those of the local level at the start of a step, held fixed in inertial space.
-In them the Earth's rate is constant, and the velocity relative to the Earth, w, obeys
-``dw/dt = C f + g - omega_ie x w``: the increments of the body are the integrals of C f; the
-integral of w, the displacement r, integrates the Coriolis term; gravity is slow, and is taken at
-the mean place of the step and turned as the local level turns. The displacement, turned back by
-the Earth's rate, gives the new place by geometry, and the old and the new place give the turn of
-the local level in closed form: a transport rate is never integrated. The error of a run is of the
-fourth order of the step, but for what the change of the radii within a step, with climb and
-latitude, does to the turn of gravity: at most 1/2 g (omega_ie + v/R) (v_d + e2 v)/R dt², which
-for steps of a second at 230 m/s and a climb of 10 m/s is 1e-9 m/s².
+A step is integrated in the axes of the local level at its start, held fixed in inertial space.
+There the Earth's rate is constant, and the velocity relative to the Earth, w, obeys ``dw/dt = C f +
+g - omega_ie x w``. The body's increments are the integrals of C f; the Coriolis term is integrated
+by the displacement r, the integral of w; gravity is taken at the mean position of the step and
+turned with the local level. The displacement, turned back by the Earth's rate, gives the new
+position by geometry, and the two positions give the turn of the local level in closed form: no
+transport rate is integrated. The error of a run is of the fourth order of the step, except for the
+effect of the changing radii on the turn of gravity in a climb: at most 1/2 g (omega_ie + v/R) (v_d
++ e2 v)/R dt², 1e-9 m/s² for steps of 1 s at 230 m/s and a climb of 10 m/s.
 """
 
 from __future__ import annotations
@@ -19,19 +18,26 @@ import math
 from numba import njit
 
 from strapdown._kernels.earth import gravity_around
-from strapdown._kernels.rotation import dcm_from_quat, quat_from_rotvec, quat_multiply
+from strapdown._kernels.rotation import (
+    DEGREES,
+    dcm_from_quat,
+    euler_degrees_from_quat,
+    quat_from_rotvec,
+    quat_multiply,
+    wrap_pi,
+)
 
-# Places in the state: radians, m, m/s, quaternion body to level, sine and cosine of the latitude
-# (turned with the level from step to step, which spares computing them), the radius of the prime
-# vertical over a, the downward acceleration that the vertical loop has found, m/s², and the time
-# since its last reference, s.
+# Indices of the state: rad, m, m/s, quaternion body to level, sine and cosine of the latitude
+# (turned with the level from step to step instead of computed), the radius of the prime vertical
+# over a, the downward acceleration estimated by the vertical loop, m/s², and the time since its
+# last reference, s.
 LAT, LON, ALT, V, Q, SINE, COSINE, PRIME, PULL, SINCE = 0, 1, 2, 3, 6, 10, 11, 12, 13, 14
 STATE = 15
-# The part of the state that is kept of every step.
+# Length of the part of the state that goes into the history.
 ROW = 10
 
-# What becomes of the height, and the places of the choice, the time constant of its loop, and the
-# change of gravity with height, 1/s².
+# Modes of the height, and the indices of mode, time constant of its loop, and change of gravity
+# with height, 1/s², in the options.
 FREE, HELD, DAMPED = 0.0, 1.0, 2.0
 MODE, TAU, SPRING = 0, 1, 2
 # Limits: cosine of the latitude, turn of the level about the vertical in one step, speed, heights.
@@ -40,8 +46,8 @@ OPTIONS = 7
 # A step that takes a larger part of the way around the pole is beyond the series of `displace`.
 LARGEST_TURN = 0.01
 
-# Why a run ends before its increments do. The last is for axes that have no pole: a step goes
-# farther around the Earth than `LARGEST_TURN`.
+# Reasons for ending early. The last is for axes without a pole: a step longer than `LARGEST_TURN`
+# around the Earth.
 DONE, POLE, DIVERGED, LEAP = 0, 1, 2, 3
 
 THIRD = 1.0 / 3.0
@@ -71,8 +77,8 @@ def turn_back(w, x, y, z, a, b, c):
 def displace(s, c, curvature, parallel, change, north, east, down):
     """Change of latitude, longitude and height by a straight displacement in local axes.
 
-    First to the meridian of the new place, then along it, on the circle of curvature and the
-    change of its radius; what is left out is of the fourth order of displacement over radius.
+    First to the meridian of the new position, then along it, on the circle of curvature and the
+    change of its radius; the remainder is of the fourth order of displacement over radius.
     `curvature` is that of the meridian at the height, `parallel` one over the radius of the
     parallel, `change` half the derivative of the meridian's radius with latitude, over itself.
     """
@@ -96,13 +102,12 @@ def displace(s, c, curvature, parallel, change, north, east, down):
 
 @njit(cache=True, error_model="numpy", inline="always")
 def level_turn(s, c, dlat, turn):
-    """Quaternion from the new local level to the old one, from the two places in closed form.
+    """Quaternion from the new local level to the old one, in closed form of the two positions.
 
-    `turn` is the change of longitude and, relative to inertial space, of the Earth's angle; the
+    `turn` is the change of longitude and, relative to inertial space, of the Earth's angle. The
     quaternion is (cos y cos h, sin y cos l, -cos y sin h, -sin y sin l) of half of it, y, half the
-    change of latitude, h, and the latitude between the two, l. Of h, which is no larger than 1e-4
-    for a step of a kilometre, the second order is kept, of y the third. Returns sine and cosine
-    of the new latitude, too.
+    change of latitude, h, and the latitude between the two, l. h, at most 1e-4 for a step of 1 km,
+    is kept to second order, y to third. Also returns sine and cosine of the new latitude.
     """
     h = 0.5 * dlat
     y = 0.5 * turn
@@ -171,8 +176,8 @@ def ned_step(
     me = half * ve + 0.5 * se - twelfth * ue + sixth * (on * vd - od * vn)
     md = half * vd + 0.5 * sd - twelfth * ud + sixth * (gd - on * ve)
 
-    # Gravity at the mean place. Of the rise the first term is the fall of the level's surface, the
-    # last what the Earth turns while the body moves: height is that over the Earth.
+    # Gravity at the mean position. In the rise, the first term is the fall of the level surface,
+    # the last the Earth's turn while the body moves: the height is relative to the Earth.
     to_north = mn * curvature
     to_east = me * parallel * c
     rise = 2.0 * THIRD * (mn * to_north + me * to_east) - md + sixth * on * ve
@@ -243,13 +248,13 @@ def ned_step(
 
 @njit(cache=True, inline="always")
 def guide_height(alt, vd, pull, since, before, reference, dt, mode, tau, spring):
-    """Height, down velocity and the loop's memory after a step, as the height is guided.
+    """Height, down velocity and the loop's memory after a step, with the height held or damped.
 
-    The loop is closed over the time since the reference before, however many steps that was,
+    The loop is closed over the time since the previous reference, however many steps that was,
     with the gains of the fading memory of second degree, whose three poles are at exp(-time/tau)
-    whatever that time is: `1 - q³, 3/2 (1 - q)² (1 + q), (1 - q)³` of height, velocity times
-    time, acceleration times its square (Morrison 1969, ch. 13). For short times these are 3/tau,
-    3/tau², 1/tau³ times it. `spring` holds what gravity gives away with height.
+    for any time: `1 - q³, 3/2 (1 - q)² (1 + q), (1 - q)³` for height, velocity times time,
+    acceleration times time squared (Morrison 1969, ch. 13). For short times these are 3/tau,
+    3/tau², 1/tau³ times it. `spring` is the decrease of gravity with height, 1/s².
     """
     if mode == HELD:
         return before, 0.0, pull, since
@@ -269,8 +274,8 @@ def guide_height(alt, vd, pull, since, before, reference, dt, mode, tau, spring)
 
 @njit(cache=True, inline="always")
 def within(alt, vn, ve, vd, qw, cosine, speed, lowest, highest):
-    """Whether a state means anything."""
-    # So written, NaN in any of them does not.
+    """Whether a state is finite and within the limits of speed and height."""
+    # Written so that NaN fails.
     return (
         vn * vn + ve * ve + vd * vd <= speed * speed
         and lowest <= alt <= highest
@@ -281,7 +286,7 @@ def within(alt, vn, ve, vd, qw, cosine, speed, lowest, highest):
 
 @njit(cache=True, inline="always")
 def verdict(alt, vn, ve, vd, qw, cosine, turn, limit, speed, lowest, highest):
-    """Whether a state is one that this mechanization may go on from."""
+    """Whether this mechanization can continue from a state: `DONE` or the reason why not."""
     if not within(alt, vn, ve, vd, qw, cosine, speed, lowest, highest):
         return DIVERGED
     if cosine < limit or abs(turn) > LARGEST_TURN:
@@ -291,10 +296,10 @@ def verdict(alt, vn, ve, vd, qw, cosine, turn, limit, speed, lowest, highest):
 
 @njit(cache=True, error_model="numpy")
 def ned_advance(state, increments, reference, earth, options, history):
-    """Advance over a segment; returns the steps that were made, and why no more.
+    """Advance over a segment; returns the steps made, and why it ended.
 
-    `reference` holds a height for every step, or nothing; `history` takes the first ten numbers
-    of the state after each step. A step whose end is not allowed is not made.
+    `reference` holds a height for every step, or is empty; `history` takes the first ten numbers
+    of the state after each step. A step with an invalid end is not made.
     """
     lat, lon, alt, vn, ve, vd = state[0], state[1], state[2], state[3], state[4], state[5]
     qw, qx, qy, qz = state[6], state[7], state[8], state[9]
@@ -367,10 +372,10 @@ def ned_advance(state, increments, reference, earth, options, history):
 
 @njit(cache=True)
 def reverse_increments(increments, out):
-    """Increments of the same motion run backward, in the order in which it is met.
+    """Increments of the same motion run backward, in reverse order.
 
-    Backward the body turns by the opposite rotation vector; specific force is the same, and gives
-    its velocity and distance in the axes of what was the end of the step.
+    Backward the body turns by the opposite rotation vector; the specific force is the same, and its
+    velocity and distance are in the axes of what was the end of the step.
     """
     steps = increments.shape[0]
     for i in range(steps):
@@ -390,4 +395,16 @@ def reverse_increments(increments, out):
             ux * dt - increments[i, 7],
             uy * dt - increments[i, 8],
             uz * dt - increments[i, 9],
+        )
+
+
+@njit(cache=True)
+def trajectory_rows(history, out):
+    """Latitude, longitude in deg, height, velocity, roll, pitch and heading in deg."""
+    for k in range(history.shape[0]):
+        out[k, 0], out[k, 1] = history[k, 0] * DEGREES, wrap_pi(history[k, 1]) * DEGREES
+        for j in range(2, 6):
+            out[k, j] = history[k, j]
+        out[k, 6], out[k, 7], out[k, 8] = euler_degrees_from_quat(
+            history[k, 6], history[k, 7], history[k, 8], history[k, 9]
         )

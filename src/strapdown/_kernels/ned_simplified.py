@@ -1,8 +1,8 @@
 """Navigation in local north-east-down as Tadic and Vukajlovic (2016) describe it, term by term.
 
-Every step takes velocity, place and their rates as they are at its start, and the position by the
-trapezoid: the first order of the step in what is slow. What the paper leaves out, or says may be
-left out, is a switch.
+Every step uses velocity, position and their rates at its start, and integrates the position by the
+trapezoid: first order of the step in slow quantities. Terms that the paper omits, or says may be
+omitted, are switches.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from strapdown._kernels.rotation import (
     quat_normalise,
 )
 
-# Places of the state after the ten that are kept: the vertical loop's, as in `ned`.
+# Indices of the state after the ten of the history: the vertical loop's, as in `ned`.
 PULL, SINCE = 10, 11
 STATE = 12
 
@@ -57,7 +57,7 @@ def simplified_advance(
     `coriolis` is the second term of (1); `turning` and `transport` are the Earth's rate (7) and
     the transport rate (8), in the attitude and in that term. `azimuth` is 1, or -1 for the sign
     that the third component of (8) has in print; `fixed` is a gravity, or NaN for that of the
-    place.
+    position.
     """
     a, e2, gamma, k = earth[0], earth[1], earth[2], earth[3]
     rate, f, m = earth[4], earth[5], earth[6]

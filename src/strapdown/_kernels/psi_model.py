@@ -21,9 +21,9 @@ from strapdown._kernels.level import ALT, AXIS, OMEGA_EL, Q_LB, curvatures
 from strapdown._kernels.rotation import dcm_from_quat
 from strapdown._kernels.rotation_vector import cross
 
-# Vertical displacement and velocity, a bit each: nothing moves them where the height is held.
+# Bits of vertical displacement and velocity, which are constant where the height is held.
 HELD_ROWS = (1 << 2) | (1 << 5)
-# Below this cosine of the latitude there is no direction to the north, and no slope along it.
+# Below this cosine of the latitude north is undefined, and there is no slope along it.
 NO_MERIDIAN = 1e-9
 
 
@@ -38,12 +38,11 @@ def minus_cross(f, row, column, x, y, z):
 
 @njit(**GIVEN)
 def gravity_gradient(f, row, column, level, up, earth):
-    """Set the block at (row, column) to the change of gravity, as a vector, with the place.
+    """Set the block at (row, column) to the change of gravity, as a vector, with position.
 
     Over the level surface gravity turns with the normal and grows towards the poles; with height
-    its length changes as Bruns' formula has it, ``-g (sum of the curvatures) - 2 W²``, and its
-    direction by as much as the length does over the surface, as the field has no curl. Returns
-    gravity.
+    its length changes by Bruns' formula, ``-g (sum of the curvatures) - 2 W²``, and its direction
+    by as much as the length does over the surface, as the field has no curl. Returns gravity.
     """
     kx, ky, kz = level[AXIS], level[AXIS + 1], level[AXIS + 2]
     sine = kz * up
@@ -80,8 +79,8 @@ def gravity_gradient(f, row, column, level, up, earth):
 def couple(f, row, matrix, terms, rate, force):
     """Add to the sensors' columns of three rows ``matrix @ coupling(rate, force)``.
 
-    `terms` lists what is not zero of a coupling: factor (0 none, 1 to 3 rate, 4 to 6 force), axis,
-    state, value.
+    `terms` lists the nonzero elements of a coupling: factor (0 none, 1 to 3 rate, 4 to 6 force),
+    axis, state, value.
     """
     for e in range(terms.shape[0]):
         m, axis, j = int(terms[e, 0]), int(terms[e, 1]), CORE + int(terms[e, 2])
@@ -99,7 +98,7 @@ def psi_dynamics(f, level, up, matrix, specific, rate, force, gyro, accel, held,
     """Fill the first nine rows of F, (9, w).
 
     `matrix` is C_lb and `specific` C_lb f, both means; `rate` and `force` are those of the body.
-    With a height that is held nothing moves vertically.
+    With a held height nothing moves vertically.
     """
     wx, wy, wz = level[OMEGA_EL], level[OMEGA_EL + 1], level[OMEGA_EL + 2]
     spin = earth[RATE]
@@ -116,8 +115,8 @@ def psi_dynamics(f, level, up, matrix, specific, rate, force, gyro, accel, held,
     couple(f, 3, matrix, accel, rate, force)
     couple(f, 6, matrix, gyro, rate, force)
     if held:
-        # What holds the height turns with the normal as gravity does: together they are as large
-        # as the vertical force that is felt.
+        # The force that holds the height turns with the normal as gravity does: together they
+        # equal the vertical specific force.
         bearing = up * specific[2] / g
         for i in range(3, 5):
             for j in range(2):
@@ -147,7 +146,7 @@ def means_of_steps(states, q_at, rows, at, longest, matrix):
         ay, az = states[end, q_at + 2], states[end, q_at + 3]
         bw, bx = states[end + 1, q_at], states[end + 1, q_at + 1]
         by, bz = states[end + 1, q_at + 2], states[end + 1, q_at + 3]
-        # Between the two ends; the sign of a quaternion is not its own.
+        # Mean of the two ends; the sign of a quaternion is arbitrary.
         sign = 1.0
         if aw * bw + ax * bx + ay * by + az * bz < 0.0:
             sign = -1.0
@@ -202,10 +201,10 @@ def psi_transitions(
 ):
     """Fill the transition and the covariance of noise over increments `rows`.
 
-    `levels` are level rows at both sides of every step; steps are taken together up to `longest`
-    seconds, with the means of attitude, force and rate over them. `gyro` and `accel` are terms of
-    couplings (`couple`). The rest is room to work in: `f` (9, `growth.padded_width`); `step`,
-    `added` and `work` (n, n); `growth` and `room` of `growth`; `matrix` (6, 3).
+    `levels` are level rows at both sides of every step; steps are grouped up to `longest` seconds,
+    with the means of attitude, force and rate over them. `gyro` and `accel` are terms of couplings
+    (`couple`). The rest are work arrays: `f` (9, `growth.padded_width`); `step`, `added` and `work`
+    (n, n); `growth` and `room` of `growth`; `matrix` (6, 3).
     """
     n = phi.shape[0]
     for i in range(n):

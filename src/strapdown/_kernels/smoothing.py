@@ -1,9 +1,10 @@
-"""A fixed-interval smoother's way back over what a filter kept: growths and updates.
+"""Fixed-interval smoother: the backward pass over the recorded history of a filter.
 
-It carries the adjoint pair (l, L) back: what the data from an instant on tell of the errors then,
-``estimate = P l``, and how much less is unknown for it, ``P - P L P``, with the filter's covariance
-P of that instant. Over a growth ``l = Phi' l``, ``L = Phi' L Phi``: nothing is inverted, whatever
-the noise was. Over an update the filter's covariance before it is, in units of its deviations.
+It carries the adjoint pair (l, L) back: the information of all later data on the errors,
+``estimate = P l``, and the reduction of their covariance, ``P - P L P``, with the filter's
+covariance P of that instant. Over a propagation ``l = Phi' l``, ``L = Phi' L Phi``: nothing is
+inverted, whatever the noise was. Over an update the filter's covariance before it is inverted, in
+units of its standard deviations.
 """
 
 from __future__ import annotations
@@ -13,34 +14,27 @@ import math
 import numpy as np
 from numba import njit
 
+from strapdown._kernels.covariance import udu_matrix
 from strapdown._kernels.given_arrays import GIVEN, dot
-from strapdown._kernels.smoothing_rows import (
-    CORE,
-    COVARIANCE,
-    GROWTH,
-    KIND,
-    UPDATE,
-    begin_of_move,
-    begin_of_taken,
-    unpack,
-)
+from strapdown._kernels.growth import LANES as GROWTH_LANES
+from strapdown._kernels.level import level_place
 
-# Numbers that are reckoned together: rows of matrices are padded to a multiple of it, with zeros.
+# Vector width: rows of matrices are padded with zeros to a multiple of it.
 LANES = 8
-# A pivot, of 1, below which a direction is taken to be known exactly: rounding of a covariance that
-# was made by thousands of operations is some 1e-14 of it.
+# Pivot, relative to 1, below which a direction counts as exactly known: thousands of operations
+# leave a rounding error of some 1e-14 in a covariance.
 EXACT = 1e-12
 
 
 @njit(cache=True)
 def padded(n):
-    """Columns of a matrix to work in, of n errors."""
+    """Columns of a work matrix for n errors."""
     return (n + LANES - 1) // LANES * LANES
 
 
 @njit(cache=True, error_model="numpy")
 def inverse(P, out):
-    """Fill the inverse of a covariance; zero for what it says is known exactly."""
+    """Fill the inverse of a covariance; zero for exactly known directions."""
     n = P.shape[0]
     sd, lower = np.empty(n), np.zeros((n, n))
     for i in range(n):
@@ -102,7 +96,7 @@ def product(A, B, n, out):
 
 @njit(**GIVEN)
 def sandwich(A, S, n, half, out):
-    """Fill ``A S A'``, symmetric S, (n, n) within padded matrices; `half` is room to work in."""
+    """Fill ``A S A'``, symmetric S, (n, n) within padded matrices; `half` is a work array."""
     product(A, S, n, half)
     for i in range(n):
         for j in range(i, n):
@@ -140,7 +134,7 @@ def estimate_of(row, told, n, out):
 
 @njit(**GIVEN)
 def told_before_growth(core, decay, told, new):
-    """Change l to ``Phi' l``; vectors are padded."""
+    """Replace l by ``Phi' l``; vectors are padded."""
     for p in range(0, told.shape[0], LANES):
         for j in range(LANES):
             new[p + j] = decay[p + j] * told[p + j]
@@ -154,7 +148,7 @@ def told_before_growth(core, decay, told, new):
 
 @njit(**GIVEN)
 def less_before_growth(core, decay, less, n, half):
-    """Change L to ``Phi' L Phi``, exactly symmetric; matrices are padded, `half` is room."""
+    """Replace L by ``Phi' L Phi``, exactly symmetric; padded matrices, `half` to work in."""
     for i in range(n):
         a0, a1, a2 = less[i, 0], less[i, 1], less[i, 2]
         a3, a4, a5 = less[i, 3], less[i, 4], less[i, 5]
@@ -187,7 +181,7 @@ def less_before_growth(core, decay, less, n, half):
 
 @njit(cache=True, error_model="numpy")
 def before_update(row, P, told, less, room):
-    """Take the adjoint pair over an update with the covariance P after it."""
+    """Carry the adjoint pair back over an update with the covariance P after it."""
     n = P.shape[0]
     before, weight, A, half, added, new = room
     unpack(row, begin_of_move(n), before)
@@ -216,7 +210,7 @@ def smooth_back(rows, n, told, less, wanted, estimates, covariances):
 
     Parameters
     ----------
-    rows : ndarray, (k, `smoothing_rows.row_width`)
+    rows : ndarray, (k, `row_width`)
     n : int
         Number of errors.
     told, less : ndarray, (`padded`,) and (n, `padded`)
@@ -251,3 +245,92 @@ def smooth_back(rows, n, told, less, wanted, estimates, covariances):
         else:
             told[:] = 0.0
             less[:, :] = 0.0
+
+
+# History of a filter for its smoother, in rows: a begin, a propagation, an update.
+#
+# Of n errors a row has its time, its kind, the rotation from north-east-down to level axes (C_ln,
+# row by row), and the upper half of the covariance after it, row by row. From `begin_of_move` on, a
+# propagation has the rows of its transition for position, velocity and attitude, and the decay of
+# the other errors; an update has the upper half of the covariance before it, and the error that it
+# removed.
+
+
+# Kinds of rows: propagation, update, begin of a filter (independent of all before it).
+GROWTH, UPDATE, BEGIN = 0, 1, 2
+# Rows of a transition with more than a decay.
+CORE = 9
+# Indices of a row.
+TIME, KIND, TURN, COVARIANCE = 0, 1, 2, 11
+
+
+@njit(cache=True)
+def begin_of_move(n):
+    """Index in a row of n errors after the covariance."""
+    return COVARIANCE + n * (n + 1) // 2
+
+
+@njit(cache=True)
+def begin_of_taken(n):
+    """Index in an update's row after the covariance before it."""
+    return begin_of_move(n) + n * (n + 1) // 2
+
+
+@njit(cache=True)
+def row_width(n):
+    """Numbers in a row of n errors."""
+    return max(begin_of_taken(n) + n, begin_of_move(n) + CORE * n + n - CORE)
+
+
+@njit(**GIVEN)
+def unpack(row, at, out):
+    """Fill a symmetric matrix from its upper half, row by row, from an index of a row on."""
+    n = out.shape[0]
+    for i in range(n):
+        for j in range(i, n):
+            out[i, j] = out[j, i] = row[at]
+            at += 1
+
+
+@njit(**GIVEN)
+def pack(matrix, row, at):
+    """Write the upper half of a symmetric matrix, row by row, from an index of a row on."""
+    n = matrix.shape[0]
+    for i in range(n):
+        for j in range(i, n):
+            row[at] = 0.5 * (matrix[i, j] + matrix[j, i])
+            at += 1
+
+
+@njit(cache=True, error_model="numpy")
+def pack_covariance(factored, covariance, P, row, at):
+    """Write a covariance, a matrix or factors, from an index of a row on; P to work in."""
+    if factored:
+        udu_matrix(covariance, P)
+        pack(P, row, at)
+    else:
+        pack(covariance, row, at)
+
+
+@njit(cache=True, error_model="numpy")
+def head_row(which, factored, states, time, kind, P, row):
+    """Fill time, kind, rotation and covariance of a row; P, (n, n), to work in."""
+    turn = row[TURN:COVARIANCE].reshape(3, 3)
+    # Of either mechanization the turn is its own transpose.
+    level_place(which, states[0], turn)
+    row[TIME], row[KIND] = time, kind
+    pack_covariance(factored, states[2], P, row, COVARIANCE)
+
+
+@njit(cache=True, error_model="numpy")
+def move_by_growth(growth, row, n):
+    """Fill the part of a propagation (`growth.growth_of_step`) in a row of n errors."""
+    phi, _, _, tail, _ = growth
+    at = begin_of_move(n)
+    for i in range(CORE):
+        for j in range(n):
+            row[at] = phi[j // GROWTH_LANES, GROWTH_LANES * i + j % GROWTH_LANES]
+            at += 1
+    for s in range(n - CORE):
+        row[at] = tail[s]
+        at += 1

@@ -14,7 +14,7 @@ from numba import njit
 
 # Rows of `facts`.
 NOISE2, BIAS2, DRIFT2, TIME, SCALE2, ACROSS2, OTHER2, STEP2 = range(8)
-# Places in `counts`.
+# Indices of `counts`.
 SAMPLES, LEARNED = range(2)
 # Kinds of events.
 EXCLUDED, READMITTED, DISAGREE, TOO_FEW = range(4)
@@ -85,10 +85,10 @@ def variances(facts, mean, ref, other, other_ref, known, share, learned, learn, 
 
 @njit(cache=True, error_model="numpy")
 def isolate(axes, weights, z, groups, limits, separation, x):
-    """Find what, left out, makes the others agree, and alone does so.
+    """Find the axis, or group, whose exclusion alone makes the others agree.
 
     Returns the axis, or ``-2 - group``, or -1 where there is none; the most likely axis and the
-    next one; and by how much the first differs from what the others tell.
+    next one; and the difference of the first from the others.
     """
     m = z.size
     trial = weights.copy()
@@ -141,7 +141,7 @@ def isolate(axes, weights, z, groups, limits, separation, x):
 
 @njit(cache=True, error_model="numpy")
 def take_in(z, other, axes, weights, learn, offset, ref, other_ref, counts, known, out):
-    """Add a sample to what axes read while they are compared; at the end, how each is off."""
+    """Add a sample to the readings under comparison; at the end, the offset of each axis."""
     for i in range(z.size):
         if out[i] == 0 and not math.isfinite(z[i]):
             return
@@ -196,7 +196,7 @@ def vote(
     fused,
     used,
 ):
-    """Go over samples z, (n, m); `mean` to `told` are the state, and change.
+    """Process samples z, (n, m); `mean` to `told` are the state, and change.
 
     Returns events ``(row, kind, axis or group, next axis, size, chi-square, limit, since)``. A
     group that failed as a whole is ``-2 - group``.
@@ -248,7 +248,7 @@ def vote(
             else:
                 alarms[s] = 0
             usual += 1 if alarms[s] == 0 else 0
-        # What was told is told again only after it has been away for as long as one is kept out.
+        # An event is repeated only after an absence as long as an exclusion.
         if usual == windows:
             for i in range(m):
                 told[i] = max(told[i] - 1, 0)
@@ -274,14 +274,14 @@ def vote(
                 for t in range(windows):
                     alarms[t] = 0
                 if counts[LEARNED] < learn:
-                    # What was learned from it is forgotten.
+                    # Values learned from it are discarded.
                     counts[LEARNED] = 0
                     ref[:] = 0.0
                     other_ref[:] = 0.0
                 break
             if alarms[s] < 2 * persist[s]:
                 continue
-            # Beside what was told already: is there more?
+            # Further disagreement beside the known one.
             for i in range(m):
                 if told[i] > 0:
                     told[i] = hold

@@ -2,22 +2,21 @@
 
 Chernodarov 2009, Eqs. (1), (2), (4). Level axes w are xi, eta, zeta with zeta up; q_ew turns
 vectors from w to the Earth's axes and so holds latitude, longitude and the wander angle; q_ib is
-the attitude of the body in the inertial axes that were the Earth's when the run began. The Earth's
-angle since then is kept by cosine and sine of its half. From the three follows the attitude body
-to level, ``q_wb = conj(q_ew) conj(q_ie) q_ib``.
+the attitude of the body in the inertial axes that were the Earth's at the start of the run. The
+Earth's angle since then is kept as cosine and sine of its half. The attitude body to level is
+``q_wb = conj(q_ew) conj(q_ie) q_ib``.
 
-A step is made as that of north-east-down (`ned`): in axes that are those of w at its start, held
-fixed in inertial space; the new place by geometry from a straight displacement; no transport rate
-is integrated. Nothing is divided by the cosine of the latitude: the Earth's axis comes in by its
-components in w, which are regular everywhere. The turn of the level in a step is about a horizontal
-axis; what azimuth that leaves after many steps is nothing physical, as place, velocity and attitude
-have it alike.
+A step is integrated as in `ned`: in the axes w of its start, held fixed in inertial space; the new
+position by geometry from a straight displacement; no transport rate is integrated. Nothing is
+divided by the cosine of the latitude: the Earth's axis enters by its components in w, which are
+regular everywhere. The level turns about a horizontal axis in each step; the azimuth that remains
+after many steps has no physical meaning, as position, velocity and attitude share it.
 
-The error of a run is of the fourth order of the step, but for what the gradients of gravity lack, a
-part in 1e3 of them, of the first: some 1e-11 m/s² for steps of a second in an aircraft.
+The error of a run is of the fourth order of the step, except for a first-order part from the
+gradients of gravity, which are exact to 1e-3: 1e-11 m/s² for steps of 1 s in an aircraft.
 
-What is summed over a run, the two quaternions and the Earth's angle, is summed with what rounding
-left of the step before (Kahan 1965), so that a day of steps of a millisecond loses nothing.
+The sums over a run (the two quaternions and the Earth's angle) are compensated (Kahan 1965): a day
+of steps of 1 ms loses nothing by rounding.
 """
 
 from __future__ import annotations
@@ -47,16 +46,15 @@ from strapdown._kernels.ned import (
     within,
 )
 from strapdown._kernels.rotation import dcm_from_quat, quat_from_rotvec, quat_multiply
-from strapdown._kernels.wander_geometry import curving, earth_axis, level_with, shift, tilt
 
-# Places in the state: quaternion w to Earth, height in m, velocity in w in m/s, quaternion body to
-# w; quaternion body to inertial; what rounding left of the two that are summed; cosine and sine of
-# half the Earth's angle and what rounding left of them; the radius of the prime vertical over a;
-# and the memory of the vertical loop, as `ned.PULL` and `ned.SINCE`.
+# Indices of the state: quaternion w to Earth, height in m, velocity in w in m/s, quaternion body to
+# w; quaternion body to inertial; rounding errors of the two summed quaternions; cosine and sine of
+# half the Earth's angle and their rounding errors; the radius of the prime vertical over a; and the
+# memory of the vertical loop, as `ned.PULL` and `ned.SINCE`.
 Q_EW, ALT, V, Q_WB = 0, 4, 5, 8
 Q_IB, LOW_EW, LOW_IB, SPIN, PRIME, PULL, SINCE = 12, 16, 20, 24, 28, 29, 30
 STATE = 31
-# The part of the state that is kept of every step.
+# Length of the part of the state that goes into the history.
 ROW = 12
 
 TWO_THIRDS = 2.0 / 3.0
@@ -65,7 +63,7 @@ THIRD = 1.0 / 3.0
 
 @njit(cache=True, inline="always")
 def add(high, low, more):
-    """Sum and what rounding left of it."""
+    """Sum, and its rounding error."""
     more += low
     total = high + more
     return total, more - (total - high)
@@ -80,9 +78,9 @@ def half_turn(y):
 
 @njit(cache=True, inline="always")
 def tilt_place(q, low, d, x, y):
-    """Quaternion times (1 + d, x, y, 0), and what rounding left.
+    """Quaternion times (1 + d, x, y, 0), and its rounding error.
 
-    The norm needs no care: d is known to its own last digit.
+    No normalization is needed: d is exact to its own last digit.
     """
     w0, x0, y0, z0 = q
     w1, w2 = add(w0, low[0], d * w0 - (x0 * x + y0 * y))
@@ -94,9 +92,10 @@ def tilt_place(q, low, d, x, y):
 
 @njit(cache=True, inline="always")
 def turn_body(q, low, d, x, y, z):
-    """Quaternion times (1 + d, x, y, z), drawn to norm 1, and what rounding left.
+    """Quaternion times (1 + d, x, y, z), normalized, and its rounding error.
 
-    Only what is across q changes the rotation; along q, d may have the rounding of a number near 1.
+    Only the part across q changes the rotation; along q, d may have the rounding of a number near
+    1.
     """
     w0, x0, y0, z0 = q
     d += 0.5 * (1.0 - (w0 * w0 + x0 * x0 + y0 * y0 + z0 * z0))
@@ -109,7 +108,7 @@ def turn_body(q, low, d, x, y, z):
 
 @njit(cache=True, inline="always")
 def body_to_level(q_ew, c, s, q_ib):
-    """Quaternion q_wb from the place, the half angle of the Earth and the attitude in inertial."""
+    """Quaternion q_wb from q_ew, the half angle of the Earth and the attitude in inertial axes."""
     w, x, y, z = q_ib
     return quat_multiply(
         q_ew[0],
@@ -158,7 +157,7 @@ def wander_step(
     my += sixth * (gy - veer_y - swing * (ox - across * vy))
     mz = half * vz + 0.5 * sz - twelfth * uz + sixth * (gz - lift)
 
-    # What climbing and the change of the curvature do to the normal, as in `shift`, at the velocity
+    # Effect of the climb and the change of curvature on the normal, as in `shift`, at the velocity
     # of the start: the mean of the square of time is a third.
     north = px * vx + py * vy
     sine = curvature * north
@@ -171,8 +170,8 @@ def wander_step(
     third = THIRD * dt * dt
     bent_x, bent_y = third * (pull * px - u * qx), third * (pull * py - u * qy)
 
-    # Mean change of the normal, and gravity at the mean place. On the way over the Earth the body
-    # is turned back by its rate.
+    # Mean change of the normal, and gravity at the mean position. Over the Earth the body is turned
+    # back by its rate.
     ex, ey = mx - sixth * veer_x, my - sixth * veer_y
     toward = along * (px * ex + py * ey)
     nx, ny = across * ex + toward * px + bent_x, across * ey + toward * py + bent_y
@@ -278,7 +277,7 @@ def put_state(state, q_ew, low_ew, alt, v, q_wb, q_ib, low_ib, spin, w, pull, si
 
 @njit(cache=True, inline="always")
 def wander_verdict(alt, v, q_wb, q_ew, t2, speed, lowest, highest):
-    """Whether a state is one that this mechanization may go on from."""
+    """Whether this mechanization can continue from a state: `DONE` or the reason why not."""
     if not within(alt, v[0], v[1], v[2], q_wb[0], q_ew[0], speed, lowest, highest):
         return DIVERGED
     if t2 > LARGEST_TURN * LARGEST_TURN:
@@ -347,3 +346,71 @@ def wander_advance(state, increments, reference, earth, options, history):
         history[i, 8], history[i, 9], history[i, 10], history[i, 11] = q_wb
     put_state(state, q_ew, low_ew, alt, v, q_wb, q_ib, low_ib, spin, w, pull, since)
     return made, why
+
+
+# How the level lies on the ellipsoid, by the Earth's axis in its axes: regular at the poles.
+
+
+@njit(cache=True, inline="always")
+def earth_axis(w, x, y, z):
+    """Components in w of the unit vector of the Earth's axis, from q_ew."""
+    return 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w + z * z - (x * x + y * y)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def curving(w, alt, a, e2):
+    """N + h, the derivative of N s by s, and the curvatures across and along the meridian.
+
+    N is the radius of the prime vertical, `w` that over a, s the sine of the latitude; the
+    curvatures are those of the level surface at the height h.
+    """
+    prime = a * w
+    slope = prime * w * w
+    return prime + alt, slope, 1.0 / (prime + alt), 1.0 / (slope * (1.0 - e2) + alt)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def shift(kx, ky, s, w, far, slope, across, curvature, e2, rx, ry, rz):
+    """Tilt of the normal, as tangents along xi and eta, and rise, by a straight displacement r.
+
+    A point of normal n and height h is ``(N + h) n - e² N s p``, p the Earth's axis and s = p . n.
+    So the new normal is along ``(N + h) zeta + r + e² d p`` with d the change of N s, taken to
+    third order in r: the remainder is of ``e² (r/R)⁴`` and ``e⁴ (r/R)³``. `far` is N + h; the
+    others are as in `curving`.
+    """
+    north = kx * rx + ky * ry
+    sine = curvature * north
+    per = e2 * slope * curvature
+    pull = per * north
+    u = (rz + pull * s) * across
+    tx, ty = (rx + pull * kx) * across, (ry + pull * ky) * across
+    t2 = tx * tx + ty * ty
+    lost = 0.5 * t2
+    # The second and the third order of the change of s, but for what d's own have on it: that is
+    # the factor (N + h) / (M + h).
+    more = u * (u * sine + s * t2 - sine) - lost * (s + sine)
+    sine += more
+    bend = 1.5 * e2 * w * w * s * sine * sine
+    pull = per * (north + far * (more + bend))
+    u = (rz + pull * s) * across
+    inverse = across * ((1.0 - u) * (1.0 + u * u))
+    tx, ty = (rx + pull * kx) * inverse, (ry + pull * ky) * inverse
+    t2 = tx * tx + ty * ty
+    rise = rz + (far + rz + pull * s) * t2 * (0.5 - 0.125 * t2) - 0.5 * e2 * slope * sine * sine
+    return tx, ty, t2, rise
+
+
+@njit(cache=True, inline="always")
+def tilt(tx, ty, t2):
+    """Quaternion from the new w to the old one, less 1, of a tilt by tangents; its zeta is 0."""
+    half = 0.5 - t2 * (0.1875 - 0.12109375 * t2)
+    return -t2 * (0.125 - 0.0859375 * t2), -ty * half, tx * half
+
+
+@njit(cache=True, inline="always")
+def level_with(tx, ty, t2, x, y, z):
+    """Vector in the new w, of one in the old, as `tilt` turns it; up to the sixth order."""
+    less = 0.5 - 0.375 * t2
+    along = tx * x + ty * y
+    lean = z - t2 * less * z + less * along
+    return x - tx * lean, y - ty * lean, (1.0 - t2 * less) * (z + along)

@@ -82,7 +82,7 @@ def sum_inertially(imu: pd.DataFrame, ends: Indices | None = None) -> InertialSu
     DataError
         As `increments.motion_increments`.
     """
-    from strapdown._kernels.inertial_sums import inertial_sums
+    from strapdown._kernels.sums import inertial_sums
 
     increments = motion_increments(imu)
     rows = np.ascontiguousarray(increments[MOTION].to_numpy(dtype=np.float64))
@@ -132,7 +132,7 @@ def moments(stamps: Array, values: Array, degrees: int) -> Array:
     ndarray, (degrees, k), the unit of `values`
         Degree zero first.
     """
-    from strapdown._kernels.inertial_sums import legendre_moments
+    from strapdown._kernels.sums import legendre_moments
 
     out = np.empty((degrees, values.shape[1]))
     u = 2.0 * stamps / stamps[-1] - 1.0

@@ -21,8 +21,7 @@ from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.covariance import Observation
 from strapdown.estimation.error_filter import ErrorFilter, FilterState
 from strapdown.estimation.error_model import PHYSICAL, Segment
-from strapdown.mechanization.mechanization import Mechanization
-from strapdown.mechanization.state_error import displacement_between
+from strapdown.mechanization.mechanization import Mechanization, displacement_between
 from strapdown.nav_state import NavState
 from strapdown.sensors.triad_errors import Triad
 
@@ -230,7 +229,7 @@ def without_steady_turn(rows: Array, earth: Array) -> Array:
 
 def _turned(rows: Array) -> float:
     """Angle between the attitudes before and after, rad."""
-    from strapdown._kernels.inertial_sums import inertial_sums
+    from strapdown._kernels.sums import inertial_sums
 
     n = len(rows)
     turned = np.empty((n + 1, 4))

@@ -23,7 +23,7 @@ from strapdown.plugins import plugins
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.simulation import SCENARIOS
 from strapdown.simulation.crash_cases import CASES
-from strapdown.simulation.crash_scenarios import CRASHES
+from strapdown.simulation.crash_motion import CRASHES
 
 __all__ = ["HEADINGS", "Listed", "cell_text", "listed_modules"]
 

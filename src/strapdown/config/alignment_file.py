@@ -31,8 +31,7 @@ from strapdown.config.wanted import ALIGNMENT_WANTED
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import ConfigError
 from strapdown.estimation.error_filter import ErrorFilter
-from strapdown.formats.columns import parse_axes
-from strapdown.formats.unit_words import parse_unit
+from strapdown.formats.columns import parse_axes, parse_unit
 from strapdown.sensors.triad_errors import NAMED_AXES, check_axes_matrix
 
 __all__ = [

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown._kernels import crash_events as kernel
-from strapdown._kernels import window_change as rows
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.acceleration import Acceleration
 from strapdown.errors import ConfigError, DataError, Finding
@@ -458,7 +457,7 @@ class EventDetector:
         self._options = options
         self._noise, self._bias = two_sds(noise, "noise"), two_sds(bias_sd, "bias_sd")
         self._state = np.zeros(kernel.SIZE)
-        self._rows = np.zeros((1024, rows.WIDTH))
+        self._rows = np.zeros((1024, kernel.WIDTH))
         self._held, self._gone = 0, 0
         self._events: list[CrashEvent] = []
 
@@ -528,9 +527,9 @@ class EventDetector:
         if 0 < held < len(self._rows) and np.shape(accel) == (3,):
             x, y, z = accel
             # `extend` rejects samples that are not finite or not later, with its message.
-            if time > self._rows[held - 1, rows.T] and math.isfinite(x + y + z + time):
+            if time > self._rows[held - 1, kernel.T] and math.isfinite(x + y + z + time):
                 row = self._rows[held]
-                row[rows.T], row[rows.AX], row[rows.AY] = time, x, y
+                row[kernel.T], row[kernel.AX], row[kernel.AY] = time, x, y
                 self._held = held + 1
                 return self._advance()
         return self.extend([time], [accel])  # type: ignore[arg-type]
@@ -563,11 +562,11 @@ class EventDetector:
             return ()
         self._make_room(len(stamps))
         new = slice(self._held, self._held + len(stamps))
-        self._rows[new, rows.T] = stamps
-        self._rows[new, rows.AX] = values[:, 0]
-        self._rows[new, rows.AY] = values[:, 1]
+        self._rows[new, kernel.T] = stamps
+        self._rows[new, kernel.AX] = values[:, 0]
+        self._rows[new, kernel.AY] = values[:, 1]
         if self._held + self._gone == 0:
-            self._rows[0, rows.VX :] = 0.0
+            self._rows[0, kernel.VX :] = 0.0
             kernel.begin(self._state, float(stamps[0]))
         self._held += len(stamps)
         return self._advance()
@@ -600,7 +599,7 @@ class EventDetector:
                 time=time[bad[0]],
                 accel=accel[bad[0]].tolist(),
             )
-        last = self._rows[self._held - 1, rows.T] if self._held else -math.inf
+        last = self._rows[self._held - 1, kernel.T] if self._held else -math.inf
         back = np.flatnonzero(np.diff(time, prepend=last) <= 0.0)
         if back.size:
             raise DataError(
@@ -621,7 +620,7 @@ class EventDetector:
             reach = rule.trigger_window + 2.0 * rule.wake_window
             pending = state[kernel.PENDING]
             oldest = state[kernel.NOW] if math.isnan(pending) else pending
-            first = int(np.searchsorted(self._rows[: self._held, rows.T], oldest - reach)) - 2
+            first = int(np.searchsorted(self._rows[: self._held, kernel.T], oldest - reach)) - 2
             first = max(min(first, int(state[kernel.TAILS : kernel.TAILS + 3].min()) - 1), 0)
             self._rows[: self._held - first] = self._rows[first : self._held].copy()
             state[kernel.TAILS : kernel.TAILS + 3] -= first
@@ -629,7 +628,7 @@ class EventDetector:
             self._held -= first
             self._gone += first
         if 2 * (self._held + more) > len(self._rows):
-            larger = np.zeros((2 * (self._held + more), rows.WIDTH))
+            larger = np.zeros((2 * (self._held + more), kernel.WIDTH))
             larger[: self._held] = self._rows[: self._held]
             self._rows = larger
 

@@ -9,8 +9,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
+from strapdown._kernels.crash_errors import grow_errors, grow_noise
 from strapdown._kernels.earth import RATE
-from strapdown._kernels.error_growth import grow_errors, grow_noise
 from strapdown._kernels.ned import ROW, Q, V, reverse_increments
 from strapdown.crash.unit_effects import SampleEffects
 from strapdown.ellipsoids import find_ellipsoid

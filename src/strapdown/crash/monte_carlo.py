@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown._kernels.perturbed_runs import perturbed_runs
+from strapdown._kernels.crash_errors import perturbed_runs
 from strapdown.crash.leg import VELOCITY
 from strapdown.crash.path import CrashPath
 from strapdown.errors import ConfigError

@@ -430,7 +430,7 @@ class FirDecimation:
         state : FirState
         outputs : ndarray, (m, c)
         """
-        from strapdown._kernels.fir import fir_decimate
+        from strapdown._kernels.signals import fir_decimate
 
         held = np.ascontiguousarray(np.vstack([state.values, values]))
         start = self.centre + state.given * self.factor - self.half + int(self.means)

@@ -229,7 +229,7 @@ class OutlierDesign:
         DataError
             A value is not finite.
         """
-        from strapdown._kernels.outliers import replace_outliers
+        from strapdown._kernels.signals import replace_outliers
 
         check_segment(values, state.first + state.raw.shape[1])
         new = np.ascontiguousarray(values.T)

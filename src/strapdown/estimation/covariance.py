@@ -51,33 +51,18 @@ class CovarianceForm(ABC):
 
     @abstractmethod
     def begin(self, P: Array) -> Array:
-        """Return the state of a covariance.
+        """Return the state of a covariance; (n, n).
 
-        Parameters
-        ----------
-        P : ndarray, (n, n)
-            Symmetric, positive semidefinite: a row of zeros is an exactly known state.
-
-        Returns
-        -------
-        ndarray, (n, n)
-
-        Raises
-        ------
-        DataError
-            P is not finite, not symmetric, or has a negative eigenvalue beyond rounding.
+        `P` ((n, n)): symmetric, positive semidefinite: a row of zeros is an exactly known state.
+        DataError: p is not finite, not symmetric, or has a negative eigenvalue beyond rounding.
         """
 
     @abstractmethod
     def predict(self, state: Array, Phi: Array, Q: Array) -> Array:
         """Return the state of ``Phi P Phi' + Q``.
 
-        Parameters
-        ----------
-        state : ndarray, (n, n)
-        Phi : ndarray, (n, n)
-        Q : ndarray, (n, n)
-            Symmetric, positive semidefinite to rounding; of any rank.
+        `state` ((n, n)). `Phi` ((n, n)). `Q` ((n, n)): symmetric, positive semidefinite to
+        rounding; of any rank.
         """
 
     @abstractmethod
@@ -92,24 +77,10 @@ class CovarianceForm(ABC):
     ) -> tuple[Array, Array, Innovations]:
         """Update with the observations of an epoch, one after the other.
 
-        Parameters
-        ----------
-        state : ndarray, (n, n)
-        x : ndarray, (n,)
-            Estimate before.
-        z : ndarray, (l,)
-        H : ndarray, (l, n)
-        R : ndarray, (l,)
-            Variances of observations that are independent of each other.
-        rule : UpdateRule, or a sequence of them, optional
-            Weighting of the observations, one rule for all or one for each; full weight if not
-            given.
-
-        Returns
-        -------
-        state : ndarray, (n, n)
-        x : ndarray, (n,)
-        innovations : Innovations
+        `state` ((n, n)). `x` ((n,)): estimate before. `z` ((l,)). `H` ((l, n)). `R` ((l,)):
+        variances of observations that are independent of each other. `rule` (or a sequence of
+        them): weighting of the observations, one rule for all or one for each; full weight if not
+        given. Returns `state` ((n, n)); `x` ((n,)).
         """
 
     def epoch(
@@ -125,21 +96,9 @@ class CovarianceForm(ABC):
     ) -> tuple[Array, Array, Innovations]:
         """Predict, then update: a form may combine both at a lower cost.
 
-        Parameters
-        ----------
-        state : ndarray, (n, n)
-            Before the prediction.
-        Phi, Q : ndarray, (n, n)
-            As for `predict`.
-        x : ndarray, (n,)
-            Estimate, predicted already.
-        z, H, R, rule
-            As for `update`.
-
-        Returns
-        -------
-        state, x, innovations
-            As from `update`.
+        `state` ((n, n)): before the prediction. `Phi`, `Q` ((n, n)): as for `predict`. `x` ((n,)):
+        estimate, predicted already. `z`, `H`, `R`, `rule`: as for `update`. Returns state, x,
+        innovations, as from `update`.
         """
         return self.update(self.predict(state, Phi, Q), x, z, H, R, rule)
 
@@ -185,14 +144,8 @@ class UpdateRule(Protocol):
     def step(self, nu: float, s: float, r: float) -> Step:
         """Return the step of one observation.
 
-        Parameters
-        ----------
-        nu : float
-            Observation minus its prediction.
-        s : float
-            ``h P h'``, the variance of the prediction.
-        r : float
-            Variance of the observation.
+        `nu`: observation minus its prediction. `s`: ``h P h'``, the variance of the prediction.
+        `r`: variance of the observation.
         """
         ...
 
@@ -203,9 +156,6 @@ class FullUpdate:
     def step(self, nu: float, s: float, r: float) -> Step:
         """Return the full step, as `UpdateRule.step`."""
         return Step(nu, 1.0, r, 1.0)
-
-
-# Observations of a filter.
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,20 +192,10 @@ ROUNDINGS = 1e3
 
 
 def checked_covariance(P: Array) -> Array:
-    """Return a covariance as an array of its own, exactly symmetric.
+    """Return a covariance as an array of its own, exactly symmetric; (n, n).
 
-    Parameters
-    ----------
-    P : array_like, (n, n)
-
-    Returns
-    -------
-    ndarray, (n, n)
-
-    Raises
-    ------
-    DataError
-        P is not square, not finite, not symmetric, or not positive semidefinite.
+    `P` ((n, n)). DataError: p is not square, not finite, not symmetric, or not positive
+    semidefinite.
     """
     P = np.array(P, dtype=np.float64, order="C")
     if P.ndim != 2 or P.shape[0] != P.shape[1] or not P.size:
@@ -368,17 +308,9 @@ def take_by_rule(
 ) -> Innovations:
     """Update the factors of a covariance and x, in place, by every observation.
 
-    Parameters
-    ----------
-    expect, take : kernels
-        The two halves of a scalar step; the rule is evaluated between them.
-    parts : (ndarray, ndarray)
-        Arrays in which the kernels keep a covariance.
-    x : ndarray, (n,)
-    observations : (z, H, R)
-    rule : UpdateRule, or a sequence of them
-    work : ndarray
-        Passed from `expect` to `take`.
+    `expect`, `take` (kernels): the two halves of a scalar step; the rule is evaluated between them.
+    `parts` ((ndarray, ndarray)): arrays in which the kernels keep a covariance. `x` ((n,)).
+    `observations` ((z, H, R)). `work`: passed from `expect` to `take`.
     """
     z, H, R = observations
     matrix, diagonal = parts
@@ -457,10 +389,7 @@ class Plain(CovarianceForm):
     ) -> tuple[Array, Array, Innovations]:
         """Update with the observations of an epoch; see `CovarianceForm.update`.
 
-        Raises
-        ------
-        DataError
-            Shapes that do not fit, or an observation that is not finite.
+        DataError: shapes that do not fit, or an observation that is not finite.
         """
         kernels = _kernels()
         z, H, R = contiguous(z, H, R)
@@ -502,13 +431,6 @@ class Joseph(Plain):
 # The covariance as ``U D U'``: Bierman's update and Thornton's prediction.
 
 
-@cache
-def _kernels_ud() -> tuple[ModuleType, ModuleType]:
-    from strapdown._kernels import factored_update, factors
-
-    return factors, factored_update
-
-
 @dataclass(frozen=True)
 class BiermanThornton(CovarianceForm):
     """Unit upper triangular U and diagonal D; a state holds U above its diagonal and D on it.
@@ -523,25 +445,22 @@ class BiermanThornton(CovarianceForm):
 
     def begin(self, P: Array) -> Array:
         """Return the factors of a covariance; see `CovarianceForm.begin`."""
-        factors, _ = _kernels_ud()
         P = checked_covariance(P)
         out = np.empty_like(P)
-        if (row := factors.udu_factor(P, out)) >= 0:
+        if (row := _kernels().udu_factor(P, out)) >= 0:
             raise indefinite(row)
         return out
 
     def predict(self, state: Array, Phi: Array, Q: Array) -> Array:
         """Return the factors of ``Phi P Phi' + Q``, by one weighted Gram-Schmidt.
 
-        Raises
-        ------
-        DataError
-            Shapes that do not fit; Phi or Q that is not finite; Q with a negative eigenvalue.
+        DataError: shapes that do not fit; Phi or Q that is not finite; Q with a negative
+        eigenvalue.
         """
         state, Phi, Q = contiguous(state, Phi, Q)
         check_prediction(state, Phi, Q)
         out = np.empty_like(state)
-        row = _kernels_ud()[0].udu_predict(state, Phi, Q, out)
+        row = _kernels().udu_predict(state, Phi, Q, out)
         if row >= 0:
             raise bad_prediction(row, Phi, Q)
         return out
@@ -557,12 +476,9 @@ class BiermanThornton(CovarianceForm):
     ) -> tuple[Array, Array, Innovations]:
         """Update with the observations of an epoch; see `CovarianceForm.update`.
 
-        Raises
-        ------
-        DataError
-            Shapes that do not fit, or an observation that is not finite.
+        DataError: shapes that do not fit, or an observation that is not finite.
         """
-        _, kernels = _kernels_ud()
+        kernels = _kernels()
         z, H, R = contiguous(z, H, R)
         ud, x = own(state), own(x)
         check_observations(x, z, H, R)
@@ -579,18 +495,11 @@ class BiermanThornton(CovarianceForm):
     def matrix(self, state: Array) -> Array:
         """Return ``U D U'``."""
         out = np.empty_like(state)
-        _kernels_ud()[0].udu_matrix(np.ascontiguousarray(state), out)
+        _kernels().udu_matrix(np.ascontiguousarray(state), out)
         return out
 
 
 # The W-D form: columns are appended over an epoch, and orthogonalized once at its end.
-
-
-@cache
-def _kernels_wd() -> ModuleType:
-    from strapdown._kernels import factored_update
-
-    return factored_update
 
 
 @dataclass(frozen=True)
@@ -645,7 +554,7 @@ class Chernodarov(BiermanThornton):
         observations: tuple[Array, Array, Array],
         rule: UpdateRule | Sequence[UpdateRule] | None,
     ) -> tuple[Array, Array, Innovations]:
-        kernels = _kernels_wd()
+        kernels = _kernels()
         z, H, R = contiguous(*observations)
         x, out = own(x), np.empty_like(state)
         check_observations(x, z, H, R)
@@ -667,9 +576,6 @@ class Chernodarov(BiermanThornton):
         if row >= 0:
             raise bad_prediction(row, Phi, Q)
         return out, x, innovations
-
-
-# Covariance forms by name.
 
 
 COVARIANCES: dict[str, type[CovarianceForm]] = {

@@ -45,7 +45,7 @@ Array = NDArray[np.float64]
 
 # Relative excess of a noise over its known part, so that the difference stays positive
 # semidefinite: for a noise of deficient rank, as that of a quaternion's four numbers, rounding of
-# the whole, 2e-16, must be negligible beside it (`_kernels.factors.INDEFINITE`).
+# the whole, 2e-16, must be negligible beside it (`_kernels.covariance.INDEFINITE`).
 ROUNDING = 1e-5
 # Position of the rotation among the physical errors.
 ROTATION = slice(6, 9)
@@ -96,15 +96,8 @@ class ErrorFilter:
     def begin(self, start: NavState, P: Array) -> FilterState:
         """Return the state at a start.
 
-        Parameters
-        ----------
-        start : NavState
-        P : ndarray, (p, p)
-            Covariance of the physical errors: nine in north-east-down axes, and the sensors'.
-
-        Returns
-        -------
-        FilterState
+        `P` ((p, p)): covariance of the physical errors: nine in north-east-down axes, and the
+        sensors'.
         """
         state = self.mechanization.begin(start)
         row = self.mechanization.history_row(state)
@@ -143,21 +136,10 @@ class ErrorFilter:
     ) -> None:
         """Advance a state of the mechanization, in place, over compensated increments.
 
-        Parameters
-        ----------
-        mechanization : ndarray
-            It is changed.
-        time : ndarray, (k,), s
-            Ends of the steps, for messages.
-        rows : ndarray, (k, 10)
-            From `compensated`.
-        history : ndarray, (k, row)
-            Filled with its rows after each step.
-
-        Raises
-        ------
-        DivergenceError
-            The state is outside the validity of the mechanization; the sample is named.
+        `mechanization`: it is changed. `time` ((k,), s): ends of the steps, for messages. `rows`
+        ((k, 10)): from `compensated`. `history` ((k, row)): filled with its rows after each step.
+        DivergenceError: the state is outside the validity of the mechanization; the sample is
+        named.
         """
         made, why = self.mechanization.advance_rows(
             mechanization, rows, np.empty(0), self.earth, history
@@ -170,23 +152,9 @@ class ErrorFilter:
     ) -> tuple[FilterState, Array]:
         """Propagate estimates and covariance over steps that the mechanization has made.
 
-        Parameters
-        ----------
-        state : FilterState
-            At the start of the first step.
-        time : ndarray, (k,), s
-            Ends of the steps.
-        history : ndarray, (k + 1, row)
-        rows : ndarray, (k, 10)
-            From `compensated`.
-        mechanization : ndarray
-            Its state after the last step.
-
-        Returns
-        -------
-        state : FilterState
-        Phi : ndarray, (n, n)
-            How the states went on.
+        `state`: at the start of the first step. `time` ((k,), s): ends of the steps. `history` ((k
+        + 1, row)). `rows` ((k, 10)): from `compensated`. `mechanization`: its state after the last
+        step. Returns `Phi` ((n, n)): how the states went on.
         """
         segment = Segment(self.mechanization, np.concatenate([[state.time], time]), history, rows)
         Phi, Q = self._transition(segment)
@@ -202,24 +170,9 @@ class ErrorFilter:
     def predict(self, state: FilterState, time: Array, rows: Array) -> tuple[FilterState, Segment]:
         """Propagate over motion increments.
 
-        Parameters
-        ----------
-        state : FilterState
-        time : ndarray, (k,), s
-            Ends of the steps.
-        rows : ndarray, (k, 10)
-            As the sensors gave them.
-
-        Returns
-        -------
-        state : FilterState
-        segment : Segment
-            The run, of increments without the errors estimated so far.
-
-        Raises
-        ------
-        DivergenceError
-            The mechanization has left its range of validity.
+        `time` ((k,), s): ends of the steps. `rows` ((k, 10)): as the sensors gave them. Returns
+        `segment`: the run, of increments without the errors estimated so far. DivergenceError: the
+        mechanization has left its range of validity.
         """
         after, segment = self._run(state, time, rows)
         Phi, Q = self._transition(segment)
@@ -240,20 +193,8 @@ class ErrorFilter:
         the observation, ``M = cov(w, v)`` and ``S = M R^-1``, the transition is ``Phi - S H`` and
         the covariance of the noise ``Q - S M'`` (Simon, Optimal State Estimation, 2006, sec. 7.1).
 
-        Parameters
-        ----------
-        state : FilterState
-        time, rows : ndarray
-            As `predict`.
-        observe : callable
-            Returns the observation of a segment: of the errors at its start, R without the noise
-            that is in the rotation of the state.
-
-        Returns
-        -------
-        state : FilterState
-        segment : Segment
-        innovations : Innovations
+        `time`, `rows`: as `predict`. `observe`: returns the observation of a segment: of the errors
+        at its start, R without the noise that is in the rotation of the state.
         """
         after, segment = self._run(state, time, rows)
         Phi, Q = self._transition(segment)
@@ -282,22 +223,10 @@ class ErrorFilter:
     ) -> tuple[FilterState, Array, list[Innovations]]:
         """Update with the observations of an epoch, and correct the state (closed loop).
 
-        Parameters
-        ----------
-        state : FilterState
-        observations : sequence of Observation
-            Of this state, independent of each other.
-        rules : sequence of UpdateRule, of a sequence of them, or of None, optional
-            Weighting of each, one rule for all of its components or one for each; the filter's
-            own for all, if not given.
-
-        Returns
-        -------
-        state : FilterState
-        taken : ndarray, (p,)
-            The physical errors that were corrected.
-        innovations : list of Innovations
-            Of each observation.
+        `observations`: of this state, independent of each other. `rules` (of a sequence of them, or
+        of None): weighting of each, one rule for all of its components or one for each; the
+        filter's own for all, if not given. Returns `taken` ((p,)): the physical errors that were
+        corrected; `innovations`: of each observation.
         """
         to_physical = self.model.to_physical(self.mechanization, state.time, state.row)
         x = np.zeros(to_physical.shape[1])
@@ -313,20 +242,8 @@ class ErrorFilter:
     ) -> tuple[FilterState, Array, list[Innovations]]:
         """Update with the observations of an epoch without correcting the state.
 
-        Parameters
-        ----------
-        state : FilterState
-        x : ndarray, (n,)
-            Estimated states before it.
-        observations, rules
-            As `observe`.
-
-        Returns
-        -------
-        state : FilterState
-            With the covariance after.
-        x : ndarray, (n,)
-        innovations : list of Innovations
+        `x` ((n,)): estimated states before it. `observations`, `rules`: as `observe`. Returns
+        `state`: with the covariance after; `x` ((n,)).
         """
         to_physical = self.model.to_physical(self.mechanization, state.time, state.row)
         covariance, x, seen = self.form.update(
@@ -406,9 +323,6 @@ def symmetric(P: Array) -> Array:
     return 0.5 * (P + P.T)
 
 
-# State of a filter between steps.
-
-
 @dataclass(frozen=True, eq=False)
 class FilterState:
     """State of a filter between steps.
@@ -445,11 +359,7 @@ def rules_of_components(
 ) -> list[UpdateRule] | None:
     """Return one rule for each component, or None if no component has one.
 
-    Parameters
-    ----------
-    rules : sequence of Rules
-        One an observation.
-    observations : sequence of Observation
+    `rules`: one an observation.
     """
     if not any(rules):
         return None
@@ -462,11 +372,7 @@ def rules_of_components(
 def split_innovations(seen: Innovations, observations: Sequence[Observation]) -> list[Innovations]:
     """Split the innovations of a joint update by observation.
 
-    Parameters
-    ----------
-    seen : Innovations
-        Of all components, one observation after the other.
-    observations : sequence of Observation
+    `seen`: of all components, one observation after the other.
     """
     cuts = np.cumsum([one.z.size for one in observations])[:-1]
     parts = (np.split(values, cuts) for values in (seen.nu, seen.s, seen.weight))
@@ -483,16 +389,7 @@ BIASES = ("gyro_bias", "accel_bias")
 
 
 def resting(segment: Segment) -> Segment:
-    """Return a segment whose specific forces are gravity at its attitude.
-
-    Parameters
-    ----------
-    segment : Segment
-
-    Returns
-    -------
-    Segment
-    """
+    """Return a segment whose specific forces are gravity at its attitude."""
     used = segment.mechanization
     levels = used.levels(segment.history[:-1])
     rows = segment.increments.copy()
@@ -508,17 +405,8 @@ def biases_in_level(
 ) -> Array:
     """Return the transition by a correction that keeps bias errors constant in level axes.
 
-    Parameters
-    ----------
-    mechanization : Mechanization
-    layout : StateLayout
-        Of n states.
-    before, after : ndarray, (row,)
-        Of a history, before and after the correction of the attitude.
-
-    Returns
-    -------
-    ndarray, (n, n)
+    `layout`: of n states. `before`, `after` ((row,)): of a history, before and after the correction
+    of the attitude. Returns (n, n).
     """
     q_before, q_after = mechanization.levels(np.stack([before, after]))[:, ATTITUDE]
     turn = rotation.dcm_from_quaternion(rotation.compose(rotation.conjugate(q_after), q_before))
@@ -547,20 +435,13 @@ LARGE = math.radians(0.8)
 # Positions of both tilts among the physical errors.
 TILTS = slice(6, 8)
 # Blocks of states that act as a bias of the accelerometers, in order of preference.
-LARGE_TILT_BIASES = ("accel_bias", "accel_drift")
+ACCEL_BIASES = ("accel_bias", "accel_drift")
 
 
 def is_large(P: Array) -> bool:
     """Return whether a tilt may be so large that its second order counts.
 
-    Parameters
-    ----------
-    P : ndarray, (p, p)
-        Covariance of the physical errors, level axes.
-
-    Returns
-    -------
-    bool
+    `P` ((p, p)): covariance of the physical errors, level axes.
     """
     return float(np.trace(P[TILTS, TILTS])) > LARGE**2
 
@@ -579,22 +460,11 @@ def unlearnt_force(
 
     Its mean is neglected: subtracting it did not change how far bounds held in 60 drives.
 
-    Parameters
-    ----------
-    filter_ : ErrorFilter
-    state : FilterState
-        Before the observation.
-    before, after : ndarray, (p, p)
-        Covariance of the physical errors before and after it, level axes.
+    `state`: before the observation. `before`, `after` ((p, p)): covariance of the physical errors
+    before and after it, level axes. Returns (n, n), or None, for the states of the model. None
+    where the tilt is not large, no part is tied to a bias, or the model has no bias of the
+    accelerometers.
 
-    Returns
-    -------
-    ndarray, (n, n), or None
-        For the states of the model. None where the tilt is not large, no part is tied to a
-        bias, or the model has no bias of the accelerometers.
-
-    Notes
-    -----
     Tied is the part of the bias that is correlated with the tilt: ``T = M P M'/g²`` with the
     regression M of the accelerometers' error, level axes, on the tilts. For an exactly known
     accelerometer M is zero, and so is the inflation. Jazwinski, Stochastic Processes and
@@ -602,7 +472,7 @@ def unlearnt_force(
     derived here.
     """
     layout = filter_.model.layout
-    names = [name for name in LARGE_TILT_BIASES if name in layout]
+    names = [name for name in ACCEL_BIASES if name in layout]
     if not is_large(before) or not names:
         return None
     used = filter_.mechanization

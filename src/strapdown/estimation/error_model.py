@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown._kernels import psi_model as kernel
-from strapdown._kernels import wander_error_states as states
-from strapdown._kernels import wander_errors as wander_errors
+from strapdown._kernels import wander_errors
 from strapdown._kernels.growth import growth_arrays, growth_room, padded_width
 from strapdown._kernels.level import LEVEL
 from strapdown.ellipsoids import find_ellipsoid
@@ -106,18 +105,9 @@ class ErrorModel(ABC):
     def transition(self, segment: Segment, step: float) -> tuple[Array, Array]:
         """Return the transition of the errors from the start of a segment to its end.
 
-        Parameters
-        ----------
-        segment : Segment
-        step : float, s
-            Longest time over which attitude and force are taken by their means; increments
-            themselves are never divided.
-
-        Returns
-        -------
-        Phi : ndarray, (n, n)
-        Q : ndarray, (n, n)
-            Covariance that the noise adds.
+        `step` (s): longest time over which attitude and force are taken by their means; increments
+        themselves are never divided. Returns `Phi` ((n, n)); `Q` ((n, n)): covariance that the
+        noise adds.
         """
 
     @abstractmethod
@@ -136,14 +126,7 @@ class ErrorModel(ABC):
 def refuse_damped_height(mechanization: Mechanization) -> None:
     """Refuse a mechanization with a height loop of its own.
 
-    Parameters
-    ----------
-    mechanization : Mechanization
-
-    Raises
-    ------
-    ConfigError
-        Its height is damped.
+    ConfigError: its height is damped.
     """
     if mechanization.height == "damped":
         raise ConfigError("estimation.error-model-no-states-loop", quantity="height")
@@ -184,10 +167,7 @@ class RotationVectorModel(ErrorModel):
     def transition(self, segment: Segment, step: float) -> tuple[Array, Array]:
         """Return the transition of the errors over a segment, as `ErrorModel.transition`.
 
-        Raises
-        ------
-        ConfigError
-            The height of the mechanization is damped: its loop has states of its own.
+        ConfigError: the height of the mechanization is damped: its loop has states of its own.
         """
         used = segment.mechanization
         refuse_damped_height(used)
@@ -233,7 +213,7 @@ class RotationVectorModel(ErrorModel):
 
 COMPONENTS = ("w", "x", "y", "z")
 #: Number of states before those of the sensors.
-STATES = states.STATES
+STATES = wander_errors.STATES
 
 
 @dataclass(frozen=True)
@@ -277,17 +257,9 @@ class QuaternionModel(ErrorModel):
     def transition(self, segment: Segment, step: float) -> tuple[Array, Array]:
         """Return the transition of the errors over a segment, as `ErrorModel.transition`.
 
-        Parameters
-        ----------
-        segment : Segment
-            Of a `WanderAzimuth`; its times are those of one clock throughout a run.
-        step : float, s
-
-        Raises
-        ------
-        ConfigError
-            The mechanization has no wander azimuth, or damps its height by a loop that has states
-            of its own.
+        `segment`: of a `WanderAzimuth`; its times are those of one clock throughout a run. `step`
+        (s). ConfigError: the mechanization has no wander azimuth, or damps its height by a loop
+        that has states of its own.
         """
         used = _checked(segment.mechanization)
         k = self.layout.size - STATES
@@ -320,9 +292,9 @@ class QuaternionModel(ErrorModel):
             np.empty(LEVEL),
         )
         end = levels[-1]
-        states.fix_gauge(end, phi)
-        states.fix_gauge(end, q)
-        states.fix_gauge(end, q.T)
+        wander_errors.fix_gauge(end, phi)
+        wander_errors.fix_gauge(end, q)
+        wander_errors.fix_gauge(end, q.T)
         _, back = _columns(used, segment.time[0], segment.history[0])
         forth, _ = _columns(used, segment.time[-1], segment.history[-1])
         core = forth[:, :PHYSICAL]
@@ -345,7 +317,7 @@ class QuaternionModel(ErrorModel):
         used = _checked(mechanization)
         core = np.empty((PHYSICAL, PHYSICAL))
         earth = find_ellipsoid(used.ellipsoid).parameters()
-        states.physical_of_variables(used.levels(row[None])[0], earth, core)
+        wander_errors.physical_of_variables(used.levels(row[None])[0], earth, core)
         _, back = _columns(used, time, row)
         k = self.layout.size - STATES
         out = np.zeros((PHYSICAL + k, STATES + k))
@@ -362,7 +334,7 @@ class QuaternionModel(ErrorModel):
         core = np.empty((PHYSICAL, PHYSICAL))
         earth = find_ellipsoid(used.ellipsoid).parameters()
         held = used.height == "held"
-        states.variables_of_physical(used.levels(row[None])[0], earth, held, core)
+        wander_errors.variables_of_physical(used.levels(row[None])[0], earth, held, core)
         forth, _ = _columns(used, time, row)
         k = self.layout.size - STATES
         out = np.zeros((STATES + k, PHYSICAL + k))
@@ -373,23 +345,14 @@ class QuaternionModel(ErrorModel):
     def null_directions(self, mechanization: Mechanization, time: float, row: Array) -> Array:
         """Return the directions without physical meaning.
 
-        Parameters
-        ----------
-        mechanization : Mechanization
-        time : float, s
-        row : ndarray, (12,)
-
-        Returns
-        -------
-        ndarray, (3, n)
-            Twice the norm of ``q_ib`` and of ``q_ew`` by 1, and a turn of the level axes about
-            zeta by 1 rad.
+        `time` (s). `row` ((12,)). Returns (3, n), twice the norm of ``q_ib`` and of ``q_ew`` by 1,
+        and a turn of the level axes about zeta by 1 rad.
         """
         used = _checked(mechanization)
         forth, _ = _columns(used, time, row)
         turn = np.zeros(PHYSICAL)
         turn[wander_errors.THETA + 2] = 1.0
-        states.turn_gauge(
+        wander_errors.turn_gauge(
             used.levels(row[None])[0], 1.0, turn[wander_errors.DV : wander_errors.DV + 3]
         )
         out = np.zeros((3, self.layout.size))
@@ -402,8 +365,8 @@ def _columns(used: Mechanization, time: float, row: Array) -> tuple[Array, Array
     """States of the variables of the kernel and of the two norms, and the inverse."""
     forth, back = np.empty((2, STATES, STATES))
     turn = find_ellipsoid(used.ellipsoid).rotation_rate * time
-    states.component_columns(row, turn, forth)
-    states.invert_columns(forth, back)
+    wander_errors.component_columns(row, turn, forth)
+    wander_errors.invert_columns(forth, back)
     return forth, back
 
 
@@ -418,9 +381,6 @@ def _checked(mechanization: Mechanization) -> Mechanization:
         )
     refuse_damped_height(mechanization)
     return mechanization
-
-
-# Error models by name.
 
 
 ERROR_MODELS: dict[str, type[ErrorModel]] = {

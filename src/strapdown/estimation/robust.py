@@ -17,9 +17,6 @@ from strapdown.estimation.covariance import Innovations, Step
 __all__ = ["AdaptiveRule", "Scales"]
 
 
-# Interface of every influence function: the influence of a residual by its size.
-
-
 @dataclass(frozen=True)
 class Influence(ABC):
     """An M-estimator's rho, psi = rho' and weight = psi / residual.
@@ -80,9 +77,6 @@ def check_rising(name: str, **values: float) -> None:
         before, known = value, quantity
 
 
-# Least squares as an influence function: every residual has full weight.
-
-
 @dataclass(frozen=True)
 class LeastSquares(Influence):
     """``psi(u) = u``: the plain Kalman filter."""
@@ -112,9 +106,6 @@ class LeastSquares(Influence):
     def psi_prime(self, u: float) -> float:
         """1."""
         return 1.0
-
-
-# Huber's influence function: the influence of a residual is limited to k standard deviations.
 
 
 @dataclass(frozen=True)
@@ -213,9 +204,6 @@ def check_scale(scale: float) -> None:
         raise ConfigError("estimation.scale-update", quantity="scale", scale=scale)
 
 
-# Hampel's influence function: in three parts, zero beyond c.
-
-
 @dataclass(frozen=True)
 class Hampel(Influence):
     """``psi(u) = u`` up to a, a up to b, then down in a straight line to zero at c.
@@ -278,9 +266,6 @@ class Hampel(Influence):
         return -self.a / (self.c - self.b) if self.b < size <= self.c else 0.0
 
 
-# Tukey's biweight: a smooth influence function that falls to zero at c.
-
-
 @dataclass(frozen=True)
 class Tukey(Influence):
     """``psi(u) = u (1 - (u / c)^2)^2`` up to c, zero beyond.
@@ -333,9 +318,6 @@ class Tukey(Influence):
         """``(1 - (u / c)^2)^2``, the biweight."""
         t = (u / self.c) ** 2
         return (1.0 - t) ** 2 if t < 1.0 else 0.0
-
-
-# IGG-III: full weight, then decreasing, then zero; used for GNSS positions.
 
 
 @dataclass(frozen=True)
@@ -394,9 +376,6 @@ class Igg3(Influence):
         return -2.0 * self.k0 * max(0.0, self.k1 - size) / (self.k1 - self.k0) ** 2
 
 
-# Influence functions by name.
-
-
 INFLUENCES: dict[str, type[Influence]] = {
     "huber": Huber,
     "hampel": Hampel,
@@ -426,18 +405,8 @@ def post_fit(influence: Influence, b: float, kappa: float) -> float:
     then lies on the far side of F, no step goes past the root, and a slope that is not positive
     means that there is none.
 
-    Parameters
-    ----------
-    influence : Influence
-    b : float
-        Residual before the fit, >= 0.
-    kappa : float
-        Variance of the prediction over that of the observation, >= 0.
-
-    Returns
-    -------
-    float
-        From 0 to b.
+    `b`: residual before the fit, >= 0. `kappa`: variance of the prediction over that of the
+    observation, >= 0. Returns from 0 to b.
     """
     best, least = b, math.inf
     lo = 0.0
@@ -483,9 +452,6 @@ def _rising_root(
         u = slope_at = after
         excess = u + kappa * psi(u) - b
     return u
-
-
-# The robust update as Chernodarov prints it: one Newton step, kept for comparison.
 
 
 @dataclass(frozen=True)
@@ -637,22 +603,9 @@ class AdaptiveScale:
     ) -> ScaleState:
         """Return the scale state after an observation.
 
-        Parameters
-        ----------
-        state : ScaleState
-            Before it.
-        nu : float
-            Innovation.
-        s : float
-            Variance of the prediction, ``h P h'``.
-        r : float
-            Variance of the observation as stated, without the factor.
-        weight : float
-            Weight by the rule; 0 is a rejection.
-
-        Returns
-        -------
-        ScaleState
+        `state`: before it. `nu`: innovation. `s`: variance of the prediction, ``h P h'``. `r`:
+        variance of the observation as stated, without the factor. `weight`: weight by the rule; 0
+        is a rejection.
         """
         rejected = state.rejected + 1 if weight == 0.0 else 0
         own = math.exp(state.log_square) * r
@@ -667,9 +620,6 @@ class AdaptiveScale:
         square = state.log_square + share * excess / (within * information)
         square = min(max(square, 2.0 * math.log(self.lowest)), 2.0 * math.log(self.highest))
         return ScaleState(square, information, rejected)
-
-
-# A robust rule that learns the scale of each component of an observation.
 
 
 #: Learned scale of each component of an observation.
@@ -711,18 +661,8 @@ class AdaptiveRule:
     def after(self, scales: Scales, seen: Innovations, R: NDArray[np.float64]) -> Scales:
         """Return the scale state after an observation.
 
-        Parameters
-        ----------
-        scales : tuple of ScaleState
-            Before it.
-        seen : Innovations
-            Innovations of the observation.
-        R : ndarray, (l,)
-            Its stated variances.
-
-        Returns
-        -------
-        tuple of ScaleState
+        `scales`: before it. `seen`: innovations of the observation. `R` ((l,)): its stated
+        variances.
         """
         return tuple(
             self.scale.after(one, nu, s - r, r, weight)
@@ -735,9 +675,6 @@ class AdaptiveRule:
                 strict=True,
             )
         )
-
-
-# Update rules by name.
 
 
 UPDATE_RULES: dict[str, type[RobustUpdate] | type[PaperUpdate] | type[AdaptiveRule]] = {

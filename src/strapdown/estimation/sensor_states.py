@@ -79,16 +79,7 @@ class Stacked(NamedTuple):
 
 
 def stack(blocks: tuple[SensorStates, ...]) -> Stacked:
-    """Stack blocks, as kernels take them.
-
-    Parameters
-    ----------
-    blocks : tuple of SensorStates
-
-    Returns
-    -------
-    Stacked
-    """
+    """Stack blocks, as kernels take them."""
     size = sum(len(one.block) for one in blocks)
     gyro, accel = np.zeros((2, COUPLING, 3, size))
     decay, drive, sd = np.zeros((3, size))
@@ -105,9 +96,6 @@ def _terms(coupling: Array) -> Array:
     places = np.argwhere(coupling)
     values = coupling[tuple(places.T)]
     return np.column_stack([places.astype(np.float64), values]).reshape(-1, 4)
-
-
-# Names, units and positions of the states of a filter.
 
 
 @dataclass(frozen=True)

@@ -130,13 +130,8 @@ class SignalFilter:
     def begin(self, samples: Array, noise: float, epoch: float) -> SignalState:
         """Return the state before the first epoch, from its samples.
 
-        Parameters
-        ----------
-        samples : ndarray, (l,)
-            Those of the first epoch.
-        noise : float
-            Standard deviation of a sample.
-        epoch : float, s
+        `samples` ((l,)): those of the first epoch. `noise`: standard deviation of a sample. `epoch`
+        (s).
         """
         middle = float(np.median(samples))
         spread = float(np.median(np.abs(samples - middle))) * 3.0 + noise
@@ -149,21 +144,11 @@ class SignalFilter:
     ) -> tuple[SignalState, SignalEpochs]:
         """Process whole epochs.
 
-        Parameters
-        ----------
-        state : SignalState
-        samples : ndarray, (k, l)
-            Of k epochs.
-        ages : ndarray, (l,), s
-            Age of each sample at the end of its epoch.
-        noise : float
-            Standard deviation of a sample.
-        step : float, s
-            Of the samples; an epoch has l.
-        last : bool
-            Whether to return the remaining epochs without the later ones.
+        `samples` ((k, l)): of k epochs. `ages` ((l,), s): age of each sample at the end of its
+        epoch. `noise`: standard deviation of a sample. `step` (s): of the samples; an epoch has l.
+        `last`: whether to return the remaining epochs without the later ones.
         """
-        from strapdown._kernels.signal_smoother import smooth_fixed_lag
+        from strapdown._kernels.signals import smooth_fixed_lag
 
         count, size = samples.shape
         T = size * step

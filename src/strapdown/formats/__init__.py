@@ -20,10 +20,8 @@ from strapdown.formats import (
     join,
     kf_gins,
     kitti,
-    matlab,
     mpu6050,
-    npy_folder,
-    npz,
+    numpy_files,
     parquet,
     phyphox,
     psins,
@@ -81,39 +79,27 @@ READERS: dict[str, Reader] = {
         "KF-GINS increments, seven columns without a header", kf_gins.detect, kf_gins.read
     ),
     "psins": Reader("PSINS increments (.imu)", psins.detect, psins.read),
-    "npy-folder": Reader("folder of NumPy arrays (.npy)", npy_folder.detect, npy_folder.read),
+    "npy-folder": Reader(
+        "folder of NumPy arrays (.npy)", numpy_files.detect_folder, numpy_files.read_folder
+    ),
     "csv": Reader("text table (.csv .txt .tsv .dat)", csv.detect, csv.read),
     "python-ins": Reader("python-ins arrays: time, imu (.npz)", pyins.detect, pyins.read),
-    "npz": Reader("NumPy archive (.npz)", npz.detect, npz.read),
+    "npz": Reader("NumPy archive (.npz)", numpy_files.detect, numpy_files.read),
     "parquet": Reader("Parquet (.parquet .pq)", parquet.detect, parquet.read),
     "hdf5": Reader("HDF5 (.h5 .hdf5) and MATLAB v7.3 (.mat)", hdf5.detect, hdf5.read),
     "foot-mounted": Reader(
         "unit on a shoe: timestamps, imu_data (.mat)", foot_mounted.detect, foot_mounted.read
     ),
-    "matlab": Reader("MATLAB up to v7 (.mat)", matlab.detect, matlab.read),
+    "matlab": Reader("MATLAB up to v7 (.mat)", hdf5.detect_matlab, hdf5.read_matlab),
 }
 
 
 def read_raw(path: Path, form: str | None = None) -> RawLog:
     """Read the raw columns of a log.
 
-    Parameters
-    ----------
-    path : Path
-        A file, or the folder of a known recording.
-    form : str, optional
-        A key of `READERS`; detected from the file if not given.
-
-    Returns
-    -------
-    RawLog
-
-    Raises
-    ------
-    ConfigError
-        The file does not exist, or the format is unknown.
-    DataError
-        The format is not recognized, or the file is damaged.
+    `path`: a file, or the folder of a known recording. `form`: a key of `READERS`; detected from
+    the file if not given. ConfigError: the file does not exist, or the format is unknown.
+    DataError: the format is not recognized, or the file is damaged.
     """
     if not path.exists():
         raise ConfigError("io.no-such-log", file=str(path))
@@ -193,10 +179,6 @@ def read_joined(paths: Sequence[str | Path], options: ReadOptions | None = None)
         User's statements about the logs. A column is named as in its log, or as
         ``log/column``.
 
-    Returns
-    -------
-    Recording
-
     Raises
     ------
     ConfigError
@@ -222,10 +204,6 @@ def read_log(path: str | Path, options: ReadOptions | None = None) -> Recording:
         A file, or the folder of a known recording.
     options : ReadOptions, optional
         User's statements about the log.
-
-    Returns
-    -------
-    Recording
 
     Raises
     ------

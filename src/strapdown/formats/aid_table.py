@@ -1,4 +1,4 @@
-"""Measurements of an odometer, a barometer and similar, from a table with named columns."""
+"""Aiding measurements from tables with named columns, and surveyed control points."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from strapdown.constants import TIME_UNITS
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.formats import csv, parquet
+from strapdown.formats import csv, foot_mounted, parquet
+from strapdown.formats.arrays import numbers, ticks_of
 from strapdown.formats.clocks import GPS, RELATIVE, Clock, clock_of_name, unrolled, with_clock
 from strapdown.formats.columns import CLOCKS, TIMES
 from strapdown.formats.find_columns import Column
-from strapdown.formats.numbers import numbers, ticks_of
 from strapdown.formats.quantity_columns import (
     ANGLES,
     LENGTHS,
@@ -28,7 +28,8 @@ from strapdown.formats.quantity_columns import (
 )
 from strapdown.formats.recording import RawLog
 
-__all__ = ["SYNONYMS", "UNITS", "read_aid_table"]
+__all__ = ["POINT", "SYNONYMS", "UNITS", "read_aid_table", "read_control_points"]
+
 
 Array = NDArray[np.float64]
 #: Unit of a table's column to the units accepted in a file, with their factors to it.
@@ -64,34 +65,16 @@ def read_aid_table(
 ) -> pd.DataFrame:
     """Read the measurements of an aiding sensor.
 
-    Parameters
-    ----------
-    path : str or Path
-        Text table or Parquet with column names, which may carry a unit: ``speed_km_h``,
-        ``Pressure [hPa]``, ``heading_sd_deg``.
-    columns : dict of str to str
-        Required column to its unit, a key of `UNITS`. A column that ends in ``_sd`` is the
-        standard deviation of the column before it, and must be positive where given.
-    optional : sequence of str
-        Those of `columns` that may be missing.
-    names : dict of str to str, optional
-        Column of the table to its name in the file, or its number, from 1.
-    repair : bool
-        Drop and count rows that cannot be used, instead of refusing the file.
-
-    Returns
-    -------
-    DataFrame
-        Indexed by ``time`` s, with the `columns` that were found, in their units; ``attrs`` has
-        the clock (`clocks`), ``source`` and ``findings``.
-
-    Raises
-    ------
-    ConfigError
-        The file does not exist, or `names` names a column that it does not have.
-    DataError
-        A column is missing, a unit does not fit, a value is not a number, a standard deviation is
-        not positive, or time does not advance; the message names the row.
+    `path`: text table or Parquet with column names, which may carry a unit: ``speed_km_h``,
+    ``Pressure [hPa]``, ``heading_sd_deg``. `columns`: required column to its unit, a key of
+    `UNITS`. A column that ends in ``_sd`` is the standard deviation of the column before it, and
+    must be positive where given. `optional`: those of `columns` that may be missing. `names`:
+    column of the table to its name in the file, or its number, from 1. `repair`: drop and count
+    rows that cannot be used, instead of refusing the file. Returns indexed by ``time`` s, with the
+    `columns` that were found, in their units; ``attrs`` has the clock (`clocks`), ``source`` and
+    ``findings``. ConfigError: the file does not exist, or `names` names a column that it does not
+    have. DataError: a column is missing, a unit does not fit, a value is not a number, a standard
+    deviation is not positive, or time does not advance; the message names the row.
     """
     path = Path(path)
     raw = _raw(path)
@@ -219,3 +202,43 @@ def _refuse_or_say(
             reason=fault,
         )
     )
+
+
+#: Columns, m.
+POINT = ["north", "east"]
+
+
+def read_control_points(path: str | Path, names: Mapping[str, str] | None = None) -> pd.DataFrame:
+    """Read control points.
+
+    Parameters
+    ----------
+    path : str or Path
+        A text table or Parquet with columns ``time north east``, s and m, from any origin and
+        in any direction; or the log of a foot-mounted unit that has them (`foot_mounted`).
+    names : dict of str to str, optional
+        Column of the table to its name in the file.
+
+    Returns
+    -------
+    DataFrame
+        By ``time`` s: ``north``, ``east`` m.
+
+    Raises
+    ------
+    ConfigError
+        The file does not exist.
+    DataError
+        The file cannot be used, or it has fewer than two points, which leave the heading open.
+    """
+    path = Path(path)
+    if path.is_file() and foot_mounted.detect_points(path):
+        time, places = foot_mounted.read_points(path)
+        table = pd.DataFrame(places, index=pd.Index(time, name="time"), columns=POINT)
+        table.attrs |= {"source": path.name, "findings": ()}
+        table = with_clock(table, Clock(RELATIVE))
+    else:
+        table = read_aid_table(path, dict.fromkeys(POINT, "m"), names=names)
+    if len(table) < 2:
+        raise DataError("io.control-point-origin-heading-fit", file=path.name, count=len(table))
+    return table

@@ -1,19 +1,26 @@
-"""Named arrays from binary files, laid out as columns."""
+"""Columns of numbers: named arrays from binary files, conversion from text, rows of errors."""
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
 from strapdown.formats.columns import read_name
+from strapdown.formats.find_columns import Column
 from strapdown.formats.recording import RawLog
 from strapdown.tables import SAMPLINGS
+
+__all__ = ["told_by_file_rows"]
+
 
 RATES = ("sampling_rate", "sample_rate", "rate_hz", "fs", "freq", "frequency")
 # An array is refused if it declares more than SMALL and exceeds its stored bytes by this ratio.
@@ -24,16 +31,7 @@ SMALL = 64 * 1024 * 1024  # bytes
 def refuse_lie(declared: int, stored: int, what: str, file: str) -> None:
     """Refuse an array that declares far more data than its file can hold.
 
-    Parameters
-    ----------
-    declared, stored : int, bytes
-    what : str
-        Name of the array.
-    file : str
-
-    Raises
-    ------
-    DataError
+    `what`: name of the array.
     """
     if declared > SMALL and declared > LARGEST_RATIO * max(stored, 1):
         raise DataError(
@@ -49,25 +47,9 @@ def raw_log(
 ) -> RawLog:
     """Convert named arrays to columns of one length.
 
-    Parameters
-    ----------
-    path : Path
-    arrays : dict of str to ndarray
-        One- and two-dimensional; a second dimension of up to 16 becomes ``name[0]``,
-        ``name[1]`` …
-    units : dict of str to str
-        Where the file states them.
-    meta : dict
-        May hold ``sampling``, ``axes`` and a sampling rate.
-
-    Returns
-    -------
-    RawLog
-
-    Raises
-    ------
-    DataError
-        No numeric array has two samples or more.
+    `arrays`: One- and two-dimensional; a second dimension of up to 16 becomes ``name[0]``,
+    ``name[1]`` …. `units`: where the file states them. `meta`: may hold ``sampling``, ``axes`` and
+    a sampling rate. DataError: no numeric array has two samples or more.
     """
     columns: dict[str, NDArray[Any]] = {}
     for name, array in arrays.items():
@@ -162,3 +144,68 @@ def _text(value: Any) -> str | None:
     if isinstance(value, np.ndarray):
         return _text(value.reshape(-1)[0]) if value.size else None
     return str(value)
+
+
+def numbers(raw: RawLog, column: Column, quantity: str) -> NDArray[Any]:
+    """Return the values of a column as numbers.
+
+    `quantity`: for messages. Returns (n,), integers or floats, as in the file; NaN for missing
+    values. DataError: a value is not a number.
+    """
+    values = raw.columns[column.source]
+    if values.dtype.kind in "iufb":
+        return values
+    texts = pd.Series(values)
+    found = pd.to_numeric(texts, errors="coerce").to_numpy(dtype=np.float64)
+    bad = np.flatnonzero(np.isnan(found) & texts.notna().to_numpy())
+    if bad.size:
+        raise DataError(
+            "io.value-not-a-number",
+            file=raw.name,
+            row=raw.row(int(bad[0])),
+            quantity=quantity,
+            values=values[bad[0]],
+            source=column.source,
+        )
+    return found
+
+
+def ticks_of(raw: RawLog, column: Column) -> tuple[NDArray[Any], bool]:
+    """Return stamps as numbers; dates and times of day as nanoseconds since 1970, and True.
+
+    DataError: a stamp is neither, or of another kind than those before it.
+    """
+    values = raw.columns[column.source]
+    if values.dtype.kind == "M":
+        return values.astype("datetime64[ns]").astype(np.int64), True
+    if values.dtype.kind != "O" or not re.match(r"\d{4}-\d\d-\d\d[T ]\d\d:", str(values[0])):
+        return numbers(raw, column, "time"), False
+    texts = pd.Series(values).str.replace(",", ".")
+    dates = pd.to_datetime(texts, format="ISO8601", utc=True, errors="coerce")
+    bad = np.flatnonzero(dates.isna().to_numpy())
+    if bad.size:
+        raise DataError(
+            "io.not-date-time-like-those",
+            file=raw.name,
+            row=raw.row(int(bad[0])),
+            quantity="time",
+            values=values[bad[0]],
+            source=column.source,
+        )
+    stamps = dates.dt.tz_localize(None).to_numpy().astype("datetime64[ns]")
+    return stamps.astype(np.int64), True
+
+
+@contextmanager
+def told_by_file_rows(name: str, row_of: Callable[[int], int | None]) -> Iterator[None]:
+    """Re-raise errors of a table with the row of its file.
+
+    `name`: file name. `row_of`: maps a row of the table, from 0, to a row of the file.
+    """
+    try:
+        yield
+    except DataError as error:
+        row = error.finding.row
+        raise DataError(
+            error.finding, file=name, row=None if row is None else row_of(row - 1)
+        ) from None

@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
+from strapdown.formats.arrays import numbers
 from strapdown.formats.columns import read_name
 from strapdown.formats.find_columns import Column
-from strapdown.formats.members import file_member, first_line
-from strapdown.formats.numbers import numbers
 from strapdown.formats.recording import RawLog, TruthInSensorAxes
+from strapdown.formats.sensor_folder import file_member, first_line
 
 Array = NDArray[np.float64]
 

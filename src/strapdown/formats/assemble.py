@@ -6,24 +6,30 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown import rotation
 from strapdown.constants import TIME_UNITS
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.formats.assemble_truth import truth_of_log
-from strapdown.formats.body_axes import Axes, body_axes
-from strapdown.formats.clocks import RELATIVE, Clock, clock_of_name, with_clock
+from strapdown.formats.arrays import numbers, ticks_of
+from strapdown.formats.clocks import RELATIVE, Clock, Stamps, clock_of_name, read_stamps, with_clock
+from strapdown.formats.columns import EULERS, QUATERNIONS, factor_of, parse_axes, parse_unit
 from strapdown.formats.find_columns import AXES, Column, find_columns, require_gyro
 from strapdown.formats.inference import Inference
-from strapdown.formats.judge import UNITS
-from strapdown.formats.numbers import ticks_of
+from strapdown.formats.judge import SUMS, UNITS, intervals, sampling_of_sums
 from strapdown.formats.recording import Origin, RawLog, ReadOptions, Recording
-from strapdown.formats.stamps import Stamps, read_stamps
-from strapdown.formats.summed import SUMS, intervals, sampling_of_sums
-from strapdown.formats.triad_units import told_by_numbers, units_of_triads, values_of_triads
-from strapdown.formats.unit_words import factor_of, parse_unit
+from strapdown.formats.triad_units import (
+    Axes,
+    axes_matrix,
+    body_axes,
+    mirrored,
+    told_by_numbers,
+    units_of_triads,
+    values_of_triads,
+)
 from strapdown.results.inputs import Reading
-from strapdown.tables import SAMPLINGS, find_gaps, imu_table
+from strapdown.tables import SAMPLINGS, attitude_table, find_gaps, imu_table
 
 __all__ = [
     "assemble",
@@ -41,22 +47,9 @@ Array = NDArray[np.float64]
 def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     """Convert raw columns to a recording.
 
-    Parameters
-    ----------
-    raw : RawLog
-    options : ReadOptions
-        The user's statements override those of the file, which override column names.
-
-    Returns
-    -------
-    Recording
-
-    Raises
-    ------
-    DataError
-        A value, a stamp or a unit cannot be used; the message names file, row and remedy.
-    ConfigError
-        An option names a column that does not exist.
+    `options`: the user's statements override those of the file, which override column names.
+    DataError: a value, a stamp or a unit cannot be used; the message names file, row and remedy.
+    ConfigError: an option names a column that does not exist.
     """
     found = find_columns(raw, options)
     require_gyro(raw, found)
@@ -152,9 +145,6 @@ def _readings_of_triad(
     return readings
 
 
-# Time of a log: unit, stamps and clock.
-
-
 def stamps_of_log(
     raw: RawLog,
     found: dict[str, Column],
@@ -167,28 +157,10 @@ def stamps_of_log(
 ) -> Stamps:
     """Convert the stamps of the finite rows to seconds.
 
-    Parameters
-    ----------
-    raw : RawLog
-    found : dict of str to Column
-    ticks : ndarray or None, (n,)
-        Stamps as in the file.
-    dated : bool
-        Whether they were dates, now converted to ns.
-    options : ReadOptions
-    finite : ndarray of bool, (n,)
-        From `finite_rows`.
-    said : dict of str to Inference
-        Inferences from the numbers.
-    findings : list of Finding
-        Inferences and repairs are appended.
-
-    Raises
-    ------
-    DataError
-        Time is missing, or cannot be used.
-    ConfigError
-        The stated rate is invalid.
+    `ticks` ((n,)): stamps as in the file. `dated`: whether they were dates, now converted to ns.
+    `finite` ((n,)): from `finite_rows`. `said`: inferences from the numbers. `findings`: inferences
+    and repairs are appended. DataError: time is missing, or cannot be used. ConfigError: the stated
+    rate is invalid.
     """
     rows = np.flatnonzero(finite)
     rate = options.rate or raw.rate
@@ -257,27 +229,11 @@ def clock_of_log(raw: RawLog, found: dict[str, Column], stamps: Stamps, dated: b
     return Clock(name, origin)
 
 
-# Sampling of the rates: instantaneous or mean.
-
-
 def sampling_of_rates(raw: RawLog, options: ReadOptions, findings: list[Finding]) -> str:
     """Return the sampling stated by the user, else by the file, else instantaneous.
 
-    Parameters
-    ----------
-    raw : RawLog
-    options : ReadOptions
-    findings : list of Finding
-        Assumptions are appended.
-
-    Returns
-    -------
-    {'instantaneous', 'mean'}
-
-    Raises
-    ------
-    ConfigError
-        The sampling is unknown.
+    `findings`: assumptions are appended. Returns {'instantaneous', 'mean'}. ConfigError: the
+    sampling is unknown.
     """
     asked = (options.sampling or raw.sampling or "").lower()
     if not asked:
@@ -296,8 +252,6 @@ def sampling_of_rates(raw: RawLog, options: ReadOptions, findings: list[Finding]
         )
     return asked
 
-
-# Plausibility of a log's numbers.
 
 PLAUSIBILITY_AXES = "xyz"
 
@@ -344,10 +298,7 @@ def report_absurd(
 ) -> None:
     """Report rates that are implausible, or clipped at the sensor's full scale.
 
-    Raises
-    ------
-    DataError
-        A rate is beyond the limit of any rotating body.
+    DataError: a rate is beyond the limit of any rotating body.
     """
     largest = np.abs(gyro).max(axis=0)
     k = int(largest.argmax())
@@ -404,9 +355,6 @@ def report_absurd(
             )
 
 
-# Rows of a log in which every used value is a number.
-
-
 def finite_rows(
     raw: RawLog,
     found: dict[str, Column],
@@ -415,29 +363,11 @@ def finite_rows(
     options: ReadOptions,
     findings: list[Finding],
 ) -> NDArray[np.bool_]:
-    """Select the rows in which every used value is a number.
+    """Select the rows in which every used value is a number; (n,).
 
-    Parameters
-    ----------
-    raw : RawLog
-    found : dict of str to Column
-    ticks : ndarray or None, (n,)
-        Stamps as in the file.
-    values : dict of str to ndarray, (n, 3)
-        Values of the triads used.
-    options : ReadOptions
-        Whether rows may be dropped.
-    findings : list of Finding
-        The number of dropped rows is appended.
-
-    Returns
-    -------
-    ndarray of bool, (n,)
-
-    Raises
-    ------
-    DataError
-        A row cannot be used and may not be dropped, or no row is left.
+    `ticks` ((n,)): stamps as in the file. `values` ((n, 3)): values of the triads used. `options`:
+    whether rows may be dropped. `findings`: the number of dropped rows is appended. DataError: a
+    row cannot be used and may not be dropped, or no row is left.
     """
     blocks = dict(values)
     if ticks is not None:
@@ -474,3 +404,157 @@ def finite_rows(
     if not keep.any():
         raise DataError("io.no-usable-row", file=raw.name)
     return keep
+
+
+# Attitude truth, from the log itself or from a file of its own.
+
+Turn = tuple[list[int], list[float]]
+
+AS_THEY_ARE: Turn = ([0, 1, 2], [1.0, 1.0, 1.0])
+
+# Optical systems write a zero quaternion while their markers are lost.
+LOST = 1e-6
+
+
+def truth_of_log(
+    raw: RawLog,
+    found: dict[str, Column],
+    time: Array,
+    kept: NDArray[np.int64],
+    axes: Turn,
+    readings: list[Reading],
+    findings: list[Finding],
+) -> tuple[pd.DataFrame | None, NDArray[np.bool_] | None]:
+    """Return the truth of a log, in the body axes that the log is read in.
+
+    `time` ((n,), s): stamps of the rows used. `kept` ((n,)): those rows. `axes`: sensor axis of
+    each body axis, and its sign. `readings`, `findings`: its source columns and findings are
+    appended. Returns `scored` (or None): rows of `truth` that count for errors. ConfigError: the
+    axes are a mirror image, for which no attitude exists.
+    """
+    if raw.truth is not None:
+        q_ns, scored = raw.truth.q_ns[kept], raw.truth.scored[kept]
+    else:
+        # The frames of an attitude are unknown unless the file states its axes.
+        q, names = _quaternions(raw, found) if raw.axes else (None, [])
+        if q is None:
+            _mention(raw, found, findings)
+            return None, None
+        # Avoid copies of a long log.
+        q = q if kept.size == len(q) else q[kept]
+        if not _known(q).any():
+            return None, None
+        for name in names:
+            column = found[name]
+            values = numbers(raw, column, name)
+            first = float(values[kept[np.argmax(np.isfinite(values[kept]))]])
+            readings.append(Reading(column.source, name, column.unit or "", column.why, first))
+        q_ns, scored = q, np.ones(kept.size, dtype=bool)
+        del q
+    known = _known(q_ns)
+    if not known.any():
+        return None, None
+    q_nb = q_ns if known.all() else q_ns[known]
+    if axes != AS_THEY_ARE:
+        q_nb = rotation.compose(q_nb, _sensor_from_body(raw, axes))
+    return attitude_table(time[known], q_nb, raw.name), scored[known]
+
+
+def truth_of_file(raw: RawLog, options: ReadOptions, origin: Origin) -> pd.DataFrame | None:
+    """Return the truth of a separate file, on the clock of a log.
+
+    `options`: of these, `repair` is used, and the axes of the log where the attitude is that of its
+    sensor. `origin`: origin of the log's time. Returns an Attitude table of the rows with known
+    attitude; None if there is none. DataError: time cannot be used.
+    """
+    found = find_columns(raw, ReadOptions())
+    if raw.truth is not None:
+        q: Array | None = _of_body(raw, raw.truth.q_ns, options.axes)
+    else:
+        q, _ = _quaternions(raw, found)
+    if q is None or "time" not in found:
+        return None
+    ticks, dated = ticks_of(raw, found["time"])
+    rows = np.flatnonzero(_known(q) & np.isfinite(ticks.astype(np.float64)))
+    if not rows.size:
+        return None
+    unit = "ns" if dated else found["time"].unit
+    try:
+        stamps = read_stamps(
+            ticks[rows],
+            parse_unit(unit, "time") if unit else None,
+            "",
+            file=raw.name,
+            row=lambda k: raw.row(int(rows[k])),
+            repair=options.repair,
+            origin=origin,
+            only_seconds=True,
+        )
+    except DataError as error:
+        if unit is not None:
+            raise
+        # The options that would state it are those of the log.
+        raise DataError(
+            "io.truth-time-unusable",
+            file=raw.name,
+            row=error.finding.row,
+            quantity="time",
+            reason=error.finding,
+        ) from None
+    return attitude_table(stamps.seconds[stamps.keep], q[rows][stamps.keep], raw.name)
+
+
+def _of_body(raw: RawLog, q_ns: Array, text: str | None) -> Array:
+    """Convert the attitude of the sensor to that of the body axes of a log."""
+    axes = parse_axes(text) if text else AS_THEY_ARE
+    if axes == AS_THEY_ARE:
+        return q_ns
+    known = _known(q_ns)
+    q = np.full_like(q_ns, np.nan)
+    q[known] = rotation.compose(q_ns[known], _sensor_from_body(raw, axes))
+    return q
+
+
+def _known(q: Array) -> NDArray[np.bool_]:
+    large = (q.max(axis=1) > LOST) | (q.min(axis=1) < -LOST)
+    known: NDArray[np.bool_] = np.isfinite(q).all(axis=1) & large
+    return known
+
+
+def _quaternions(raw: RawLog, found: dict[str, Column]) -> tuple[Array | None, list[str]]:
+    """Return the attitude of each row, NaN where unknown, and its source columns."""
+    if all(n in found for n in QUATERNIONS):
+        parts = [numbers(raw, found[n], n) for n in QUATERNIONS]
+        return np.column_stack(parts).astype(np.float64, copy=False), list(QUATERNIONS)
+    if not all(n in found for n in EULERS):
+        return None, []
+    angles = np.column_stack([numbers(raw, found[n], n) for n in EULERS]).astype(np.float64)
+    units = {found[n].unit for n in EULERS}
+    if units == {"rad"}:
+        angles = np.degrees(angles)
+    elif units != {"deg"}:
+        raise DataError("io.unit-angles-not-stated", file=raw.name, quantity=", ".join(EULERS))
+    finite = np.isfinite(angles).all(axis=1)
+    q = np.full((len(angles), 4), np.nan)
+    q[finite] = rotation.quaternion_from_euler(angles[finite])
+    return q, list(EULERS)
+
+
+def _mention(raw: RawLog, found: dict[str, Column], findings: list[Finding]) -> None:
+    """Note that an attitude of unknown frames, as from a phone, is not used as truth."""
+    if not raw.axes and any(set(names) <= set(found) for names in (QUATERNIONS, EULERS)):
+        findings.append(
+            Finding(
+                "io.attitude-not-used",
+                severity="note",
+                file=raw.name,
+                quantity="attitude",
+            )
+        )
+
+
+def _sensor_from_body(raw: RawLog, axes: Turn) -> Array:
+    """Return the quaternion ``q_sb`` from body axes to the axes of the file's truth."""
+    if mirrored(*axes):
+        raise ConfigError("io.truth-axes-mirrored", file=raw.name, quantity="--axes")
+    return rotation.quaternion_from_dcm(axes_matrix(*axes).T)

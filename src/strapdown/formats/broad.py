@@ -11,7 +11,7 @@ from strapdown import rotation
 from strapdown.errors import DataError
 from strapdown.formats import hdf5
 from strapdown.formats.arrays import raw_log
-from strapdown.formats.assemble_truth import LOST
+from strapdown.formats.assemble import LOST
 from strapdown.formats.recording import RawLog, TruthInSensorAxes
 from strapdown.rotation.quaternions import Q_NED_ENU
 
@@ -31,10 +31,6 @@ def detect(path: Path) -> bool:
 
 def read(path: Path) -> RawLog:
     """Read a trial: sensor, optical attitude, and the samples that are scored.
-
-    Parameters
-    ----------
-    path : Path
 
     Returns
     -------

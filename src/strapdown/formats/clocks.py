@@ -14,13 +14,18 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.constants import TIME_UNITS
 from strapdown.errors import DataError, Finding
+from strapdown.formats.inference.conclusion import THRESHOLD, infer_time_unit, wrap_bits
+from strapdown.formats.recording import Origin
 
 __all__ = [
     "GPS",
@@ -37,6 +42,7 @@ __all__ = [
     "unrolled",
     "with_clock",
 ]
+
 
 Array = NDArray[np.float64]
 GPS, UNIX, RELATIVE = "gps-seconds-of-week", "unix", "relative"
@@ -86,12 +92,7 @@ class Clock:
 
 
 def clock_of(table: pd.DataFrame) -> Clock:
-    """Return the clock stated in a table's ``attrs``.
-
-    Parameters
-    ----------
-    table : DataFrame
-    """
+    """Return the clock stated in a table's ``attrs``."""
     said = table.attrs
     return Clock(
         said.get("clock", RELATIVE), float(said.get("clock_origin", 0.0)), said.get("gps_week")
@@ -99,13 +100,7 @@ def clock_of(table: pd.DataFrame) -> Clock:
 
 
 def with_clock(table: pd.DataFrame, clock: Clock) -> pd.DataFrame:
-    """Write a clock to the ``attrs`` of a new table; return the same table.
-
-    Parameters
-    ----------
-    table : DataFrame
-    clock : Clock
-    """
+    """Write a clock to the ``attrs`` of a new table; return the same table."""
     table.attrs |= {"clock": clock.name, "clock_origin": clock.origin, "gps_week": clock.week}
     return table
 
@@ -113,19 +108,8 @@ def with_clock(table: pd.DataFrame, clock: Clock) -> pd.DataFrame:
 def clock_of_name(name: str, first: float, *, dated: bool = False) -> str:
     """Infer the clock from a column's name and its first stamp.
 
-    Parameters
-    ----------
-    name : str
-        As ``gps_sow_s``, ``unix_time_ms``, ``t``.
-    first : float, s
-        Its first stamp.
-    dated : bool
-        Whether the stamps are dates.
-
-    Returns
-    -------
-    str
-        `GPS`, `UNIX` or `RELATIVE`.
+    `name`: as ``gps_sow_s``, ``unix_time_ms``, ``t``. `first` (s): its first stamp. `dated`:
+    whether the stamps are dates. Returns `GPS`, `UNIX` or `RELATIVE`.
     """
     words = set(re.split(r"[^a-z]+", name.lower()))
     if dated or words & _WORDS[UNIX]:
@@ -138,10 +122,7 @@ def clock_of_name(name: str, first: float, *, dated: bool = False) -> str:
 def leap_seconds(unix: Array) -> Array:
     """Return GPS time minus UTC at given instants.
 
-    Parameters
-    ----------
-    unix : ndarray, (n,), s
-        Since 1970.
+    `unix` ((n,), s): since 1970.
     """
     starts = np.array([start for start, _ in _LEAPS])
     ahead = np.array([0.0, *(float(count) for _, count in _LEAPS)])
@@ -151,10 +132,7 @@ def leap_seconds(unix: Array) -> Array:
 def gps_from_unix(unix: Array) -> Array:
     """Convert UTC to GPS seconds since 1980-01-06.
 
-    Parameters
-    ----------
-    unix : ndarray, (n,), s
-        Since 1970, without leap seconds.
+    `unix` ((n,), s): since 1970, without leap seconds.
     """
     return np.asarray(unix - GPS_EPOCH + leap_seconds(unix))
 
@@ -162,10 +140,7 @@ def gps_from_unix(unix: Array) -> Array:
 def unix_from_gps(seconds: Array) -> Array:
     """Convert GPS seconds to UTC, seconds since 1970.
 
-    Parameters
-    ----------
-    seconds : ndarray, (n,), s
-        GPS time since 1980-01-06.
+    `seconds` ((n,), s): GPS time since 1980-01-06.
     """
     guess = seconds + GPS_EPOCH
     return np.asarray(guess - leap_seconds(guess - leap_seconds(guess)))
@@ -174,19 +149,9 @@ def unix_from_gps(seconds: Array) -> Array:
 def unrolled(time: Array) -> tuple[Array, list[int]]:
     """Unwrap seconds of week across the end of a week.
 
-    Parameters
-    ----------
-    time : ndarray, (n,), s
+    `time` ((n,), s). Returns `time` ((n,), s): counted on from the first row's week. The same array
+    if there is no rollover; `rows`: rows, from 0, that begin a week.
 
-    Returns
-    -------
-    time : ndarray, (n,), s
-        Counted on from the first row's week. The same array if there is no rollover.
-    rows : list of int
-        Rows, from 0, that begin a week.
-
-    Notes
-    -----
     A rollover is a decrease of more than half a week, from the last hour of a week to the
     first hour of the next.
     """
@@ -206,24 +171,11 @@ def on_clock_of(
 ) -> tuple[pd.DataFrame, Finding | None]:
     """Convert a table's time to that of the inertial sensors.
 
-    Parameters
-    ----------
-    table, imu : DataFrame
-        Indexed by time; ``attrs`` state their clocks, which are unknown otherwise.
-    source : str, optional
-        Name of `table` for messages; by default that in its ``attrs``.
-
-    Returns
-    -------
-    table : DataFrame
-        The same table if its time is already on that clock, or if one of the clocks is unknown.
-    finding : Finding or None
-        The offset that was added.
-
-    Raises
-    ------
-    DataError
-        One clock counts from 1970, the other is a GPS week, and the week is not stated.
+    `table`, `imu`: indexed by time; ``attrs`` state their clocks, which are unknown otherwise.
+    `source`: name of `table` for messages; by default that in its ``attrs``. Returns `table`: the
+    same table if its time is already on that clock, or if one of the clocks is unknown; `finding`:
+    the offset that was added. DataError: one clock counts from 1970, the other is a GPS week, and
+    the week is not stated.
     """
     own, other = clock_of(table), clock_of(imu)
     file = source or table.attrs.get("source")
@@ -259,4 +211,234 @@ def on_clock_of(
         quantity="time",
         severity="note",
         shift=shift,
+    )
+
+
+# Time stamps of a log: units, faults and repairs.
+
+
+# Range of steps of inertial sensors.
+PLAUSIBLE_STEP = (1e-5, 0.25)  # s
+# Later stamps are counted from the first: a double resolves a clock of 1970 to only 0.2 µs.
+EPOCH = 1e6  # s
+
+
+@dataclass(frozen=True)
+class Stamps:
+    """Stamps in seconds, with findings.
+
+    Attributes
+    ----------
+    seconds : ndarray, (n,)
+    unit : str
+    why : str
+        Reason for the unit.
+    keep : ndarray of bool, (n,)
+        Rows that remain when those with faulty stamps are dropped.
+    origin : Origin
+        The raw stamp at time zero.
+    findings : list of Finding
+    """
+
+    seconds: Array
+    unit: str
+    why: str
+    keep: NDArray[np.bool_]
+    origin: Origin
+    findings: list[Finding]
+
+
+def read_stamps(
+    raw: NDArray[Any],
+    unit: str | None,
+    why: str,
+    *,
+    file: str,
+    row: Callable[[int], int],
+    repair: bool,
+    origin: Origin | None = None,
+    only_seconds: bool = False,
+) -> Stamps:
+    """Turn raw stamps into increasing seconds.
+
+    `raw` ((n,)): finite numbers. `unit`: if known. `why`: source of the unit. `file`: for messages.
+    `row`: maps the number of a stamp to its row in the file. `repair`: drop repeated and reversed
+    stamps, and unwrap a counter. `origin`: count from here, as another log does; by default from
+    zero, or from the first stamp if zero is far away. `only_seconds`: infer no unit other than
+    seconds from the numbers. DataError: the unit is not stated and not evident, or time does not
+    advance.
+    """
+    findings: list[Finding] = []
+    # Small and unsigned integers would overflow for negative steps.
+    stamps = raw.astype(np.int64) if raw.dtype.kind in "iub" else raw.astype(np.float64)
+    if unit in (None, "s"):
+        whole, weeks = unrolled(stamps.astype(np.float64, copy=False))
+        if weeks:
+            stamps, unit = whole, "s"
+            findings.append(
+                Finding(
+                    "io.seconds-of-week-unrolled",
+                    file=file,
+                    row=row(weeks[0]),
+                    quantity="time",
+                    severity="note",
+                )
+            )
+    ticks = (stamps - stamps[0]).astype(np.float64)  # exact, before a factor rounds it
+    if not repair:
+        _refuse_backward(stamps, ticks, file, row)
+    keep, ticks = _repaired(stamps, ticks, file, findings)
+    if unit is None:
+        unit, why = _evident_unit(stamps[keep], file, findings, only_seconds)
+    elif (usual := _mean_step(ticks[keep]) * TIME_UNITS[unit]) > 0 and not (
+        PLAUSIBLE_STEP[0] <= usual <= 4 * PLAUSIBLE_STEP[1]
+    ):
+        findings.append(
+            Finding(
+                "io.stated-time-unit-implausible",
+                file=file,
+                quantity="time",
+                unit=unit,
+                usual=1.0 / usual,
+            )
+        )
+    factor = TIME_UNITS[unit]
+    first = stamps[0].item()
+    if origin is None:
+        far = abs(first) * factor > EPOCH
+        origin = Origin(first if far else 0, unit)
+        if far:
+            findings.append(
+                Finding(
+                    "io.time-from-first-stamp",
+                    file=file,
+                    quantity="time",
+                    severity="note",
+                    first=first,
+                    unit=unit,
+                )
+            )
+    return Stamps(_since(first, unit, origin) + ticks * factor, unit, why, keep, origin, findings)
+
+
+def _since(stamp: float, unit: str, origin: Origin) -> float:
+    """Return seconds from an origin to a stamp; exact if both count whole ticks of one unit."""
+    if unit == origin.unit:
+        return (stamp - origin.stamp) * TIME_UNITS[unit]
+    return stamp * TIME_UNITS[unit] - origin.stamp * TIME_UNITS[origin.unit]
+
+
+def _mean_step(ticks: Array) -> float:
+    # Logs that arrive in bursts have a median far from the mean step.
+    return float((ticks[-1] - ticks[0]) / (ticks.size - 1)) if ticks.size > 1 else 0.0
+
+
+def _refuse_backward(
+    stamps: NDArray[Any], ticks: Array, file: str, row: Callable[[int], int]
+) -> None:
+    steps = np.diff(ticks)
+    bad = np.flatnonzero(steps <= 0)
+    if not bad.size:
+        return
+    k = int(bad[0])
+    here, then = stamps[k], stamps[k + 1]
+    if steps[k] == 0:
+        raise DataError(
+            "io.stamp-repeated",
+            file=file,
+            row=row(k + 1),
+            quantity="time",
+            then=then,
+            count=bad.size,
+        )
+    if bits := wrap_bits(stamps[k], steps[k], _usual_step(steps)):
+        raise DataError(
+            "io.time-counter-wraps",
+            file=file,
+            row=row(k + 1),
+            quantity="time",
+            here=here,
+            then=then,
+            bits=bits,
+        )
+    raise DataError(
+        "io.time-goes-back",
+        file=file,
+        row=row(k + 1),
+        quantity="time",
+        here=here,
+        then=then,
+        count=bad.size,
+    )
+
+
+def _usual_step(steps: Array) -> float:
+    forward = steps[steps > 0]
+    return float(np.median(forward)) if forward.size else 0.0
+
+
+def _repaired(
+    stamps: NDArray[Any], ticks: Array, file: str, findings: list[Finding]
+) -> tuple[NDArray[np.bool_], Array]:
+    steps = np.diff(ticks)
+    usual = _usual_step(steps)
+    added = np.zeros(ticks.size)
+    for k in np.flatnonzero(steps < 0):
+        if bits := wrap_bits(stamps[k], steps[k], usual):
+            added[k + 1] = 2.0**bits
+    if wraps := int(np.count_nonzero(added)):
+        ticks = ticks + np.cumsum(added)
+        findings.append(
+            Finding(
+                "io.counter-wrapped-undone",
+                file=file,
+                quantity="time",
+                severity="note",
+                count=wraps,
+            )
+        )
+    latest = np.maximum.accumulate(np.concatenate([[-np.inf], ticks[:-1]]))
+    keep = ticks > latest
+    if dropped := int((~keep).sum()):
+        findings.append(
+            Finding(
+                "io.rows-not-later-left-out",
+                file=file,
+                quantity="time",
+                severity="note",
+                count=dropped,
+            )
+        )
+    return keep, ticks
+
+
+def _evident_unit(
+    stamps: NDArray[Any], file: str, findings: list[Finding], only_seconds: bool
+) -> tuple[str, str]:
+    said = infer_time_unit(stamps)
+    if said.settled and (said.value == "s" or not only_seconds):
+        unit = str(said.value)
+        if unit != "s":
+            findings.append(said.finding("io.time-unit-inferred", file=file, quantity="time"))
+        return unit, str(said)
+    usual = _mean_step((stamps - stamps[0]).astype(np.float64))
+    shares = {str(v): p for v, p in ((said.value, said.confidence), *said.alternatives) if v}
+    choices = [
+        Finding(
+            "io.choice-of-time-unit",
+            severity="note",
+            unit=u,
+            rate_hz=1.0 / (usual * TIME_UNITS[u]),
+            share=p,
+        )
+        for u, p in shares.items()
+        if p >= 1e-3 and usual > 0
+    ]
+    raise DataError(
+        "io.time-unit-undecided" if choices else "io.time-unit-of-no-step",
+        file=file,
+        quantity="time",
+        step=usual,
+        threshold=THRESHOLD,
+        choices=choices,
     )

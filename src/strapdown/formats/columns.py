@@ -2,21 +2,34 @@
 
 from __future__ import annotations
 
+import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-from strapdown.constants import TIME_UNITS
+from strapdown.constants import (
+    ACCEL_SUMS,
+    ACCEL_UNITS,
+    GYRO_SUMS,
+    GYRO_UNITS,
+    MAG_UNITS,
+    TIME_UNITS,
+)
 from strapdown.errors import ConfigError
-from strapdown.formats.unit_words import UNIT_OF, unit_of
 
 __all__ = [
     "QUANTITIES",
+    "UNIT_OF",
     "ColumnName",
+    "factor_of",
     "parse_axes",
     "parse_column_option",
+    "parse_unit",
     "read_name",
     "says_increment",
+    "unit_of",
 ]
+
 
 _AXES = "xyz"
 TRIADS = {
@@ -153,16 +166,9 @@ class ColumnName:
 def read_name(name: str) -> ColumnName:
     """Parse quantity and unit from a column's name.
 
-    Parameters
-    ----------
-    name : str
-        As ``gyro_x_rad_s``, ``Gyroscope x (rad/s)``, ``wx``, ``acc_y [g]``, ``time_ms``; or
-        ``gyro[0]``, the first of an array of three.
-
-    Returns
-    -------
-    ColumnName
-        None for each part that the name does not state.
+    `name`: as ``gyro_x_rad_s``, ``Gyroscope x (rad/s)``, ``wx``, ``acc_y [g]``, ``time_ms``; or
+    ``gyro[0]``, the first of an array of three. Returns none for each part that the name does not
+    state.
     """
     text, index = name.strip(), ""
     if match := INDEXED.fullmatch(text):
@@ -229,10 +235,7 @@ def _quantity(word: str) -> str | None:
 def says_increment(name: str) -> bool:
     """Whether a name states that its column holds increments per sample.
 
-    Parameters
-    ----------
-    name : str
-        As ``dtheta_x_rad``, ``delta_v_y (m/s)``, ``dv[2]``.
+    `name`: as ``dtheta_x_rad``, ``delta_v_y (m/s)``, ``dv[2]``.
     """
     text = _BRACKETS.sub("", INDEXED.sub(r"\1", name.strip()))
     known = [n for names in SUMMED.values() for n in names]
@@ -246,19 +249,8 @@ def says_increment(name: str) -> bool:
 def parse_column_option(items: list[str]) -> dict[str, str]:
     """Parse ``--columns`` as quantity to column.
 
-    Parameters
-    ----------
-    items : list of str
-        Each ``quantity=column``, several joined by commas.
-
-    Returns
-    -------
-    dict of str to str
-
-    Raises
-    ------
-    ConfigError
-        The syntax is wrong or the quantity is unknown.
+    `items`: each ``quantity=column``, several joined by commas. ConfigError: the syntax is wrong or
+    the quantity is unknown.
     """
     known = [*QUANTITIES, *TRIADS]
     out: dict[str, str] = {}
@@ -281,22 +273,9 @@ def parse_column_option(items: list[str]) -> dict[str, str]:
 def parse_axes(text: str) -> tuple[list[int], list[float]]:
     """Parse which sensor axis points forward, right and down.
 
-    Parameters
-    ----------
-    text : str
-        Three of ``x y z`` with an optional sign, as in ``x,-y,-z``; or the directions of the
-        sensor's x, y and z: ``forward-left-up``, which is equivalent.
-
-    Returns
-    -------
-    axis : list of int
-        Sensor axis of each body axis, 0 to 2.
-    sign : list of float
-
-    Raises
-    ------
-    ConfigError
-        The text is not a signed permutation of three axes.
+    `text`: three of ``x y z`` with an optional sign, as in ``x,-y,-z``; or the directions of the
+    sensor's x, y and z: ``forward-left-up``, which is equivalent. Returns `axis`: sensor axis of
+    each body axis, 0 to 2. ConfigError: the text is not a signed permutation of three axes.
     """
     if said := _directions(text):
         return said
@@ -319,3 +298,124 @@ def _directions(text: str) -> tuple[list[int], list[float]] | None:
         raise ConfigError("io.axes-name-direction-twice", quantity="--axes", text=text)
     axis = [next(k for k, (body, _) in enumerate(said) if body == b) for b in range(3)]
     return axis, [said[k][1] for k in axis]
+
+
+# Spellings of units, and units of raw counts.
+
+
+# Each spelling to its canonical word.
+_SPELLINGS = {
+    "rad/s": "rad/s rad_s rads rad_per_s rad/sec radps rad·s-1 rad*s^-1 rad.s-1",
+    "mrad/s": "mrad/s mrad_s",
+    "deg/s": "deg/s deg_s degs dps °/s °_s º/s deg_per_s deg/sec degps",
+    "mdeg/s": "mdeg/s mdps mdeg_s",
+    "deg/h": "deg/h deg/hr deg_h deg_per_h °/h",
+    "m/s2": "m/s2 m/s^2 m/s² m_s2 ms2 ms-2 mps2 m_per_s2 m/s/s m·s-2 m*s^-2",
+    "g": "g g0 gs",
+    "m/s": "m/s m_s mps m_per_s m/sec m·s-1 m*s^-1",
+    "g*s": "g*s g·s g_s",
+    "mg": "mg",
+    "uT": "ut µt μt microtesla",
+    "nT": "nt nanotesla",
+    "gauss": "gauss",
+    "mG": "mgauss milligauss",
+    "T": "tesla",
+    "s": "s sec secs second seconds",
+    "ms": "ms msec millis milliseconds",
+    "us": "us µs μs usec micros microseconds",
+    "ns": "ns nsec nanos nanoseconds",
+    "min": "min minutes",
+    "deg": "deg ° degree degrees",
+    "rad": "rad radian radians",
+}
+UNIT_OF = {spelling: unit for unit, text in _SPELLINGS.items() for spelling in text.split()}
+# Powers of a second, with any separator of the factors: rad s^-1, m·s⁻².
+_POWERS = {
+    "rads-1": "rad/s",
+    "mrads-1": "mrad/s",
+    "degs-1": "deg/s",
+    "°s-1": "deg/s",
+    "ms-2": "m/s2",
+    "ms-1": "m/s",
+}
+_RAISED = str.maketrans({"⁻": "-", "−": "-", "¹": "1", "²": "2"})
+_NUMBER = r"\d+(?:\.\d*)?(?:[eE][+-]?\d+)?"
+# Counts per unit, as in deg/s/131; or units per count, as in 1/131 deg/s.
+_PARTS = re.compile(rf"(?P<unit>.*\D)/\s*(?P<counts>{_NUMBER})")
+_TIMES = re.compile(rf"(?P<up>{_NUMBER})(?:\s*/\s*(?P<down>{_NUMBER}))?\s*[ *·]\s*(?P<unit>\D.*)")
+
+
+def unit_of(text: str) -> str | None:
+    """Parse the spelling of a unit.
+
+    `text`: as ``rad/s``, ``[deg/s]``, ``m s^-2``, in any case. Returns in the spelling of this
+    package.
+    """
+    word = re.sub(r"\s+", "", text.strip().strip("[]()").lower())
+    if word in UNIT_OF:
+        return UNIT_OF[word]
+    return _POWERS.get(re.sub(r"[·*.^]", "", word.translate(_RAISED)))
+
+
+def parse_unit(text: str, kind: str) -> str:
+    """Check a unit that the user stated.
+
+    `text`: a unit; for a gyro or an accelerometer also one of raw counts, as ``deg/s/131`` or
+    ``g/16384`` (counts per unit), or ``1/131 deg/s`` or ``0.061 deg/s`` (units per count). `kind`
+    ({'gyro', 'accel', 'mag', 'time'}). Returns in the spelling of this package; `factor_of` has its
+    factor. ConfigError: the text is not a unit of that kind.
+    """
+    known = {
+        "gyro": {**GYRO_UNITS, **GYRO_SUMS},
+        "accel": {**ACCEL_UNITS, **ACCEL_SUMS},
+        "mag": MAG_UNITS,
+        "time": TIME_UNITS,
+    }[kind]
+    unit = _word(text)
+    if unit in known:
+        return unit
+    counted = kind in ("gyro", "accel")
+    scale, of = _taken_apart(text) if counted else (None, "")
+    if scale is None or (unit := _word(of)) not in known:
+        raise ConfigError(
+            "io.unknown-unit-or-counts" if counted else "io.unknown-unit",
+            quantity=f"--{kind}-unit",
+            word=text,
+            known=known,
+            example="deg/s/131" if kind == "gyro" else "g/16384",
+        )
+    counts = f"{1.0 / scale:g}"
+    exact = math.isclose(float(counts) * scale, 1.0, rel_tol=1e-12)
+    return f"{unit}/{counts}" if exact else f"{scale!r} {unit}"
+
+
+def factor_of(unit: str, known: Mapping[str, float]) -> float:
+    """Return the factor from a unit to SI.
+
+    `unit`: as returned by `parse_unit`. `known`: factors of plain units.
+    """
+    if unit in known:
+        return known[unit]
+    scale, of = _taken_apart(unit)
+    return float(scale or 1.0) * known[of]
+
+
+def _word(text: str) -> str:
+    """Return the unit of a text, or the text; for accelerometers also with the sign of iOS."""
+    bare = text.strip()
+    if bare.startswith("-") and (unit := unit_of(bare[1:])):
+        return f"-{unit}"
+    return unit_of(bare) or bare
+
+
+def _taken_apart(text: str) -> tuple[float | None, str]:
+    """Parse how much of which unit a count is; None if the text has no such form."""
+    bare = text.strip()
+    if match := _PARTS.fullmatch(bare):
+        up, down, unit = 1.0, float(match["counts"]), match["unit"]
+    elif match := _TIMES.fullmatch(bare):
+        up, down, unit = float(match["up"]), float(match["down"] or 1.0), match["unit"]
+    else:
+        return None, ""
+    scale = up / down if down > 0.0 else math.inf
+    return (scale if 0.0 < scale < math.inf else None), unit

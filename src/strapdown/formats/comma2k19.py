@@ -19,9 +19,14 @@ from numpy.typing import NDArray
 
 from strapdown import frames, rotation
 from strapdown.errors import DataError, Finding
-from strapdown.formats import npy
+from strapdown.formats import numpy_files
+from strapdown.formats.clocks import RELATIVE, Clock
+from strapdown.formats.gnss_fixes import Fixes, GnssOptions
 from strapdown.formats.join import join
 from strapdown.formats.recording import RawLog, TruthInSensorAxes
+
+__all__ = ["belongs", "detect_fixes", "files_of", "read_fixes"]
+
 
 Array = NDArray[np.float64]
 
@@ -90,7 +95,7 @@ def _find(path: Path, *parts: str) -> Path | None:
 
 def _log(name: str, kind: str, triad: str, unit: str, t: Path, value: Path) -> RawLog:
     label = f"{name}/{value.name if value.suffix else kind}"
-    time, values = npy.load(t, f"{name}/{t.name}"), npy.load(value, label)
+    time, values = numpy_files.load(t, f"{name}/{t.name}"), numpy_files.load(value, label)
     kinds = time.dtype.kind + values.dtype.kind
     if time.ndim != 1 or values.shape != (time.size, 3) or not set(kinds) <= set("iuf"):
         raise DataError(
@@ -120,7 +125,7 @@ def _truth(path: Path, name: str, raw: RawLog) -> tuple[TruthInSensorAxes | None
     files = tuple(f for f in found if f is not None)
     if len(files) < 3:
         return None, ()
-    times, positions, q_ed = (npy.load(f, f"{name}/{f.name}") for f in files)
+    times, positions, q_ed = (numpy_files.load(f, f"{name}/{f.name}") for f in files)
     shapes = (times.shape, positions.shape, q_ed.shape)
     kinds = "".join(array.dtype.kind for array in (times, positions, q_ed))
     if (
@@ -192,3 +197,123 @@ def _at_samples(time: Array, frames: Array, q: Array) -> tuple[NDArray[np.int64]
     )
     part = rotation.quaternion_from_rotation_vector(turned * share[:, None])
     return sample, np.asarray(rotation.compose(q[k], part))
+
+
+# Fixes of the segment's receiver, on the clock of the inertial sensors.
+#
+# ``processed_log/GNSS`` holds ``live_gnss_ublox`` and ``live_gnss_qcom`` (README of comma2k19, "Log
+# Format"), each with ``t``, s since the device started, and six columns ``value``: latitude and
+# longitude in deg, speed in m/s, UTC, altitude in m, bearing in deg; or the same with ``__`` for
+# the slashes and the suffix ``.npy``. UTC counts from 1970, in seconds by the README, in
+# milliseconds in the segments. The altitude is above the ellipsoid: in the README's segment the
+# camera's pose is 1.1 m below it, and the geoid is 32 m below the ellipsoid there.
+#
+# ``t`` is when a fix was written, UTC when it was measured, and no fix is written before it is
+# measured: the smallest ``t`` minus UTC is the difference of the clocks, including the latency
+# common to all fixes. A fix is dated by its UTC plus this difference.
+
+
+#: The first one present is used: ten fixes per second, and one in two seconds.
+RECEIVERS = ("live_gnss_ublox", "live_gnss_qcom")
+COLUMNS = 6
+#: From this value on UTC is in ms: as seconds it would be in the year 5138.
+IN_MS = 1e11
+AGAIN = "get the segment again from its source"
+
+
+def detect_fixes(path: Path) -> bool:
+    """Whether a folder has the arrays of a receiver."""
+    return bool(files_of(path))
+
+
+def belongs(path: Path) -> bool:
+    """Whether a file is one of the arrays of a receiver."""
+    parts = (path.resolve().parent.name, *path.stem.split("__"))
+    return path.name.split("__")[-1] in ("t", "value", "t.npy", "value.npy") and any(
+        receiver in parts for receiver in RECEIVERS
+    )
+
+
+def files_of(path: Path) -> tuple[Path, ...]:
+    """Find the stamps and values of the receiver of a folder; empty if there is none.
+
+    `path`: the folder of a segment, its ``processed_log``, ``GNSS`` in it, the folder of one
+    receiver, or the folder of the arrays.
+    """
+    if not path.is_dir():
+        return ()
+    own = path.resolve().name
+    for receiver in RECEIVERS:
+        for folder in (path, path / "GNSS", path / "processed_log" / "GNSS"):
+            found = tuple(folder / receiver / part for part in ("t", "value"))
+            if all(file.is_file() for file in found):
+                return found
+        flat = tuple(path / f"GNSS__{receiver}__{part}.npy" for part in ("t", "value"))
+        if all(file.is_file() for file in flat):
+            return flat
+        if own == receiver and (path / "t").is_file() and (path / "value").is_file():
+            return path / "t", path / "value"
+    return ()
+
+
+def read_fixes(path: Path, options: GnssOptions) -> Fixes:
+    """Read the fixes of a segment.
+
+    Returns without standard deviations. Speed and bearing are converted to velocity north and east;
+    down is not measured. DataError: an array is damaged or has the wrong shape.
+    """
+    t_file, value_file = files_of(path)
+    name = path.resolve().name
+    t, value = (numpy_files.load(file, f"{name}/{file.name}") for file in (t_file, value_file))
+    if (
+        t.ndim != 1
+        or value.shape != (t.size, COLUMNS)
+        or not set(t.dtype.kind + value.dtype.kind) <= set("iuf")
+    ):
+        raise DataError(
+            "io.stamps-shape-values-numbers-shapes-2",
+            file=f"{name}/{value_file.name}",
+            quantity="fixes",
+            shape=t.shape,
+            shape_2=value.shape,
+            dtype=value.dtype,
+            columns=COLUMNS,
+        )
+    if not t.size:
+        raise DataError("io.no-fix", file=f"{name}/{value_file.name}")
+    lat, lon, speed, utc, alt, bearing = np.asarray(value, dtype=np.float64).T
+    findings: list[Finding] = []
+    course = np.radians(bearing)
+    return Fixes(
+        name=name,
+        time=_dated(np.asarray(t, dtype=np.float64), utc, name, findings),
+        place=np.column_stack([lat, lon, alt]),
+        rows=np.arange(1, t.size + 1),
+        clock=Clock(RELATIVE),
+        velocity=np.column_stack(
+            [speed * np.cos(course), speed * np.sin(course), np.full(t.size, np.nan)]
+        ),
+        findings=findings,
+    )
+
+
+def _dated(t: Array, utc: Array, name: str, findings: list[Finding]) -> Array:
+    """Compute when each fix was measured, on the clock of the stamps."""
+    if not (np.isfinite(utc).all() and np.isfinite(t).all() and (np.diff(utc) > 0.0).all()):
+        findings.append(
+            Finding("io.not-every-fix-utc-later", file=name, quantity="time", severity="note")
+        )
+        return t
+    seconds = utc * 1e-3 if utc.max() > IN_MS else utc
+    late = t - seconds
+    late -= late.min()
+    findings.append(
+        Finding(
+            "io.comma2k19-fixes-dated-by-utc",
+            file=name,
+            quantity="time",
+            late=late.max(),
+            median=np.median(late),
+        )
+    )
+    return np.asarray(t - late)

@@ -11,9 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError
-from strapdown.formats.crash_attributes import attributes_of, check_attributes
-from strapdown.formats.crash_record import CrashChannel, CrashRecord
-from strapdown.formats.crash_text import LONGEST_NAME, clean, unique
+from strapdown.formats.crash_record import (
+    LONGEST_NAME,
+    CrashChannel,
+    CrashRecord,
+    attributes_of,
+    check_attributes,
+    clean,
+    unique,
+)
 
 Array = NDArray[np.float64]
 
@@ -85,14 +91,6 @@ def detect(path: Path) -> bool:
 
 def read(path: Path) -> CrashRecord:
     """Read a record written as JSON.
-
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    CrashRecord
 
     Raises
     ------

@@ -1,7 +1,9 @@
-"""Common form of all crash records: channels in SI units, with the metadata of the file."""
+"""Crash records: channels in SI units with metadata; their names, units and attributes."""
 
 from __future__ import annotations
 
+import math
+import unicodedata
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,11 +12,30 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.constants import ACCEL_UNITS, GYRO_UNITS, TIME_UNITS
+from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.formats.columns import UNIT_OF
+from strapdown.formats.columns import unit_of as plain_unit_of
+from strapdown.tables import SAMPLINGS
+
+__all__ = [
+    "FACTORS",
+    "LONGEST_NAME",
+    "LONGEST_TEXT",
+    "QUANTITIES",
+    "CrashChannel",
+    "CrashRecord",
+    "attributes_of",
+    "check_attributes",
+    "clean",
+    "factor_of",
+    "state_unit",
+    "unique",
+    "unit_of",
+]
+
 
 Array = NDArray[np.float64]
-
-__all__ = ["QUANTITIES", "CrashChannel", "CrashRecord"]
 
 
 def _sample_row(sample: int) -> int:
@@ -129,10 +150,7 @@ class CrashRecord:
     def channel(self, name: str) -> CrashChannel:
         """Return a channel by its name.
 
-        Raises
-        ------
-        DataError
-            No channel has this name; the message suggests the most similar.
+        DataError: no channel has this name; the message suggests the most similar.
         """
         for channel in self.channels:
             if channel.name == name:
@@ -145,3 +163,202 @@ class CrashRecord:
             word=name,
             known=[c.name for c in self.channels],
         )
+
+
+# Cleaning of untrusted texts from files, for names and messages.
+
+
+LONGEST_NAME = 120
+LONGEST_TEXT = 400
+
+
+def clean(text: str, longest: int = LONGEST_TEXT) -> str:
+    """Reduce a text to one line, without control or bidirectional formatting characters.
+
+    `longest`: longer texts are cut and end with three dots. Returns markup is kept; escaping is
+    left to the code that writes a page.
+    """
+    # Of a very long text only the part that can be kept is processed.
+    kept = "".join(
+        " " if c.isspace() else "\N{REPLACEMENT CHARACTER}" if _steers(c) else c
+        for c in text[: 4 * longest]
+    )
+    kept = " ".join(kept.split())
+    return kept if len(kept) <= longest else kept[: longest - 1] + "…"
+
+
+def _steers(character: str) -> bool:
+    return unicodedata.category(character) in ("Cc", "Cf", "Cs", "Co", "Cn")
+
+
+def unique(names: list[str]) -> list[str]:
+    """The same names, each one once: a second ``ax`` is ``ax (2)``."""
+    taken: set[str] = set()
+    out = []
+    for name in names:
+        other, count = name, 1
+        while other in taken:
+            count += 1
+            other = f"{name} ({count})"
+        taken.add(other)
+        out.append(other)
+    return out
+
+
+# Units of crash records: text to quantity and factor to SI.
+
+
+#: Units of each quantity, with the factor to SI. Mile, foot, inch and pound are those of the
+#: international agreement of 1959: 0.3048 m per foot, 0.45359237 kg per pound.
+FACTORS: dict[str, dict[str, float]] = {
+    "acceleration": dict(ACCEL_UNITS),
+    "rate": dict(GYRO_UNITS),
+    "velocity": {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704, "ft/s": 0.3048, "mm/s": 1e-3},
+    "displacement": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "ft": 0.3048},
+    "force": {"N": 1.0, "kN": 1e3, "lbf": 4.4482216152605},
+    "time": dict(TIME_UNITS),
+}
+_QUANTITY = {unit: quantity for quantity, units in FACTORS.items() for unit in units}
+# Spellings of crash laboratories and recorders, in addition to those of other logs.
+_SPELLINGS = {
+    "m/s2": "m/(s*s) m/(s^2) m/s*s m/ss m/sec2 m/sec^2 m/s**2 meters/sec/sec",
+    "g": "g's g`s g-force gn g_n",
+    "rad/s": "radians/s radians/sec 1/s*rad",
+    "deg/s": "degrees/s degrees/sec degree/s deg/second °/sec",
+    "m/s": "meters/second metres/second",
+    "km/h": "km/h kph kmh km/hr kmph km_h km_per_h km·h-1",
+    "mph": "mph mi/h mile/h miles/h miles/hour mi/hr",
+    "ft/s": "ft/s ft/sec fps feet/s ft_s",
+    "mm/s": "mm/s",
+    "m": "m meter metre meters metres",
+    "cm": "cm",
+    "mm": "mm millimeter millimetre millimeters millimetres",
+    "in": "in inch inches",
+    "ft": "ft feet foot",
+    "N": "n newton newtons nwt",
+    "kN": "kn kilonewton kilonewtons",
+    "lbf": "lbf lbs",
+}
+_UNIT_OF = {
+    **{text: unit for text, unit in UNIT_OF.items() if unit in _QUANTITY},
+    **{spelling: unit for unit, text in _SPELLINGS.items() for spelling in text.split()},
+}
+
+
+def unit_of(text: str) -> tuple[str, str] | None:
+    """Parse a unit as written in a file.
+
+    `text`: as ``m/(s*s)``, ``G's``, ``km/h``, ``[deg/s]``. Returns (str, str) or None, the
+    quantity, a key of `FACTORS`, and the unit, a key of its table; None if the unit is unknown.
+    """
+    plain = text.lower().replace(" ", "").strip("[]\t")
+    unit = _UNIT_OF.get(plain) or _UNIT_OF.get(plain.strip("()")) or plain_unit_of(plain)
+    return (_QUANTITY[unit], unit) if unit in _QUANTITY else None
+
+
+def factor_of(quantity: str, unit: str) -> float | None:
+    """Return the factor to SI, or None if the quantity does not have the unit."""
+    return FACTORS.get(quantity, {}).get(unit)
+
+
+def state_unit(text: str, quantity: str, key: str = "unit") -> str:
+    """Check a unit stated in a case.
+
+    `quantity`: a key of `FACTORS`. `key`: key of the case, for the message. Returns in the spelling
+    of this package. ConfigError: the quantity does not have this unit.
+    """
+    known = FACTORS[quantity]
+    if text in known:
+        return text
+    found = unit_of(text)
+    if found is None or found[0] != quantity:
+        raise ConfigError(
+            "io.crash-unit-of-other-quantity" if found else "io.crash-unit-unknown",
+            quantity=key,
+            is_of=found[0] if found else None,
+            needed=quantity,
+            word=text,
+            known=known,
+        )
+    return found[1]
+
+
+# Metadata of a crash channel as plain data, for files that store it beside the samples.
+
+
+_AXES = ("", "x", "y", "z", "-x", "-y", "-z")
+_TEXTS = ("name", "quantity", "axis", "unit", "place", "body", "low_pass")
+_NUMBERS = ("full_scale", "bandwidth")
+MOST_REMARKS = 50
+
+
+def attributes_of(channel: CrashChannel) -> dict[str, Any]:
+    """Return everything of a channel except its samples.
+
+    Returns the unit is the SI unit in which the values are written.
+    """
+    return {
+        "name": channel.name,
+        "quantity": channel.quantity,
+        "axis": channel.axis,
+        "unit": QUANTITIES[channel.quantity] or channel.unit,
+        "sampling": channel.sampling,
+        "place": channel.place,
+        "body": channel.body,
+        "low_pass": channel.low_pass,
+        "remarks": list(channel.remarks),
+        "full_scale": channel.full_scale,
+        "bandwidth": channel.bandwidth,
+    }
+
+
+def check_attributes(said: object, file: str, row: int | None = None) -> dict[str, Any]:
+    """Check the metadata of a channel from a file.
+
+    `said`: as read from the file. Returns as `attributes_of`; missing entries are empty, texts are
+    cleaned. DataError: the metadata has the wrong structure.
+    """
+    if not isinstance(said, Mapping):
+        raise _bad("a channel", "io.channel-no-table", file, row)
+    texts = {}
+    for key in _TEXTS:
+        value = said.get(key, "")
+        if not isinstance(value, str):
+            raise _bad(key, "io.channel-no-text", file, row, value=str(value)[:40])
+        texts[key] = clean(value, LONGEST_NAME) if key in ("name", "unit") else clean(value)
+    numbers = {}
+    for key in _NUMBERS:
+        value = said.get(key)
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if value is not None and not (number and math.isfinite(value)):
+            raise _bad(key, "io.channel-no-number", file, row, value=str(value)[:40])
+        numbers[key] = None if value is None else float(value)
+    for key, known in (("quantity", tuple(QUANTITIES)), ("axis", _AXES)):
+        if texts[key] not in known:
+            raise DataError(
+                "io.channel-unknown-word",
+                file=file,
+                row=row,
+                quantity=key,
+                key=key,
+                word=texts[key],
+                known=known,
+            )
+    remarks = said.get("remarks", [])
+    if not isinstance(remarks, list) or not all(isinstance(r, str) for r in remarks):
+        raise _bad("remarks", "io.channel-remarks-no-texts", file, row)
+    sampling = said.get("sampling")
+    if sampling not in (None, *SAMPLINGS):
+        raise _bad(
+            "sampling", "io.channel-sampling", file, row, value=str(sampling)[:40], known=SAMPLINGS
+        )
+    return {
+        **texts,
+        **numbers,
+        "sampling": sampling,
+        "remarks": tuple(clean(r) for r in remarks[:MOST_REMARKS]),
+    }
+
+
+def _bad(key: str, code: str, file: str, row: int | None, **data: Any) -> DataError:
+    return DataError(code, file=file, row=row, quantity=key, key=key, **data)

@@ -9,11 +9,56 @@ from itertools import islice
 from pathlib import Path
 
 from strapdown.errors import ConfigError, DataError
-from strapdown.formats import crash_json, crash_log, crash_mme, crash_nhtsa, crash_table
-from strapdown.formats.crash_record import CrashRecord
-from strapdown.formats.crash_text import clean
+from strapdown.formats import crash_json, crash_nhtsa, crash_table, mme_reader
+from strapdown.formats.crash_record import CrashRecord, clean
+from strapdown.formats.crash_table import record_of
 
-__all__ = ["CRASH_READERS", "CrashReader", "read_crash_record"]
+__all__ = ["CRASH_READERS", "CrashReader", "detect", "read", "read_crash_record"]
+
+
+# Logs of inertial sensors as crash records: arrays, phones, MATLAB, HDF5.
+
+
+# Log formats whose columns may be those of a crash.
+LOGS = (
+    "sensor-logger",
+    "phyphox",
+    "sensor-folder",
+    "npy-folder",
+    "npz",
+    "parquet",
+    "hdf5",
+    "matlab",
+)
+
+
+def detect(path: Path) -> bool:
+    """Whether the file is a log with columns in another format: .npz, .h5, of a phone."""
+    from strapdown.formats import READERS
+
+    return any(READERS[key].detect(path) for key in LOGS)
+
+
+def read(path: Path) -> CrashRecord:
+    """Read a log of another format.
+
+    Raises
+    ------
+    DataError
+        The file is damaged, or of none of these formats.
+    """
+    from strapdown.formats import READERS
+
+    for key in LOGS:
+        if READERS[key].detect(path):
+            return record_of(READERS[key].read(path), path, "log")
+    raise DataError(
+        "io.crash-log-format-unknown",
+        file=path.name,
+        quantity="format",
+        logs=[READERS[key].title for key in LOGS],
+    )
+
 
 # Spreadsheet files, which hold more than a table.
 SPREADSHEETS = (".xlsx", ".xls", ".xlsm", ".ods", ".numbers")
@@ -55,15 +100,15 @@ CRASH_READERS: dict[str, CrashReader] = {
         crash_nhtsa.read,
     ),
     "mme": CrashReader(
-        "test in ISO MME (ISO/TS 13499): .mme or its folder", crash_mme.detect, crash_mme.read
+        "test in ISO MME (ISO/TS 13499): .mme or its folder", mme_reader.detect, mme_reader.read
     ),
     "json": CrashReader(
         "crash record as JSON, as this package writes it", crash_json.detect, crash_json.read
     ),
     "log": CrashReader(
         "log with a column a channel: .npz .parquet .h5 .mat, of a phone",
-        crash_log.detect,
-        crash_log.read,
+        detect,
+        read,
     ),
     "csv": CrashReader(
         "text table with a column a channel: .csv .txt; also of a vehicle's event data recorder",

@@ -16,16 +16,22 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
+from strapdown.formats.arrays import numbers, ticks_of
 from strapdown.formats.columns import INDEXED, TRIADS, read_name
-from strapdown.formats.crash_attributes import attributes_of, check_attributes
-from strapdown.formats.crash_record import CrashChannel, CrashRecord
-from strapdown.formats.crash_stamps import Clock, seconds_of
-from strapdown.formats.crash_text import LONGEST_NAME, clean, unique
-from strapdown.formats.crash_units import factor_of, unit_of
-from strapdown.formats.crash_velocity import ONE_STEP
-from strapdown.formats.day_time import day_nanoseconds
+from strapdown.formats.crash_record import (
+    LONGEST_NAME,
+    CrashChannel,
+    CrashRecord,
+    attributes_of,
+    check_attributes,
+    clean,
+    factor_of,
+    unique,
+    unit_of,
+)
+from strapdown.formats.crash_samples import ONE_STEP, Clock, seconds_of
+from strapdown.formats.csv import day_nanoseconds
 from strapdown.formats.find_columns import Column
-from strapdown.formats.numbers import numbers, ticks_of
 from strapdown.formats.recording import RawLog
 
 __all__ = [
@@ -62,10 +68,6 @@ def detect(path: Path) -> bool:
 def read(path: Path) -> CrashRecord:
     """Read a text table.
 
-    Parameters
-    ----------
-    path : Path
-
     Returns
     -------
     CrashRecord
@@ -93,19 +95,12 @@ def record_of(
 
     Parameters
     ----------
-    raw : RawLog
-    path : Path
     form : str
         Key of the format.
     notes : dict of str to dict, optional
         Metadata of columns stated in the file, as from `attributes_of`.
-    title : str, optional
     remarks : tuple of str, optional
         Lines above the table.
-
-    Returns
-    -------
-    CrashRecord
 
     Raises
     ------
@@ -410,17 +405,9 @@ class ChannelName:
 def read_channel_name(name: str, unit: str = "") -> ChannelName:
     """Parse quantity, axis and unit from a column's name.
 
-    Parameters
-    ----------
-    name : str
-        As ``ax [g]``, ``Gyr_X (deg/s)``, ``Lateral Delta-V (km/h)``, ``Yaw rate``.
-    unit : str
-        Unit from a row of units under the header.
-
-    Returns
-    -------
-    ChannelName
-        The quantity follows from the unit; without a unit, from the words.
+    `name`: as ``ax [g]``, ``Gyr_X (deg/s)``, ``Lateral Delta-V (km/h)``, ``Yaw rate``. `unit`: unit
+    from a row of units under the header. Returns the quantity follows from the unit; without a
+    unit, from the words.
     """
     said = read_name(name)
     text = name.strip()
@@ -517,25 +504,9 @@ def read_text_table(
 ) -> tuple[RawLog, dict[str, dict[str, Any]], str, tuple[str, ...]]:
     """Read a text table whose header may be below the first line.
 
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    RawLog
-        `units` are those of the row of units, if there is one.
-    dict of str to dict
-        Metadata of columns from comments, as from `crash_attributes.attributes_of`.
-    str
-        Title in a comment, or empty.
-    tuple of str
-        The other lines above the table, where recorders write rate, range and axes.
-
-    Raises
-    ------
-    DataError
-        As `formats.csv.read`.
+    Returns : `units` are those of the row of units, if there is one; : metadata of columns from
+    comments, as from `crash_record.attributes_of`; : title in a comment, or empty; : the other
+    lines above the table, where recorders write rate, range and axes.
     """
     if path.stat().st_size > LARGEST:
         raise DataError(

@@ -11,12 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.formats.crash_record import QUANTITIES, CrashChannel, CrashRecord
-from strapdown.formats.crash_stamps import Clock, last_midnight, seconds_of
-from strapdown.formats.crash_units import FACTORS, factor_of, state_unit
+from strapdown.formats.clocks import EPOCH
+from strapdown.formats.crash_record import (
+    FACTORS,
+    QUANTITIES,
+    CrashChannel,
+    CrashRecord,
+    factor_of,
+    state_unit,
+)
+from strapdown.formats.crash_samples import Clock, last_midnight, seconds_of
 from strapdown.formats.inference import Signals, infer_signals
 from strapdown.formats.judge import what_numbers_say
-from strapdown.formats.stamps import EPOCH
 from strapdown.tables import ACCEL, GYRO, SAMPLINGS
 
 if TYPE_CHECKING:
@@ -203,7 +209,7 @@ def _check_quantity(
 def _as_mean(
     channel: CrashChannel, stamps: Array, values: Array, findings: list[Finding]
 ) -> tuple[Array, Array]:
-    from strapdown.formats.crash_velocity import mean_accelerations_of, starts_at_zero
+    from strapdown.formats.crash_samples import mean_accelerations_of, starts_at_zero
 
     if stamps.size < 2:
         raise DataError(
@@ -321,25 +327,9 @@ def triad_stamps(
 ) -> tuple[Array, Array]:
     """Return stamps in s and values of a channel.
 
-    Parameters
-    ----------
-    record : CrashRecord
-    channel : CrashChannel
-    time, time_unit, rate_hz
-        As in `triad_of_channels`.
-    findings : list of Finding
-        Inferences are appended.
-
-    Returns
-    -------
-    time, values : ndarray, (n,)
-
-    Raises
-    ------
-    ConfigError
-        Arguments contradict the record or each other.
-    DataError
-        Stamps are not known, or time does not advance.
+    `time`, `time_unit`, `rate_hz`: as in `triad_of_channels`. `findings`: inferences are appended.
+    Returns `time`, `values` ((n,)). ConfigError: arguments contradict the record or each other.
+    DataError: stamps are not known, or time does not advance.
     """
     if rate_hz is not None and not (math.isfinite(rate_hz) and rate_hz > 0.0):
         raise ConfigError("io.crash-rate-not-positive", quantity="rate_hz", rate_hz=rate_hz)
@@ -510,30 +500,10 @@ def triad_factor(
 ) -> tuple[dict[str, float], str]:
     """Return the factors from the values of each axis to SI units.
 
-    Parameters
-    ----------
-    record : CrashRecord
-    axes : dict of str to (CrashChannel, ndarray)
-        Values are SI if the channel's unit is known, else as recorded.
-    time : ndarray, (n,), s
-    quantity : {'acceleration', 'rate'}
-    stated : str or None
-        Unit stated in the case.
-    findings : list of Finding
-        Inferences are appended.
-
-    Returns
-    -------
-    factors : dict of str to float
-    unit : str
-        As recorded, or stated.
-
-    Raises
-    ------
-    ConfigError
-        The stated unit does not fit the quantity, or contradicts the record.
-    DataError
-        The unit is not known.
+    `axes`: values are SI if the channel's unit is known, else as recorded. `time` ((n,), s).
+    `quantity` ({'acceleration', 'rate'}). `stated`: unit stated in the case. `findings`: inferences
+    are appended. Returns `unit`: as recorded, or stated. ConfigError: the stated unit does not fit
+    the quantity, or contradicts the record. DataError: the unit is not known.
     """
     own = {a: c.unit for a, (c, _) in axes.items() if _known(c)}
     velocity = {c.quantity == "velocity" for c, _ in axes.values()}

@@ -5,6 +5,8 @@ from __future__ import annotations
 import codecs
 import itertools
 import re
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -13,11 +15,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
-from strapdown.formats.csv_columns import NULLS, Columns, columns_at_once, parsed
-from strapdown.formats.day_time import is_day_time
+from strapdown.formats.columns import unit_of
 from strapdown.formats.recording import RawLog
-from strapdown.formats.unit_words import unit_of
 from strapdown.tables import SAMPLINGS
+
+__all__ = [
+    "NULLS",
+    "Columns",
+    "columns_at_once",
+    "day_nanoseconds",
+    "is_day_time",
+    "parsed",
+    "single_blanks",
+]
+
 
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat")
 COMMENTS = ("#", "%", "//")
@@ -42,10 +53,6 @@ def detect(path: Path) -> bool:
 def read(path: Path) -> RawLog:
     """Read the columns of a text table.
 
-    Parameters
-    ----------
-    path : Path
-
     Returns
     -------
     RawLog
@@ -64,22 +71,7 @@ def read(path: Path) -> RawLog:
 def parse(data: bytes, name: str, files: tuple[Path, ...]) -> RawLog:
     """Read the columns of a text table from a file or a member of an archive.
 
-    Parameters
-    ----------
-    data : bytes
-    name : str
-        For messages.
-    files : tuple of Path
-        File that holds it.
-
-    Returns
-    -------
-    RawLog
-
-    Raises
-    ------
-    DataError
-        As `read`.
+    `name`: for messages. `files`: file that holds it.
     """
     return _at_once(data, name, files) or _line_by_line(data, name, files)
 
@@ -180,10 +172,7 @@ def _log(
 def decoded(data: bytes, name: str) -> tuple[str, list[Finding]]:
     """Decode the text of a file and collect findings.
 
-    Raises
-    ------
-    DataError
-        The content is not text.
+    DataError: the content is not text.
     """
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return data.decode("utf-16", "replace"), []
@@ -362,13 +351,8 @@ def _comma_is_decimal(lines: list[str], separator: str | None) -> bool:
 def write(path: Path, columns: dict[str, NDArray[Any]], comments: dict[str, str]) -> None:
     """Write columns as text, with the fewest digits that reproduce each number exactly.
 
-    Parameters
-    ----------
-    path : Path
-    columns : dict of str to ndarray, (n,)
-        Names with their unit, as ``gyro_x_rad_s``.
-    comments : dict of str to str
-        Written at the top as ``# key: value``.
+    `columns` ((n,)): names with their unit, as ``gyro_x_rad_s``. `comments`: written at the top as
+    ``# key: value``.
     """
     import pyarrow as pa
     import pyarrow.csv as pa_csv
@@ -382,3 +366,190 @@ def write(path: Path, columns: dict[str, NDArray[Any]], comments: dict[str, str]
             stream,
             pa_csv.WriteOptions(include_header=False),
         )
+
+
+# Fast parsing of text lines into numeric columns.
+
+
+Columns = list[NDArray[Any]]
+#: Texts of missing values.
+NULLS = ("", "nan", "NaN", "NAN", "-nan", "NA", "N/A", "NULL", "null", "None")
+#: From this many bytes on, the first lines decide which columns are numeric.
+LONG = 1 << 22
+
+
+def columns_at_once(
+    data: bytes, count: int, separator: str | None, start: int = 0
+) -> Columns | None:
+    """Parse columns of lines of equal width.
+
+    `data`: ASCII, without quotes from `start` on; the last line ends with a line break. `count`:
+    number of columns. `separator`: separator of fields; None for any run of blanks. `start`:
+    characters before the first of these lines. Returns or None, as `parsed`. None if a line has
+    another width, is empty, or may hold non-numbers.
+    """
+    # A comma may be a decimal sign, and an x part of a hexadecimal number.
+    odd = (b"x", b"X", *(() if separator == "," else (b",",)))
+    if count < 2 or any(data.find(c, start) >= 0 for c in odd):
+        return None
+    if data.find(b"\r", start) >= 0:
+        data, start = data[start:].replace(b"\r\n", b"\n"), 0
+        if b"\r" in data:
+            return None
+    # No copy: a text may take half of the memory.
+    columns = _parsed_or_none(memoryview(data)[start:], count, separator or " ")
+    if columns is not None and all(_full(c) for c in columns):
+        return columns
+    body = data[start:]
+    # A missing value may be two adjacent blanks, or a line without any.
+    if separator is None:
+        body = single_blanks(body)
+        columns = _parsed_or_none(body, count, " ")
+    return None if b"\n\n" in body or body.startswith(b"\n") else columns
+
+
+def _parsed_or_none(body: bytes | memoryview, count: int, delimiter: str) -> Columns | None:
+    import pyarrow as pa
+
+    try:
+        return parsed(body, count, delimiter)
+    except pa.ArrowInvalid:
+        return None
+
+
+def _full(column: NDArray[Any]) -> bool:
+    return column.dtype.kind in "iu" or (
+        column.dtype.kind == "f" and bool(np.isfinite(column.sum()))
+    )
+
+
+def single_blanks(text: bytes) -> bytes:
+    """Reduce runs of blanks to one between fields, with none at the ends of a line.
+
+    `text`: fields separated by blanks and tabs. Returns the same object if unchanged.
+    """
+    text = text.replace(b"\t", b" ")
+    # Four passes reduce runs of up to 300 blanks; longer ones take more passes.
+    for run in (16, 4, 3, 2):
+        text = text.replace(b" " * run, b" ")
+    while b"  " in text:
+        text = text.replace(b"  ", b" ")
+    return text.replace(b"\n ", b"\n").replace(b" \n", b"\n").removeprefix(b" ")
+
+
+def parsed(
+    body: bytes | memoryview,
+    count: int,
+    delimiter: str,
+    *,
+    decimal: str = ".",
+    quote: str | Literal[False] = '"',
+    text: Sequence[int] = (),
+) -> Columns:
+    """Parse lines, each number to the nearest double.
+
+    `body`: UTF-8, without a header. `count`: number of columns. `quote`: quote around fields that
+    hold the delimiter. `text`: columns to keep as text. Returns (n,), numbers with NaN for missing
+    values, dates as dates, the rest as text. pyarrow.ArrowInvalid: a line has the wrong number of
+    fields.
+    """
+    import pyarrow as pa
+
+    def read(part: bytes | memoryview, types: dict[str, Any]) -> Any:
+        return _table(part, types, count, delimiter, decimal, quote)
+
+    asked = {str(k): pa.string() for k in text}
+    table = None
+    if len(body) > LONG:
+        # Where a type is not stated, Arrow keeps all of the text until it is known.
+        with suppress(pa.ArrowInvalid):
+            top = bytes(body[:LONG])
+            seen = read(top[: top.rfind(b"\n") + 1], asked).schema
+            numbers = {f.name: f.type for f in seen if str(f.type) in ("int64", "double")}
+            table = read(body, {**numbers, **asked})
+    if table is None:
+        table = read(body, asked)
+    columns = []
+    # Column by column, so that at most one is in memory twice.
+    for _ in range(count):
+        columns.append(_array(table.column(0)))
+        table = table.remove_column(0)
+    pa.default_memory_pool().release_unused()
+    return columns
+
+
+def _table(
+    body: bytes | memoryview,
+    types: dict[str, Any],
+    count: int,
+    delimiter: str,
+    decimal: str,
+    quote: str | Literal[False],
+) -> Any:
+    import pyarrow as pa
+    import pyarrow.csv as pa_csv
+
+    return pa_csv.read_csv(
+        pa.BufferReader(body),
+        read_options=pa_csv.ReadOptions(
+            column_names=[str(k) for k in range(count)], use_threads=False
+        ),
+        parse_options=pa_csv.ParseOptions(
+            delimiter=delimiter, quote_char=quote, ignore_empty_lines=False
+        ),
+        convert_options=pa_csv.ConvertOptions(
+            decimal_point=decimal,
+            null_values=list(NULLS),
+            strings_can_be_null=True,
+            column_types=types,
+        ),
+    )
+
+
+def _array(column: Any) -> NDArray[Any]:
+    """Convert to numbers with NaN for missing values, to dates, or to text."""
+    kind = str(column.type)
+    if kind in ("int64", "double"):
+        values: NDArray[Any] = column.to_numpy()
+        return values
+    if kind == "null":
+        return np.full(len(column), np.nan)
+    if kind.startswith("timestamp") and not column.null_count:
+        dates: NDArray[Any] = column.cast("timestamp[ns]").to_numpy()
+        return dates
+    return np.array([None if v is None else str(v) for v in column.to_pylist()], dtype=object)
+
+
+_TIME = re.compile(
+    r"(?:\d{1,2}[./-]\d{1,2}[./-]\d{2,4}[ T]+)?(\d{1,2}):([0-5]\d):([0-5]\d)(?:[.,:](\d{1,9}))?"
+)
+_DAY = 86_400 * 10**9
+# A decrease of more than half a day is midnight.
+_HALF_DAY = _DAY // 2
+
+
+def is_day_time(field: str) -> bool:
+    """Whether a field is a time of day, with seconds."""
+    return _TIME.fullmatch(field) is not None
+
+
+def day_nanoseconds(texts: NDArray[Any]) -> NDArray[np.int64] | None:
+    """Convert times of day to nanoseconds since the midnight before the first.
+
+    `texts` ((n,)). Returns (n,), or None, none if one is not a time of day. Counting continues past
+    midnight; dates are ignored.
+    """
+    found = [None if t is None else _TIME.fullmatch(str(t).strip()) for t in texts]
+    if not found or any(m is None or int(m[1]) > 23 for m in found):
+        return None
+    whole = np.array(
+        [
+            (int(m[1]) * 3600 + int(m[2]) * 60 + int(m[3])) * 10**9
+            + int((m[4] or "0").ljust(9, "0"))
+            for m in found
+            if m
+        ],
+        dtype=np.int64,
+    )
+    fell = np.concatenate([[0], np.cumsum(np.diff(whole) < -_HALF_DAY)])
+    return np.asarray(whole + fell * _DAY, dtype=np.int64)

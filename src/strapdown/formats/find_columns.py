@@ -12,9 +12,9 @@ from strapdown.formats.columns import (
     TRIADS,
     read_name,
     says_increment,
+    unit_of,
 )
 from strapdown.formats.recording import RawLog, ReadOptions
-from strapdown.formats.unit_words import unit_of
 
 AXES = "xyz"
 
@@ -31,21 +31,9 @@ class Column:
 def find_columns(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
     """Find the column of each quantity.
 
-    Parameters
-    ----------
-    raw : RawLog
-    options : ReadOptions
-        Its `columns` override what the file states, which overrides column names.
-
-    Returns
-    -------
-    dict of str to Column
-        Quantity to column; quantities that were not found are absent.
-
-    Raises
-    ------
-    ConfigError
-        Two columns fit one quantity, or an option names a column that does not exist.
+    `options`: its `columns` override what the file states, which overrides column names. Returns
+    quantity to column; quantities that were not found are absent. ConfigError: two columns fit one
+    quantity, or an option names a column that does not exist.
     """
     found = {
         quantity: Column(source, unit, "stated by the file")
@@ -78,12 +66,7 @@ def find_columns(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
 
 
 def require_gyro(raw: RawLog, found: dict[str, Column]) -> None:
-    """Refuse a log without three rates; the message lists its columns.
-
-    Raises
-    ------
-    DataError
-    """
+    """Refuse a log without three rates; the message lists its columns."""
     missing = [f"gyro_{a}" for a in AXES if f"gyro_{a}" not in found]
     if not missing:
         return

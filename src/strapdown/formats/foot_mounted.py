@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError
-from strapdown.formats import matlab
+from strapdown.formats import hdf5
 from strapdown.formats.recording import RawLog
 
 __all__ = ["detect", "detect_points", "read", "read_points"]
@@ -36,7 +36,7 @@ def detect_points(path: Path) -> bool:
 
 
 def _names(path: Path) -> set[str]:
-    if not matlab.detect(path):
+    if not hdf5.detect_matlab(path):
         return set()
     from scipy.io import whosmat
 
@@ -47,7 +47,7 @@ def _names(path: Path) -> set[str]:
 
 
 def _arrays(path: Path, *names: str) -> dict[str, Any]:
-    arrays, _ = matlab.read_arrays(path)
+    arrays, _ = hdf5.read_matlab_arrays(path)
     for name in names:
         if name not in arrays:
             raise DataError(
@@ -77,14 +77,6 @@ def _log(path: Path) -> tuple[Array, Array]:
 def read(path: Path) -> RawLog:
     """Read rates and specific force.
 
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    RawLog
-
     Raises
     ------
     DataError
@@ -106,21 +98,8 @@ def read(path: Path) -> RawLog:
 def read_points(path: Path) -> tuple[Array, Array]:
     """Read the control points.
 
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    time : ndarray, (m,), s
-        Times at which the foot was on each point.
-    places : ndarray, (m, 2), m
-        North and east.
-
-    Raises
-    ------
-    DataError
-        As `read`; or the numbers of points and samples differ, or a sample does not exist.
+    Returns `time` ((m,), s): times at which the foot was on each point; `places` ((m, 2), m): north
+    and east.
     """
     time, _ = _log(path)
     arrays = _arrays(path, *POINTS)

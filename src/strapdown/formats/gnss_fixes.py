@@ -10,8 +10,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.formats.arrays import told_by_file_rows
 from strapdown.formats.clocks import GPS, RELATIVE, Clock, unrolled, with_clock
-from strapdown.formats.table_rows import told_by_file_rows
 from strapdown.tables import gnss_table
 from strapdown.tables.checks import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
 
@@ -106,21 +106,9 @@ class Fixes:
 def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
     """Convert fixes to a Gnss table, or report their fault.
 
-    Parameters
-    ----------
-    fixes : Fixes
-    options : GnssOptions
-
-    Returns
-    -------
-    DataFrame
-        A Gnss table; ``attrs`` has its clock (`clocks`) and its `findings`.
-
-    Raises
-    ------
-    DataError
-        A stamp or position is not a number, time does not advance, a standard deviation is
-        zero, negative or not stated, or as `gnss_table`.
+    Returns a Gnss table; ``attrs`` has its clock (`clocks`) and its `findings`. DataError: a stamp
+    or position is not a number, time does not advance, a standard deviation is zero, negative or
+    not stated, or as `gnss_table`.
     """
     count = fixes.time.size
     asked, taken = options.position_sd, {}
@@ -159,9 +147,6 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
 def first_of(rows: NDArray[np.int64]) -> int | None:
     """Return the first of consecutive rows; None if some between were dropped."""
     return int(rows[0]) if int(rows[-1]) - int(rows[0]) == len(rows) - 1 else None
-
-
-# --- time and position ------------------------------------------------------------------
 
 
 def _time(fixes: Fixes, options: GnssOptions) -> tuple[Array, NDArray[np.bool_]]:
@@ -242,9 +227,6 @@ def _say_left_out(fixes: Fixes, keep: NDArray[np.bool_], code: str) -> None:
                 count=out.size,
             )
         )
-
-
-# --- standard deviations ----------------------------------------------------------------
 
 
 def _velocity(fixes: Fixes, asked: Sd | None, count: int) -> tuple[Array, Array]:

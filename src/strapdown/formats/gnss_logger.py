@@ -21,12 +21,12 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
+from strapdown.formats.arrays import numbers
 from strapdown.formats.clocks import UNIX, Clock
-from strapdown.formats.csv_columns import parsed
+from strapdown.formats.csv import parsed
 from strapdown.formats.find_columns import Column
 from strapdown.formats.gnss_fixes import Fixes, GnssOptions
 from strapdown.formats.join import join
-from strapdown.formats.numbers import numbers
 from strapdown.formats.phones import sensor_log
 from strapdown.formats.recording import RawLog
 
@@ -99,10 +99,6 @@ def _is_fix_header(line: str) -> bool:
 def read(path: Path) -> RawLog:
     """Read gyro, accelerometer and magnetometer, joined on the stamps of the gyro.
 
-    Parameters
-    ----------
-    path : Path
-
     Returns
     -------
     RawLog
@@ -152,21 +148,8 @@ def read(path: Path) -> RawLog:
 def read_fixes(path: Path, options: GnssOptions) -> Fixes:
     """Read the fixes of the receiver.
 
-    Parameters
-    ----------
-    path : Path
-    options : GnssOptions
-        Not used.
-
-    Returns
-    -------
-    Fixes
-        Stamps in s since 1970, on the clock of the sensors if the log has it.
-
-    Raises
-    ------
-    DataError
-        The log has no fix, or a line is damaged.
+    `options`: not used. Returns stamps in s since 1970, on the clock of the sensors if the log has
+    it. DataError: the log has no fix, or a line is damaged.
     """
     findings: list[Finding] = []
     lines = _lines(path)

@@ -55,11 +55,6 @@ class _Epoch:
 def read(path: Path, options: GnssOptions) -> Fixes:
     """Read the fixes of NMEA sentences.
 
-    Parameters
-    ----------
-    path : Path
-    options : GnssOptions
-
     Returns
     -------
     Fixes

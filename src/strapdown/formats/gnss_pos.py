@@ -20,7 +20,7 @@ from strapdown import rotation
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.clocks import GPS, WEEK, Clock, leap_seconds
-from strapdown.formats.csv_columns import columns_at_once
+from strapdown.formats.csv import columns_at_once
 from strapdown.formats.gnss_fixes import Fixes, GnssOptions
 from strapdown.frames import geodetic_from_ecef, q_ne
 
@@ -68,11 +68,6 @@ class _Layout:
 
 def read(path: Path, options: GnssOptions) -> Fixes:
     """Read the fixes of an RTKLIB solution.
-
-    Parameters
-    ----------
-    path : Path
-    options : GnssOptions
 
     Returns
     -------
@@ -241,9 +236,6 @@ def _time(
         )
     first = weeks[0] + np.floor(seconds[0] / WEEK)
     return np.asarray(WEEK * (weeks - first) + seconds), int(first)
-
-
-# --- positions and velocities -----------------------------------------------------------
 
 
 def _stack(named: dict[str, Array], names: list[str]) -> Array | None:

@@ -1,7 +1,8 @@
-"""HDF5 files, including MATLAB v7.3."""
+"""HDF5 and MATLAB files; MATLAB v7.3 is HDF5."""
 
 from __future__ import annotations
 
+import io
 from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ from strapdown.formats.recording import RawLog
 
 if TYPE_CHECKING:
     import h5py
+
 
 SUFFIXES = (".h5", ".hdf5", ".hdf", ".mat")
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -31,10 +33,6 @@ def detect(path: Path) -> bool:
 
 def read(path: Path) -> RawLog:
     """Read the numeric datasets of an HDF5 file.
-
-    Parameters
-    ----------
-    path : Path
 
     Returns
     -------
@@ -55,22 +53,7 @@ def read_arrays(
 ) -> tuple[dict[str, NDArray[Any]], dict[str, str], dict[str, Any]]:
     """Read arrays, their ``unit`` attributes, and the attributes of the file.
 
-    Parameters
-    ----------
-    path : Path
-    only : collection of str, optional
-        Names of the datasets to read; all if not given.
-
-    Returns
-    -------
-    arrays : dict of str to ndarray
-    units : dict of str to str
-    meta : dict
-
-    Raises
-    ------
-    DataError
-        As `read`.
+    `only` (collection of str): names of the datasets to read; all if not given.
     """
     import h5py
 
@@ -118,14 +101,7 @@ def write(
 ) -> None:
     """Write arrays with their units; equal input gives identical bytes.
 
-    Parameters
-    ----------
-    path : Path
-    arrays : dict of str to ndarray
-    units : dict of str to str
-        Written as the attribute ``unit`` of each.
-    meta : dict of str to str
-        Written as attributes of the file.
+    `units`: written as the attribute ``unit`` of each. `meta`: written as attributes of the file.
     """
     import h5py
 
@@ -136,3 +112,72 @@ def write(
             dataset = file.create_dataset(name, data=array, track_times=False)
             if name in units:
                 dataset.attrs["unit"] = units[name]
+
+
+# MATLAB files up to v7; v7.3 is read as HDF5.
+
+
+# Header text of a file. SciPy would write date and platform; equal input must give identical bytes.
+_HEADER = b"MATLAB 5.0 MAT-file, written by strapdown"
+
+
+def detect_matlab(path: Path) -> bool:
+    """Whether the name is that of a MATLAB file and the content is not HDF5."""
+    return path.is_file() and path.suffix.lower() == ".mat" and not detect(path)
+
+
+def read_matlab(path: Path) -> RawLog:
+    """Read the numeric arrays of a MATLAB file.
+
+    DataError: the file is not a MATLAB file, is damaged, or declares more data than it holds.
+    """
+    arrays, meta = read_matlab_arrays(path)
+    return raw_log(path, arrays, {}, meta)
+
+
+def read_matlab_arrays(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+    """Read the arrays and the texts of a MATLAB file."""
+    from scipy.io import loadmat, whosmat
+
+    stored = path.stat().st_size
+    try:
+        for name, shape, _ in whosmat(path):
+            refuse_lie(8 * int(np.prod(shape, dtype=object)), stored, str(name), path.name)
+        content = loadmat(path)
+    except DataError:
+        raise
+    except Exception as error:  # a damaged file can break the parser anywhere
+        raise DataError(
+            "io.matlab-unreadable", file=path.name, error=error or type(error).__name__
+        ) from None
+    named: dict[str, NDArray[Any]] = {}
+    for name, value in content.items():
+        if not name.startswith("__"):
+            named |= _unfolded(name, value)
+    arrays = {k: v for k, v in named.items() if v.dtype.kind in "iufb" and v.size > 1}
+    return arrays, {k: v for k, v in named.items() if k not in arrays}
+
+
+def _unfolded(name: str, value: Any) -> dict[str, NDArray[Any]]:
+    """Return a value under its name; fields of a structure under name.field."""
+    if not isinstance(value, np.ndarray) or value.dtype.names is None or value.size != 1:
+        return {name: np.asarray(value)}
+    found: dict[str, NDArray[Any]] = {}
+    for field in value.dtype.names:
+        found |= _unfolded(f"{name}.{field}", value[field].item())
+    return found
+
+
+def write_matlab(path: Path, arrays: dict[str, NDArray[Any]], meta: dict[str, str]) -> None:
+    """Write arrays; equal input gives identical bytes.
+
+    `meta`: written as character arrays.
+    """
+    from scipy.io import savemat
+
+    buffer = io.BytesIO()
+    stream: Any = buffer  # SciPy's stubs only accept file names
+    savemat(stream, {**arrays, **meta}, oned_as="column")
+    data = bytearray(buffer.getvalue())
+    data[:116] = _HEADER.ljust(116)
+    path.write_bytes(data)

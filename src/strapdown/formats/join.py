@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from strapdown.constants import TIME_UNITS
 from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.formats.arrays import numbers, ticks_of
 from strapdown.formats.columns import QUANTITIES
 from strapdown.formats.find_columns import Column, find_columns
-from strapdown.formats.numbers import numbers, ticks_of
 from strapdown.formats.recording import RawLog, ReadOptions
 from strapdown.tables import find_gaps
 
@@ -48,31 +48,13 @@ def join(
 
     Interpolation is linear; there is no extrapolation.
 
-    Parameters
-    ----------
-    logs : sequence of RawLog
-        One has the gyro. Their clocks have a common origin; units may differ.
-    name : str
-        Name of the result, for messages.
-    files : tuple of Path, optional
-        Every file that was read; by default those of the logs.
-    rows_of_member : bool
-        Name the result after the gyro's log, a member of a folder or an archive, because rows
-        are counted in that.
-
-    Returns
-    -------
-    RawLog
-        The rows of the gyro's log, without those for which another sensor has no value; columns
-        are named ``log/column``. The findings list interpolations with their distances, and
-        dropped rows.
-
-    Raises
-    ------
-    DataError
-        No log has a gyro; clocks do not overlap; a value is not a number; axes differ.
-    ConfigError
-        Two logs have the same quantity.
+    `logs`: one has the gyro. Their clocks have a common origin; units may differ. `name`: name of
+    the result, for messages. `files`: every file that was read; by default those of the logs.
+    `rows_of_member`: name the result after the gyro's log, a member of a folder or an archive,
+    because rows are counted in that. Returns the rows of the gyro's log, without those for which
+    another sensor has no value; columns are named ``log/column``. The findings list interpolations
+    with their distances, and dropped rows. DataError: no log has a gyro; clocks do not overlap; a
+    value is not a number; axes differ. ConfigError: two logs have the same quantity.
     """
     found = [find_columns(log, ReadOptions()) for log in logs]
     k = _with_gyro(logs, found, name)
@@ -141,10 +123,7 @@ def known_only(stated: dict[str, tuple[str, str | None]]) -> dict[str, tuple[str
 def clock_of(log: RawLog, found: dict[str, Column]) -> Clock:
     """Return the stamps of a log.
 
-    Raises
-    ------
-    DataError
-        The log has no stamps, or they are not numbers.
+    DataError: the log has no stamps, or they are not numbers.
     """
     if "time" not in found:
         raise DataError(
@@ -169,21 +148,9 @@ def in_seconds(clock: Clock, origin: Clock) -> Array:
 def at_stamps(time: Array, own: Array, values: Array) -> tuple[Array, NDArray[np.bool_], float]:
     """Interpolate samples linearly to stamps.
 
-    Parameters
-    ----------
-    time : ndarray, (n,)
-        Stamps of the output.
-    own : ndarray, (m,)
-        Increasing stamps of the samples.
-    values : ndarray, (m, 3)
-
-    Returns
-    -------
-    values : ndarray, (n, 3)
-        NaN before the first sample and after the last.
-    inside : ndarray of bool, (n,)
-    distance : float
-        Largest distance from a stamp inside to its nearest sample.
+    `time` ((n,)): stamps of the output. `own` ((m,)): increasing stamps of the samples. `values`
+    ((m, 3)). Returns `values` ((n, 3)): NaN before the first sample and after the last; `inside`
+    ((n,)); `distance`: largest distance from a stamp inside to its nearest sample.
     """
     inside = (time >= own[0]) & (time <= own[-1])
     out = np.column_stack(
@@ -337,20 +304,8 @@ def _wide(ticks: Any) -> Any:
 def with_columns(logs: Sequence[RawLog], options: ReadOptions) -> list[RawLog]:
     """Return logs with the columns that the user named, as if the logs stated them.
 
-    Parameters
-    ----------
-    logs : sequence of RawLog
-    options : ReadOptions
-        A column is named as in its log, or as ``log/column``.
-
-    Returns
-    -------
-    list of RawLog
-
-    Raises
-    ------
-    ConfigError
-        A named column is in no log.
+    `options`: a column is named as in its log, or as ``log/column``. ConfigError: a named column is
+    in no log.
     """
     asked: list[dict[str, str]] = [{} for _ in logs]
     for quantity, source in options.columns.items():

@@ -1,4 +1,4 @@
-"""Checks of the statements of a log and its user against the numbers."""
+"""Checks of the statements of a log and its user against the numbers; sums as means."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.constants import ACCEL_UNITS, GYRO_UNITS, MAG_UNITS
-from strapdown.errors import DataError, Finding
+from strapdown.constants import ACCEL_SUMS, ACCEL_UNITS, GYRO_SUMS, GYRO_UNITS, MAG_UNITS
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.inference import THRESHOLD, Inference
-from strapdown.formats.summed import SUMS, sum_of
+
+__all__ = ["OPEN", "SUMS", "intervals", "sampling_of_sums", "sum_of"]
+
 
 Array = NDArray[np.float64]
 UNITS = {"gyro": GYRO_UNITS, "accel": ACCEL_UNITS, "mag": MAG_UNITS}
@@ -28,24 +30,9 @@ def inferred_unit(
 ) -> tuple[str, str]:
     """Infer the unit of a triad, which is not stated, from its numbers.
 
-    Parameters
-    ----------
-    triad : {'gyro', 'accel', 'mag'}
-    said : dict of str to Inference
-        By quantity.
-    values : ndarray, (n, 3)
-    file : str
-    findings : list of Finding
-        Inferences are appended.
-
-    Returns
-    -------
-    unit, why : str
-
-    Raises
-    ------
-    DataError
-        The probability does not reach 0.99, or the numbers are increments.
+    `triad` ({'gyro', 'accel', 'mag'}). `said`: by quantity. `values` ((n, 3)). `findings`:
+    inferences are appended. DataError: the probability does not reach 0.99, or the numbers are
+    increments.
     """
     unit = said.get(f"{triad}_unit")
     form = said.get(f"{triad}_form")
@@ -123,17 +110,8 @@ def report_contradictions(
 ) -> None:
     """Report where the numbers contradict a file or a name.
 
-    Parameters
-    ----------
-    said : dict of str to Inference
-    units : dict of str to str
-        Triad to the unit that it is read in.
-    asked : set of str
-        Triads whose unit the user stated or the numbers gave; these are not checked.
-    mirrored : bool
-        The user stated left-handed sensor axes.
-    file : str
-    findings : list of Finding
+    `units`: triad to the unit that it is read in. `asked`: triads whose unit the user stated or the
+    numbers gave; these are not checked. `mirrored`: the user stated left-handed sensor axes.
     """
     for triad, unit in units.items():
         other = said.get(f"{triad}_unit")
@@ -196,14 +174,7 @@ def _settled(said: dict[str, Inference], quantity: str) -> bool:
 def axes_against_gravity(said: dict[str, Inference]) -> Finding | None:
     """Check by gravity whether axes taken as forward, right, down are correct.
 
-    Parameters
-    ----------
-    said : dict of str to Inference
-
-    Returns
-    -------
-    Finding or None
-        None if gravity agrees, or is inconclusive.
+    Returns none if gravity agrees, or is inconclusive.
     """
     up = said.get("up_axis")
     if up is None or up.value is None or up.value == "-z" or up.confidence < 0.5:
@@ -225,13 +196,7 @@ def report_upside_down(
 ) -> None:
     """Report that the stated axes have the sensor upside down.
 
-    Parameters
-    ----------
-    said : dict of str to Inference
-    axis : str
-        The sensor axis stated to point down.
-    file : str
-    findings : list of Finding
+    `axis`: the sensor axis stated to point down.
     """
     up = said.get("up_axis")
     if up is None or up.value != axis or up.confidence < 0.8:
@@ -245,3 +210,59 @@ def report_upside_down(
             evidence=up.evidence[0],
         )
     )
+
+
+# Increments of angle and velocity, converted to means over their steps.
+
+#: Units of increments, by triad.
+SUMS: dict[str, dict[str, float]] = {"gyro": GYRO_SUMS, "accel": ACCEL_SUMS, "mag": {}}
+#: Unit choices for a name that states increments without a unit.
+OPEN = {triad: " or ".join(units) for triad, units in SUMS.items()}
+# Unit of the increments for each unit of rate.
+_SUM_OF = {"rad/s": "rad", "deg/s": "deg", "m/s2": "m/s", "g": "g*s"}
+
+
+def sum_of(unit: str | None, triad: str) -> str:
+    """Return the unit of the increments of a rate, or the choice if the unit is unknown."""
+    return _SUM_OF.get(unit or "", OPEN[triad])
+
+
+def intervals(time: Array, kept: NDArray[np.int64]) -> Array:
+    """Compute the integration time of each sample; (n, 1), s.
+
+    `time` ((n,), s): stamps of the samples used; at least two. `kept` ((n,)): their indices in the
+    log. After a dropped sample an increment still belongs to its own step, not to the gap.
+    """
+    steps = np.diff(time)
+    usual = float(np.median(steps))
+    alone = np.diff(kept) > 1
+    length = np.concatenate([[usual], np.where(alone, np.minimum(steps, usual), steps)])
+    return np.asarray(length[:, None])
+
+
+def sampling_of_sums(
+    summed: set[str], triads: set[str], asked: str | None, file: str, findings: list[Finding]
+) -> str:
+    """Return the sampling of increments: always means, regardless of the file.
+
+    `summed`: triads that hold increments; not empty. `triads`: triads used. `asked`: sampling
+    stated by the user. `findings`: the conversion is appended. ConfigError: the user states
+    instantaneous values.
+    """
+    names = [t for t in ("gyro", "accel") if t in summed]
+    if asked and asked.lower() != "mean":
+        raise ConfigError(
+            "io.sampling-against-increments", quantity="--sampling", asked=asked, names=names
+        )
+    rest = [t for t in ("gyro", "accel") if t in triads - summed]
+    findings.append(
+        Finding(
+            "io.increments-made-means-with-rates" if rest else "io.increments-made-means",
+            file=file,
+            quantity="sampling",
+            severity="note",
+            names=names,
+            rest=rest,
+        )
+    )
+    return "mean"

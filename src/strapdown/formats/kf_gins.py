@@ -9,14 +9,32 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
-from strapdown.formats.clocks import GPS, WEEK
+from strapdown.formats.arrays import numbers, told_by_file_rows
+from strapdown.formats.clocks import GPS, WEEK, Clock, clock_of, unrolled, with_clock
+from strapdown.formats.find_columns import Column
+from strapdown.formats.gnss_fixes import Fixes, GnssOptions
 from strapdown.formats.recording import RawLog
+from strapdown.formats.trajectory_csv import write_decimals
+from strapdown.formats.trajectory_options import TrajectoryFileOptions
+from strapdown.tables import TRAJECTORY, check_trajectory, trajectory_table
+from strapdown.tables.checks import index_of, values_of
 
-__all__ = ["COLUMNS", "detect", "read"]
+__all__ = [
+    "COLUMNS",
+    "detect",
+    "detect_fixes",
+    "detect_trajectory",
+    "read",
+    "read_fixes",
+    "read_trajectory",
+    "write_nav",
+]
+
 
 Array = NDArray[np.float64]
 COLUMNS = ["time", *(f"dtheta_{a}" for a in "xyz"), *(f"dv_{a}" for a in "xyz")]
@@ -67,10 +85,6 @@ def _are_increments(block: Array) -> bool:
 
 def read(path: Path) -> RawLog:
     """Read increments of angle and velocity.
-
-    Parameters
-    ----------
-    path : Path
 
     Returns
     -------
@@ -127,3 +141,185 @@ def _axes(columns: dict[str, NDArray[np.float64]], raw: RawLog) -> str | None:
         )
     )
     return "x,y,z" if told else None
+
+
+# Fixes: seven columns without a header, or thirteen with velocity.
+#
+# Each line: GPS seconds of week; latitude, longitude in deg and height above the ellipsoid in m, of
+# the antenna; standard deviations north, east, down in m; and, with thirteen columns, velocity
+# north, east, down and its standard deviations in m/s.
+
+
+NAMES = ("time", "lat", "lon", "alt", "north_sd", "east_sd", "down_sd")
+WITH_VELOCITY = (*NAMES, "VN", "VE", "VD", "VN_sd", "VE_sd", "VD_sd")
+
+
+def detect_fixes(path: Path) -> bool:
+    """Detect by rows of seven or thirteen numbers without a header."""
+    if not path.is_file() or path.suffix.lower() not in csv.SUFFIXES:
+        return False
+    with path.open("rb") as stream:
+        head = stream.read(csv.HEAD)
+    lines = [line.split() for line in head.splitlines() if line.strip()]
+    lines = [line for line in lines if not line[0].startswith((b"#", b"%"))]
+    if not lines or len(lines[0]) not in (len(NAMES), len(WITH_VELOCITY)):
+        return False
+    return all(csv.is_data(f.decode("latin-1")) for f in lines[0])
+
+
+def read_fixes(path: Path, options: GnssOptions) -> Fixes:
+    """Read fixes without a header.
+
+    DataError: the number of columns differs, a value is not a number, or the data are inertial.
+    """
+    if detect(path):
+        raise DataError("io.these-increments-inertial-sensors-not", file=path.name)
+    raw = csv.read(path)
+    names = WITH_VELOCITY if len(raw.columns) == len(WITH_VELOCITY) else NAMES
+    if len(raw.columns) != len(names):
+        raise DataError(
+            "io.kf-gins-fix-column-count",
+            file=raw.name,
+            row=raw.row(0),
+            count=len(raw.columns),
+        )
+    return fixes_of(raw, names)
+
+
+def fixes_of(raw: RawLog, names: tuple[str, ...]) -> Fixes:
+    """Convert columns in a known order to fixes."""
+    values = {
+        name: np.asarray(numbers(raw, Column(column, None, ""), name), dtype=np.float64)
+        for name, column in zip(names, raw.columns, strict=True)
+    }
+
+    def block(first: int) -> np.ndarray:
+        return np.column_stack([values[n] for n in names[first : first + 3]])
+
+    raw.findings.append(
+        Finding(
+            "io.taken-for-kf-gins-fixes-with-velocity"
+            if len(names) > len(NAMES)
+            else "io.taken-for-kf-gins-fixes",
+            file=raw.name,
+            severity="note",
+            count=len(names),
+        )
+    )
+    return Fixes(
+        name=raw.name,
+        time=values["time"],
+        place=block(1),
+        rows=np.arange(1, values["time"].size + 1) if raw.rows is None else raw.rows,
+        clock=Clock(GPS),
+        velocity=block(7) if len(names) > len(NAMES) else None,
+        position_sd=block(4),
+        velocity_sd=block(10) if len(names) > len(NAMES) else None,
+        findings=raw.findings,
+    )
+
+
+# Trajectories (``.nav``): eleven columns without a header.
+#
+# Each line: GPS week, seconds of week; latitude, longitude in deg, height above the ellipsoid in m;
+# velocity north, east, down in m/s; roll, pitch, heading in deg, heading from 0 to 360.
+
+TRAJECTORY_NAMES = ("week", "time", *TRAJECTORY)
+SUFFIX = ".nav"
+# Decimals of the columns: 10 ns; 1e-11 deg is a micrometer; 1e-8 m and m/s; 1e-9 deg.
+DECIMALS = (0, 8, 11, 11, 8, 8, 8, 8, 9, 9, 9)
+
+
+def detect_trajectory(path: Path) -> bool:
+    """Detect by the name, or by rows of eleven numbers without a header."""
+    if not path.is_file():
+        return False
+    if path.suffix.lower() == SUFFIX:
+        return True
+    if path.suffix.lower() not in csv.SUFFIXES:
+        return False
+    with path.open("rb") as stream:
+        lines = stream.read(csv.HEAD).splitlines()
+    rows = [line.split() for line in lines if line.strip() and line.lstrip()[:1] not in b"#%"]
+    return bool(rows) and len(rows[0]) == len(TRAJECTORY_NAMES) and all(_number(f) for f in rows[0])
+
+
+def _number(field: bytes) -> bool:
+    try:
+        float(field)
+    except ValueError:
+        return False
+    return True
+
+
+def read_trajectory(path: Path) -> pd.DataFrame:
+    """Read a trajectory.
+
+    Returns
+    -------
+    DataFrame
+        A Trajectory table, time in seconds of the week of the first row; week 0 means that the
+        week is not known.
+
+    Raises
+    ------
+    DataError
+        A row has another width or a value that is not a number, or as `trajectory_table`.
+    """
+    raw = csv.read(path)
+    if len(raw.columns) != len(TRAJECTORY_NAMES):
+        raise DataError(
+            "io.nav-column-count",
+            file=raw.name,
+            row=raw.row(0),
+            count=len(raw.columns),
+            count_2=len(TRAJECTORY_NAMES),
+        )
+    named = zip(TRAJECTORY_NAMES, raw.columns, strict=True)
+    values = {
+        n: np.asarray(numbers(raw, Column(c, None, ""), n), dtype=np.float64) for n, c in named
+    }
+    week = values["week"]
+    time = values["time"] + WEEK * (week - week[0])
+    if np.isfinite(time).all():
+        time, _ = unrolled(time)
+    with told_by_file_rows(raw.name, raw.row):
+        table = trajectory_table(
+            time,
+            np.column_stack([values[n] for n in TRAJECTORY[:3]]),
+            np.column_stack([values[n] for n in TRAJECTORY[3:6]]),
+            np.column_stack([values[n] for n in TRAJECTORY[6:]]),
+            source=raw.name,
+        )
+    known = np.isfinite(week[0]) and week[0] > 0
+    with_clock(table, Clock(GPS, 0.0, int(week[0]) if known else None))
+    table.attrs["findings"] = tuple(raw.findings)
+    return table
+
+
+def write_nav(
+    path: Path,
+    trajectory: pd.DataFrame,
+    *,
+    name: str = "trajectory",
+    options: TrajectoryFileOptions | None = None,
+) -> None:
+    """Write a trajectory for KF-GINS and its evaluation tools.
+
+    `trajectory`: a Trajectory table. Its ``attrs`` may state the GPS week (`clocks`); otherwise it
+    is 0. `name`: not written: the format has no field for it. `options`: not used. DataError: the
+    table is not valid.
+
+    Numbers are rounded to `DECIMALS`: positions to a micrometer, times to 10 ns.
+    """
+    check_trajectory(trajectory)
+    time = index_of(trajectory)
+    clock = clock_of(trajectory)
+    week, seconds = np.zeros(time.size), time
+    if clock.name == GPS and clock.week is not None:
+        seconds = time + clock.origin
+        more = np.floor(seconds / WEEK)
+        week, seconds = clock.week + more, seconds - WEEK * more
+    values = values_of(trajectory, TRAJECTORY)
+    columns = [week, seconds, *values[:, :8].T, np.mod(values[:, 8], 360.0)]
+    write_decimals(path, columns, DECIMALS)

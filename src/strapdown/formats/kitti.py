@@ -54,10 +54,6 @@ def read(path: Path) -> RawLog:
     path : Path
         The folder ``oxts``, or its parent, the folder of the drive.
 
-    Returns
-    -------
-    RawLog
-
     Raises
     ------
     DataError
@@ -93,22 +89,8 @@ def read(path: Path) -> RawLog:
 def read_fixes(path: Path, options: GnssOptions) -> Fixes:
     """Read positions and velocities of the unit's own solution as fixes.
 
-    Parameters
-    ----------
-    path : Path
-        As `read`.
-    options : GnssOptions
-        Not used.
-
-    Returns
-    -------
-    Fixes
-        Each with the accuracy that the unit states; down as north and east.
-
-    Raises
-    ------
-    DataError
-        As `read`.
+    `path`: as `read`. `options`: not used. Returns each with the accuracy that the unit states;
+    down as north and east.
     """
     time, values, _ = _values(path)
     name = path.resolve().name
@@ -141,11 +123,6 @@ def read_trajectory(path: Path) -> pd.DataFrame:
     -------
     DataFrame
         A Trajectory table in seconds from 1970.
-
-    Raises
-    ------
-    DataError
-        As `read`.
     """
     time, values, _ = _values(path)
     name = path.resolve().name
@@ -164,10 +141,7 @@ def read_trajectory(path: Path) -> pd.DataFrame:
 def files_of(path: Path) -> tuple[Path, ...]:
     """List the files that fixes or a trajectory are read from.
 
-    Parameters
-    ----------
-    path : Path
-        As `read`.
+    `path`: as `read`.
     """
     return _files(path)
 

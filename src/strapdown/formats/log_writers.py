@@ -15,7 +15,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError
-from strapdown.formats import csv, hdf5, matlab, npz
+from strapdown.formats import csv, hdf5, numpy_files
 from strapdown.tables import ACCEL, EULER, GYRO, QUATERNION
 
 __all__ = [
@@ -57,7 +57,7 @@ def _write_csv(path: Path, imu: pd.DataFrame, truth: pd.DataFrame | None) -> Non
 def _write_npz(path: Path, imu: pd.DataFrame, truth: pd.DataFrame | None) -> None:
     named = {k + _SUFFIX.get(k, ""): v for k, v in _arrays(imu, truth).items()}
     meta = {"sampling": np.array(imu.attrs["sampling"]), "axes": np.array(_AXES)}
-    npz.write(path, named | meta)
+    numpy_files.write(path, named | meta)
 
 
 def _write_hdf5(path: Path, imu: pd.DataFrame, truth: pd.DataFrame | None) -> None:
@@ -68,7 +68,7 @@ def _write_hdf5(path: Path, imu: pd.DataFrame, truth: pd.DataFrame | None) -> No
 
 def _write_mat(path: Path, imu: pd.DataFrame, truth: pd.DataFrame | None) -> None:
     named = {k + _SUFFIX.get(k, ""): v for k, v in _arrays(imu, truth).items()}
-    matlab.write(path, named, {"sampling": imu.attrs["sampling"], "axes": _AXES})
+    hdf5.write_matlab(path, named, {"sampling": imu.attrs["sampling"], "axes": _AXES})
 
 
 LogWriter = Callable[[Path, pd.DataFrame, pd.DataFrame | None], None]
@@ -85,19 +85,8 @@ LOG_WRITERS: dict[str, LogWriter] = {
 def log_formats(names: Sequence[str]) -> tuple[str, ...]:
     """Look up formats by name.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Keys of `LOG_WRITERS`; ``all`` selects every format.
-
-    Returns
-    -------
-    tuple of str
-
-    Raises
-    ------
-    ConfigError
-        A format does not exist.
+    `names`: keys of `LOG_WRITERS`; ``all`` selects every format. ConfigError: a format does not
+    exist.
     """
     for name in names:
         if name not in (*LOG_WRITERS, "all"):
@@ -112,13 +101,7 @@ def log_formats(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def write_attitude_csv(path: Path, attitude: pd.DataFrame) -> None:
-    """Write an Attitude table as text.
-
-    Parameters
-    ----------
-    path : Path
-    attitude : DataFrame
-    """
+    """Write an Attitude table as text."""
     columns = {"time_s": attitude.index.to_numpy(dtype=np.float64)}
     columns |= {q: attitude[q].to_numpy() for q in QUATERNION}
     columns |= {f"{e}_deg": attitude[e].to_numpy() for e in EULER}

@@ -177,16 +177,8 @@ class MmeCode:
 def decode_mme(code: str, *, objects: int = 1) -> MmeCode | None:
     """Decode a channel code.
 
-    Parameters
-    ----------
-    code : str
-    objects : int
-        Number of test objects: with more than one, the body names the object.
-
-    Returns
-    -------
-    MmeCode or None
-        None unless the code has sixteen letters and digits.
+    `objects`: number of test objects: with more than one, the body names the object. Returns none
+    unless the code has sixteen letters and digits.
     """
     text = code.strip().upper()
     if len(text) != LENGTH or not (text.isascii() and text.isalnum()):

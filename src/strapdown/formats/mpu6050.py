@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
-from strapdown.formats import hdf5, matlab
+from strapdown.formats import hdf5
 from strapdown.formats.recording import RawLog
 
 GYRO_FILE = "mpu6050_gyroscope.mat"
@@ -95,7 +95,7 @@ def _accel_columns(
 
 
 def _buffer(path: Path, name: str, findings: list[Finding]) -> NDArray[Any]:
-    arrays = (hdf5.read_arrays(path) if hdf5.detect(path) else matlab.read_arrays(path))[0]
+    arrays = (hdf5.read_arrays(path) if hdf5.detect(path) else hdf5.read_matlab_arrays(path))[0]
     if name not in arrays or 4 not in arrays[name].shape or arrays[name].ndim != 2:
         raise DataError(
             "io.no-four-rows-holds",

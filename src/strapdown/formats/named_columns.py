@@ -42,23 +42,10 @@ _ENDINGS |= {"_hpa": "hPa", "_kpa": "kPa", "_pa": "Pa", "_m": "m", "_s": "s"}
 def read_reference_path(path: str | Path) -> pd.DataFrame:
     """Read the path of a point from cameras or a survey.
 
-    Parameters
-    ----------
-    path : str or Path
-        A table with the columns ``time north east down`` and, if not exact, ``north_sd east_sd
-        down_sd``; s and m, unless a column states ``[ms]`` or ``[mm]``.
-
-    Returns
-    -------
-    DataFrame
-        Indexed by time in s, positions in m.
-
-    Raises
-    ------
-    ConfigError
-        The file does not exist.
-    DataError
-        A column is missing or unknown, a value is not a number, or time does not advance.
+    `path`: a table with the columns ``time north east down`` and, if not exact, ``north_sd east_sd
+    down_sd``; s and m, unless a column states ``[ms]`` or ``[mm]``. Returns indexed by time in s,
+    positions in m. ConfigError: the file does not exist. DataError: a column is missing or unknown,
+    a value is not a number, or time does not advance.
     """
     raw = read_raw(Path(path))
     units = {"time": "s"} | dict.fromkeys([*NED, *POSITION_SD], "m")
@@ -77,24 +64,10 @@ def read_reference_path(path: str | Path) -> pd.DataFrame:
 
 
 def columns_of(raw: RawLog, units: Mapping[str, str], wanted: Sequence[str]) -> dict[str, Array]:
-    """Return columns by name, in the units of the tables.
+    """Return columns by name, in the units of the tables; (n,).
 
-    Parameters
-    ----------
-    raw : RawLog
-    units : mapping of str to str
-        Unit of each possible column.
-    wanted : sequence of str
-        Required columns.
-
-    Returns
-    -------
-    dict of str to ndarray, (n,)
-
-    Raises
-    ------
-    DataError
-        A column is missing, has an unknown unit, or holds a value that is not a number.
+    `units`: unit of each possible column. `wanted`: required columns. DataError: a column is
+    missing, has an unknown unit, or holds a value that is not a number.
     """
     by_lower = {name.lower(): name for name in units}
     found: dict[str, Array] = {}

@@ -99,10 +99,7 @@ class CrashTest:
     def channel(self, number: int) -> Channel:
         """Return a channel by its number.
 
-        Raises
-        ------
-        DataError
-            The channel does not exist.
+        DataError: the channel does not exist.
         """
         for channel in self.channels:
             if channel.number == number:
@@ -126,10 +123,6 @@ def read_nhtsa(path: str | Path) -> CrashTest:
     path : str or Path
         The header, ``v10146.EV5``, or its folder. The channels, ``v10146.001`` and so on, are
         beside it and are read when `Channel.table` is first used.
-
-    Returns
-    -------
-    CrashTest
 
     Raises
     ------
@@ -178,10 +171,7 @@ def read_nhtsa(path: str | Path) -> CrashTest:
 def header_of(path: Path) -> Path:
     """Find the header of a test, given as file or folder.
 
-    Raises
-    ------
-    DataError
-        The folder holds no header, or more than one.
+    DataError: the folder holds no header, or more than one.
     """
     if not path.is_dir():
         return path
@@ -337,10 +327,7 @@ LARGEST_HEADER = 50_000_000
 def sections(file: Path) -> dict[str, list[tuple[list[str], int]]]:
     """Split a header into sections: rows of fields, with their line numbers.
 
-    Raises
-    ------
-    DataError
-        The file is missing, empty, far too large, truncated, or in another format.
+    DataError: the file is missing, empty, far too large, truncated, or in another format.
     """
     if not file.is_file():
         raise DataError("io.no-such-file", file=str(file))
@@ -431,9 +418,6 @@ def row_error(file: Path, line: int, section: str, found: int, needed: int) -> D
         section=section,
         needed=needed,
     )
-
-
-# One channel of a crash test of the NHTSA database: its header row and its samples.
 
 
 KMH = 1.0 / 3.6
@@ -544,10 +528,7 @@ class Channel:
     def si_unit(self) -> str:
         """Unit of `table`.
 
-        Raises
-        ------
-        DataError
-            The recorded unit is not known.
+        DataError: the recorded unit is not known.
         """
         return self._si()[0]
 
@@ -563,11 +544,8 @@ class Channel:
         Accelerations are as recorded: the channels are zeroed before the impact, so they exclude
         gravity of the state before it.
 
-        Raises
-        ------
-        DataError
-            The file is missing, empty, truncated, or differs from the header; a value is not a
-            finite number; time does not advance; or the unit is unknown.
+        DataError: the file is missing, empty, truncated, or differs from the header; a value is not
+        a finite number; time does not advance; or the unit is unknown.
         """
         time, values = self.recorded
         assert self.path is not None
@@ -580,13 +558,7 @@ class Channel:
 
     @cached_property
     def recorded(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Stamps in s from the impact, and samples in the unit as recorded.
-
-        Raises
-        ------
-        DataError
-            As `table`, except for the unit.
-        """
+        """Stamps in s from the impact, and samples in the unit as recorded."""
         if self.path is None:
             raise DataError(
                 "io.listed-header-file-not-folder",

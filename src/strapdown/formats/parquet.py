@@ -28,10 +28,6 @@ def detect(path: Path) -> bool:
 def read(path: Path) -> RawLog:
     """Read the numeric columns of a table.
 
-    Parameters
-    ----------
-    path : Path
-
     Returns
     -------
     RawLog

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
+from strapdown.formats.arrays import numbers
 from strapdown.formats.find_columns import Column
 from strapdown.formats.join import Clock, at_stamps, in_seconds
-from strapdown.formats.numbers import numbers
 from strapdown.formats.recording import RawLog
 
 # The phone's own axes point right, to the top edge, and out of the screen. It is assumed to lie on
@@ -35,26 +35,9 @@ def sensor_log(
 ) -> RawLog:
     """Make the log of one sensor of a phone.
 
-    Parameters
-    ----------
-    name : str
-        For messages.
-    file : Path
-    columns : mapping of str to ndarray, (n,)
-    triad : str
-        ``gyro``, ``accel`` or ``mag``.
-    unit : str or None
-        None if unknown.
-    time : (str, str)
-        Column of the stamps and their unit.
-    xyz : (str, str, str)
-        Columns of the three axes.
-    rows : ndarray of int, optional
-    findings : list of Finding, optional
-
-    Returns
-    -------
-    RawLog
+    `name`: for messages. `columns` ((n,)). `triad`: ``gyro``, ``accel`` or ``mag``. `unit`: none if
+    unknown. `time` ((str, str)): column of the stamps and their unit. `xyz` ((str, str, str)):
+    columns of the three axes.
     """
     return RawLog(
         name=name,
@@ -71,20 +54,9 @@ def sensor_log(
 def force_of(linear: RawLog, gravity: RawLog) -> RawLog:
     """Add linear acceleration and gravity, each with the phone's sign, to specific force.
 
-    Parameters
-    ----------
-    linear, gravity : RawLog
-        From `sensor_log`, of the triad ``accel``, in one unit.
-
-    Returns
-    -------
-    RawLog
-        The sum, at the stamps of `linear` that gravity covers.
-
-    Raises
-    ------
-    DataError
-        The two do not overlap in time, or a value is not a number.
+    `linear`, `gravity`: from `sensor_log`, of the triad ``accel``, in one unit. Returns the sum, at
+    the stamps of `linear` that gravity covers. DataError: the two do not overlap in time, or a
+    value is not a number.
     """
     clocks, values = [], []
     for log in (linear, gravity):

@@ -17,9 +17,9 @@ import numpy as np
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.join import join
-from strapdown.formats.members import Member, file_member, first_line, members_of, peek
 from strapdown.formats.phones import AXES, XYZ
 from strapdown.formats.recording import RawLog
+from strapdown.formats.sensor_folder import Member, file_member, first_line, members_of, peek
 
 _TIME = re.compile(r"time \(s\)", re.I)
 _TRIADS = {
@@ -41,14 +41,6 @@ def detect(path: Path) -> bool:
 
 def read(path: Path) -> RawLog:
     """Read gyro, specific force and magnetic field, joined on the stamps of the gyro.
-
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    RawLog
 
     Raises
     ------

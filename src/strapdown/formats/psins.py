@@ -50,10 +50,6 @@ def detect(path: Path) -> bool:
 def read(path: Path) -> RawLog:
     """Read the increments of a strapdown unit.
 
-    Parameters
-    ----------
-    path : Path
-
     Returns
     -------
     RawLog
@@ -77,9 +73,6 @@ def read(path: Path) -> RawLog:
     if any("psins" in c.lower() for c in comments):
         return _simu(path, lines, ended, findings)
     return _matrix(path, lines, ended, findings) or csv.parse(data, path.name, (path,))
-
-
-# --- the log of a SIMU ------------------------------------------------------------------
 
 
 def _simu(path: Path, lines: Lines, ended: bool, findings: list[Finding]) -> RawLog:
@@ -182,9 +175,6 @@ def _counts(
     return block, rows
 
 
-# --- plain matrices ---------------------------------------------------------------------
-
-
 def _matrix(path: Path, lines: Lines, ended: bool, findings: list[Finding]) -> RawLog | None:
     """Return increments in rad and m/s with their time, if plausible; else None."""
     if len(lines) < 3 or any(len(line.split()) != 7 for _, line in lines[:3]):
@@ -213,9 +203,6 @@ def _matrix(path: Path, lines: Lines, ended: bool, findings: list[Finding]) -> R
         )
     )
     return _log(path, time, block[:, :6], rows, AXES if up else None, findings, None)
-
-
-# --- both -------------------------------------------------------------------------------
 
 
 def _block(

@@ -15,7 +15,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError
-from strapdown.formats import npz
+from strapdown.formats import numpy_files
 from strapdown.formats.clocks import RELATIVE, Clock, with_clock
 from strapdown.formats.gnss_fixes import Fixes, GnssOptions
 from strapdown.formats.recording import RawLog
@@ -53,7 +53,7 @@ def detect_truth(path: Path) -> bool:
 
 
 def _arrays(path: Path, time: str, values: str, width: int) -> tuple[Array, Array]:
-    arrays = npz.arrays_of(path)
+    arrays = numpy_files.arrays_of(path)
     stamps, block = arrays[time], arrays[values]
     numeric = stamps.dtype.kind in "iuf" and block.dtype.kind in "iuf"
     if not numeric or stamps.ndim != 1 or block.shape != (stamps.size, width):
@@ -70,14 +70,6 @@ def _arrays(path: Path, time: str, values: str, width: int) -> tuple[Array, Arra
 
 def read(path: Path) -> RawLog:
     """Read the angular rates and specific force.
-
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    RawLog
 
     Raises
     ------
@@ -98,22 +90,7 @@ def read(path: Path) -> RawLog:
 
 
 def read_fixes(path: Path, options: GnssOptions) -> Fixes:
-    """Read the fixes; the archive does not state standard deviations.
-
-    Parameters
-    ----------
-    path : Path
-    options : GnssOptions
-
-    Returns
-    -------
-    Fixes
-
-    Raises
-    ------
-    DataError
-        As `read`.
-    """
+    """Read the fixes; the archive does not state standard deviations."""
     time, place = _arrays(path, "fix_time", "fix", 3)
     return Fixes(path.name, time, place, np.arange(1, time.size + 1))
 
@@ -121,19 +98,10 @@ def read_fixes(path: Path, options: GnssOptions) -> Fixes:
 def read_truth(path: Path) -> pd.DataFrame:
     """Read the trajectory.
 
-    Parameters
-    ----------
-    path : Path
-
     Returns
     -------
     DataFrame
         A Trajectory table.
-
-    Raises
-    ------
-    DataError
-        As `read`, or as `trajectory_table`.
     """
     time, truth = _arrays(path, "time", "truth", 9)
     table = trajectory_table(time, truth[:, :3], truth[:, 3:6], truth[:, 6:], source=path.name)

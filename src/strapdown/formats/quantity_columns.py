@@ -10,12 +10,12 @@ import numpy as np
 
 from strapdown.constants import TIME_UNITS
 from strapdown.errors import ConfigError, DataError
-from strapdown.formats.columns import CLOCKS
-from strapdown.formats.unit_words import UNIT_OF as UNITS_OF_LOGS
-from strapdown.formats.unit_words import unit_of
+from strapdown.formats.columns import CLOCKS, unit_of
+from strapdown.formats.columns import UNIT_OF as UNITS_OF_LOGS
 
 __all__ = [
     "ANGLES",
+    "GEODETIC_QUANTITIES",
     "LENGTHS",
     "PRESSURES",
     "RATES",
@@ -24,6 +24,7 @@ __all__ = [
     "Quantity",
     "find_quantities",
 ]
+
 
 ANGLES = {"deg": 1.0, "rad": float(np.degrees(1.0))}
 LENGTHS = {"m": 1.0, "km": 1000.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048}
@@ -99,32 +100,11 @@ def find_quantities(
 ) -> dict[str, Found]:
     """Find the column of each quantity.
 
-    Parameters
-    ----------
-    names : iterable of str
-        As in the file.
-    known : dict of str to Quantity
-    asked : dict of str to str
-        Quantity to the name of its column, or its number, from 1; overrides what the names
-        suggest.
-    file : str
-        For messages.
-    units : dict of str to str, optional
-        Column to unit, if stated apart from the name.
-    of : str
-        Object that the quantities describe, for messages.
-
-    Returns
-    -------
-    dict of str to Found
-        Quantities that were not found are absent.
-
-    Raises
-    ------
-    ConfigError
-        A requested column does not exist, or its quantity is unknown.
-    DataError
-        Two columns fit one quantity, or a unit does not fit its quantity.
+    `names`: as in the file. `asked`: quantity to the name of its column, or its number, from 1;
+    overrides what the names suggest. `file`: for messages. `units`: column to unit, if stated apart
+    from the name. `of`: object that the quantities describe, for messages. Returns quantities that
+    were not found are absent. ConfigError: a requested column does not exist, or its quantity is
+    unknown. DataError: two columns fit one quantity, or a unit does not fit its quantity.
     """
     columns = list(names)
     wanted: dict[str, str] = {}
@@ -176,11 +156,7 @@ def find_quantities(
 def read_words(name: str, known: Mapping[str, Quantity]) -> tuple[str, str | None]:
     """Split a name into its word without blanks, and its unit as spelled, or None.
 
-    Parameters
-    ----------
-    name : str
-    known : dict of str to Quantity
-        A name that is a word as a whole has no unit: ``h``, ``s``.
+    `known`: a name that is a word as a whole has no unit: ``h``, ``s``.
     """
     text = name.strip()
     bracket = _BRACKETS.search(text)
@@ -216,3 +192,39 @@ def _factor(
             units=", ".join(known.units) or "none",
         )
     return known.units[spelled]
+
+
+# Column names of positions and velocities in tables of fixes and of trajectories.
+
+
+_HEADS = ("v", "vel", "velocity", "speed")
+
+
+def _velocities(letter: str, word: str) -> tuple[str, ...]:
+    return tuple(h + e for h in _HEADS for e in (letter, word)) + tuple(word + h for h in _HEADS)
+
+
+#: Degrees, meters over the ellipsoid, meters per second; velocity up is negative velocity down.
+GEODETIC_QUANTITIES: dict[str, Quantity] = {
+    "lat": Quantity(("lat", "latitude"), ANGLES),
+    "lon": Quantity(("lon", "lng", "long", "longitude"), ANGLES),
+    "alt": Quantity(
+        (
+            "alt",
+            "altitude",
+            "h",
+            "hgt",
+            "height",
+            "hell",
+            "altell",
+            "heightell",
+            "ellipsoidalheight",
+            "heightellipsoid",
+            "altitudeellipsoid",
+        ),
+        LENGTHS,
+    ),
+    "VN": Quantity(_velocities("n", "north"), SPEEDS),
+    "VE": Quantity(_velocities("e", "east"), SPEEDS),
+    "VD": Quantity(_velocities("d", "down"), SPEEDS, _velocities("u", "up")),
+}

@@ -15,7 +15,7 @@ from strapdown.errors import ConfigError, DataError
 from strapdown.evaluation.position_references import is_place, parse_place
 from strapdown.evaluation.reference_points import parse_reference
 from strapdown.formats import csv, read_raw
-from strapdown.formats.assemble_truth import truth_of_file
+from strapdown.formats.assemble import truth_of_file
 from strapdown.formats.recording import Origin, ReadOptions
 
 __all__ = ["read_reference_words", "read_truth"]
@@ -29,22 +29,11 @@ SENTENCE = re.compile(
 def read_reference_words(path: Path) -> list[str] | None:
     """Read reference points as sentences.
 
-    Parameters
-    ----------
-    path : Path
-        ``.toml`` with ``references = ["end same as start", ...]``; a text file with one sentence
-        per line (``#`` for comments); or a CSV with the columns ``time_s, kind, since_s,
-        roll_deg, pitch_deg, heading_deg, turns, axis, sd_deg``, as needed by the kinds.
-
-    Returns
-    -------
-    list of str or None
-        None if the file is not a list of reference points; it may be an attitude truth.
-
-    Raises
-    ------
-    DataError
-        An entry of the list is missing or malformed.
+    `path`: ``.toml`` with ``references = ["end same as start", ...]``; a text file with one
+    sentence per line (``#`` for comments); or a CSV with the columns ``time_s, kind, since_s,
+    roll_deg, pitch_deg, heading_deg, turns, axis, sd_deg``, as needed by the kinds. Returns none if
+    the file is not a list of reference points; it may be an attitude truth. DataError: an entry of
+    the list is missing or malformed.
     """
     if path.suffix.lower() == ".toml":
         return _understood(list(enumerate(_from_toml(path), start=1)), path, "sentence")

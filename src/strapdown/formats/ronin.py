@@ -38,14 +38,6 @@ def detect(path: Path) -> bool:
 def read(path: Path) -> RawLog:
     """Read rates, specific force and, if present, the magnetic field.
 
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    RawLog
-
     Raises
     ------
     DataError

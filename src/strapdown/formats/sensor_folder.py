@@ -1,18 +1,24 @@
-"""Folders and zip archives with one text table per sensor, as ``gyro.csv`` and ``accel.csv``."""
+"""Folders and zip archives with one text table per sensor, and access to their members."""
 
 from __future__ import annotations
 
+import codecs
 import dataclasses
 import re
-from pathlib import Path
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
 
 from strapdown.errors import DataError
 from strapdown.formats import csv
+from strapdown.formats.arrays import refuse_lie
 from strapdown.formats.columns import read_name
 from strapdown.formats.find_columns import find_columns
 from strapdown.formats.join import join
-from strapdown.formats.members import Member, members_of, peek
 from strapdown.formats.recording import RawLog, ReadOptions
+
+__all__ = ["Member", "is_container", "members_of", "peek"]
+
 
 _TRIADS = {"gyro": "gyro", "accel": "accel", "mag": "mag", "magnetometer": "mag"}
 _AXIS = re.compile(r"([xyz])(?:[\s_-]*axis)?(?:\s*[\[(].*)?", re.I)
@@ -27,10 +33,6 @@ def detect(path: Path) -> bool:
 
 def read(path: Path) -> RawLog:
     """Read each sensor's table, joined on the stamps of the gyro.
-
-    Parameters
-    ----------
-    path : Path
 
     Returns
     -------
@@ -73,3 +75,128 @@ def _log(member: Member) -> RawLog:
         unit = read_name(column).unit or read_name(member.stem).unit
         stated[column] = (f"{triad}_{axis}", unit)
     return dataclasses.replace(raw, stated=stated)
+
+
+# Uniform access to the files of a folder or the members of a zip archive.
+
+
+HEAD = 4096  # bytes in which the first line is searched
+
+
+@dataclass(frozen=True)
+class Member:
+    """A file of a folder, or a member of an archive.
+
+    Attributes
+    ----------
+    name : str
+        Path inside the folder or archive, with slashes.
+    label : str
+        Given path and name, for messages.
+    file : Path
+        The file on disk that holds it.
+    archived : bool
+    """
+
+    name: str
+    label: str
+    file: Path
+    archived: bool
+
+    @property
+    def stem(self) -> str:
+        """Last part of the name without its suffix."""
+        return PurePosixPath(self.name).stem
+
+    @property
+    def suffix(self) -> str:
+        """Suffix of the name, in lower case."""
+        return PurePosixPath(self.name).suffix.lower()
+
+    def read(self) -> bytes:
+        """Read the whole content.
+
+        Raises
+        ------
+        DataError
+            The file cannot be read, or declares more data than is stored.
+        """
+        return self._bytes(-1)
+
+    def first_line(self) -> str:
+        """Return the first non-blank line, up to `HEAD` bytes."""
+        data = self._bytes(HEAD)
+        wide = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+        text = data.decode("utf-16" if wide else "utf-8-sig", "replace")
+        return next((line for line in text.splitlines() if line.strip()), "")
+
+    def _bytes(self, count: int) -> bytes:
+        try:
+            if not self.archived:
+                with self.file.open("rb") as stream:
+                    return stream.read(count)
+            with zipfile.ZipFile(self.file) as archive:
+                info = archive.getinfo(self.name)
+                refuse_lie(info.file_size, info.compress_size, self.name, self.file.name)
+                with archive.open(info) as member:
+                    return member.read(count)
+        except DataError:
+            raise
+        except Exception as error:  # a damaged archive can break any of the decoders
+            raise DataError(
+                "io.member-unreadable", file=self.label, error=error or type(error).__name__
+            ) from None
+
+
+def is_container(path: Path) -> bool:
+    """Whether this is a folder, or has the name of a zip archive."""
+    return path.is_dir() or (path.is_file() and path.suffix.lower() == ".zip")
+
+
+def members_of(path: Path) -> list[Member]:
+    """List the files of a folder and of its folder ``meta``, or the members of an archive.
+
+    Returns sorted by name; files that macOS adds to archives are left out. DataError: the archive
+    is damaged.
+    """
+    whole = path.resolve().name
+    if path.is_dir():
+        found = sorted(p for f in (path, path / "meta") if f.is_dir() for p in f.iterdir())
+        return [
+            Member(name, f"{whole}/{name}", p, False)
+            for p in found
+            if p.is_file() and not (name := p.relative_to(path).as_posix()).startswith(".")
+        ]
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = sorted({i.filename for i in archive.infolist() if not i.is_dir()})
+    except Exception as error:  # zipfile raises more than BadZipFile on damaged archives
+        raise DataError(
+            "io.zip-unreadable", file=whole, error=error or type(error).__name__
+        ) from None
+    return [
+        Member(n, f"{whole}/{n}", path, True)
+        for n in names
+        if not any(part.startswith((".", "__MACOSX")) for part in PurePosixPath(n).parts)
+    ]
+
+
+def peek(path: Path) -> list[Member]:
+    """List members for format detection; none if not a container or unreadable."""
+    try:
+        return members_of(path) if is_container(path) else []
+    except (DataError, OSError):
+        return []
+
+
+def first_line(member: Member) -> str:
+    """Return the first line of a member for format detection; empty if unreadable."""
+    try:
+        return member.first_line()
+    except DataError:
+        return ""
+
+
+def file_member(path: Path) -> Member:
+    """Wrap a single file as a member."""
+    return Member(path.name, path.name, path, False)

@@ -28,9 +28,9 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.join import join
-from strapdown.formats.members import Member, file_member, first_line, members_of, peek
 from strapdown.formats.phones import force_of, sensor_log
 from strapdown.formats.recording import RawLog
+from strapdown.formats.sensor_folder import Member, file_member, first_line, members_of, peek
 
 TIME = ("time", "ns")
 GYROS = ("Gyroscope", "GyroscopeUncalibrated")
@@ -67,14 +67,6 @@ def detect(path: Path) -> bool:
 
 def read(path: Path) -> RawLog:
     """Read gyro, specific force and magnetic field, joined on the stamps of the gyro.
-
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    RawLog
 
     Raises
     ------

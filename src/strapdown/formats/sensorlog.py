@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
+from strapdown.formats.arrays import ticks_of
 from strapdown.formats.find_columns import Column
 from strapdown.formats.join import join
-from strapdown.formats.members import file_member, first_line
-from strapdown.formats.numbers import ticks_of
 from strapdown.formats.phones import force_of, sensor_log
 from strapdown.formats.recording import RawLog
+from strapdown.formats.sensor_folder import file_member, first_line
 
 MOTION, GYRO, FORCE = "motionRotationRate", "gyroRotation", "accelerometerAcceleration"
 USER, GRAVITY = "motionUserAcceleration", "motionGravity"
@@ -50,10 +50,6 @@ def detect(path: Path) -> bool:
 
 def read(path: Path) -> RawLog:
     """Read rates and specific force, joined on the stamps of the gyro.
-
-    Parameters
-    ----------
-    path : Path
 
     Returns
     -------

@@ -55,10 +55,6 @@ def detect(path: Path) -> bool:
 def read(path: Path) -> RawLog:
     """Read the blocks of each sensor, joined on the stamps of the gyro.
 
-    Parameters
-    ----------
-    path : Path
-
     Returns
     -------
     RawLog

@@ -1,8 +1,10 @@
-"""Trajectories and their differences as text tables, with units in the column names."""
+"""Trajectories and their differences as text tables with units, and as Parquet."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -10,7 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown.evaluation.trajectory_differences import ROTATION_ERROR
 from strapdown.formats import csv
-from strapdown.formats.decimal_rows import write_decimals
+from strapdown.formats.clocks import clock_of
 from strapdown.formats.trajectory_options import TrajectoryFileOptions
 from strapdown.tables import (
     EULER,
@@ -22,7 +24,17 @@ from strapdown.tables import (
     check_trajectory_error,
 )
 
-__all__ = ["DECIMALS", "named_columns", "one_line", "told_of", "write_csv", "write_error_csv"]
+__all__ = [
+    "DECIMALS",
+    "named_columns",
+    "one_line",
+    "told_of",
+    "write_csv",
+    "write_decimals",
+    "write_error_csv",
+    "write_parquet",
+]
+
 
 #: Decimals of time, latitude, longitude, height, velocity and attitude, for fixed digits.
 DECIMALS = (9, 11, 11, 6, 8, 8, 8, 9, 9, 9)
@@ -119,3 +131,81 @@ def write_error_csv(path: Path, table: pd.DataFrame, *, name: str = "error") -> 
     if more:
         comments["phi"] = "rotation vector of C_est C_ref^T about north, east, down"
     csv.write(path, named_columns(table, [*TRAJECTORY_ERROR, *more]), comments)
+
+
+# Fast writing of rows of numbers with fixed decimals.
+
+
+Array = NDArray[np.float64]
+# Rows converted to text at once.
+PIECE = 1 << 15
+
+
+def write_decimals(
+    path: Path,
+    columns: Sequence[Array],
+    decimals: Sequence[int],
+    *,
+    separator: str = " ",
+    head: str = "",
+) -> None:
+    """Write columns of numbers as lines.
+
+    `columns` ((n,)): finite numbers. `decimals`: decimals of each column, 0 to 15. The error of a
+    number is at most half a unit of its last decimal, plus the precision of a double. `separator`:
+    one ASCII character. `head`: header text, with its line feeds.
+    """
+    from strapdown._kernels.decimal_text import WIDTH, decimal_text
+
+    count = columns[0].size
+    places = np.array(decimals, dtype=np.int64)
+    text = np.empty(min(count, PIECE) * len(columns) * WIDTH, dtype=np.uint8)
+    with path.open("wb") as stream:
+        stream.write(head.encode())
+        for first in range(0, count, PIECE):
+            rows = np.column_stack([c[first : first + PIECE] for c in columns])
+            written = decimal_text(rows, places, ord(separator), text)
+            if written < 0:
+                # A number of more than 15 digits.
+                form = separator.join(f"%.{d}f" for d in decimals) + "\n"
+                stream.write("".join(form % tuple(row) for row in rows.tolist()).encode())
+            else:
+                stream.write(text[:written].data)
+
+
+def write_parquet(
+    path: Path,
+    trajectory: pd.DataFrame,
+    *,
+    name: str = "trajectory",
+    options: TrajectoryFileOptions | None = None,
+) -> None:
+    """Write a Trajectory table as Parquet.
+
+    `trajectory`: further numeric columns, such as standard deviations, are written under their own
+    names. `options`: ellipsoid and epoch are written to the file's metadata, like the comments of
+    the CSV. DataError: the table is not valid.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    chosen = options or TrajectoryFileOptions()
+    check_trajectory(trajectory)
+    columns = named_columns(trajectory, TRAJECTORY)
+    columns |= {
+        str(c): trajectory[c].to_numpy(dtype=np.float64)
+        for c in trajectory.columns
+        if c not in TRAJECTORY and trajectory[c].dtype.kind in "iuf"
+    }
+    clock = clock_of(trajectory)
+    told: dict[str, Any] = told_of(name, chosen)
+    told |= {"clock": clock.name, "clock_origin_s": repr(clock.origin)}
+    told |= {} if clock.week is None else {"gps_week": str(clock.week)}
+    table = pa.table({n: pa.array(v) for n, v in columns.items()})
+    pq.write_table(
+        table.replace_schema_metadata(told),
+        path,
+        compression="zstd",
+        use_dictionary=False,
+        use_byte_stream_split=True,
+    )

@@ -95,10 +95,7 @@ class TrajectoryFileOptions:
     def require_wgs84(self, form: str) -> None:
         """Refuse positions that a format would misinterpret.
 
-        Raises
-        ------
-        ConfigError
-            The ellipsoid is not WGS 84.
+        ConfigError: the ellipsoid is not WGS 84.
         """
         if self.ellipsoid != WGS84:
             raise ConfigError(
@@ -111,12 +108,7 @@ class TrajectoryFileOptions:
     def date(self, time: float) -> str:
         """Return date and time of day of an instant in UTC, to the microsecond.
 
-        Raises
-        ------
-        ConfigError
-            No epoch was given.
-        DataError
-            The date is out of range.
+        ConfigError: no epoch was given. DataError: the date is out of range.
         """
         if self.epoch is None:
             raise ConfigError("io.without-epoch-no-dates", quantity="epoch")

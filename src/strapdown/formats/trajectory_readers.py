@@ -1,9 +1,9 @@
-"""Readers of trajectory files."""
+"""Readers of trajectory files: their columns, and the consistency of their content."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,21 +11,37 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import ConfigError, DataError
-from strapdown.formats import csv, kitti, parquet, pyins, trajectory_nav
+from strapdown.constants import TIME_UNITS
+from strapdown.dsp.running_integral import running_integral
+from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.formats import csv, kf_gins, kitti, parquet, pyins
+from strapdown.formats.arrays import numbers, ticks_of, told_by_file_rows
 from strapdown.formats.clocks import Clock, clock_of_name, with_clock
+from strapdown.formats.columns import CLOCKS, EULERS, TIMES
 from strapdown.formats.find_columns import Column
-from strapdown.formats.numbers import numbers, ticks_of
-from strapdown.formats.quantity_columns import Found
+from strapdown.formats.quantity_columns import (
+    ANGLES,
+    GEODETIC_QUANTITIES,
+    Found,
+    Quantity,
+    find_quantities,
+)
 from strapdown.formats.recording import RawLog
-from strapdown.formats.table_rows import told_by_file_rows
-from strapdown.formats.trajectory_columns import QUANTITIES, find_trajectory_columns
-from strapdown.formats.trajectory_plausibility import judge_trajectory
-from strapdown.tables import trajectory_table
+from strapdown.rotation import within_half_turn
+from strapdown.tables import EULER, VELOCITY, trajectory_table
+
+__all__ = [
+    "QUANTITIES",
+    "TRAJECTORY_READERS",
+    "TrajectoryReader",
+    "files_of_trajectory",
+    "find_trajectory_columns",
+    "judge_trajectory",
+    "read_trajectory",
+]
+
 
 Array = NDArray[np.float64]
-
-__all__ = ["TRAJECTORY_READERS", "TrajectoryReader", "files_of_trajectory", "read_trajectory"]
 
 
 @dataclass(frozen=True)
@@ -40,7 +56,7 @@ class TrajectoryReader:
 #: Tried before a table is read by its column names.
 TRAJECTORY_READERS: dict[str, TrajectoryReader] = {
     "kf-gins": TrajectoryReader(
-        "KF-GINS, eleven columns (.nav)", trajectory_nav.detect, trajectory_nav.read
+        "KF-GINS, eleven columns (.nav)", kf_gins.detect_trajectory, kf_gins.read_trajectory
     ),
     "python-ins": TrajectoryReader(
         "python-ins arrays: time, truth (.npz)", pyins.detect_truth, pyins.read_truth
@@ -52,12 +68,7 @@ _ELLIPSOID = re.compile(r"[#%]\s*ellipsoid\s*:\s*(\S+)\s*$", re.M)
 
 
 def files_of_trajectory(path: str | Path) -> tuple[Path, ...]:
-    """List the files that a trajectory is read from: one, or several of a folder.
-
-    Parameters
-    ----------
-    path : str or Path
-    """
+    """List the files that a trajectory is read from: one, or several of a folder."""
     given = Path(path)
     return kitti.files_of(given) if kitti.detect(given) else (given,)
 
@@ -146,3 +157,126 @@ def _values(raw: RawLog, quantity: str, column: Found) -> Array:
         return np.asarray(ticks * (1e-9 if dated else column.factor), dtype=np.float64)
     values = np.asarray(numbers(raw, of, quantity), dtype=np.float64)
     return values if column.factor == 1.0 else values * column.factor
+
+
+# Assignment of the columns of a text table to the quantities of a trajectory, with units.
+
+
+#: Quantities of a trajectory table, with their possible names.
+QUANTITIES: dict[str, Quantity] = {
+    "time": Quantity((*TIMES, *CLOCKS), TIME_UNITS),
+    **GEODETIC_QUANTITIES,
+    **{angle: Quantity(tuple(words), ANGLES) for angle, words in EULERS.items()},
+}
+
+
+def find_trajectory_columns(
+    names: Iterable[str], asked: Mapping[str, str], file: str
+) -> dict[str, Found]:
+    """Find the column of each quantity.
+
+    `names`: as in the file. `asked`: quantity (one of `QUANTITIES`) to the name of its column, or
+    its number, from 1; overrides what the names suggest. `file`: for messages. Returns one for each
+    of `QUANTITIES`. ConfigError: a requested column does not exist, or its quantity is unknown.
+    DataError: a quantity is missing, two columns fit one quantity, or a unit does not fit.
+    """
+    columns = list(names)
+    found = find_quantities(columns, QUANTITIES, asked, file, of="a trajectory")
+    missing = [q for q in QUANTITIES if q not in found]
+    if missing:
+        raise DataError("io.missing-columns-3", file=file, missing=missing, columns=columns)
+    return found
+
+
+# Consistency of a trajectory's positions, velocities and headings.
+
+
+# A spherical Earth suffices to detect factors of 57.
+EARTH = 6.371e6  # m
+# Least motion for a conclusion.
+LEAST_MOTION = 5.0  # m, root mean square
+MOVING = 1.0  # m/s
+# Misfit of positions and integrated velocity, as a fraction of the motion: above which they
+# disagree, and below which another reading is accepted.
+DISAGREE, AGREE = 0.5, 0.1
+
+
+def judge_trajectory(
+    table: pd.DataFrame, *, angles_stated: bool, euler_stated: bool
+) -> list[Finding]:
+    """Compare positions with the integral of velocity, and heading with the course.
+
+    `table`: a Trajectory table. `angles_stated`, `euler_stated`: whether the file states the unit
+    of latitude and longitude, and of the attitude; radians are then not considered. Returns
+    positions and velocities that disagree without an apparent reason. DataError: they disagree but
+    agree with latitude and longitude exchanged, or taken as radians; or heading disagrees with the
+    course but agrees if taken as radians.
+    """
+    file = table.attrs.get("source")
+    if len(table) < 3:
+        return []
+    time = table.index.to_numpy(dtype=np.float64)
+    velocity = table[VELOCITY[:2]].to_numpy(dtype=np.float64)
+    if not euler_stated:
+        _refuse_radians_of_attitude(table[EULER].to_numpy(dtype=np.float64), velocity, file)
+    moved = running_integral(time, velocity)
+    moved -= moved.mean(axis=0)
+    size = float(np.sqrt(np.square(moved).sum(axis=1).mean()))
+    if not size > LEAST_MOTION:
+        return []
+    lat, lon = table["lat"].to_numpy(dtype=np.float64), table["lon"].to_numpy(dtype=np.float64)
+
+    def misfit(lat_deg: Array, lon_deg: Array) -> float:
+        phi, lam = np.radians(lat_deg), np.unwrap(np.radians(lon_deg))
+        place = EARTH * np.column_stack([phi, (lam - lam[0]) * np.cos(phi.mean())])
+        place -= place.mean(axis=0)
+        return float(np.sqrt(np.square(place - moved).sum(axis=1).mean())) / size
+
+    plain = misfit(lat, lon)
+    if plain < DISAGREE:
+        return []
+    readings: list[tuple[str, Callable[[], float], bool]] = [
+        (
+            "io.lat-lon-exchanged",
+            lambda: misfit(lon, lat),
+            bool(np.abs(lon).max() <= 90.0),
+        ),
+        (
+            "io.lat-lon-in-radians",
+            lambda: misfit(np.degrees(lat), np.degrees(lon)),
+            not angles_stated and bool(np.abs(lat).max() < 1.6 and np.abs(lon).max() < 6.3),
+        ),
+    ]
+    for code, of, possible in readings:
+        if possible and (other := of()) < AGREE:
+            raise DataError(code, file=file, quantity="lat, lon", misfit=plain, other=other)
+    return [
+        Finding(
+            "io.positions-and-velocities-disagree",
+            file=file,
+            quantity="lat, lon",
+            plain=plain,
+        )
+    ]
+
+
+def _refuse_radians_of_attitude(euler: Array, velocity: Array, file: str | None) -> None:
+    fast = np.hypot(velocity[:, 0], velocity[:, 1]) > MOVING
+    if fast.sum() < 3 or np.abs(euler).max() > 6.3:
+        return
+    course = np.degrees(np.arctan2(velocity[fast, 1], velocity[fast, 0]))
+
+    def apart(heading_deg: Array) -> float:
+        return float(np.median(np.abs(within_half_turn(course - heading_deg))))
+
+    heading = euler[fast, 2]
+    plain, radians = apart(heading), apart(np.degrees(heading))
+    # No vehicle moves 20 deg off its heading and, by coincidence, along 57 times its heading.
+    if plain > 20.0 and radians < 5.0:
+        raise DataError(
+            "io.heading-in-radians",
+            file=file,
+            quantity="heading",
+            plain=plain,
+            radians=radians,
+        )

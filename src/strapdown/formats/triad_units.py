@@ -1,24 +1,39 @@
-"""Units of gyro, accelerometer and magnetometer: stated, named, or inferred."""
+"""Units and axes of gyro, accelerometer and magnetometer: stated, named, or inferred."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
-from strapdown.formats.body_axes import mirrored
-from strapdown.formats.columns import parse_axes, says_increment
+from strapdown.formats.arrays import numbers
+from strapdown.formats.columns import parse_axes, parse_unit, says_increment
 from strapdown.formats.find_columns import AXES, Column
 from strapdown.formats.inference import Inference, Signals, infer_signals
-from strapdown.formats.judge import UNITS, inferred_unit, report_contradictions
-from strapdown.formats.numbers import numbers
+from strapdown.formats.judge import (
+    OPEN,
+    SUMS,
+    UNITS,
+    axes_against_gravity,
+    inferred_unit,
+    report_contradictions,
+    report_upside_down,
+)
 from strapdown.formats.recording import RawLog, ReadOptions
-from strapdown.formats.summed import OPEN, SUMS
-from strapdown.formats.unit_words import parse_unit
 
-__all__ = ["left_out", "told_by_numbers", "units_of_triads", "values_of_triads"]
+__all__ = [
+    "Axes",
+    "axes_matrix",
+    "body_axes",
+    "left_out",
+    "mirrored",
+    "told_by_numbers",
+    "units_of_triads",
+    "values_of_triads",
+]
 
 
 Array = NDArray[np.float64]
@@ -34,22 +49,8 @@ def told_by_numbers(
 ) -> dict[str, Inference]:
     """Run the inference on the numbers; skipped for a gyro alone with a stated unit.
 
-    Parameters
-    ----------
-    raw : RawLog
-    found : dict of str to Column
-    options : ReadOptions
-    values : dict of str to ndarray, (n, 3)
-        From `values_of_triads`.
-    ticks : ndarray or None, (n,)
-        Stamps as in the file.
-    dated : bool
-        Whether they were dates, now converted to ns.
-
-    Returns
-    -------
-    dict of str to Inference
-        By quantity.
+    `values` ((n, 3)): from `values_of_triads`. `ticks` ((n,)): stamps as in the file. `dated`:
+    whether they were dates, now converted to ns. Returns by quantity.
     """
     if set(values) == {"gyro"} and _stated_unit(found, "gyro", options):
         return {}
@@ -78,25 +79,8 @@ def units_of_triads(
 ) -> dict[str, tuple[str, str]]:
     """Return the unit of each usable triad, with the reason.
 
-    Parameters
-    ----------
-    raw : RawLog
-    found : dict of str to Column
-    options : ReadOptions
-    values : dict of str to ndarray, (n, 3)
-    said : dict of str to Inference
-        From `told_by_numbers`.
-    findings : list of Finding
-        Dropped triads, inferences and contradictions are appended.
-
-    Returns
-    -------
-    dict of str to (str, str)
-
-    Raises
-    ------
-    DataError
-        The unit of the gyro is not known.
+    `values` ((n, 3)). `said`: from `told_by_numbers`. `findings`: dropped triads, inferences and
+    contradictions are appended. DataError: the unit of the gyro is not known.
     """
     units: dict[str, tuple[str, str]] = {}
     asked: set[str] = set()
@@ -119,12 +103,7 @@ def units_of_triads(
 
 
 def _refuse_open(raw: RawLog, found: dict[str, Column], triad: str) -> None:
-    """Refuse a unit that the file leaves open: the numbers cannot decide between f and -f.
-
-    Raises
-    ------
-    DataError
-    """
+    """Refuse a unit that the file leaves open: the numbers cannot decide between f and -f."""
     column = found[f"{triad}_x"]
     unit = column.unit
     if unit is None and says_increment(column.source):
@@ -159,8 +138,6 @@ def _stated_unit(
     return None
 
 
-# Values of gyro, accelerometer and magnetometer as in a file.
-
 # Unusable triads are dropped, except the gyro, which suffices for an attitude.
 OPTIONAL = ("accel", "mag")
 
@@ -168,23 +145,9 @@ OPTIONAL = ("accel", "mag")
 def values_of_triads(
     raw: RawLog, found: dict[str, Column], findings: list[Finding]
 ) -> dict[str, Array]:
-    """Return the raw values of each usable triad.
+    """Return the raw values of each usable triad; (n, 3).
 
-    Parameters
-    ----------
-    raw : RawLog
-    found : dict of str to Column
-    findings : list of Finding
-        Dropped triads are appended.
-
-    Returns
-    -------
-    dict of str to ndarray, (n, 3)
-
-    Raises
-    ------
-    DataError
-        The values of the gyro cannot be used.
+    `findings`: dropped triads are appended. DataError: the values of the gyro cannot be used.
     """
     values = {"gyro": _triad(raw, found, "gyro")}
     for triad in OPTIONAL:
@@ -227,3 +190,53 @@ def left_out(raw: RawLog, triad: str, error: DataError) -> Finding:
         quantity=triad,
         reason=error.finding,
     )
+
+
+@dataclass(frozen=True)
+class Axes:
+    """Sensor axis of each body axis, with its sign and the reason."""
+
+    axis: list[int]
+    sign: list[float]
+    why: str
+
+
+def axes_matrix(axis: list[int], sign: list[float]) -> Array:
+    """Return the matrix ``C_bs`` from sensor axes to body axes."""
+    return np.asarray(np.eye(3)[axis] * np.array(sign)[:, None])
+
+
+def mirrored(axis: list[int], sign: list[float]) -> bool:
+    """Whether axes are a mirror image of the sensor's."""
+    return bool(np.linalg.det(axes_matrix(axis, sign)) < 0)
+
+
+def body_axes(
+    raw: RawLog, options: ReadOptions, said: dict[str, Inference], findings: list[Finding]
+) -> Axes:
+    """Return the axes stated by the user, else by the file, else the sensor's own.
+
+    `said`: inferences from the numbers. `findings`: assumptions and doubts are appended.
+    """
+    text = options.axes or raw.axes
+    if text is None:
+        doubt = None if options.accel_unit else axes_against_gravity(said)
+        taken = doubt or Finding("io.axes-not-stated", severity="note")
+        findings.append(taken.replace(file=raw.name, quantity="axes"))
+        return Axes([0, 1, 2], [1.0, 1.0, 1.0], "as they are")
+    axis, sign = parse_axes(text)
+    if options.axes and not options.accel_unit:
+        down = ("-" if sign[2] < 0 else "") + AXES[axis[2]]
+        report_upside_down(said, down, raw.name, findings)
+    if options.axes and mirrored(axis, sign):
+        findings.append(
+            Finding(
+                "io.axes-mirrored",
+                file=raw.name,
+                quantity="axes",
+                severity="note",
+                text=text,
+            )
+        )
+    why = f"{text} {'by --axes' if options.axes else 'of this kind of recording'}"
+    return Axes(axis, sign, why)

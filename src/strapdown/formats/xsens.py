@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
+from strapdown.formats.arrays import numbers
 from strapdown.formats.find_columns import Column
-from strapdown.formats.numbers import numbers
 from strapdown.formats.recording import RawLog
 
 COUNTER, STAMP = "PacketCounter", "SampleTimeFine"
@@ -49,10 +49,6 @@ def detect(path: Path) -> bool:
 
 def read(path: Path) -> RawLog:
     """Read rates and specific force, with stamps from the counters.
-
-    Parameters
-    ----------
-    path : Path
 
     Returns
     -------
@@ -157,13 +153,7 @@ def _unwrapped(
 
 
 def _tick(raw: RawLog, ticks: NDArray[Any], rate: float | None) -> int:
-    """Determine the tick in µs: the one that matches the stated rate, or a plausible one.
-
-    Raises
-    ------
-    DataError
-        Both are plausible, or none is.
-    """
+    """Determine the tick in µs: the one that matches the stated rate, or a plausible one."""
     step = float(np.median(np.diff(ticks))) if ticks.size > 1 else 0.0
     if not step > 0.0:
         return TICKS[0]

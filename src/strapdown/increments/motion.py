@@ -9,8 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown._kernels import motion_blocks
-from strapdown._kernels import motion_increments as one_step
+from strapdown._kernels import motion_increments as kernel
 from strapdown.errors import ConfigError, DataError
 from strapdown.increments.angle import INTERPOLATIONS as BETWEEN_STAMPS
 from strapdown.tables import ACCEL, GYRO, MOTION, check_imu, check_motion_increments, imu_table
@@ -86,18 +85,18 @@ def motion_increments(
     force = np.ascontiguousarray(imu[ACCEL].to_numpy(dtype=np.float64))
     dt = np.diff(time)
     out = np.empty((len(dt), len(MOTION)))
-    scratch = np.empty((motion_blocks.ROWS, motion_blocks.WIDEST))
+    scratch = np.empty((kernel.ROWS, kernel.WIDEST))
     ends: NDArray[Any] = time[1:]
     if samples == 1 and interpolation == "linear":
-        one_step.motion_increments_linear(dt, rate, force, mean, out)
+        kernel.motion_increments_linear(dt, rate, force, mean, out)
     elif interpolation == "cubic":
-        motion_blocks.motion_increments_neighbours(dt, rate, force, mean, scratch, out)
+        kernel.motion_increments_neighbours(dt, rate, force, mean, scratch, out)
     else:
-        motion_blocks.motion_increments_blocks(dt, rate, force, mean, samples, scratch, out)
+        kernel.motion_increments_blocks(dt, rate, force, mean, samples, scratch, out)
     if rows == "block" and samples > 1:
         last = np.empty(len(dt), dtype=np.int64)
         joined = np.empty_like(out)
-        count = motion_blocks.join_blocks(dt, samples, out, last, joined)
+        count = kernel.join_blocks(dt, samples, out, last, joined)
         # The step length equals the stamp difference, to the last bit.
         ends, out = ends[last[:count]], joined[:count].copy()
     table = pd.DataFrame(out, index=pd.Index(ends, name="time"), columns=MOTION, copy=False)

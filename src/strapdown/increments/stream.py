@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown._kernels import motion_blocks
-from strapdown._kernels import motion_increments as one_step
+from strapdown._kernels import motion_increments as kernel
 from strapdown.errors import ConfigError
 
 __all__ = ["IncrementStream", "IncrementStreamState"]
@@ -107,11 +106,11 @@ class IncrementStream:
         rate, force = (np.ascontiguousarray(samples[:, k : k + 3]) for k in (0, 3))
         out = np.empty((dt.size, 10))
         if self.interpolation == "linear":
-            one_step.motion_increments_linear(dt, rate, force, state.mean, out)
+            kernel.motion_increments_linear(dt, rate, force, state.mean, out)
             upto = dt.size
         else:
-            scratch = np.empty((motion_blocks.ROWS, motion_blocks.WIDEST))
-            motion_blocks.motion_increments_neighbours(dt, rate, force, state.mean, scratch, out)
+            scratch = np.empty((kernel.ROWS, kernel.WIDEST))
+            kernel.motion_increments_neighbours(dt, rate, force, state.mean, scratch, out)
             upto = dt.size if last else max(dt.size - 1, state.done)
         # Keep the step before the next one: it gives the slope of a mean, and is its neighbor.
         keep = max(upto - 1, 0)

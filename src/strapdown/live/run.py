@@ -20,9 +20,9 @@ from strapdown.config.navigation import CommandTable, LiveTable, NavigationSpec,
 from strapdown.config.navigation_file import navigation_spec
 from strapdown.config.navigation_modules import given_of, sensors_of
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
+from strapdown.formats.clocks import EPOCH
 from strapdown.formats.columns import parse_axes
 from strapdown.formats.log_writers import LOG_WRITERS
-from strapdown.formats.stamps import EPOCH
 from strapdown.live.clock import Clock
 from strapdown.live.latency import Latency, LatencyTape
 from strapdown.live.lines import (

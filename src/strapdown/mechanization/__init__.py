@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from strapdown._kernels.level import OMEGA_EL, V_L
-from strapdown.mechanization.mechanization import Mechanization
+from strapdown.mechanization.mechanization import HEIGHTS, Mechanization
 from strapdown.mechanization.ned import NorthEastDown
-from strapdown.mechanization.reference_heights import HEIGHTS
-from strapdown.mechanization.run import NavigationRun, navigate_segments, run_mechanization
+from strapdown.mechanization.run import (
+    NavigationRun,
+    NavTracker,
+    navigate_segments,
+    run_mechanization,
+)
 from strapdown.mechanization.tadic import Tadic
-from strapdown.mechanization.tracker import NavTracker
 from strapdown.mechanization.wander_azimuth import WanderAzimuth
 
 __all__ = [

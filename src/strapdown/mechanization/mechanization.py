@@ -6,32 +6,38 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, NoReturn
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from strapdown import rotation
+from strapdown._kernels import earth as kernel
 from strapdown._kernels.earth import RATE
-from strapdown._kernels.level import LEVEL
+from strapdown._kernels.level import LEVEL, ned_correct, ned_correct_rows, ned_levels
 from strapdown._kernels.ned import (
     ALT,
+    LARGEST_TURN,
     LAT,
+    LEAP,
     LON,
+    POLE,
     ROW,
     Q,
     V,
     reverse_increments,
+    trajectory_rows,
 )
-from strapdown._kernels.ned_level import ned_correct, ned_correct_rows, ned_levels
-from strapdown._kernels.trajectory import trajectory_rows
-from strapdown.ellipsoids import find_ellipsoid
-from strapdown.errors import ConfigError, Finding
-from strapdown.mechanization.reference_heights import HEIGHTS, reference_heights
-from strapdown.mechanization.refusal import refuse_start, refuse_step
+from strapdown.ellipsoids import WGS84, Ellipsoid, find_ellipsoid
+from strapdown.errors import ConfigError, DataError, DivergenceError, Finding
+from strapdown.frames import q_ne
 from strapdown.nav_state import NavState
 from strapdown.tables import MOTION, TRAJECTORY, check_trajectory
 from strapdown.tables.checks import is_number, values_of
+
+__all__ = ["displacement_between", "state_error"]
+
 
 Array = NDArray[np.float64]
 
@@ -129,15 +135,9 @@ class Mechanization(ABC):
     def levels(self, history: Array) -> Array:
         """Return the quantities that a filter needs of each row of a history.
 
-        Parameters
-        ----------
-        history : ndarray, (n, `row`)
-
-        Returns
-        -------
-        ndarray, (n, 14)
-            In level axes l: quaternion body to level, velocity, unit vector of the Earth's axis,
-            height, rate of the level relative to the Earth (`_kernels.level`).
+        `history` ((n, `row`)). Returns (n, 14), in level axes l: quaternion body to level,
+        velocity, unit vector of the Earth's axis, height, rate of the level relative to the Earth
+        (`_kernels.level`).
         """
         out = np.empty((len(history), LEVEL))
         ned_levels(history, find_ellipsoid(self.ellipsoid).parameters(), out)
@@ -150,28 +150,16 @@ class Mechanization(ABC):
     def level_from_ned(self, row: Array) -> Array:
         """Return the matrix from north-east-down to level axes, (3, 3).
 
-        Parameters
-        ----------
-        row : ndarray, (`row`,)
-            Of a history.
+        `row` ((`row`,)): of a history.
         """
         return np.eye(3)
 
     def correct(self, state: Array, error: ArrayLike) -> Array:
         """Subtract an error from a state.
 
-        Parameters
-        ----------
-        state : ndarray
-            It is not changed.
-        error : array_like, (9,)
-            State − truth, in level axes of the state: displacement in m, difference of the
-            velocities as vectors in m/s, and the rotation vector in rad of the attitude relative
-            to the Earth, ``C_state = exp([psi x]) C_true``.
-
-        Returns
-        -------
-        ndarray
+        `state`: it is not changed. `error` ((9,)): state − truth, in level axes of the state:
+        displacement in m, difference of the velocities as vectors in m/s, and the rotation vector
+        in rad of the attitude relative to the Earth, ``C_state = exp([psi x]) C_true``.
         """
         after = state.copy()
         earth = find_ellipsoid(self.ellipsoid).parameters()
@@ -179,18 +167,10 @@ class Mechanization(ABC):
         return after
 
     def corrected_history(self, history: Array, errors: Array) -> Array:
-        """Subtract an error from each row of a history.
+        """Subtract an error from each row of a history; (n, `row`).
 
-        Parameters
-        ----------
-        history : ndarray, (n, `row`)
-            It is not changed.
-        errors : ndarray, (n, 9)
-            As `correct`, in level axes of each row.
-
-        Returns
-        -------
-        ndarray, (n, `row`)
+        `history` ((n, `row`)): it is not changed. `errors` ((n, 9)): as `correct`, in level axes of
+        each row.
         """
         after = np.array(history)
         ned_correct_rows(after, errors, find_ellipsoid(self.ellipsoid).parameters())
@@ -199,14 +179,7 @@ class Mechanization(ABC):
     def nav_state(self, state: Array, time: float) -> NavState:
         """Return the position, velocity and attitude of a state.
 
-        Parameters
-        ----------
-        state : ndarray
-        time : float, s
-
-        Returns
-        -------
-        NavState
+        `time` (s).
         """
         return NavState(
             time=time,
@@ -241,35 +214,16 @@ class Mechanization(ABC):
     ) -> tuple[Array, Array]:
         """Advance over a segment of motion increments.
 
-        Parameters
-        ----------
-        state : ndarray
-            From `begin`, or from an earlier segment; it is not changed.
-        increments : DataFrame
-            A MotionIncrements table of any length, one row included.
-        heights : array_like, (n,), m, optional
-            Reference heights at the ends of the steps (backward: at their starts), for a damped
-            height; NaN for a missing one.
-        backward : bool
-            Go from the end of the increments to their start.
-
-        Returns
-        -------
-        state : ndarray
-            After the last step.
-        history : ndarray, (n, `row`)
-            After each step; backward the first row is the start of the first step. Of
-            north-east-down: latitude and longitude in rad, height in m, velocity north, east,
-            down in m/s, and ``q_nb``.
-
-        Raises
-        ------
-        DivergenceError
-            The state has left the validity of this mechanization, or is too near a pole; the first
-            such step is named.
-        DataError
-            `heights` is missing where the height is damped, given where it is not, infinite, or
-            of another length.
+        `state`: from `begin`, or from an earlier segment; it is not changed. `increments`: a
+        MotionIncrements table of any length, one row included. `heights` ((n,), m): reference
+        heights at the ends of the steps (backward: at their starts), for a damped height; NaN for a
+        missing one. `backward`: go from the end of the increments to their start. Returns `state`:
+        after the last step; `history` ((n, `row`)): after each step; backward the first row is the
+        start of the first step. Of north-east-down: latitude and longitude in rad, height in m,
+        velocity north, east, down in m/s, and ``q_nb``. DivergenceError: the state has left the
+        validity of this mechanization, or is too near a pole; the first such step is named.
+        DataError: `heights` is missing where the height is damped, given where it is not, infinite,
+        or of another length.
         """
         rows = values_of(increments, MOTION)
         history = np.empty((len(rows), self.row))
@@ -322,16 +276,7 @@ class Mechanization(ABC):
     ) -> pd.DataFrame:
         """Return a history as a Trajectory table.
 
-        Parameters
-        ----------
-        time : array_like, (n,), s
-        history : ndarray, (n, `row`)
-        source : str, optional
-            Name for messages.
-
-        Returns
-        -------
-        DataFrame
+        `time` ((n,), s). `history` ((n, `row`)).
         """
         rows = np.empty((len(history), len(TRAJECTORY)))
         self.fill_trajectory(history, rows)
@@ -365,3 +310,157 @@ class Mechanization(ABC):
             alt=row[self.alt_at],
             speed=self._speed(row),
         )
+
+
+# Errors for a step that leaves the validity of a mechanization.
+
+
+def refuse_start(
+    alt: float,
+    speed: float,
+    height_limits: tuple[float, float],
+    largest_speed: float,
+    source: str | None,
+) -> None:
+    """Refuse a start outside of the limits.
+
+    `alt` (m). `speed` (m/s). `height_limits` (m). `largest_speed` (m/s). `source`: name for the
+    message. DivergenceError: the state is outside of the limits.
+    """
+    lowest, highest = height_limits
+    if speed > largest_speed or not lowest <= alt <= highest:
+        raise DivergenceError(
+            "mechanization.state-begin-high-outside-or",
+            file=source,
+            quantity="state",
+            alt=alt,
+            speed=speed,
+            lowest=lowest,
+            highest=highest,
+            largest_speed=largest_speed,
+        )
+
+
+def refuse_step(
+    why: int, step: int, increments: pd.DataFrame, before: Finding | None, latitude_limit_deg: float
+) -> NoReturn:
+    """Raise the error of a step that a kernel refused.
+
+    `why`: code by the kernel's `verdict`. `step`: row of the increments, from 0. `increments`: a
+    MotionIncrements table. `before`: finding on the state before it; None at the first step.
+    `latitude_limit_deg` (deg). DivergenceError: always.
+    """
+    time = float(increments.index[step])
+    row = increments.iloc[step]
+    source = increments.attrs.get("source")
+    if why == POLE:
+        raise DivergenceError(
+            "mechanization.first-step-near-pole"
+            if before is None
+            else "mechanization.step-near-pole",
+            file=source,
+            quantity="lat",
+            time=time,
+            step=step + 1,
+            latitude_limit_deg=latitude_limit_deg,
+            before=before,
+        )
+    if why == LEAP:
+        raise DivergenceError(
+            "mechanization.first-step-too-far" if before is None else "mechanization.step-too-far",
+            file=source,
+            quantity="state",
+            time=time,
+            step=step + 1,
+            at_row=row["dt"],
+            largest_turn=LARGEST_TURN,
+            before=before,
+        )
+    raise DivergenceError(
+        "mechanization.first-step-diverges" if before is None else "mechanization.step-diverges",
+        file=source,
+        quantity="state",
+        time=time,
+        step=step + 1,
+        increments=[f"{name} {row[name]:.4g}" for name in MOTION],
+        before=before,
+    )
+
+
+#: Height options: free (by the sensors), held, damped by a reference.
+HEIGHTS = ("free", "held", "damped")
+
+
+def reference_heights(height: str, heights: ArrayLike | None, steps: int) -> Array:
+    """Return the reference heights of a segment as a kernel takes them.
+
+    `height` ({'free', 'held', 'damped'}): height option. `heights` ((n,), m, or None): NaN for
+    missing ones. `steps`: steps of the segment. Returns (n,), or (0,) where the height is not
+    damped. DataError: they are missing where the height is damped, given where it is not, infinite,
+    or of another length.
+    """
+    if height != "damped":
+        if heights is None:
+            return np.empty(0)
+        raise DataError("mechanization.heights-damp-height", quantity="heights", height=height)
+    if heights is None:
+        raise DataError("mechanization.height-damped-no-reference", quantity="heights")
+    try:
+        reference = np.ascontiguousarray(heights, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise DataError("mechanization.these-no-numbers", quantity="heights") from None
+    if reference.shape != (steps,):
+        raise DataError(
+            "mechanization.shape-steps", quantity="heights", shape=reference.shape, steps=steps
+        )
+    if np.isinf(reference).any():
+        raise DataError(
+            "mechanization.infinite",
+            row=int(np.argmax(np.isinf(reference))) + 1,
+            quantity="heights",
+        )
+    return reference
+
+
+def state_error(state: NavState, truth: NavState, ellipsoid: Ellipsoid = WGS84) -> Array:
+    """Return the error of a state, as defined in the filters.
+
+    Parameters
+    ----------
+    state, truth : NavState
+    ellipsoid : Ellipsoid
+
+    Returns
+    -------
+    ndarray, (9,)
+        State − truth, in north-east-down of `state`: displacement in m (to 1e-9 m), difference
+        of the velocities as vectors in m/s, and the rotation vector in rad of the attitude relative
+        to the Earth, ``C_state = exp([psi x]) C_true``. `Mechanization.correct` subtracts it.
+    """
+    apart = displacement_between(state, truth, ellipsoid)
+    # From the truth's local level to that of the state.
+    between = rotation.compose(_q_ne(state), rotation.conjugate(_q_ne(truth)))
+    psi = rotation.rotation_vector_from_quaternion(
+        rotation.compose(state.q_nb, rotation.conjugate(rotation.compose(between, truth.q_nb)))
+    )
+    return np.concatenate([apart, state.v_n - rotation.rotate(between, truth.v_n), psi])
+
+
+def displacement_between(state: NavState, truth: NavState, ellipsoid: Ellipsoid = WGS84) -> Array:
+    """Return the first three numbers of `state_error`, (3,), m."""
+    return np.array(
+        kernel.displacement(
+            state.lat,
+            state.lon,
+            state.alt,
+            truth.lat,
+            truth.lon,
+            truth.alt,
+            ellipsoid.semi_major_axis,
+            ellipsoid.eccentricity_squared,
+        )
+    )
+
+
+def _q_ne(state: NavState) -> Array:
+    return q_ne(math.degrees(state.lat), math.degrees(state.lon))

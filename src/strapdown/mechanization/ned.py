@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from strapdown._kernels import ned as kernel
-from strapdown._kernels.ned_sample import ned_update
+from strapdown._kernels.sample import ned_update
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.mechanization.mechanization import Array, Mechanization
 from strapdown.nav_state import NavState
@@ -40,16 +40,7 @@ class NorthEastDown(Mechanization):
     source: ClassVar[str] = "Tadic (2016) (1)-(19)"
 
     def begin(self, start: NavState) -> Array:
-        """Return the state of the kernel at a start.
-
-        Parameters
-        ----------
-        start : NavState
-
-        Returns
-        -------
-        ndarray, (15,)
-        """
+        """Return the state of the kernel at a start; (15,)."""
         down = 0.0 if self.height == "held" else start.v_n[2]
         place = [start.lat, start.lon, start.alt]
         level = self._level(start.lat)

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NoReturn
 
 import numpy as np
 import pandas as pd
+from numba.core.errors import NumbaError
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown._kernels import sample as kernel
+from strapdown._kernels.ned import LARGEST_TURN, LEAP, POLE
+from strapdown.ellipsoids import find_ellipsoid
+from strapdown.errors import ConfigError, DataError, DivergenceError, Finding
 from strapdown.increments.stream import IncrementStream, IncrementStreamState
 from strapdown.mechanization.mechanization import Mechanization
+from strapdown.mechanization.ned import NorthEastDown
 from strapdown.nav_state import NavState
-from strapdown.tables import ACCEL, GYRO, MOTION, PHI, check_imu, check_motion_increments
+from strapdown.tables import ACCEL, GYRO, MOTION, PHI, SAMPLINGS, check_imu, check_motion_increments
 from strapdown.tables.checks import (
     check_columns,
     check_rows,
@@ -28,7 +34,7 @@ from strapdown.tables.checks import (
 Array = NDArray[np.float64]
 
 # A step with a larger rotation, rad, is poorly described by its samples.
-LARGEST_TURN = 1.0
+LARGEST_STEP_ROTATION = 1.0
 # The longest step, s, over which two samples describe the motion between them. The user decides on
 # longer gaps.
 LONGEST_STEP = 1.0
@@ -82,7 +88,6 @@ def run_mechanization(
 
     Parameters
     ----------
-    mechanization : Mechanization
     start : NavState
         At the start of the first step; of a backward run at the end of the last.
     increments : DataFrame
@@ -94,10 +99,6 @@ def run_mechanization(
     longest_step : float, s
         A longer step is a gap in the data, and refused.
 
-    Returns
-    -------
-    NavigationRun
-
     Raises
     ------
     DataError
@@ -105,8 +106,6 @@ def run_mechanization(
         is not at the time where the increments begin.
     ConfigError
         `longest_step` is not a valid time.
-    DivergenceError
-        As `Mechanization.advance`.
     """
     check_motion_increments(increments)
     if increments.empty:
@@ -165,11 +164,6 @@ def navigate_segments(
     ------
     DataFrame
         Trajectory table of each segment, at its samples; of the first from its second sample on.
-
-    Raises
-    ------
-    DataError, DivergenceError
-        As `run_mechanization`.
     """
     pieces = [segments] if isinstance(segments, pd.DataFrame) else segments
     state = mechanization.begin(start)
@@ -291,7 +285,7 @@ def _wide_steps(increments: pd.DataFrame) -> tuple[Finding, ...]:
 
 def _large_turns(increments: pd.DataFrame) -> tuple[Finding, ...]:
     phi = increments[PHI].to_numpy(dtype=np.float64)
-    if max(phi.max(), -phi.min()) <= LARGEST_TURN:
+    if max(phi.max(), -phi.min()) <= LARGEST_STEP_ROTATION:
         return ()
     row, axis = divmod(int(np.abs(phi).argmax()), 3)
     return (
@@ -303,3 +297,169 @@ def _large_turns(increments: pd.DataFrame) -> tuple[Finding, ...]:
             phi=phi[row, axis],
         ),
     )
+
+
+# Navigation sample by sample, as it runs on a device or live.
+
+
+# Looked up once: attribute lookup is a significant part of a call of a microsecond.
+_ndarray = np.ndarray
+
+
+class NavTracker:
+    """Navigate from samples, one call per sample.
+
+    Its result equals, to the last bit, that of a run over the same samples with
+    `increments.motion_increments` at its defaults.
+
+    Parameters
+    ----------
+    start : NavState
+        At the first sample.
+    mechanization : NorthEastDown or WanderAzimuth, optional
+        North-east-down on WGS 84 with a free height, if not given.
+    sampling : {'instantaneous', 'mean'}
+        Sample type: the value at its stamp, or its mean over the interval that ends there.
+    longest_step : float, s
+        A longer step is a gap in the data, and refused; so is a first sample that is farther
+        than this from the time of `start`.
+
+    Raises
+    ------
+    ConfigError
+        `sampling` is unknown, `longest_step` is not a valid time, or the mechanization differs.
+    """
+
+    __slots__ = ("_mechanization", "_record", "_update")
+
+    def __init__(
+        self,
+        start: NavState,
+        mechanization: Mechanization | None = None,
+        sampling: str = "instantaneous",
+        longest_step: float = LONGEST_STEP,
+    ) -> None:
+        check_longest_step(longest_step)
+        if sampling not in SAMPLINGS:
+            raise ConfigError(
+                "mechanization.no-kind-sampling",
+                quantity="sampling",
+                sampling=sampling,
+                samplings=SAMPLINGS,
+            )
+        used: object = NorthEastDown() if mechanization is None else mechanization
+        update = used.sample_kernel() if isinstance(used, Mechanization) else None
+        if not isinstance(used, Mechanization) or update is None:
+            raise ConfigError(
+                "mechanization.tracker-steps-northeastdown-or-wanderazimuth",
+                quantity="mechanization",
+                used=used,
+            )
+        begin = used.begin(start)
+        record = np.zeros(kernel.STATE + len(begin))
+        record[kernel.TIME] = start.time
+        record[kernel.LONGEST] = longest_step
+        record[kernel.MEAN] = float(sampling == "mean")
+        record[kernel.EARTH : kernel.OPTIONS] = find_ellipsoid(used.ellipsoid).parameters()
+        record[kernel.OPTIONS : kernel.STATE] = used.kernel_options()
+        record[kernel.STATE :] = begin
+        self._mechanization = used
+        self._record = record
+        self._update = update
+
+    def update(
+        self,
+        time: float,
+        gyro: Array | Sequence[float],
+        accel: Array | Sequence[float],
+        height: float = float("nan"),
+    ) -> None:
+        """Process one sample.
+
+        `time` (s): later than that of the sample before. `gyro` ((3,), rad/s): body rate relative
+        to inertial space, forward-right-down. `accel` ((3,), m/s²): specific force in the same
+        axes. `height` (m): reference height now, for a damped height; NaN for a missing one.
+        DataError: time does not advance, or leaps; or rate and force are not three finite numbers
+        each. DivergenceError: the state would diverge, or come too near to a pole.
+
+        A sample that raises an error is ignored; the state is as before it.
+        """
+        try:
+            if gyro.__class__ is not _ndarray:
+                gyro = np.asarray(gyro, dtype=np.float64)
+            if accel.__class__ is not _ndarray:
+                accel = np.asarray(accel, dtype=np.float64)
+            why = self._update(self._record, time, gyro, accel, height)
+        except (NumbaError, TypeError, ValueError):
+            # Of a type that cannot be compiled for, or not numbers.
+            why = kernel.BAD_SAMPLE
+        if why:
+            self._refuse(why, time, gyro, accel)
+
+    def _refuse(self, why: int, time: float, gyro: ArrayLike, accel: ArrayLike) -> NoReturn:
+        row = int(self._record[kernel.SAMPLES]) + 1
+        if why == kernel.BAD_TIME:
+            raise DataError(
+                "mechanization.time-does-not-advance-followed",
+                row=row,
+                quantity="time",
+                record=self._record[kernel.TIME],
+                time=time,
+            )
+        if why == kernel.BAD_START:
+            raise DataError(
+                "mechanization.state-first-sample",
+                row=row,
+                quantity="time",
+                record=self._record[kernel.TIME],
+                time=time,
+            )
+        if why == kernel.BAD_HEIGHT:
+            raise DataError(
+                "mechanization.reference-height-height-or-infinite",
+                row=row,
+                quantity="height",
+                height=self._mechanization.height,
+            )
+        if why == kernel.GAP:
+            raise DataError(
+                "mechanization.gap-before-body-did-not",
+                row=row,
+                quantity="time",
+                time=time - self._record[kernel.TIME],
+                time_2=time,
+            )
+        rate, force = (v.tolist() if isinstance(v, np.ndarray) else v for v in (gyro, accel))
+        given = f"time {time}, rate {rate}, force {force}"
+        if why == kernel.BAD_SAMPLE:
+            raise DataError(
+                "mechanization.time-three-finite-rates-three",
+                row=row,
+                quantity="gyro, accel",
+                given=given,
+            )
+        if why == POLE:
+            raise DivergenceError(
+                "mechanization.step-comes-nearer-pole-than",
+                row=row,
+                quantity="lat",
+                time=time,
+                latitude_limit_deg=self._mechanization.latitude_limit_deg,
+            )
+        if why == LEAP:
+            raise DivergenceError(
+                "mechanization.step-place-would-move-more",
+                row=row,
+                quantity="state",
+                time=time,
+                largest_turn=LARGEST_TURN,
+            )
+        raise DivergenceError(
+            "mechanization.state-would-diverge", row=row, quantity="state", given=given
+        )
+
+    @property
+    def state(self) -> NavState:
+        """Position, velocity and attitude at the last sample."""
+        record = self._record
+        return self._mechanization.nav_state(record[kernel.STATE :], float(record[kernel.TIME]))

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from strapdown import rotation
+from strapdown._kernels import level
 from strapdown._kernels import wander as kernel
-from strapdown._kernels import wander_level as level
 from strapdown._kernels.level import LEVEL
-from strapdown._kernels.wander_sample import wander_update
+from strapdown._kernels.sample import wander_update
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import ConfigError, Finding
 from strapdown.mechanization.mechanization import Array, Mechanization
@@ -70,17 +70,10 @@ class WanderAzimuth(Mechanization):
     def begin(self, start: NavState) -> Array:
         """Return the state of the kernel at a start, with a wander angle of zero.
 
-        Parameters
-        ----------
-        start : NavState
-            At a pole its longitude gives the direction of north.
-
-        Returns
-        -------
-        ndarray, (31,)
-            The row of a history, (12,): ``q_ew`` from level to ECEF axes, height in m, velocity
-            xi, eta, zeta in m/s, ``q_wb`` from body to level. Then ``q_ib`` from body to inertial
-            axes, those of ECEF at the start, and the memory of the kernel.
+        `start`: at a pole its longitude gives the direction of north. Returns (31,), the row of a
+        history, (12,): ``q_ew`` from level to ECEF axes, height in m, velocity xi, eta, zeta in
+        m/s, ``q_wb`` from body to level. Then ``q_ib`` from body to inertial axes, those of ECEF at
+        the start, and the memory of the kernel.
         """
         state = np.zeros(kernel.STATE)
         state[kernel.Q_EW : kernel.ALT] = level.wander_from_geodetic(start.lat, start.lon, 0.0)
@@ -177,44 +170,23 @@ class WanderAzimuth(Mechanization):
     def wander_angle(self, history: Array) -> Array:
         """Return the angle from east to xi, anticlockwise.
 
-        Parameters
-        ----------
-        history : ndarray, (n, 12)
-
-        Returns
-        -------
-        ndarray, (n,), rad
-            Within half a turn; at a pole, to rounding, zero.
+        `history` ((n, 12)). Returns (n,), rad, within half a turn; at a pole, to rounding, zero.
         """
         return np.array([level.geodetic_from_wander(*row[: kernel.ALT])[2] for row in history])
 
     def earth_attitude(self, history: Array) -> Array:
         """Return the attitude relative to the Earth, regular at the poles.
 
-        Parameters
-        ----------
-        history : ndarray, (n, 12)
-
-        Returns
-        -------
-        ndarray, (n, 4)
-            ``q_eb = q_ew q_wb``, from body to ECEF axes.
+        `history` ((n, 12)). Returns (n, 4), ``q_eb = q_ew q_wb``, from body to ECEF axes.
         """
         return rotation.compose(history[:, : kernel.ALT], history[:, kernel.Q_WB : kernel.ROW])
 
     def inertial_attitude(self, history: Array, elapsed: ArrayLike) -> Array:
         """Return the attitude in inertial axes, the first quaternion of the paper.
 
-        Parameters
-        ----------
-        history : ndarray, (n, 12)
-        elapsed : array_like, (n,), s
-            Since the inertial axes were those of ECEF: for those of the kernel, the start.
-
-        Returns
-        -------
-        ndarray, (n, 4)
-            ``q_ib = [cos(W t / 2), 0, 0, sin(W t / 2)] q_ew q_wb``, W the rate of the Earth.
+        `history` ((n, 12)). `elapsed` ((n,), s): since the inertial axes were those of ECEF: for
+        those of the kernel, the start. Returns (n, 4), ``q_ib = [cos(W t / 2), 0, 0, sin(W t / 2)]
+        q_ew q_wb``, W the rate of the Earth.
         """
         rate = find_ellipsoid(self.ellipsoid).rotation_rate
         halves = np.ascontiguousarray(0.5 * rate * np.asarray(elapsed, dtype=np.float64))

@@ -8,11 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown._kernels import error_loop as kernel
-from strapdown._kernels import fix_loop as fix_kernel
+from strapdown._kernels import filter_loop as kernel
 from strapdown._kernels.growth import growth_arrays, growth_room, padded_width
-from strapdown._kernels.level import LEVEL
-from strapdown._kernels.level_place import NED, WANDER
+from strapdown._kernels.level import LEVEL, NED, WANDER
 from strapdown.errors import DivergenceError
 from strapdown.estimation.covariance import (
     BiermanThornton,
@@ -200,13 +198,13 @@ class CompiledEngine(Engine):
             Whether it stopped for a covariance to be noted.
         """
         (note_at, interval), size, k = notes, len(fixes.time), self._n - 9
-        told, at = np.empty((size, fix_kernel.TOLD, 3)), np.empty(size)
+        told, at = np.empty((size, kernel.TOLD, 3)), np.empty(size)
         noted, sensors, sd = np.empty((size, 9, 9)), np.empty((size, k)), np.empty((size, k))
         why, done = kernel.FULL, 0
         while why == kernel.FULL:
             # A fix needs a propagation and an update.
             self.nodes.make_room(2)
-            why, made, self._count, more, self.nodes.used = fix_kernel.over_fixes(
+            why, made, self._count, more, self.nodes.used = kernel.over_fixes(
                 self._kinds,
                 self._model,
                 self._states,
@@ -234,7 +232,7 @@ class CompiledEngine(Engine):
                 sd[done:],
             )
             done += more
-        if why == fix_kernel.BAD_FIX:
+        if why == kernel.BAD_FIX:
             raise bad_observation(0, told[done, 0, 0], told[done, 1, 0], fixes.values[done, 4:])
         self._after(why, time, made)
         fixed = Fixed(at[:done], told[:done], noted[:done], sensors[:done], sd[:done])

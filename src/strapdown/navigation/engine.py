@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown._kernels.error_loop import BEYOND
-from strapdown._kernels.smoothing_rows import (
+from strapdown._kernels.filter_loop import BEYOND
+from strapdown._kernels.smoothing import (
     BEGIN,
     CORE,
     COVARIANCE,
@@ -335,7 +335,7 @@ class NodeRows:
     """Smoother history of a chunk: one row for each node of the filter.
 
     A node is the begin of a filter, a growth of the errors, or an update. Errors are the p physical
-    ones of its model, in level axes of the mechanization; `_kernels.smoothing_rows` has the
+    ones of its model, in level axes of the mechanization; `_kernels.smoothing` has the
     layout of a row. Compiled loops fill `room` from `used` on; others call `grew` and `updated`.
 
     Parameters

@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown._kernels.split_increment import split_increment
-from strapdown._kernels.steady_motion import STEADY, steady_motion
+from strapdown._kernels.motion_increments import split_increment
+from strapdown._kernels.sums import STEADY, steady_motion
 from strapdown.errors import ConfigError
 from strapdown.estimation.covariance import Innovations, Observation, UpdateRule
 from strapdown.estimation.error_filter import (

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown._kernels.level import Q_LB
-from strapdown._kernels.motion_blocks import join_blocks
+from strapdown._kernels.motion_increments import join_blocks
 from strapdown.dsp.samples import even_step
 from strapdown.errors import ConfigError, DataError
 from strapdown.estimation.error_filter import symmetric

@@ -13,8 +13,7 @@ from typing import IO, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown._kernels.smoothing import padded, smooth_back
-from strapdown._kernels.smoothing_rows import COVARIANCE, TIME, TURN, row_width
+from strapdown._kernels.smoothing import COVARIANCE, TIME, TURN, padded, row_width, smooth_back
 from strapdown.errors import ConfigError
 from strapdown.estimation.covariance import Observation
 from strapdown.mechanization.mechanization import Mechanization

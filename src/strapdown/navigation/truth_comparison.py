@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
-from strapdown._kernels import geodetic as kernel
+from strapdown._kernels import earth as kernel
 from strapdown.dsp.chi_square import chi_square_exceeded, chi_square_quantile, normal_quantile
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import DataError, Finding

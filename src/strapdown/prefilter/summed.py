@@ -126,7 +126,7 @@ class Summed(Prefilter):
 
 def _joined(values: Array, grid: Grid, factor: int, before: int, steps: int) -> Array:
     """Motion increments of each step, composed over the output intervals."""
-    from strapdown._kernels import motion_blocks as kernels
+    from strapdown._kernels import motion_increments as kernels
 
     dt = np.full(len(values) - 1, grid.step)
     rows, scratch = np.empty((len(dt), 10)), np.empty((kernels.ROWS, kernels.WIDEST))

@@ -7,7 +7,7 @@ from typing import Any
 
 from strapdown.bundle.seal import Seal, to_json
 from strapdown.config.crash_case import CaseSpec
-from strapdown.formats.mme_writer import write_mme
+from strapdown.formats.crash_writers import write_mme
 from strapdown.progress import Progress, silent
 from strapdown.report.crash_document import crash_document
 from strapdown.report.crash_figures import crash_figures

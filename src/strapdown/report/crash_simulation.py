@@ -18,11 +18,11 @@ from strapdown.config import CrashSimulationSpec
 from strapdown.crash.pdof import pdof
 from strapdown.errors import ConfigError
 from strapdown.formats.crash_record import QUANTITIES, CrashChannel, CrashRecord
-from strapdown.formats.mme_writer import write_mme
-from strapdown.formats.recorder_csv import (
+from strapdown.formats.crash_writers import (
     ACCEL_HEADINGS,
     GYRO_HEADINGS,
     TIME,
+    write_mme,
     write_path_csv,
     write_recorder_csv,
 )
@@ -37,8 +37,8 @@ from strapdown.simulation.crash_cases import (
     find_case,
     record_case,
 )
-from strapdown.simulation.exact_answers import ExactAnswers
-from strapdown.simulation.recorder_design import TriadDesign
+from strapdown.simulation.crash_recording import TriadDesign
+from strapdown.simulation.mounted_motion import ExactAnswers
 from strapdown.tables import ACCEL, GYRO
 
 __all__ = [

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown.dsp.running_integral import running_integral
 from strapdown.evaluation.plane_bound import plane_bound
-from strapdown.formats.trajectory_thinning import thin
+from strapdown.formats.trajectory_maps import thin
 from strapdown.frames import ned_from_geodetic
 from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.report.chart import BLACK, BLUE, GREY, PURPLE, VERMILLION, Chart, Line, Panel

@@ -16,7 +16,7 @@ from strapdown.ellipsoids import WGS84, Ellipsoid, find_ellipsoid
 from strapdown.errors import ConfigError
 from strapdown.formats.log_writers import LOG_WRITERS, log_formats
 from strapdown.formats.trajectory_csv import one_line
-from strapdown.formats.trajectory_thinning import thin
+from strapdown.formats.trajectory_maps import thin
 from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS, TrajectoryFileOptions
 from strapdown.frames import ned_from_geodetic
 from strapdown.report.chart import BLUE, ORANGE, Array, Chart, Line, Panel, break_jumps, curve

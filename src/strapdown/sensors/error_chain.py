@@ -222,7 +222,7 @@ def _through_filter(errors: TriadErrors, t: Array, u: Array, steps: Array, mean:
 
 def _held(edges: Array, u: Array, bandwidth: float) -> Array:
     """Filter output at the end of each step, with the input held within the step."""
-    from strapdown._kernels.recursion import first_order
+    from strapdown._kernels.signals import first_order
     from strapdown.sensors.low_pass import time_constant
 
     h = np.diff(edges) / time_constant(bandwidth)
@@ -412,7 +412,7 @@ def gauss_markov(seed: Seed, steps: Array, sd: Triad, correlation: float, mean: 
     mean ``(1 - a) x0/sd``, the variance ``2h - 3 + 4a - a²`` and the covariance ``(1 - a)²`` with
     x1 (Gillespie 1996, Physical Review E 54, 2084).
     """
-    from strapdown._kernels.recursion import first_order
+    from strapdown._kernels.signals import first_order
 
     h = steps / correlation
     a = np.exp(-h)

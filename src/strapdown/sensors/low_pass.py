@@ -34,7 +34,7 @@ def low_pass(time: Array, values: Array, bandwidth: float) -> Array:
     """
     if math.isinf(bandwidth):
         return values
-    from strapdown._kernels.recursion import first_order
+    from strapdown._kernels.signals import first_order
 
     h = np.diff(time) / time_constant(bandwidth)
     a = np.exp(-h)

@@ -1,23 +1,33 @@
 """Motions with exact truth, and simulated sensor data for them."""
 
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
+from strapdown.simulation.attitude_motions import (
+    Coning,
+    Gesture,
+    Handling,
+    Sculling,
+    SmoothRandom,
+    gesture,
+)
 from strapdown.simulation.cameras import film, paper_cameras, path_from_cameras
-from strapdown.simulation.coning import Coning, Sculling
-from strapdown.simulation.crash_motion import CrashMotion, CrashScenario, HaversinePulse, Setting
-from strapdown.simulation.crash_recording import record_crash
-from strapdown.simulation.crash_scenarios import (
+from strapdown.simulation.crash_motion import (
     CRASHES,
+    CrashMotion,
+    CrashScenario,
+    HaversinePulse,
+    Setting,
+    crash_scenario,
     find_crash,
-    frontal_impact,
-    oblique_impact,
-    pole_impact,
-    rear_impact,
-    side_impact,
+)
+from strapdown.simulation.crash_recording import (
+    RecorderDesign,
+    RecorderTruth,
+    TriadDesign,
+    paper_units,
+    record_crash,
 )
 from strapdown.simulation.earth_motion import EarthMotion, Origin, StationaryMotion
-from strapdown.simulation.exact_answers import ExactAnswers
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
-from strapdown.simulation.hand_motions import Gesture, Handling, gesture
 from strapdown.simulation.imu import (
     ACCEL_SEED,
     GYRO_SEED,
@@ -25,21 +35,18 @@ from strapdown.simulation.imu import (
     sample_gyro,
     simulate_imu,
 )
-from strapdown.simulation.minimum_jerk import Track
-from strapdown.simulation.motion import Motion, Pulse, PulseMotion
-from strapdown.simulation.mounted_motion import MountedMotion
-from strapdown.simulation.path_motion import Manoeuvre, PathMotion, Wave, rocking_stand
-from strapdown.simulation.recorder_design import (
-    RecorderDesign,
-    RecorderTruth,
-    TriadDesign,
-    paper_units,
+from strapdown.simulation.motion import Motion, Pulse, PulseMotion, Track
+from strapdown.simulation.mounted_motion import (
+    ExactAnswers,
+    MountedMotion,
+    PointKinematics,
+    Ringing,
+    point_kinematics,
+    point_path,
 )
-from strapdown.simulation.ringing import Ringing
+from strapdown.simulation.path_motion import Manoeuvre, PathMotion, Wave, rocking_stand
 from strapdown.simulation.scenarios import SCENARIOS, Scenario, find_scenario
-from strapdown.simulation.smooth_random import SmoothRandom
 from strapdown.simulation.spline_motion import SineVelocityMotion, SplineMotion, through_waypoints
-from strapdown.simulation.vehicle_points import PointKinematics, point_kinematics, point_path
 from strapdown.simulation.vehicles import (
     Accelerate,
     LaneChange,
@@ -100,25 +107,21 @@ __all__ = [
     "Wave",
     "aircraft",
     "car",
+    "crash_scenario",
     "film",
     "find_crash",
     "find_scenario",
-    "frontal_impact",
     "gesture",
-    "oblique_impact",
     "paper_cameras",
     "paper_units",
     "path_from_cameras",
     "point_kinematics",
     "point_path",
-    "pole_impact",
-    "rear_impact",
     "record_crash",
     "rocking_stand",
     "sample_accelerometer",
     "sample_gyro",
     "ship",
-    "side_impact",
     "simulate_gnss",
     "simulate_imu",
     "through_waypoints",

@@ -101,17 +101,10 @@ def film(
 def paper_cameras(distance: float = 8.0) -> tuple[Camera, Camera]:
     """Return a top and a side camera as in the crash test of Tadic and Vukajlovic (2016).
 
-    Parameters
-    ----------
-    distance : float, m
-        Distance from the vehicle's origin at the impact.
-
-    Returns
-    -------
-    top, side : Camera
-        1000 frames/s and 1.3 megapixels are the paper's. Chosen here: distance, a lens of 1300 px
-        with a barrel distortion calibrated to a tenth, readings to half a pixel, a pose known to 5
-        mm and 0.05 deg, a focal length to 0.1 %. The side camera is in the west and looks east.
+    `distance` (m): distance from the vehicle's origin at the impact. Returns `top`, `side`: 1000
+    frames/s and 1.3 megapixels are the paper's. Chosen here: distance, a lens of 1300 px with a
+    barrel distortion calibrated to a tenth, readings to half a pixel, a pose known to 5 mm and 0.05
+    deg, a focal length to 0.1 %. The side camera is in the west and looks east.
     """
     top = Camera(
         "top",
@@ -270,16 +263,9 @@ class Camera:
     def pixels(self, points: ArrayLike) -> Array:
         """Project points to pixels.
 
-        Parameters
-        ----------
-        points : array_like, (n, 3), m
-            North, east, down.
-
-        Returns
-        -------
-        ndarray, (n, 2), px
-            To the right and down from the upper left corner; NaN behind the camera, beyond the
-            range of the lens, and outside the image.
+        `points` ((n, 3), m): north, east, down. Returns (n, 2), px, to the right and down from the
+        upper left corner; NaN behind the camera, beyond the range of the lens, and outside the
+        image.
         """
         return project(self, self.axes, np.asarray(points, dtype=np.float64))
 
@@ -337,37 +323,17 @@ def path_from_cameras(
 ) -> pd.DataFrame:
     """Triangulate the path of a marker from two views.
 
-    Parameters
-    ----------
-    tracks_top, tracks_side : DataFrame
-        As returned by `cameras.film`.
-    cameras : tuple of Camera
-        Cameras of the first and the second tracks, as calibrated.
-    marker : str
-        Marker to triangulate.
-    central : float, px
-        Radius about the image center beyond which readings are not used, because the residual
-        distortion grows with its cube.
+    `tracks_top`, `tracks_side`: as returned by `film`. `cameras`: cameras of the first and
+    the second tracks, as calibrated. `marker`: marker to triangulate. `central` (px): radius about
+    the image center beyond which readings are not used, because the residual distortion grows with
+    its cube. Returns index ``time``, s, of the frames of the first camera at which both see the
+    marker, not corrected for any offset; ``north east down`` in m in the scene frame; ``north_sd
+    east_sd down_sd``, standard deviations in m; ``residual`` in px, root mean square residual of
+    the four readings. The second camera's readings are interpolated linearly between its frames,
+    which leaves 2e-5 m at 1000 frames/s and 130 m/s². DataError: a camera has not seen the marker,
+    or never simultaneously with the other; the message names camera and marker. ConfigError:
+    `central` is not positive, or the viewing directions are parallel.
 
-    Returns
-    -------
-    DataFrame
-        Index ``time``, s, of the frames of the first camera at which both see the marker, not
-        corrected for any offset; ``north east down`` in m in the scene frame; ``north_sd east_sd
-        down_sd``, standard deviations in m; ``residual`` in px, root mean square residual of the
-        four readings. The second camera's readings are interpolated linearly between its frames,
-        which leaves 2e-5 m at 1000 frames/s and 130 m/s².
-
-    Raises
-    ------
-    DataError
-        A camera has not seen the marker, or never simultaneously with the other; the message names
-        camera and marker.
-    ConfigError
-        `central` is not positive, or the viewing directions are parallel.
-
-    Notes
-    -----
     In each frame the position minimizes the squared differences between the four readings,
     corrected for distortion, and the projected position. The standard deviations combine those of
     the readings with those, common to all frames, that the cameras state for position, directions,

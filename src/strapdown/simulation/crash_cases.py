@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -17,11 +18,14 @@ from strapdown.errors import ConfigError
 from strapdown.sensors.crash_unit import CrashUnit, Mounting
 from strapdown.sensors.error_chain import child
 from strapdown.simulation.cameras import Camera, film, paper_cameras, path_from_cameras
-from strapdown.simulation.crash_motion import CrashScenario
-from strapdown.simulation.crash_recording import record_crash
-from strapdown.simulation.crash_scenarios import CRASHES
-from strapdown.simulation.recorder_design import RecorderDesign, RecorderTruth, paper_units
-from strapdown.simulation.vehicle_points import point_path
+from strapdown.simulation.crash_motion import CRASHES, TABLES, CrashScenario
+from strapdown.simulation.crash_recording import (
+    RecorderDesign,
+    RecorderTruth,
+    paper_units,
+    record_crash,
+)
+from strapdown.simulation.mounted_motion import point_path
 
 __all__ = ["CASES", "CaseRecorder", "CrashCase", "find_case"]
 
@@ -76,20 +80,9 @@ class CrashCase:
     def chosen(self, names: Sequence[str] = ()) -> tuple[CaseRecorder, ...]:
         """Select recorders by name.
 
-        Parameters
-        ----------
-        names : sequence of str
-            Names, in any letter case; ``all`` for every recorder; if empty, the usual ones.
-
-        Returns
-        -------
-        tuple of CaseRecorder
-            In the order of the case.
-
-        Raises
-        ------
-        ConfigError
-            A name is unknown, or a recorder uses the gyro of another that is not selected.
+        `names`: names, in any letter case; ``all`` for every recorder; if empty, the usual ones.
+        Returns in the order of the case. ConfigError: a name is unknown, or a recorder uses the
+        gyro of another that is not selected.
         """
         known = {r.design.name: r for r in self.recorders}
         wanted = [n.upper() for n in names] or list(self.usual)
@@ -124,29 +117,27 @@ SHORT_REST = 0.3  # s
 # Insufficient high range: half the peak acceleration of the wall impact at the floor.
 LOW_CEILING = 16.0 * STANDARD_GRAVITY  # m/s²
 
-
-def _paper() -> tuple[CaseRecorder, ...]:
-    designs = {d.name: d for d in paper_units()}
-    return (
-        CaseRecorder(designs["IMU1"]),
-        CaseRecorder(designs["IMU2"]),
-        CaseRecorder(designs["LAB1"], LAB_BEGINS),
-        CaseRecorder(designs["LAB2"], LAB_BEGINS),
-    )
+_DESIGNS = {d.name: d for d in paper_units()}
+_PAPER = (
+    CaseRecorder(_DESIGNS["IMU1"]),
+    CaseRecorder(_DESIGNS["IMU2"]),
+    CaseRecorder(_DESIGNS["LAB1"], LAB_BEGINS),
+    CaseRecorder(_DESIGNS["LAB2"], LAB_BEGINS),
+)
 
 
-def _turned() -> tuple[CaseRecorder, ...]:
+def _turned(crash: CrashScenario) -> tuple[CaseRecorder, ...]:
     """The paper's recorders; IMU2 is yawed 20 deg to the right but stated as straight."""
-    first, second, *others = _paper()
+    first, second, *others = _PAPER
     straight = second.design.mounting
     skew = replace(second.design, mounting=replace(straight, angles_deg=(0.0, 0.0, 20.0)))
     return (first, replace(second, design=skew, stated=straight), *others)
 
 
-def _low_ceiling() -> tuple[CaseRecorder, ...]:
+def _low_ceiling(crash: CrashScenario) -> tuple[CaseRecorder, ...]:
     """IMU1 and IMU2 of the paper with a high range that saturates early."""
     found = []
-    for recorder in _paper()[:2]:
+    for recorder in _PAPER[:2]:
         low, high = recorder.design.accelerometers
         held = replace(high, uncertainty=replace(high.uncertainty, full_scale=LOW_CEILING))
         design = replace(recorder.design, accelerometers=(low, held))
@@ -157,72 +148,40 @@ def _low_ceiling() -> tuple[CaseRecorder, ...]:
 def _short_rest(crash: CrashScenario) -> tuple[CaseRecorder, ...]:
     """IMU1 and IMU2 of the paper, switched on just before the tow."""
     begins = min(p.start for p in crash.motion.pulses) - SHORT_REST - crash.start
-    return tuple(replace(r, begins=begins) for r in _paper()[:2])
+    return tuple(replace(r, begins=begins) for r in _PAPER[:2])
 
 
-def _no_gyro() -> tuple[CaseRecorder, ...]:
+def _no_gyro(crash: CrashScenario) -> tuple[CaseRecorder, ...]:
     """IMU1 of the paper without its gyro."""
-    one = _paper()[0]
     return (
         replace(
-            one,
-            design=replace(one.design, gyro=None),
+            _PAPER[0],
+            design=replace(_PAPER[0].design, gyro=None),
             assumed_turn_sd_deg=2.0,
             because="full width against a wall at a right angle: nothing turns the car",
         ),
     )
 
 
-_IMUS = ("IMU1", "IMU2")
-_SPECIAL = (
-    CrashCase(
-        "tadic-pole",
-        "the paper's impact on a pole, by its four platforms",
-        CRASHES["pole"],
-        _paper(),
-        (*_IMUS, "LAB1", "LAB2"),
-    ),
-    CrashCase(
-        "side-disagree",
-        "struck on the left; two recorders disagree, for one sits 20 deg off what is said",
-        CRASHES["side"],
-        _turned(),
-        _IMUS,
-        "IMU2 really sits turned by 20 deg to the right (angles_deg = [0, 0, 20]), and this file "
-        "says that it sits straight: the comparison of the recorders must find that.",
-    ),
-    CrashCase(
-        "saturated",
-        "against a wall at 56 km/h; the high range ends at 16 g, half of what it should",
-        CRASHES["frontal"],
-        _low_ceiling(),
-        _IMUS,
-        "The high ranges end at 16 g, and the crash is beyond: what is cut off is missing from "
-        "delta-V and path, and no bound knows how much. The report must say so.",
-    ),
-    CrashCase(
-        "short-rest",
-        "the pole again, by recorders that were switched on 0.3 s before the car was towed",
-        CRASHES["pole"],
-        _short_rest(CRASHES["pole"]),
-        _IMUS,
-        "The stationary stretch is too short to find biases and attitude well: wider bounds, and "
-        "a limitation that says so.",
-    ),
-    CrashCase(
-        "no-gyro",
-        "against a wall at 56 km/h, by one recorder without gyro",
-        CRASHES["frontal"],
-        _no_gyro(),
-        ("IMU1",),
-        "The recorder has no gyro: that the car did not turn by more than is stated below is an "
-        "assumption, and the report must say so.",
-    ),
-)
-#: Every crash with the paper's recorders, and cases with a deliberate defect.
+_RECORDERS: dict[str, Callable[[CrashScenario], tuple[CaseRecorder, ...]]] = {
+    "side-disagree": _turned,
+    "saturated": _low_ceiling,
+    "short-rest": _short_rest,
+    "no-gyro": _no_gyro,
+}
+
+
+def _case(name: str, table: Mapping[str, Any]) -> CrashCase:
+    crash = CRASHES[table["crash"]]
+    recorders = _RECORDERS[name](crash) if name in _RECORDERS else _PAPER
+    usual = tuple(table["usual"])
+    return CrashCase(name, table["summary"], crash, recorders, usual, table.get("remark", ""))
+
+
+#: Every crash with the paper's recorders, and the cases of ``crashes.toml``.
 CASES: dict[str, CrashCase] = {
-    **{name: CrashCase(name, c.summary, c, _paper(), _IMUS) for name, c in CRASHES.items()},
-    **{case.name: case for case in _SPECIAL},
+    **{n: CrashCase(n, c.summary, c, _PAPER, ("IMU1", "IMU2")) for n, c in CRASHES.items()},
+    **{name: _case(name, table) for name, table in TABLES["cases"].items()},
 }
 
 

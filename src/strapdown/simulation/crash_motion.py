@@ -1,12 +1,14 @@
-"""Motions of a struck vehicle on the Earth: pulses of linear and angular acceleration."""
+"""Crashes and similar events of a car: pulses of linear and angular acceleration."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
+from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +16,15 @@ from numpy.typing import NDArray
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import ConfigError
-from strapdown.simulation.earth_motion import EarthMotion, Kinematics, Origin, check_duration
+from strapdown.simulation.earth_motion import (
+    EarthMotion,
+    Kinematics,
+    Origin,
+    PlaceIntegral,
+    check_duration,
+    integrate_velocity,
+)
 from strapdown.simulation.motion import euler_attitude, euler_body_acceleration, euler_body_rate
-from strapdown.simulation.place_integral import PlaceIntegral, integrate_velocity
 
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
@@ -117,7 +125,7 @@ class CrashMotion(EarthMotion):
     Notes
     -----
     Velocity, angles and their derivatives are closed forms; the position is their integral over the
-    ellipsoid, within 1e-10 m per panel (`place_integral.integrate_velocity`).
+    ellipsoid, within 1e-10 m per panel (`earth_motion.integrate_velocity`).
     """
 
     duration: float
@@ -379,3 +387,259 @@ class CrashScenario:
     def is_crash(self) -> bool:
         """Whether the scenario contains an impact."""
         return bool(self.impacts)
+
+
+# Scenarios: their numbers are in crashes.toml.
+
+#: The tables of crashes and of cases.
+TABLES: dict[str, Any] = tomllib.loads(
+    Path(__file__).with_name("crashes.toml").read_text(encoding="utf-8")
+)
+#: Moments of inertia of a car over its mass, in yaw (as for the paper's test) and in roll, m².
+YAW_GYRATION, ROLL_GYRATION = 1.90, 0.40
+
+
+def blow(direction_deg: float, change: float) -> Triple:
+    """Velocity change in vehicle axes for a given principal direction of force.
+
+    `direction_deg` (deg): principal direction of force: 0 from the front, positive clockwise.
+    `change` (m/s). Returns m/s, forward, right, down.
+    """
+    angle = math.radians(direction_deg)
+    # A component at the rounding level of pi is set to zero.
+    parts = (-math.cos(angle), -math.sin(angle))
+    ahead, right = (change * x if abs(x) > 1e-15 else 0.0 for x in parts)
+    return ahead, right, 0.0
+
+
+def velocity_change(
+    closing_speed: float, arm: float, restitution: float, gyration_squared: float
+) -> float:
+    """Velocity change of a vehicle in a plane impact against a rigid object.
+
+    `closing_speed` (m/s): speed of the center of mass along the force. `arm` (m): arm of the force
+    about the center of mass. `restitution`: separation speed over approach speed, at the contact
+    and along the force. `gyration_squared` (m²): yaw moment of inertia over mass. Returns m/s, ``V0
+    (1 + e)/(1 + d²/k²)``.
+
+    An impulse P changes the velocity by P/m and the yaw rate by ``P d/(m k²)``, hence the contact
+    speed along it by ``P/m (1 + d²/k²)``; the restitution sets this to ``(1 + e) V0``.
+    """
+    return closing_speed * (1.0 + restitution) / (1.0 + arm * arm / gyration_squared)
+
+
+def strike(
+    course: CrashCourse,
+    direction_deg: float,
+    change: float,
+    arm: float,
+    length: float,
+    gyration_squared: float = YAW_GYRATION,
+) -> Triple:
+    """Add one blow, with the yaw rate ``dV d/k²`` of its arm; return its velocity change (`blow`).
+
+    Time advances to its end. `arm` in m is positive where it yaws the vehicle to the right.
+    """
+    delta_v = blow(direction_deg, change)
+    yaw_rate = math.degrees(change * arm / gyration_squared)
+    course.push(length, delta_v, (0.0, 0.0, yaw_rate))
+    course.time += length
+    return delta_v
+
+
+# A course lays its pulses and returns the start of the event, the starts of the impacts and their
+# velocity changes.
+Parameters = Mapping[str, float]
+Events = tuple[float, tuple[float, ...], tuple[Triple, ...]]
+
+
+def _impact(course: CrashCourse, p: Parameters) -> Events:
+    """One blow of given velocity change or restitution, then a slide to rest."""
+    start, direction = course.time, p["direction_deg"]
+    yaw_gyration = p.get("gyration_squared", YAW_GYRATION)
+    along = math.cos(math.radians(direction))
+    arm = p["arm"] if "arm" in p else p.get("offset", 0.0) * along
+    if "change" in p:
+        change = p["change"]
+    else:
+        if not abs(direction) <= 80.0:
+            raise ConfigError(
+                "simulation.force-does-not-come-front",
+                quantity="direction_deg",
+                direction_deg=direction,
+            )
+        change = velocity_change(p["entry_speed"] * along, arm, p["restitution"], yaw_gyration)
+    if "roll_deg" in p:
+        course.nod(ROLL, p["roll_deg"])
+    else:
+        course.nod(PITCH, p["pitch_deg"])
+    delta_v = strike(course, direction, change, arm, p["length"], yaw_gyration)
+    course.slide(yaw_gyration)
+    return start, (start,), (delta_v,)
+
+
+def _two_impacts(course: CrashCourse, p: Parameters) -> Events:
+    """A front-left impact, then a right-rear impact while the car yaws."""
+    one = course.time
+    course.nod(PITCH, -2.0)
+    delta_1 = strike(course, -20.0, p["first"], 0.35, 0.110)
+    course.time += p["between"]
+    two = course.time
+    delta_2 = strike(course, 130.0, p["second"], -0.3, 0.090)
+    course.slide(YAW_GYRATION)
+    return one, (one, two), (delta_1, delta_2)
+
+
+def _rollover(course: CrashCourse, p: Parameters) -> Events:
+    """A skid sideways, braked by friction, into a curb: the first half turn, still rolling."""
+    lost = min(p["entry_speed"], 1.2 * course.setting.friction * STANDARD_GRAVITY)
+    course.push(1.2, (-lost, 0.0, 0.0))
+    course.lean(HEADING, p["skid_deg"], 1.2)
+    course.time += 1.2
+    start = course.time
+    side = -math.copysign(1.0, p["skid_deg"])
+    roll_rate = math.degrees(side * p["change"] * p["height"] / ROLL_GYRATION)
+    delta_v = (0.0, -side * p["change"], -p["lift"])
+    course.push(0.15, delta_v, (roll_rate, 0.0, 0.0))
+    # Up and down in the air, then on the ground.
+    course.push(0.4, (0.0, 0.0, 2.0 * p["lift"]), delay=0.15)
+    course.push(0.08, (0.0, 0.0, -p["lift"]), delay=0.55)
+    course.time += 0.15
+    return start, (start,), (delta_v,)
+
+
+def _hard_braking(course: CrashCourse, p: Parameters) -> Events:
+    if not (p["entry_speed"] > 0.0 and 0.0 < p["deceleration"] < math.inf):
+        raise ConfigError(
+            "simulation.braking",
+            quantity="entry_speed, deceleration",
+            entry_speed=p["entry_speed"],
+            deceleration=p["deceleration"],
+        )
+    start = course.time
+    course.lean(PITCH, p["pitch_deg"], 0.4)
+    course.brake(p["deceleration"])
+    course.lean(PITCH, -p["pitch_deg"], 0.4, delay=-0.2)
+    return start, (), ()
+
+
+def _pothole(course: CrashCourse, p: Parameters) -> Events:
+    start = course.time
+    course.shift((0.0, 0.0, p["depth"]), 0.06)
+    course.nod(ROLL, p["roll_deg"], 0.06, 0.15)
+    course.push(0.04, (-0.15, 0.0, 0.0), delay=0.05)
+    course.shift((0.0, 0.0, -p["depth"]), 0.07, delay=0.06)
+    course.time += 0.21
+    return start, (), ()
+
+
+def _kerb(course: CrashCourse, p: Parameters) -> Events:
+    """Over a curb, head on: front wheels, then rear wheels 2.7 m later."""
+    speed = p["entry_speed"]
+    if not 0.0 < speed < math.inf:
+        raise ConfigError(
+            "simulation.speed-does-not-lead-over", quantity="entry_speed", entry_speed=speed
+        )
+    start, wheelbase = course.time, 2.7
+    tilt = math.degrees(math.asin(min(1.0, p["height"] / wheelbase)))
+    for delay, sign in ((0.0, 1.0), (wheelbase / speed, -1.0)):
+        course.push(0.06, (-0.3, 0.0, 0.0), delay=delay)
+        course.shift((0.0, 0.0, -0.5 * p["height"]), 0.12, delay=delay)
+        course.lean(PITCH, sign * tilt, 0.12, delay=delay)
+    course.time += wheelbase / speed + 0.12
+    return start, (), ()
+
+
+def _door_slam(course: CrashCourse, p: Parameters) -> Events:
+    start = course.time
+    course.push(0.015, (0.0, p["speed"], 0.0))
+    course.push(0.020, (0.0, -2.0 * p["speed"], 0.0), delay=0.015)
+    course.push(0.015, (0.0, p["speed"], 0.0), delay=0.035)
+    course.nod(ROLL, p["roll_deg"], 0.05, 0.15)
+    course.time += 0.2
+    return start, (), ()
+
+
+_COURSES: dict[str, Callable[[CrashCourse, Parameters], Events]] = {
+    "impact": _impact,
+    "two-impacts": _two_impacts,
+    "rollover": _rollover,
+    "hard-braking": _hard_braking,
+    "pothole": _pothole,
+    "kerb": _kerb,
+    "door-slam": _door_slam,
+}
+
+
+def crash_scenario(
+    name: str, *, setting: Setting | None = None, **parameters: float
+) -> CrashScenario:
+    """Make a crash, or another event, with parameters of its own.
+
+    Parameters
+    ----------
+    name : str
+        A name of `CRASHES`.
+    setting : Setting, optional
+        The approach, and the motion after the event.
+    **parameters : float
+        Replace those of ``crashes.toml``, which has their units and meaning.
+
+    Returns
+    -------
+    CrashScenario
+
+    Raises
+    ------
+    ConfigError
+        The name is unknown, or a number is out of range.
+    """
+    if name not in TABLES["crashes"]:
+        raise ConfigError(
+            "simulation.no-simulated-crash", quantity="crash", name=name, word=name, known=CRASHES
+        )
+    table = TABLES["crashes"][name]
+    if unknown := parameters.keys() - table["parameters"].keys():
+        raise TypeError(f"{name} has no parameter {', '.join(sorted(unknown))}")
+    own = {**table["parameters"], **parameters}
+    course = CrashCourse(setting or Setting())
+    course.approach(own.get("entry_speed", 0.0))
+    start, impacts, delta_v = _COURSES[table.get("course", "impact")](course, {**table, **own})
+    return CrashScenario(
+        name,
+        table["summary"],
+        table.get("source", CHOSEN),
+        course.motion(),
+        start,
+        impacts,
+        delta_v,
+        table.get("kind"),
+        own,
+    )
+
+
+#: Crashes and other events with the parameters of their table.
+CRASHES: dict[str, CrashScenario] = {name: crash_scenario(name) for name in TABLES["crashes"]}
+
+
+def find_crash(name: str) -> CrashScenario:
+    """Return the crash or non-crash scenario with that name.
+
+    Parameters
+    ----------
+    name : str
+
+    Returns
+    -------
+    CrashScenario
+
+    Raises
+    ------
+    ConfigError
+        The name is unknown; the message gives the nearest.
+    """
+    if name not in CRASHES:
+        raise ConfigError(
+            "simulation.no-simulated-crash", quantity="crash", name=name, word=name, known=CRASHES
+        )
+    return CRASHES[name]

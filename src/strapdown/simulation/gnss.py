@@ -1,35 +1,22 @@
-"""Simulated GNSS receiver on a motion, its response to a crash, and injected faults."""
+"""Simulated GNSS receiver on a motion, and its response to a crash."""
 
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from strapdown import rotation
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import ConfigError
 from strapdown.sensors.antenna import antenna_motion
 from strapdown.sensors.error_chain import Seed, child, gauss_markov, normal
 from strapdown.sensors.triad_errors import ZERO, Triad, TriadLike
 from strapdown.simulation.earth_motion import EarthMotion
-from strapdown.tables import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD, gnss_table
-from strapdown.tables.checks import index_of, is_number, source_of, values_of
-
-__all__ = [
-    "Frozen",
-    "GnssFault",
-    "GrowingBias",
-    "Outage",
-    "Outliers",
-    "WrongSd",
-    "inject_gnss_faults",
-]
-
+from strapdown.tables import GEODETIC, VELOCITY, gnss_table
 
 Array = NDArray[np.float64]
 
@@ -171,18 +158,9 @@ def simulate_gnss(
     ConfigError
         The fixes are fewer than two, or too many.
     """
-    count = math.floor(receiver.rate * motion.duration * (1.0 + 1e-12)) + 1
-    if not 2 <= count <= _MOST_FIXES:
-        raise ConfigError(
-            "simulation.hz-gives-fixes",
-            quantity="rate",
-            rate=receiver.rate,
-            count=count,
-            duration=motion.duration,
-            most_fixes=_MOST_FIXES,
-        )
-    instants = np.minimum(np.arange(count) / receiver.rate, motion.duration)
-    place, velocity = _antenna(motion, instants, receiver)
+    time = instants(motion, receiver.rate)
+    count = len(time)
+    place, velocity = motion_of_point(motion, time, receiver.triad("antenna"))
     noise, drift = receiver.triad("position_noise"), receiver.triad("position_drift")
     off = normal(seed, _POSITION, count) * noise
     off += gauss_markov(
@@ -195,7 +173,7 @@ def simulate_gnss(
     fast = normal(seed, _VELOCITY, count) * np.asarray(receiver.triad("velocity_noise"))
     kept = np.ones(count, dtype=np.bool_)
     if receiver.on_excess != "unaffected":
-        struck = _beyond(motion, receiver, instants)
+        struck = _beyond(motion, receiver, time)
         if receiver.on_excess == "lost":
             kept = ~struck
         else:
@@ -205,7 +183,7 @@ def simulate_gnss(
     position_sd = receiver.stated_position_sd or tuple(np.hypot(noise, drift))
     velocity_sd = receiver.stated_velocity_sd or receiver.velocity_noise
     return gnss_table(
-        (instants + receiver.time_offset)[kept],
+        (time + receiver.time_offset)[kept],
         moved_places(place, off, motion.ellipsoid)[kept],
         (velocity + fast)[kept],
         position_sd,
@@ -214,16 +192,38 @@ def simulate_gnss(
     )
 
 
-def _antenna(motion: EarthMotion, time: Array, receiver: GnssReceiver) -> tuple[Array, Array]:
+def instants(motion: EarthMotion, rate: float) -> Array:
+    """Instants ``k / rate`` within a motion, (n,), s; ConfigError if fewer than two or too many."""
+    count = math.floor(rate * motion.duration * (1.0 + 1e-12)) + 1
+    if not 2 <= count <= _MOST_FIXES:
+        raise ConfigError(
+            "simulation.hz-gives-fixes",
+            quantity="rate",
+            rate=rate,
+            count=count,
+            duration=motion.duration,
+            most_fixes=_MOST_FIXES,
+        )
+    return np.minimum(np.arange(count) / rate, motion.duration)
+
+
+def motion_of_point(motion: EarthMotion, time: Array, arm: ArrayLike) -> tuple[Array, Array]:
+    """Position (deg, deg, m) and velocity (NED, m/s) of a body point, (n, 3) each."""
     truth = motion.trajectory(time)
     return antenna_motion(
         truth[GEODETIC].to_numpy(dtype=np.float64),
         truth[VELOCITY].to_numpy(dtype=np.float64),
         motion.attitude(time),
         motion.rate(time),
-        receiver.triad("antenna"),
+        arm,
         ellipsoid=motion.ellipsoid,
     )
+
+
+def velocity_of_point(motion: EarthMotion, time: Array, arm: ArrayLike) -> Array:
+    """Velocity of a body point relative to the Earth, in body axes, (n, 3), m/s."""
+    velocity = motion_of_point(motion, time, arm)[1]
+    return rotation.rotate(rotation.conjugate(motion.attitude(time)), velocity)
 
 
 def moved_places(place: Array, off: Array, ellipsoid: Ellipsoid = WGS84) -> Array:
@@ -246,7 +246,7 @@ def _beyond(motion: EarthMotion, receiver: GnssReceiver, instants: Array) -> NDA
     struck = np.zeros(len(instants), dtype=np.bool_)
     if len(time) <= 2 * per:
         return struck
-    _, velocity = _antenna(motion, time, receiver)
+    _, velocity = motion_of_point(motion, time, receiver.triad("antenna"))
     acceleration = (velocity[per:] - velocity[:-per]) / LOOP_MEMORY
     jerk = (acceleration[per:] - acceleration[:-per]) / LOOP_MEMORY
     excess = np.linalg.norm(acceleration, axis=1) > receiver.largest_acceleration
@@ -254,230 +254,3 @@ def _beyond(motion: EarthMotion, receiver: GnssReceiver, instants: Array) -> NDA
     for at in time[per:][excess]:
         struck |= (instants >= at) & (instants <= at + receiver.outage)
     return struck
-
-
-# GNSS receiver faults injected into a Gnss table.
-
-Flags = NDArray[np.bool_]
-
-# Key in the seed tree, beside those of a receiver's own streams.
-FAULT_SEED = 4
-
-
-@dataclass(frozen=True)
-class GnssFault(ABC):
-    """A receiver fault over an interval; its kinds are the classes of this module.
-
-    Attributes
-    ----------
-    begin, end : float, s
-        Interval of the fixes, `begin` included, `end` excluded.
-
-    Raises
-    ------
-    ConfigError
-        The interval is empty, or a number is out of range.
-    """
-
-    begin: float = -math.inf
-    end: float = math.inf
-
-    def __post_init__(self) -> None:
-        if not self.begin < self.end:
-            raise ConfigError(
-                "simulation.fault-lasts-no-time",
-                quantity="begin, end",
-                begin=self.begin,
-                end=self.end,
-            )
-
-    @abstractmethod
-    def broken(
-        self, table: pd.DataFrame, within: Flags, random: np.random.Generator
-    ) -> pd.DataFrame:
-        """Return the table with the fault applied to the marked rows; the input is not changed."""
-
-    def _checked(self, name: str, low: float, high: float = math.inf) -> None:
-        value = getattr(self, name)
-        if not (is_number(value) and math.isfinite(value) and low <= value <= high):
-            raise ConfigError(
-                "simulation.fault-out-of-range"
-                if math.isfinite(high)
-                else "simulation.fault-below-least",
-                quantity=name,
-                value=value,
-                low=low,
-                high=high,
-            )
-
-
-@dataclass(frozen=True)
-class Outage(GnssFault):
-    """GNSS outage: the rows are removed."""
-
-    def broken(
-        self, table: pd.DataFrame, within: Flags, random: np.random.Generator
-    ) -> pd.DataFrame:
-        """As `GnssFault.broken`."""
-        return table[~within]
-
-
-@dataclass(frozen=True)
-class Outliers(GnssFault):
-    """Outliers: random fixes are displaced in random directions, as by multipath.
-
-    Attributes
-    ----------
-    share : float
-        Probability that a fix is an outlier.
-    size : float
-        Position error of every component, in stated standard deviations.
-    velocity_size : float
-        The same for the velocity.
-    """
-
-    share: float = 0.1
-    size: float = 50.0
-    velocity_size: float = 0.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._checked("share", 0.0, 1.0)
-        self._checked("size", 0.0)
-        self._checked("velocity_size", 0.0)
-
-    def broken(
-        self, table: pd.DataFrame, within: Flags, random: np.random.Generator
-    ) -> pd.DataFrame:
-        """As `GnssFault.broken`."""
-        struck = within & (random.random(len(table)) < self.share)
-        sign = np.where(random.random((len(table), 6)) < 0.5, -1.0, 1.0) * struck[:, None]
-        out = table.copy()
-        sd = _finite(values_of(table, POSITION_SD))
-        out[GEODETIC] = moved_places(values_of(table, GEODETIC), self.size * sd * sign[:, :3])
-        sd = _finite(values_of(table, VELOCITY_SD))
-        out[VELOCITY] = values_of(table, VELOCITY) + self.velocity_size * sd * sign[:, 3:]
-        return out
-
-
-@dataclass(frozen=True)
-class GrowingBias(GnssFault):
-    """Position error that grows linearly from zero at `begin`, as under spoofing.
-
-    Attributes
-    ----------
-    rate : tuple of float, (3,), m/s
-        North, east, down; the stated velocity is unchanged.
-    """
-
-    rate: tuple[float, float, float] = (0.1, 0.0, 0.0)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if len(self.rate) != 3 or not all(is_number(x) and math.isfinite(x) for x in self.rate):
-            raise ConfigError("simulation.no-rate", quantity="rate", rate=self.rate)
-
-    def broken(
-        self, table: pd.DataFrame, within: Flags, random: np.random.Generator
-    ) -> pd.DataFrame:
-        """As `GnssFault.broken`."""
-        time = index_of(table)
-        since = np.where(within, time - max(self.begin, float(time[0])), 0.0)
-        out = table.copy()
-        out[GEODETIC] = moved_places(
-            values_of(table, GEODETIC), since[:, None] * np.asarray(self.rate)
-        )
-        return out
-
-
-@dataclass(frozen=True)
-class Frozen(GnssFault):
-    """Repeat the last fix: position, velocity and precision are constant while stamps advance."""
-
-    def broken(
-        self, table: pd.DataFrame, within: Flags, random: np.random.Generator
-    ) -> pd.DataFrame:
-        """As `GnssFault.broken`."""
-        out = table.copy()
-        out.loc[within, :] = table.to_numpy()[int(np.flatnonzero(within)[0])]
-        return out
-
-
-@dataclass(frozen=True)
-class WrongSd(GnssFault):
-    """Wrong stated precision.
-
-    Attributes
-    ----------
-    position_factor, velocity_factor : float
-        Factors on the stated standard deviations: 1/3 if the true error is three times the stated
-        one.
-    """
-
-    position_factor: float = 1.0 / 3.0
-    velocity_factor: float = 1.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._checked("position_factor", 0.0)
-        self._checked("velocity_factor", 0.0)
-
-    def broken(
-        self, table: pd.DataFrame, within: Flags, random: np.random.Generator
-    ) -> pd.DataFrame:
-        """As `GnssFault.broken`."""
-        out = table.copy()
-        for columns, factor in (
-            (POSITION_SD, self.position_factor),
-            (VELOCITY_SD, self.velocity_factor),
-        ):
-            out.loc[within, columns] = factor * values_of(table, columns)[within]
-        return out
-
-
-def inject_gnss_faults(
-    table: pd.DataFrame, faults: Sequence[GnssFault], *, seed: int = 0
-) -> pd.DataFrame:
-    """Inject faults into a Gnss table.
-
-    Parameters
-    ----------
-    table : DataFrame
-        Not changed.
-    faults : sequence of GnssFault
-        Applied in order: a later fault acts on the output of an earlier one.
-    seed : int
-        Seed of the random draws; each fault has its own stream.
-
-    Returns
-    -------
-    DataFrame
-
-    Raises
-    ------
-    ConfigError
-        An interval contains no fix, or an outage removes all fixes.
-    """
-    out = table
-    for k, fault in enumerate(faults):
-        time = index_of(out)
-        within = (time >= fault.begin) & (time < fault.end)
-        if not within.any() or (within.all() and isinstance(fault, Outage)):
-            raise ConfigError(
-                "simulation.outage-of-every-fix" if within.any() else "simulation.no-fix-between",
-                file=source_of(table),
-                quantity=type(fault).__name__,
-                begin=fault.begin,
-                end=fault.end,
-                time=time[0],
-                time_2=time[-1],
-            )
-        random = np.random.Generator(np.random.PCG64(child(seed, FAULT_SEED, k)))
-        out = fault.broken(out, within, random)
-        out.attrs = dict(table.attrs)
-    return out
-
-
-def _finite(sd: Array) -> Array:
-    """Replace standard deviations that are not finite by zero."""
-    return np.where(np.isfinite(sd), sd, 0.0)

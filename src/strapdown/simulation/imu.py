@@ -38,7 +38,6 @@ def simulate_imu(
 
     Parameters
     ----------
-    motion : Motion
     errors : ImuErrors
         Applied in the order of `sensors.error_chain`. Jitter and low-pass act on the motion itself,
         which is evaluated at the jittered instants and between the samples.
@@ -108,26 +107,13 @@ def sample_gyro(
     straight: float = 0.0,
     specific_force: Array | None = None,
 ) -> Array:
-    """Simulate a triad of gyros.
+    """Simulate a triad of gyros; (n, 3), rad/s.
 
-    Parameters
-    ----------
-    motion : Motion
-    errors : TriadErrors
-    time : ndarray, (n,), s
-        Equally spaced, within the motion.
-    sampling : {'instantaneous', 'mean'}
-    seed : int or SeedSequence
-        Seed of the triad.
-    straight : float, rad/s
-        Largest deviation from a straight line between two samples at which the low-pass treats the
-        rate as linear (`between_samples.low_passed`); zero disables this.
-    specific_force : ndarray, (n, 3), m/s², optional
-        Specific force in body axes, if already computed.
-
-    Returns
-    -------
-    ndarray, (n, 3), rad/s
+    `time` ((n,), s): equally spaced, within the motion. `sampling` ({'instantaneous', 'mean'}).
+    `seed`: seed of the triad. `straight` (rad/s): largest deviation from a straight line between
+    two samples at which the low-pass treats the rate as linear (`low_passed`); zero
+    disables this. `specific_force` ((n, 3), m/s²): specific force in body axes, if already
+    computed.
     """
     step = float(time[1] - time[0])
     plain = specific_force
@@ -155,22 +141,11 @@ def sample_accelerometer(
     vibration: Array | None = None,
     specific_force: Array | None = None,
 ) -> Array:
-    """Simulate a triad of accelerometers.
+    """Simulate a triad of accelerometers; (n, 3), m/s².
 
-    Parameters
-    ----------
-    motion, errors, time, sampling, seed
-        As of `sample_gyro`.
-    straight : float, m/s²
-        As of `sample_gyro`.
-    vibration : ndarray, (n, 3), (m/s²)², optional
-        As of `sensors.error_chain.apply`.
-    specific_force : ndarray, (n, 3), m/s², optional
-        As of `sample_gyro`.
-
-    Returns
-    -------
-    ndarray, (n, 3), m/s²
+    `motion`, `errors`, `time`, `sampling`, `seed`: as of `sample_gyro`. `straight` (m/s²): as of
+    `sample_gyro`. `vibration` ((n, 3), (m/s²)²): as of `sensors.error_chain.apply`.
+    `specific_force` ((n, 3), m/s²): as of `sample_gyro`.
     """
     step = float(time[1] - time[0])
     plain = specific_force
@@ -316,17 +291,8 @@ def mean_over(quantity: Quantity, starts: Array, ends: Array) -> Array:
 def mean_between(quantity: Quantity, instants: Array, cuts: Sequence[float]) -> Array:
     """Mean from each instant to the next, as `mean_over`, divided at cuts; (n - 1, 3).
 
-    Parameters
-    ----------
-    quantity : callable
-    instants : ndarray, (n,), s
-        Increasing.
-    cuts : sequence of float, s
-        Instants where the quantity is not smooth, dense enough for it to be smooth between them.
-
-    Returns
-    -------
-    ndarray, (n - 1, 3)
+    `instants` ((n,), s): increasing. `cuts` (s): instants where the quantity is not smooth, dense
+    enough for it to be smooth between them. Returns (n - 1, 3).
     """
     edges, at = _cut(instants, cuts)
     means = mean_over(quantity, edges[:-1], edges[1:])
@@ -355,30 +321,18 @@ def low_passed(
 ) -> Array:
     """Output of a single-pole low-pass at increasing instants, (n, 3).
 
-    Parameters
-    ----------
-    quantity : callable
-        Maps (n,) instants to (n, 3) values.
-    instants : ndarray, (n,), s
-        Until the first instant the filter is settled at the value there.
-    bandwidth : float, Hz
-        -3 dB frequency.
-    straight : float
-        A quantity within this of a straight line between two instants is treated as linear, and the
-        quadrature elsewhere has 3 nodes; zero disables both. This saves evaluations where the
-        quantity changes little.
-
-    Returns
-    -------
-    ndarray, (n, 3)
-        ``y1 = exp(-dt/τ) y0 + ∫ exp(-(t1 - s)/τ) u(s) ds/τ`` from instant to instant, with the
-        integral by 6-node Gauss-Legendre quadrature in stretches no longer than τ, so that the
-        motion is evaluated at 6 or more instants per sample and time constant. Smooth motion is
-        exact to rounding; a jump of u is spread over its stretch.
+    `quantity`: maps (n,) instants to (n, 3) values. `instants` ((n,), s): until the first instant
+    the filter is settled at the value there. `bandwidth` (Hz): -3 dB frequency. `straight`: a
+    quantity within this of a straight line between two instants is treated as linear, and the
+    quadrature elsewhere has 3 nodes; zero disables both. This saves evaluations where the quantity
+    changes little. Returns (n, 3), ``y1 = exp(-dt/τ) y0 + ∫ exp(-(t1 - s)/τ) u(s) ds/τ`` from
+    instant to instant, with the integral by 6-node Gauss-Legendre quadrature in stretches no longer
+    than τ, so that the motion is evaluated at 6 or more instants per sample and time constant.
+    Smooth motion is exact to rounding; a jump of u is spread over its stretch.
     """
     if math.isinf(bandwidth):
         return quantity(instants)
-    from strapdown._kernels.recursion import first_order
+    from strapdown._kernels.signals import first_order
 
     tau = time_constant(bandwidth)
     steps = np.diff(instants)

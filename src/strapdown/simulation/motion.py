@@ -1,37 +1,32 @@
-"""Rotations with the attitude in closed form at every instant."""
+"""Motions with exact attitude at every instant, and what they are made of."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
+from numpy.polynomial import legendre
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
+from strapdown.errors import ConfigError
 
-# Attitude, body rate and angular acceleration from 3-2-1 Euler angles.
-
+Array = NDArray[np.float64]
 Quaternion = tuple[float, float, float, float]
 
 
 def euler_attitude(angles: Array, q_nb: Quaternion) -> Array:
     """Attitude of a body rotated by 3-2-1 angles from an initial attitude.
 
-    Parameters
-    ----------
-    angles : ndarray, (n, 3), deg
-        Roll, pitch, heading, relative to the initial attitude; any number of turns, and no
-        singularity at pitch ±90 deg.
-    q_nb : tuple of float
-        Initial attitude, scalar first.
-
-    Returns
-    -------
-    ndarray, (n, 4)
-        ``q_nb Rz(heading) Ry(pitch) Rx(roll)``, continuous in sign. Whole turns reproduce the
-        attitude to the last bit, except for that sign.
+    `angles` ((n, 3), deg): roll, pitch, heading, relative to the initial attitude; any number of
+    turns, and no singularity at pitch ±90 deg. `q_nb`: initial attitude, scalar first. Returns (n,
+    4), ``q_nb Rz(heading) Ry(pitch) Rx(roll)``, continuous in sign. Whole turns reproduce the
+    attitude to the last bit, except for that sign.
     """
     # 360 deg is not a binary fraction of pi, but whole turns can be removed without rounding.
     turns = np.rint(angles / 360.0)
@@ -45,20 +40,9 @@ def euler_attitude(angles: Array, q_nb: Quaternion) -> Array:
 def euler_body_rate(angles: Array, rates: Array) -> Array:
     """Body rate from the rates of the 3-2-1 angles.
 
-    Parameters
-    ----------
-    angles : ndarray, (n, 3), deg
-        Roll, pitch, heading.
-    rates : ndarray, (n, 3), deg/s
-        Their derivatives.
+    `angles` ((n, 3), deg): roll, pitch, heading. `rates` ((n, 3), deg/s): their derivatives.
+    Returns (n, 3), rad/s, exactly zero where all three rates are zero.
 
-    Returns
-    -------
-    ndarray, (n, 3), rad/s
-        Exactly zero where all three rates are zero.
-
-    Notes
-    -----
     ``ω = [φ' - ψ' sin θ, θ' cos φ + ψ' sin φ cos θ, ψ' cos φ cos θ - θ' sin φ]``, the inverse of
     Alexiev (2021), Eqs. (8)-(10). Valid at every pitch.
     """
@@ -77,18 +61,10 @@ def euler_body_rate(angles: Array, rates: Array) -> Array:
 def euler_body_acceleration(angles: Array, rates: Array, accelerations: Array) -> Array:
     """Time derivative of the body rate from 3-2-1 angles and their derivatives.
 
-    Parameters
-    ----------
-    angles : ndarray, (n, 3), deg
-        Roll, pitch, heading.
-    rates, accelerations : ndarray, (n, 3), deg/s and deg/s²
-        Their first and second derivatives.
-
-    Returns
-    -------
-    ndarray, (n, 3), rad/s²
-        Derivative of the components of `euler_body_rate` in body axes, at every pitch; exactly zero
-        where all derivatives are zero.
+    `angles` ((n, 3), deg): roll, pitch, heading. `rates`, `accelerations` ((n, 3), deg/s and
+    deg/s²): their first and second derivatives. Returns (n, 3), rad/s², derivative of the
+    components of `euler_body_rate` in body axes, at every pitch; exactly zero where all derivatives
+    are zero.
     """
     roll, pitch = np.radians(angles[:, 0]), np.radians(angles[:, 1])
     d_roll, d_pitch, d_heading = np.radians(rates).T
@@ -106,42 +82,79 @@ def euler_body_acceleration(angles: Array, rates: Array, accelerations: Array) -
     )
 
 
-# Base of motions near the ground: a flat, non-rotating Earth.
+class FlatMotion(ABC):
+    """Base of motions over a flat Earth at rest, in fixed north-east-down; rows by time in s.
 
+    The position is constant unless `moved` is overridden.
+    """
 
-class _Accelerated(Protocol):
-    def attitude(self, time: ArrayLike) -> Array: ...
+    @abstractmethod
+    def attitude(self, time: ArrayLike) -> Array:
+        """Exact attitude ``q_nb``, continuous in sign; (n, 4)."""
 
-    def acceleration(self, time: ArrayLike) -> Array: ...
+    def moved(self, time: ArrayLike) -> tuple[Array, Array, Array]:
+        """Position in m, velocity in m/s, acceleration in m/s²; (n, 3) each."""
+        still = np.zeros((np.size(time), 3))
+        return still, still, still
 
+    def position(self, time: ArrayLike) -> Array:
+        """Position; (n, 3), m."""
+        return self.moved(time)[0]
 
-class FlatMotion:
-    """Base of motions with position, velocity and acceleration in fixed north-east-down."""
+    def velocity(self, time: ArrayLike) -> Array:
+        """Velocity; (n, 3), m/s."""
+        return self.moved(time)[1]
 
-    def specific_force(self: _Accelerated, time: ArrayLike) -> Array:
-        """Specific force in body axes.
+    def acceleration(self, time: ArrayLike) -> Array:
+        """Acceleration without gravity; (n, 3), m/s²."""
+        return self.moved(time)[2]
 
-        Parameters
-        ----------
-        time : array_like, (n,), s
-
-        Returns
-        -------
-        ndarray, (n, 3), m/s²
-            ``C_nb^T (a_n - g_n)`` with standard gravity straight down.
-        """
+    def specific_force(self, time: ArrayLike) -> Array:
+        """``C_nb^T (a_n - g_n)`` with standard gravity straight down; (n, 3), m/s²."""
         upward = self.acceleration(time) - np.array([0.0, 0.0, STANDARD_GRAVITY])
         return rotation.rotate(rotation.conjugate(self.attitude(time)), upward)
 
 
-Array = NDArray[np.float64]
+class EulerMotion(FlatMotion):
+    """Base of motions by 3-2-1 angles from an initial attitude `q_nb`."""
+
+    q_nb: Quaternion
+
+    @abstractmethod
+    def turned(self, time: ArrayLike) -> tuple[Array, Array, Array]:
+        """Roll, pitch, heading in deg, and their first two derivatives; (n, 3) each."""
+
+    @property
+    @abstractmethod
+    def breaks(self) -> Sequence[float]:
+        """Instants between which the angles are smooth, from zero to the end, s."""
+
+    def rate(self, time: ArrayLike) -> Array:
+        """Body rate, exactly zero at rest; (n, 3), rad/s."""
+        angles, rates, _ = self.turned(time)
+        return euler_body_rate(angles, rates)
+
+    def angle(self, time: ArrayLike) -> Array:
+        """Integral of the body rate from time zero, within 1e-14 rad plus rounding; (n, 3), rad.
+
+        Constant before zero, after the end, and at rest.
+        """
+        return self._integral(time)
+
+    def attitude(self, time: ArrayLike) -> Array:
+        """Exact attitude ``q_nb``, continuous in sign; (n, 4)."""
+        return euler_attitude(self.turned(time)[0], self.q_nb)
+
+    @cached_property
+    def _integral(self) -> RateIntegral:
+        return integrate_rate(self.rate, self.breaks)
 
 
 class Motion(Protocol):
     """Interface of a motion: the exact truth at any instant from 0 to `duration`.
 
     Each method takes instants, (n,) in s, and returns one row for each. The motion decides whether
-    the Earth is flat and fixed (`flat_motion.FlatMotion`) or rotates (`earth_motion.EarthMotion`);
+    the Earth is flat and fixed (`FlatMotion`) or rotates (`earth_motion.EarthMotion`);
     sensors use only rate and specific force.
     """
 
@@ -210,16 +223,7 @@ class PulseMotion(FlatMotion):
     q_nb: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
 
     def rate(self, time: ArrayLike) -> Array:
-        """Body rate at each instant.
-
-        Parameters
-        ----------
-        time : array_like, (n,), s
-
-        Returns
-        -------
-        ndarray, (n, 3), rad/s
-        """
+        """Body rate at each instant; (n, 3), rad/s."""
         t = np.asarray(time, dtype=np.float64)
         out = np.zeros((t.size, 3))
         for p in self.pulses:
@@ -228,16 +232,7 @@ class PulseMotion(FlatMotion):
         return out
 
     def angle(self, time: ArrayLike) -> Array:
-        """Integral of the body rate from time zero.
-
-        Parameters
-        ----------
-        time : array_like, (n,), s
-
-        Returns
-        -------
-        ndarray, (n, 3), rad
-        """
+        """Integral of the body rate from time zero; (n, 3), rad."""
         t = np.asarray(time, dtype=np.float64)
         out = np.zeros((t.size, 3))
         for p in self.pulses:
@@ -272,18 +267,186 @@ class PulseMotion(FlatMotion):
             np.array(at_edge)[last], rotation.quaternion_from_rotation_vector(since)
         )
 
-    def acceleration(self, time: ArrayLike) -> Array:
-        """Zero, (n, 3), m/s²: the body rotates about the sensor."""
-        return np.zeros((np.size(time), 3))
-
-    def velocity(self, time: ArrayLike) -> Array:
-        """Zero, (n, 3), m/s."""
-        return np.zeros((np.size(time), 3))
-
-    def position(self, time: ArrayLike) -> Array:
-        """Zero, (n, 3), m."""
-        return np.zeros((np.size(time), 3))
-
 
 def _half_open(pulse: Pulse) -> Pulse:
     return Pulse(pulse.axis, pulse.start, pulse.end, pulse.rate)
+
+
+def minimum_jerk(x: Array) -> tuple[Array, Array, Array]:
+    """Unit move ``10 x³ - 15 x⁴ + 6 x⁵`` and its first two derivatives with respect to `x`.
+
+    `x`: elapsed fraction of the move; at rest outside [0, 1]. Returns `value`, `first`, `second`:
+    exactly 0, 0, 0 where ``x <= 0`` and exactly 1, 0, 0 where ``x >= 1``; all three are continuous.
+
+    Flash and Hogan (1985), J. Neurosci. 5(7), 1688-1703: the move between two rests with the least
+    mean square third derivative. Its largest rate is 15/8 of its mean rate.
+    """
+    x = np.clip(x, 0.0, 1.0)
+    rest = 1.0 - x
+    # In the second half, subtract the mirrored move from one, because the polynomial cancels there.
+    y = np.minimum(x, rest)
+    moved = y * y * y * (10.0 - y * (15.0 - 6.0 * y))
+    return (
+        np.where(x > 0.5, 1.0 - moved, moved),
+        30.0 * (x * rest) ** 2,
+        60.0 * x * rest * (rest - x),
+    )
+
+
+@dataclass(frozen=True)
+class Track:
+    """One coordinate that moves between values, with a stop at each.
+
+    Attributes
+    ----------
+    times : tuple of float, s
+        Increasing.
+    values : tuple of float
+        One per time, in any unit. Two equal neighbors are a rest; the first and the last value are
+        held before and after.
+
+    Raises
+    ------
+    ConfigError
+        The track is empty, a number is not finite, or the times do not increase.
+    """
+
+    times: tuple[float, ...]
+    values: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if not self.times or len(self.times) != len(self.values):
+            raise ConfigError(
+                "simulation.times-values",
+                quantity="track",
+                count=len(self.times),
+                count_2=len(self.values),
+            )
+        if not np.isfinite([*self.times, *self.values]).all():
+            raise ConfigError("simulation.time-or-value-not-finite", quantity="track")
+        falls = np.flatnonzero(np.diff(self.times) <= 0.0)
+        if falls.size:
+            k = int(falls[0])
+            raise ConfigError(
+                "simulation.does-not-come-after",
+                quantity="track",
+                times=self.times[k + 1],
+                times_2=self.times[k],
+            )
+
+    def evaluate(self, time: ArrayLike) -> tuple[Array, Array, Array]:
+        """Value and its first two time derivatives.
+
+        Returns `value`, `first`, `second` ((n,)): unit of the values, that per s and per s². At
+        rest the value is bit-identical to the given one, and both derivatives are exactly zero.
+        """
+        t = np.asarray(time, dtype=np.float64)
+        times, values = np.asarray(self.times), np.asarray(self.values)
+        if len(times) == 1:
+            return np.full(t.shape, values[0]), np.zeros(t.shape), np.zeros(t.shape)
+        k = np.searchsorted(times, t, side="right") - 1
+        # From the last time on use that value itself, not a rounded sum.
+        ended = k == len(times) - 1
+        k = np.clip(k, 0, len(times) - 2)
+        length, change = np.diff(times)[k], np.diff(values)[k]
+        part, first, second = minimum_jerk((t - times[k]) / length)
+        value = np.where(ended, values[-1], values[k] + change * part)
+        return value, change * first / length, change * second / (length * length)
+
+
+#: A coordinate that is constantly zero.
+STILL = Track((0.0,), (0.0,))
+
+
+_NODES = 16
+_X, _W = legendre.leggauss(_NODES)
+# Rate at the nodes to Legendre coefficients: c_j = (2j + 1)/2 sum_i w_i P_j(x_i) f(x_i), exact for
+# polynomials that 16 nodes determine.
+_TO_COEFFICIENTS = (np.arange(_NODES) + 0.5)[:, None] * (
+    legendre.legvander(_X, _NODES - 1) * _W[:, None]
+).T
+# Truncation error of the series within one panel, rad.
+_TOLERANCE = 1e-14
+# Shortest panel, s; below it rounding dominates the truncation error.
+_SHORTEST = 1e-5
+
+
+@dataclass(frozen=True)
+class RateIntegral:
+    """Integral of a rate as Legendre series over panels.
+
+    Attributes
+    ----------
+    edges : ndarray, (p + 1,), s
+    before : ndarray, (p, 3), rad
+        Integral up to the left edge of each panel.
+    series : ndarray, (p, 17, 3), rad
+        Legendre coefficients of the integral within each panel.
+    """
+
+    edges: Array
+    before: Array
+    series: Array
+
+    def __call__(self, time: ArrayLike) -> Array:
+        """Integral from the first edge; constant beyond both ends; (n, 3), rad."""
+        from strapdown._kernels.piecewise import legendre_sums
+
+        t = np.clip(np.asarray(time, dtype=np.float64), self.edges[0], self.edges[-1])
+        out = np.empty((t.size, 3))
+        legendre_sums(self.edges, self.before, self.series, t, out)
+        return out
+
+
+def integrate_rate(rate: Callable[[ArrayLike], Array], breaks: Sequence[float]) -> RateIntegral:
+    """Integrate a piecewise smooth rate.
+
+    `rate`: (n,) instants in s to (n, 3) rates in rad/s. `breaks` (s): instants where the rate or a
+    derivative may jump; the first and the last are the ends.
+
+    Sixteen Gauss-Legendre nodes per panel give the Legendre coefficients c_j of the rate. The
+    integral of P_n over any part of a panel of half-length h is at most 2h/(2n+1), so the first
+    omitted term contributes at most ``2h |c_16| / 33``. Where ``2h |c| / 29`` of the last two terms
+    kept (two, because symmetry can make one vanish) exceeds 1e-14 rad, the panel is halved. c
+    decreases geometrically for an analytic rate, and the integral over a whole panel is exact to
+    degree 31. The sums over the panels are compensated.
+    """
+    edges = np.unique(np.asarray(breaks, dtype=np.float64))
+    left, right = edges[:-1], edges[1:]
+    lefts, lengths, series = [], [], []
+    while left.size:
+        half = 0.5 * (right - left)
+        nodes = left[:, None] + half[:, None] * (1.0 + _X)
+        values = rate(nodes.ravel()).reshape(left.size, _NODES, 3)
+        c = _TO_COEFFICIENTS @ values
+        tail = np.abs(c[:, -2:]).max(axis=(1, 2))
+        good = (2.0 * half * tail / (2 * _NODES - 3) <= _TOLERANCE) | (half < _SHORTEST)
+        lefts.append(left[good])
+        lengths.append(half[good])
+        series.append(c[good])
+        middle = left[~good] + half[~good]
+        left, right = np.concatenate([left[~good], middle]), np.concatenate([middle, right[~good]])
+    order = np.argsort(np.concatenate(lefts))
+    starts = np.concatenate(lefts)[order]
+    half = np.concatenate(lengths)[order]
+    rates = np.moveaxis(np.concatenate(series)[order], 1, 0)
+    integrals = legendre.legint(rates, lbnd=-1, axis=0) * half[:, None]
+    whole = 2.0 * half[:, None] * rates[0]
+    return RateIntegral(
+        np.append(starts, edges[-1]),
+        _sums(whole),
+        np.ascontiguousarray(np.moveaxis(integrals, 0, 1)),
+    )
+
+
+def _sums(terms: Array) -> Array:
+    """Sum of all preceding terms, compensated (Neumaier 1974)."""
+    out = np.zeros_like(terms)
+    total, lost = np.zeros(3), np.zeros(3)
+    for k in range(len(terms) - 1):
+        term = terms[k]
+        new = total + term
+        lost += np.where(np.abs(total) >= np.abs(term), (total - new) + term, (term - new) + total)
+        total = new
+        out[k + 1] = total + lost
+    return out

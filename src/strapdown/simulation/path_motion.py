@@ -14,10 +14,15 @@ from numpy.typing import NDArray
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import ConfigError
-from strapdown.simulation.earth_motion import EarthMotion, Kinematics, Origin, check_duration
-from strapdown.simulation.minimum_jerk import STILL, Track
-from strapdown.simulation.motion import euler_attitude, euler_body_rate
-from strapdown.simulation.place_integral import PlaceIntegral, integrate_velocity
+from strapdown.simulation.earth_motion import (
+    EarthMotion,
+    Kinematics,
+    Origin,
+    PlaceIntegral,
+    check_duration,
+    integrate_velocity,
+)
+from strapdown.simulation.motion import STILL, Track, euler_attitude, euler_body_rate
 
 Array = NDArray[np.float64]
 
@@ -228,20 +233,9 @@ def rocking_stand(
     Parameters
     ----------
     duration : float, s
-    origin : Origin
     roll_deg, pitch_deg, heading_deg : float, deg
         Mean angles.
     roll_waves, pitch_waves, heading_waves : sequence of Wave, deg
-    ellipsoid : Ellipsoid
-
-    Returns
-    -------
-    PathMotion
-
-    Raises
-    ------
-    ConfigError
-        As `PathMotion`.
     """
     return PathMotion(
         duration,
@@ -342,24 +336,10 @@ def lay_course(
 ) -> tuple[float, Track, Track, Track]:
     """Build tracks from a list of maneuvers.
 
-    Parameters
-    ----------
-    manoeuvres : sequence of (str, Manoeuvre)
-        Each with its name for messages.
-    speed : float, m/s
-        At time zero, along the path.
-    limits : Limits
-
-    Returns
-    -------
-    duration : float, s
-    speed, turn_rate, climb : Track
-        m/s, deg/s, deg; from time zero.
-
-    Raises
-    ------
-    ConfigError
-        The list is empty, or a maneuver is infeasible; the message gives its number, from 1.
+    `manoeuvres`: each with its name for messages. `speed` (m/s): at time zero, along the path.
+    Returns `duration` (s); `speed`, `turn_rate`, `climb`: m/s, deg/s, deg; from time zero.
+    ConfigError: the list is empty, or a maneuver is infeasible; the message gives its number, from
+    1.
     """
     if not 0.0 <= speed < math.inf:
         raise ConfigError("simulation.vehicle-cannot-begin", quantity="speed", speed=speed)
@@ -384,9 +364,6 @@ def check_length(value: float, name: str = "duration") -> None:
     """Raise unless the length of a maneuver is finite and positive."""
     if not 0.0 < value < math.inf:
         raise ConfigError("simulation.not-above-zero", quantity=name, value=value)
-
-
-# Oscillations of a coordinate as sums of sines.
 
 
 @dataclass(frozen=True)
@@ -422,15 +399,7 @@ class Wave:
 def sum_waves(waves: Sequence[Wave], time: Array) -> tuple[Array, Array, Array]:
     """Sum of waves and its first two time derivatives.
 
-    Parameters
-    ----------
-    waves : sequence of Wave
-    time : ndarray, (n,), s
-
-    Returns
-    -------
-    value, first, second : ndarray, (n,)
-        Zero without waves.
+    `time` ((n,), s). Returns `value`, `first`, `second` ((n,)): zero without waves.
     """
     value, first, second = np.zeros(time.size), np.zeros(time.size), np.zeros(time.size)
     for wave in waves:
@@ -446,24 +415,11 @@ def sum_waves(waves: Sequence[Wave], time: Array) -> tuple[Array, Array, Array]:
     return value, first, second
 
 
-# Integral of a track, in closed form.
-
-
 def integrate_track(track: Track, time: Array) -> Array:
-    """Integral of a track from its first time.
+    """Integral of a track from its first time; (n,), unit of the track times s.
 
-    Parameters
-    ----------
-    track : Track
-    time : ndarray, (n,), s
-        Not before the track's first time.
+    `time` ((n,), s): not before the track's first time.
 
-    Returns
-    -------
-    ndarray, (n,), unit of the track times s
-
-    Notes
-    -----
     The integral of the minimum-jerk quintic is ``5/2 x^4 - 3 x^5 + x^6``, one half over the whole.
     """
     times, values = np.asarray(track.times), np.asarray(track.values)

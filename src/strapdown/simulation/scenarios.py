@@ -1,25 +1,17 @@
-"""Named scenarios: Alexiev's generated gyro data, and further motions.
-
-The figures of the paper are illegible in the scan. Shapes follow captions and text; numbers are
-chosen here, except those of Fig. 4, which the text gives. Every scenario except coning is at rest
-at its start and end, for 1.5 s or more.
-"""
+"""Named scenarios of rotation, from ``scenarios.toml``."""
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
 from strapdown.errors import ConfigError
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
-from strapdown.simulation.coning import Coning
-from strapdown.simulation.hand_motions import INTENSIVE, PHONE, TABLE_TO_TABLE, Handling
-from strapdown.simulation.motion import Motion, Pulse, PulseMotion
-from strapdown.simulation.smooth_random import SmoothRandom
+from strapdown.simulation.attitude_motions import Coning, Gesture, Handling, SmoothRandom, gesture
+from strapdown.simulation.motion import Motion, Pulse, PulseMotion, Track
 
-X, Y, Z = 0, 1, 2
-_QUARTER_TURN = 1.5707963267948966  # rad
-# About ten times that of a phone, to be visible in a plot: 0.01 rad/s at 100 Hz.
-_NOISE = 0.001  # rad/s/√Hz
 _BEYOND = "beyond the paper"
 
 
@@ -51,143 +43,50 @@ class Scenario:
         return self.origin if self.origin == _BEYOND else f"Alexiev 2021, {self.origin}"
 
 
-_TWO_AXES = (Pulse(X, 2.0, 4.0, 0.8), Pulse(Y, 3.0, 5.0, -0.6))
-_THREE_AXES = (Pulse(X, 2.0, 5.0, 0.3), Pulse(Y, 2.5, 4.5, 0.7), Pulse(Z, 3.0, 4.0, 1.5))
-_HOME = "end same as start"
+def _motion(table: dict[str, Any]) -> Motion:
+    duration = table["duration"]
+    if "pulses" in table:
+        pulses = ({**p, "axis": "xyz".index(p["axis"])} for p in table["pulses"])
+        return PulseMotion(tuple(Pulse(**p) for p in pulses), duration)
+    if "tracks" in table:
+        tracks: dict[str, Any] = {k: Track(*map(tuple, v)) for k, v in table["tracks"].items()}
+        return Gesture(duration, **tracks)
+    if "poses" in table:
+        return gesture(table["poses"], duration)
+    if "coning" in table:
+        return Coning(duration=duration, **table["coning"])
+    if "smooth_random" in table:
+        return SmoothRandom(duration=duration, **_tuples(table["smooth_random"]))
+    return Handling(duration=duration, **table["handling"])
 
 
-def _fig5(scale: float) -> PulseMotion:
-    # On the grid of 100 Hz but off that of 5 Hz, like unsynchronized pulses.
-    return PulseMotion(
-        (
-            Pulse(X, 2.07, 3.53, 0.10 * scale),
-            Pulse(Y, 2.51, 4.13, -0.05 * scale),
-            Pulse(Z, 2.93, 3.77, 0.15 * scale),
-        ),
-        7.0,
+def _tuples(table: dict[str, Any]) -> dict[str, Any]:
+    return {k: tuple(v) if isinstance(v, list) else v for k, v in table.items()}
+
+
+def _scenario(table: dict[str, Any]) -> Scenario:
+    return Scenario(
+        table["title"],
+        table.get("origin", _BEYOND),
+        _motion(table),
+        ImuErrors(TriadErrors(**_tuples(table["gyro"]))) if "gyro" in table else ImuErrors(),
+        tuple(table.get("references", ())),
     )
 
 
+#: The scenarios by name.
 SCENARIOS: dict[str, Scenario] = {
-    "alexiev-fig2a": Scenario(
-        "one axis",
-        "Fig. 2a",
-        PulseMotion((Pulse(Z, 2.0, 4.0, 1.0),), 6.0),
-    ),
-    "alexiev-sequence": Scenario(
-        "three axes in sequence, a quarter turn about each",
-        "Section 4, rotations that do not overlap in time",
-        PulseMotion(
-            (
-                Pulse(X, 2.0, 3.0, _QUARTER_TURN),
-                Pulse(Y, 4.0, 5.0, _QUARTER_TURN),
-                Pulse(Z, 6.0, 7.0, _QUARTER_TURN),
-            ),
-            9.0,
-        ),
-    ),
-    "alexiev-fig2b": Scenario("two axes overlapping", "Fig. 2b", PulseMotion(_TWO_AXES, 7.0)),
-    "alexiev-fig2c": Scenario(
-        "three axes overlapping with different intensity",
-        "Fig. 2c",
-        PulseMotion(_THREE_AXES, 7.0),
-    ),
-    "alexiev-fig2d": Scenario(
-        "three axes overlapping, with noise",
-        "Fig. 2d",
-        PulseMotion(_THREE_AXES, 7.0),
-        ImuErrors(TriadErrors(noise_density=_NOISE)),
-    ),
-    "alexiev-fig2e": Scenario(
-        "two axes overlapping, with noise and bias",
-        "Fig. 2e",
-        PulseMotion(_TWO_AXES, 7.0),
-        ImuErrors(TriadErrors(noise_density=_NOISE, bias=(0.02, -0.03, 0.01))),
-    ),
-    "alexiev-fig2f": Scenario(
-        "two axes overlapping, with noise and a different trend on each axis",
-        "Fig. 2f",
-        PulseMotion(_TWO_AXES, 7.0),
-        ImuErrors(TriadErrors(noise_density=_NOISE, trend=(0.01, -0.02, 0.005))),
-    ),
-    "alexiev-fig4": Scenario(
-        "through a pitch near 90°: x 0.1 rad/s and y 2 rad/s, both on [2 s, 3 s)",
-        "Fig. 4",
-        PulseMotion((Pulse(X, 2.0, 3.0, 0.1), Pulse(Y, 2.0, 3.0, 2.0)), 5.0),
-    ),
-    "alexiev-fig4-closed": Scenario(
-        "Fig. 4 with pulses closed at their end, [2 s, 3 s]: one sample too many",
-        "Fig. 4, the other reading of its interval",
-        PulseMotion((Pulse(X, 2.0, 3.0, 0.1, True), Pulse(Y, 2.0, 3.0, 2.0, True)), 5.0),
-    ),
-    "alexiev-fig5": Scenario(
-        "three axes overlapping, turns of 5° to 8°: what a rate of 5 Hz or 100 Hz makes of it",
-        "Fig. 5",
-        _fig5(1.0),
-    ),
-    "alexiev-fig5-large": Scenario(
-        "Fig. 5 with ten times the rates, turns of 46° to 84°",
-        "Fig. 5, where its statement on the naive sum ends",
-        _fig5(10.0),
-    ),
-    "alexiev-fig6": Scenario(
-        "by hand, as fast as it can be: the same pose at 5 s and at 9 s, whatever came between",
-        "Fig. 6, whose log was of 20 Hz",
-        TABLE_TO_TABLE,
-        references=("9 same as 5",),
-    ),
-    "intensive": Scenario(
-        "up to 4.5 turns a second about axes that never stay, back to the same pose",
-        "Section 4, highly intensive rotations",
-        INTENSIVE,
-        references=(_HOME,),
-    ),
-    "coning": Scenario(
-        "coning as under vibration, half-angle 1° at 10 Hz",
-        _BEYOND,
-        Coning(half_angle=1.0, frequency=10.0, duration=60.0),
-    ),
-    "coning-slow": Scenario(
-        "coning as a hand wobbles, half-angle 5° at 0.5 Hz",
-        _BEYOND,
-        Coning(half_angle=5.0, frequency=0.5, duration=60.0),
-    ),
-    "smooth-random": Scenario(
-        "smooth random rotation and translation, 0.1 to 2 Hz, 60 °/s and 1 m/s² rms",
-        _BEYOND,
-        SmoothRandom(duration=60.0, seed=1, rms_rate=60.0, rms_acceleration=1.0, band=(0.1, 2.0)),
-        references=(_HOME,),
-    ),
-    "gestures": Scenario(
-        "a phone taken up, tilted, turned and put back in the same place, five times",
-        _BEYOND,
-        PHONE,
-        references=("6 same as start", "13 same as start", "20.6 same as start", _HOME),
-    ),
-    "handling": Scenario(
-        "ten minutes of taking a phone up and putting it back in the same place",
-        _BEYOND,
-        Handling(duration=600.0, seed=1),
-        references=(_HOME,),
-    ),
+    name: _scenario(table)
+    for name, table in tomllib.loads(
+        Path(__file__).with_name("scenarios.toml").read_text(encoding="utf-8")
+    ).items()
 }
 
 
 def find_scenario(name: str) -> Scenario:
     """Return the scenario with that name.
 
-    Parameters
-    ----------
-    name : str
-
-    Returns
-    -------
-    Scenario
-
-    Raises
-    ------
-    ConfigError
-        The name is unknown; the message gives the nearest.
+    ConfigError: the name is unknown; the message gives the nearest.
     """
     if name not in SCENARIOS:
         raise ConfigError(

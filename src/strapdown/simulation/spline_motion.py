@@ -18,11 +18,12 @@ from strapdown.simulation.earth_motion import (
     EarthMotion,
     Kinematics,
     Origin,
+    PlaceIntegral,
     check_duration,
+    integrate_velocity,
 )
 from strapdown.simulation.motion import euler_attitude, euler_body_rate
 from strapdown.simulation.path_motion import MOST_PITCH
-from strapdown.simulation.place_integral import PlaceIntegral, integrate_velocity
 from strapdown.tables import EULER, check_trajectory, places_of
 
 Array = NDArray[np.float64]
@@ -87,20 +88,7 @@ class SplineMotion(EarthMotion):
     ) -> SplineMotion:
         """Make a motion through the positions and attitudes of a Trajectory table.
 
-        Parameters
-        ----------
-        trajectory : DataFrame
-            Its velocities are not used. Time is counted from its first row.
-        ellipsoid : Ellipsoid
-
-        Returns
-        -------
-        SplineMotion
-
-        Raises
-        ------
-        DataError, ConfigError
-            As `tables.check_trajectory`, and as the class.
+        `trajectory`: its velocities are not used. Time is counted from its first row.
         """
         check_trajectory(trajectory)
         stamps = np.asarray(trajectory.index, dtype=np.float64)
@@ -129,7 +117,7 @@ class SplineMotion(EarthMotion):
 
     def kinematics(self, time: Array) -> Kinematics:
         """State at given instants; as `EarthMotion.kinematics`."""
-        from strapdown._kernels.earth_motion import velocities
+        from strapdown._kernels.earth import velocities
 
         moved, first, second = self._course(time)
         velocity, acceleration = np.empty(moved.shape), np.empty(moved.shape)
@@ -161,7 +149,7 @@ class SplineMotion(EarthMotion):
 
     def _look(self) -> None:
         """Check that the spline between the positions is a feasible motion."""
-        from strapdown._kernels.earth_motion import velocities
+        from strapdown._kernels.earth import velocities
 
         part = np.linspace(0.0, 1.0, _LOOKS, endpoint=False)
         looks = (self.time[:-1, None] + np.diff(self.time)[:, None] * part).ravel()
@@ -261,9 +249,6 @@ def _unwrapped(angles: Array) -> Array:
     return np.asarray(np.r_[angles[:1], angles[1:] - 360.0 * turns])
 
 
-# Quintic splines with their derivatives.
-
-
 _DEGREE = 5  # continuous to the fourth derivative
 
 
@@ -287,17 +272,9 @@ class Spline:
 def quintic(time: ArrayLike, values: ArrayLike) -> Spline:
     """Quintic spline through values, with zero third and fourth derivatives at the ends.
 
-    Parameters
-    ----------
-    time : array_like, (n,), s
-        Two or more, increasing.
-    values : array_like, (n, m)
-
-    Returns
-    -------
-    Spline
-        With continuous fourth derivative: the curve through the values with the least mean square
-        third derivative. Two values give a straight line.
+    `time` ((n,), s): two or more, increasing. `values` ((n, m)). Returns with continuous fourth
+    derivative: the curve through the values with the least mean square third derivative. Two values
+    give a straight line.
     """
     from scipy.interpolate import make_interp_spline
 
@@ -314,9 +291,6 @@ def quintic(time: ArrayLike, values: ArrayLike) -> Spline:
     # Taylor coefficients at the left end of each segment, highest power first.
     powers = [spline(knots[:-1], nu=k) / math.factorial(k) for k in range(_DEGREE, -1, -1)]
     return Spline(knots, np.ascontiguousarray(np.stack(powers, axis=1)))
-
-
-# A path through waypoints, at given times or speeds.
 
 
 def through_waypoints(
@@ -339,11 +313,6 @@ def through_waypoints(
         Alternative to times: mean speed along the straight line from each waypoint to the next.
     most_acceleration : float, m/s²
         Largest acceleration allowed on the spline.
-    ellipsoid : Ellipsoid
-
-    Returns
-    -------
-    SplineMotion
 
     Raises
     ------
@@ -395,23 +364,12 @@ def _times(places: Array, speeds: Sequence[float], ellipsoid: Ellipsoid) -> Arra
     return np.array(times)
 
 
-# Attitude of a vehicle whose nose points along its velocity.
-
-
 def along_velocity(velocity: Array, acceleration: Array) -> tuple[Array, Array]:
     """3-2-1 angles, and their rates, of a body without roll and with its nose along the velocity.
 
-    Parameters
-    ----------
-    velocity : ndarray, (n, 3), m/s
-        North, east, down; the horizontal component must not be zero.
-    acceleration : ndarray, (n, 3), m/s²
-        Derivatives of the velocity components.
-
-    Returns
-    -------
-    angles, rates : ndarray, (n, 3), deg and deg/s
-        Roll, pitch (positive in a climb), heading within ±180.
+    `velocity` ((n, 3), m/s): north, east, down; the horizontal component must not be zero.
+    `acceleration` ((n, 3), m/s²): derivatives of the velocity components. Returns `angles`, `rates`
+    ((n, 3), deg and deg/s): roll, pitch (positive in a climb), heading within ±180.
     """
     north, east, down = velocity.T
     d_north, d_east, d_down = acceleration.T
@@ -427,8 +385,6 @@ def along_velocity(velocity: Array, acceleration: Array) -> tuple[Array, Array]:
     ]
     return np.degrees(angles).T, np.degrees(rates).T
 
-
-# Velocity as a mean plus a sine in each of north, east and down.
 
 Triple = tuple[float, float, float]
 # Shortest period as a fraction of the duration: limits the integral to a few hundred megabytes.

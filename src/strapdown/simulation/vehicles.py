@@ -12,7 +12,7 @@ from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import ConfigError
 from strapdown.simulation.earth_motion import Origin
-from strapdown.simulation.minimum_jerk import Track, minimum_jerk
+from strapdown.simulation.motion import Track, minimum_jerk
 from strapdown.simulation.path_motion import (
     Course,
     Limits,
@@ -68,7 +68,7 @@ def car(
     Raises
     ------
     ConfigError
-        As `course.lay_course` and `PathMotion`.
+        As `lay_course` and `PathMotion`.
     """
     return replace(
         _laid(origin, manoeuvres, heading_deg, speed, limits, ellipsoid),
@@ -170,9 +170,6 @@ def _laid(
         climb=climbs,
         ellipsoid=ellipsoid,
     )
-
-
-# Maneuvers of a vehicle.
 
 
 # Ratio of largest to mean slope of a minimum-jerk move.

@@ -18,11 +18,15 @@ from numpy.typing import NDArray
 
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import ConfigError
-from strapdown.simulation.earth_motion import EarthMotion, Kinematics, Origin
-from strapdown.simulation.minimum_jerk import Track
-from strapdown.simulation.motion import euler_attitude, euler_body_rate
+from strapdown.simulation.earth_motion import (
+    EarthMotion,
+    Kinematics,
+    Origin,
+    PlaceIntegral,
+    integrate_velocity,
+)
+from strapdown.simulation.motion import Track, euler_attitude, euler_body_rate
 from strapdown.simulation.path_motion import MOST_PITCH
-from strapdown.simulation.place_integral import PlaceIntegral, integrate_velocity
 
 __all__ = ["GAITS", "Gait", "Stride", "WalkingMotion", "walk"]
 

@@ -23,8 +23,8 @@ from strapdown.evaluation.differences import known_at, largest_differences
 from strapdown.evaluation.position_references import score_places
 from strapdown.evaluation.reference_points import score_references
 from strapdown.formats import read_log
+from strapdown.formats.columns import factor_of, parse_unit
 from strapdown.formats.references import read_reference_words
-from strapdown.formats.unit_words import factor_of, parse_unit
 from strapdown.increments import increments_from_imu
 from strapdown.progress import Progress, silent
 from strapdown.results.attitude_bench import AttitudeBench

@@ -23,9 +23,8 @@ from strapdown.config.navigation import (
 )
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import ConfigError, DataError, DivergenceError, Finding
-from strapdown.formats.aid_table import read_aid_table
+from strapdown.formats.aid_table import read_aid_table, read_control_points
 from strapdown.formats.clocks import on_clock_of
-from strapdown.formats.control_points import read_control_points
 from strapdown.formats.gnss_files import files_of_fixes, read_gnss
 from strapdown.formats.gnss_fixes import GnssOptions
 from strapdown.formats.recording import StatedStart

@@ -54,9 +54,8 @@ from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.triad_errors import ImuErrors
 from strapdown.sensors.uncertainty import ImuUncertainty, stated_imu
 from strapdown.simulation import simulate_imu
-from strapdown.simulation.aiding_sensors import instants, velocity_of_point
 from strapdown.simulation.earth_motion import EarthMotion, Origin
-from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
+from strapdown.simulation.gnss import GnssReceiver, instants, simulate_gnss, velocity_of_point
 from strapdown.simulation.path_motion import Limits, Manoeuvre
 from strapdown.simulation.vehicles import Accelerate, Straight, Turn, car
 from strapdown.systems.inputs import check_part, input_files, sensor_file

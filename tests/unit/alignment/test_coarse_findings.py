@@ -20,7 +20,7 @@ from strapdown.alignment.two_vector import TwoVector
 from strapdown.errors import ConfigError, DataError
 from strapdown.simulation.earth_motion import Origin
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
-from strapdown.simulation.minimum_jerk import Track
+from strapdown.simulation.motion import Track
 from strapdown.simulation.path_motion import PathMotion
 from strapdown.tables import ACCEL, GYRO
 

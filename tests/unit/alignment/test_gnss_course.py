@@ -18,7 +18,7 @@ from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
-from strapdown.simulation.minimum_jerk import Track
+from strapdown.simulation.motion import Track
 from strapdown.simulation.path_motion import PathMotion
 from strapdown.tables import POSITION_SD, VELOCITY, VELOCITY_SD
 

@@ -29,9 +29,8 @@ from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.crash_unit import Assumed, CrashUnit, Mounting, RecordedTriad, assumed_shapes
 from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.sensors.unmeasured import TURNS
-from strapdown.simulation.crash_recording import record_crash
-from strapdown.simulation.crash_scenarios import CRASHES
-from strapdown.simulation.recorder_design import paper_units
+from strapdown.simulation.crash_motion import CRASHES
+from strapdown.simulation.crash_recording import paper_units, record_crash
 from strapdown.systems.crash_reconstruction import reconstruct_crash
 from strapdown.tables import NED, VELOCITY
 

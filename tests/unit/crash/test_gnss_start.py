@@ -15,16 +15,14 @@ from strapdown.crash.prepare import prepare_unit
 from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.sensors.synchronise import synchronise
-from strapdown.simulation.crash_motion import Setting
-from strapdown.simulation.crash_recording import record_crash
-from strapdown.simulation.crash_scenarios import pole_impact
+from strapdown.simulation.crash_motion import Setting, crash_scenario
+from strapdown.simulation.crash_recording import paper_units, record_crash
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
 from strapdown.simulation.mounted_motion import MountedMotion
-from strapdown.simulation.recorder_design import paper_units
 from strapdown.systems.crash_reconstruction import reconstruct_crash
 from strapdown.tables import GEODETIC, NED, VELOCITY
 
-CRASH = pole_impact(setting=Setting(stand=1.0, coast=2.0))
+CRASH = crash_scenario("pole", setting=Setting(stand=1.0, coast=2.0))
 IMPACT = CRASH.impacts[0]
 DESIGN = next(d for d in paper_units() if d.gyro is not None)
 RECEIVER = GnssReceiver(rate=5.0, position_noise=0.5, velocity_noise=0.05, on_excess="garbage")

@@ -9,7 +9,7 @@ import pytest
 from tests.unit.crash.crash_case import RATE, prepared
 
 from strapdown import rotation
-from strapdown._kernels.perturbed_runs import perturbed_runs
+from strapdown._kernels.crash_errors import perturbed_runs
 from strapdown.crash.combine_units import combine_effects
 from strapdown.crash.delta_v_bound import resolved_delta_v_bound
 from strapdown.crash.entry import Entry

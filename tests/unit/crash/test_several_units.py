@@ -17,10 +17,9 @@ from strapdown.crash.unit_reconstruction import reconstruct_unit
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.sensors.lever_arm import move_unit
 from strapdown.sensors.synchronise import synchronise
-from strapdown.simulation.crash_recording import record_crash
-from strapdown.simulation.crash_scenarios import CRASHES
+from strapdown.simulation.crash_motion import CRASHES
+from strapdown.simulation.crash_recording import paper_units, record_crash
 from strapdown.simulation.mounted_motion import MountedMotion
-from strapdown.simulation.recorder_design import paper_units
 from strapdown.systems.crash_reconstruction import reconstruct_crash
 from strapdown.tables import ACCEL, NED
 

@@ -23,7 +23,7 @@ from strapdown.estimation.sensor_blocks import (
 from strapdown.estimation.sensor_states import stack
 from strapdown.increments import motion_increments
 from strapdown.mechanization import MECHANIZATIONS, NorthEastDown, WanderAzimuth
-from strapdown.mechanization.state_error import state_error
+from strapdown.mechanization.mechanization import state_error
 from strapdown.nav_state import NavState
 from strapdown.tables import ACCEL, GYRO, MOTION, imu_table
 from strapdown.tables.checks import values_of

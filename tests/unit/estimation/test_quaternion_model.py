@@ -27,8 +27,8 @@ from strapdown.estimation.sensor_blocks import (
 )
 from strapdown.estimation.sensor_states import stack
 from strapdown.frames import C_ne
+from strapdown.mechanization.mechanization import state_error
 from strapdown.mechanization.ned import NorthEastDown
-from strapdown.mechanization.state_error import state_error
 from strapdown.mechanization.wander_azimuth import WanderAzimuth
 from wander_runs import (
     dcm,

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from strapdown.errors import ConfigError, DataError
+from strapdown.formats.crash_record import FACTORS, clean, state_unit, unique, unit_of
 from strapdown.formats.crash_records import CRASH_READERS, read_crash_record
+from strapdown.formats.crash_samples import mean_acceleration, mean_accelerations_of
 from strapdown.formats.crash_table import read_channel_name
-from strapdown.formats.crash_text import clean, unique
-from strapdown.formats.crash_units import FACTORS, state_unit, unit_of
-from strapdown.formats.crash_velocity import mean_acceleration, mean_accelerations_of
 
 EDR = """\
 Event data recorder, most recent event

@@ -8,7 +8,7 @@ from scipy.io import savemat
 
 from strapdown.errors import DataError
 from strapdown.formats import read_log
-from strapdown.formats.control_points import read_control_points
+from strapdown.formats.aid_table import read_control_points
 
 
 def arrays(n=400, points=5):

@@ -11,7 +11,7 @@ import pytest
 
 from strapdown import frames
 from strapdown.errors import DataError
-from strapdown.formats.gnss_comma2k19 import RECEIVERS
+from strapdown.formats.comma2k19 import RECEIVERS
 from strapdown.formats.gnss_files import GnssOptions, files_of_fixes, read_gnss
 
 BOOT, UTC = 46_408.0, 1_533_226_488.0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from strapdown.formats import csv
-from strapdown.formats.csv_columns import LONG, parsed
+from strapdown.formats.csv import LONG, parsed
 
 ROW = "{0},{0}.25,{1}\n"
 

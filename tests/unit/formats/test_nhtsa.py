@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from strapdown.errors import DataError
+from strapdown.formats.crash_nhtsa import accelerations, imu_of
 from strapdown.formats.nhtsa import read_nhtsa
-from strapdown.formats.nhtsa_select import accelerations, imu_of
 
 STEM = "synthetic00001"
 VEHICLE = "|".join(

@@ -8,7 +8,7 @@ import pytest
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import ReadOptions, read_log
 from strapdown.formats.columns import read_name, says_increment
-from strapdown.formats.summed import intervals
+from strapdown.formats.judge import intervals
 from strapdown.tables import ACCEL, GYRO
 
 G0 = 9.80665

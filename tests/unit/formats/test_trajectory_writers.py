@@ -17,9 +17,8 @@ from strapdown import rotation
 from strapdown.ellipsoids import ELLIPSOIDS
 from strapdown.errors import ConfigError, DataError
 from strapdown.evaluation.trajectory_differences import trajectory_differences
-from strapdown.formats.date_line import cut_at_date_line
 from strapdown.formats.trajectory_csv import write_error_csv
-from strapdown.formats.trajectory_thinning import thin
+from strapdown.formats.trajectory_maps import cut_at_date_line, thin
 from strapdown.formats.trajectory_writers import (
     TRAJECTORY_WRITERS,
     TrajectoryFileOptions,

@@ -8,9 +8,8 @@ import pytest
 from strapdown.constants import ACCEL_UNITS, GYRO_UNITS
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import read_log
-from strapdown.formats.columns import read_name
+from strapdown.formats.columns import factor_of, parse_unit, read_name, unit_of
 from strapdown.formats.recording import ReadOptions
-from strapdown.formats.unit_words import factor_of, parse_unit, unit_of
 from strapdown.tables import ACCEL, GYRO
 
 N = 50

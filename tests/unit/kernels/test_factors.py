@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from strapdown._kernels.factors import mwgs, semidefinite_factor, udu_factor, udu_matrix
+from strapdown._kernels.covariance import mwgs, semidefinite_factor, udu_factor, udu_matrix
 
 
 def nearly_singular(rng):

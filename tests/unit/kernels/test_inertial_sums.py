@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
-from strapdown._kernels.inertial_sums import inertial_sums, legendre_moments
+from strapdown._kernels.sums import inertial_sums, legendre_moments
 
 
 def test_the_sums_are_those_of_plain_products():

@@ -8,7 +8,6 @@ import mpmath
 import numpy as np
 import pytest
 
-from strapdown._kernels import motion_blocks
 from strapdown._kernels import motion_increments as kernel
 
 U = 2.0**-53
@@ -118,7 +117,7 @@ def test_constant_rate_and_force_are_exact(dt):
     one = kernel.linear_motion(dt, *W[0], *W[0], *F[0], *F[0])
     mean = kernel.mean_motion(dt, dt, *W[0], *W[0], *F[0], *F[0])
     at = (*W[0], *F[0])
-    for motion in (one, mean, motion_blocks.sixth_order_motion(dt, at, at, at)):
+    for motion in (one, mean, kernel.sixth_order_motion(dt, at, at, at)):
         # Some twenty roundings of numbers of the size of the whole: 11 m/s2 and rad of 1.6 dt.
         scale = np.array([max(1.0, 1.6 * dt), 11.0 * dt, 5.5 * dt * dt])
         assert (wrong_by(motion, true) <= 20 * U * scale).all()
@@ -144,18 +143,18 @@ def test_parabolas_are_right_to_the_seventh_power_of_a_step():
     wrong = []
     for dt in (0.2, 0.1, 0.05):
         at = [polynomial_at(dt * g, 2) for g in (kernel_first(), 0.5, kernel_last())]
-        motion = motion_blocks.sixth_order_motion(dt, *(tuple(float(v) for v in a) for a in at))
+        motion = kernel.sixth_order_motion(dt, *(tuple(float(v) for v in a) for a in at))
         wrong.append(wrong_by(motion, flow(dt, [np.concatenate([W[k], F[k]]) for k in range(3)])))
     slopes = np.log2(np.array(wrong[:-1]) / np.array(wrong[1:]))
     assert slopes[-1] == pytest.approx([7.0, 7.0, 7.0], abs=0.3)
 
 
 def kernel_first():
-    return motion_blocks.GAUSS_FIRST
+    return kernel.GAUSS_FIRST
 
 
 def kernel_last():
-    return motion_blocks.GAUSS_LAST
+    return kernel.GAUSS_LAST
 
 
 def test_one_step_and_the_loop_give_the_same_bits():

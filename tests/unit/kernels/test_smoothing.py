@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from strapdown._kernels.smoothing import inverse, padded, smooth_back
-from strapdown._kernels.smoothing_rows import (
+from strapdown._kernels.smoothing import (
     BEGIN,
     CORE,
     COVARIANCE,
@@ -15,8 +14,11 @@ from strapdown._kernels.smoothing_rows import (
     UPDATE,
     begin_of_move,
     begin_of_taken,
+    inverse,
     pack,
+    padded,
     row_width,
+    smooth_back,
     unpack,
 )
 

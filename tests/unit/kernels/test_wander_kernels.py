@@ -10,9 +10,8 @@ import pytest
 from mpmath import mpf
 
 from strapdown import rotation
+from strapdown._kernels import level
 from strapdown._kernels import wander as kernel
-from strapdown._kernels import wander_geometry as geometry
-from strapdown._kernels import wander_level as level
 from strapdown.ellipsoids import ELLIPSOIDS, WGS84
 
 ROUNDING = 1.1e-16
@@ -103,8 +102,8 @@ def found_shift(ellipsoid, lat, alt, r):
     e2, a = ellipsoid.eccentricity_squared, ellipsoid.semi_major_axis
     s, c = math.sin(lat), math.cos(lat)
     w = 1.0 / math.sqrt(1.0 - e2 * s * s)
-    far, slope, across, curvature = geometry.curving(w, alt, a, e2)
-    tx, ty, _, rise = geometry.shift(0.0, c, s, w, far, slope, across, curvature, e2, *r)
+    far, slope, across, curvature = kernel.curving(w, alt, a, e2)
+    tx, ty, _, rise = kernel.shift(0.0, c, s, w, far, slope, across, curvature, e2, *r)
     return tx, ty, rise
 
 
@@ -133,7 +132,7 @@ def test_a_displacement_is_geometry_to_its_third_order(name, lat, alt):
 def test_the_turn_of_the_level_is_horizontal_and_the_shortest():
     for tx, ty in ((1e-3, -2e-3), (3e-8, 1e-7), (0.0, 0.0), (5e-3, 5e-3)):
         t2 = tx * tx + ty * ty
-        d, x, y = geometry.tilt(tx, ty, t2)
+        d, x, y = kernel.tilt(tx, ty, t2)
         q = np.array([1.0 + d, x, y, 0.0])
         assert np.linalg.norm(q) == pytest.approx(1.0, abs=2.0 * ROUNDING + t2**3)
         normal = np.array([tx, ty, 1.0]) / math.sqrt(1.0 + t2)
@@ -143,7 +142,7 @@ def test_the_turn_of_the_level_is_horizontal_and_the_shortest():
         back = rotation.rotate(rotation.conjugate(q), v)
         # An error of t^6, 5/16 of it, and roundings.
         bound = 220.0 * (4.0 * ROUNDING + t2**3)
-        assert geometry.level_with(tx, ty, t2, *v) == pytest.approx(back, abs=bound)
+        assert kernel.level_with(tx, ty, t2, *v) == pytest.approx(back, abs=bound)
 
 
 def test_what_rounding_leaves_is_not_lost():

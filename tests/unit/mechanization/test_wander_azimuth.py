@@ -24,7 +24,7 @@ from strapdown.mechanization import (
     WanderAzimuth,
     run_mechanization,
 )
-from strapdown.mechanization.state_error import state_error
+from strapdown.mechanization.mechanization import state_error
 from strapdown.nav_state import NavState
 from strapdown.tables import imu_table, motion_increments_table
 

@@ -17,7 +17,7 @@ from strapdown.estimation.robust import PaperUpdate, Tukey
 from strapdown.estimation.sensor_blocks import accel_bias, gauss_markov, gyro_bias, gyro_scale
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown, WanderAzimuth
-from strapdown.mechanization.state_error import state_error
+from strapdown.mechanization.mechanization import state_error
 from strapdown.nav_state import NavState
 from strapdown.navigation import navigator as navigator_module
 from strapdown.navigation.compiled_engine import compiled

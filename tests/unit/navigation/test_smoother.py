@@ -13,7 +13,7 @@ from tests.aided_drives import begin, drive, gnss_of, increments_of, navigator_o
 from strapdown.errors import ConfigError
 from strapdown.estimation.error_model import QuaternionModel
 from strapdown.mechanization import NorthEastDown
-from strapdown.mechanization.state_error import state_error
+from strapdown.mechanization.mechanization import state_error
 from strapdown.nav_state import NavState
 from strapdown.navigation import engine as node_rows
 from strapdown.navigation import smoother as smoothing_tape

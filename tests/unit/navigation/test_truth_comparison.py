@@ -8,7 +8,7 @@ import pytest
 from strapdown import rotation
 from strapdown.errors import DataError
 from strapdown.mechanization import NorthEastDown
-from strapdown.mechanization.state_error import state_error
+from strapdown.mechanization.mechanization import state_error
 from strapdown.nav_state import NavState
 from strapdown.navigation.truth_comparison import (
     compare_with_places,

@@ -11,7 +11,7 @@ from strapdown.prefilter import Grid, RobustFir, Summed
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.triad_errors import ImuErrors
 from strapdown.simulation import Coning, Sculling
-from strapdown.simulation.crash_scenarios import find_crash
+from strapdown.simulation.crash_motion import find_crash
 from strapdown.simulation.imu import simulate_imu
 from strapdown.tables import DV, GYRO, PHI, imu_table
 

@@ -23,10 +23,9 @@ from strapdown.crash.severity import find_severity_model
 from strapdown.crash.severity_model import injury_risk
 from strapdown.report.crash_figures import crash_figures
 from strapdown.sensors.crash_unit import Mounting
-from strapdown.simulation.crash_recording import record_crash
-from strapdown.simulation.crash_scenarios import find_crash
+from strapdown.simulation.crash_motion import find_crash
+from strapdown.simulation.crash_recording import paper_units, record_crash
 from strapdown.simulation.mounted_motion import MountedMotion
-from strapdown.simulation.recorder_design import paper_units
 from strapdown.systems.crash_case import CaseResult, ReferenceAnswer, SeverityAnswer
 from strapdown.systems.crash_reconstruction import reconstruct_crash
 from strapdown.tables import NED

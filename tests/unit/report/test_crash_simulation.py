@@ -19,8 +19,8 @@ from strapdown.constants import TWO_SIDED_95
 from strapdown.formats import read_raw
 from strapdown.report import crash_simulation
 from strapdown.simulation.crash_cases import CASES, record_case
-from strapdown.simulation.crash_scenarios import CRASHES
-from strapdown.simulation.exact_answers import ExactAnswers
+from strapdown.simulation.crash_motion import CRASHES
+from strapdown.simulation.mounted_motion import ExactAnswers
 from strapdown.tables import ACCEL, GYRO, NED
 
 CRASHED = [name for name, c in CRASHES.items() if c.is_crash]

@@ -7,6 +7,16 @@ import math
 
 import numpy as np
 import pytest
+from tests.sensor_faults import (
+    Burst,
+    Dead,
+    DropOut,
+    Jump,
+    Noisy,
+    Saturated,
+    Stuck,
+    inject_faults,
+)
 
 from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.catalogue import SENSORS, load_sensor
@@ -20,16 +30,6 @@ from strapdown.simulation import (
     SmoothRandom,
     StationaryMotion,
     simulate_imu,
-)
-from strapdown.simulation.sensor_faults import (
-    Burst,
-    Dead,
-    DropOut,
-    Jump,
-    Noisy,
-    Saturated,
-    Stuck,
-    inject_faults,
 )
 from strapdown.tables import ACCEL, GYRO, imu_table
 

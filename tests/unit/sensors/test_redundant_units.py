@@ -6,6 +6,15 @@ import functools
 
 import numpy as np
 import pytest
+from tests.sensor_faults import (
+    Dead,
+    DropOut,
+    Jump,
+    Noisy,
+    Saturated,
+    Stuck,
+    inject_faults,
+)
 
 from strapdown.errors import ConfigError, DataError
 from strapdown.rotation import dcm_from_euler
@@ -21,15 +30,6 @@ from strapdown.sensors.error_chain import apply, child
 from strapdown.sensors.redundant_units import MountedUnit, UnitVoting, vote_units
 from strapdown.sensors.uncertainty import BiasDrift, ImuUncertainty, TriadUncertainty
 from strapdown.simulation import ImuErrors, SmoothRandom, simulate_imu
-from strapdown.simulation.sensor_faults import (
-    Dead,
-    DropOut,
-    Jump,
-    Noisy,
-    Saturated,
-    Stuck,
-    inject_faults,
-)
 from strapdown.tables import ACCEL, GYRO, imu_table
 
 RATE = 100.0

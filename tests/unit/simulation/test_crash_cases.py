@@ -7,8 +7,8 @@ import pytest
 
 from strapdown.errors import ConfigError
 from strapdown.simulation.crash_cases import CASES, SPEED_SD, find_case, record_case
+from strapdown.simulation.crash_motion import CRASHES
 from strapdown.simulation.crash_recording import record_crash
-from strapdown.simulation.crash_scenarios import CRASHES
 from strapdown.tables import NED, POSITION_SD
 
 

@@ -20,15 +20,15 @@ from strapdown.sensors.crash_unit import Mounting
 from strapdown.sensors.error_chain import compensate
 from strapdown.sensors.triad_errors import TriadErrors
 from strapdown.sensors.uncertainty import TriadUncertainty
-from strapdown.simulation.crash_recording import record_crash
-from strapdown.simulation.imu import low_passed
-from strapdown.simulation.recorder_design import (
+from strapdown.simulation.crash_recording import (
     HIGH_G_BIAS,
     RecorderDesign,
     TriadDesign,
     WarmUp,
     paper_units,
+    record_crash,
 )
+from strapdown.simulation.imu import low_passed
 
 G = 9.80665
 MOTION = Pushed()

@@ -10,19 +10,7 @@ import pytest
 from strapdown import rotation
 from strapdown.errors import ConfigError
 from strapdown.simulation import CRASHES, Origin, Setting, find_crash
-from strapdown.simulation.crash_motion import CrashCourse
-from strapdown.simulation.crash_scenarios import (
-    blow,
-    frontal_impact,
-    hard_braking,
-    kerb,
-    oblique_impact,
-    pole_impact,
-    rear_impact,
-    rollover,
-    side_impact,
-    two_impacts,
-)
+from strapdown.simulation.crash_motion import CrashCourse, blow, crash_scenario
 
 IMPACTS = [name for name, c in CRASHES.items() if c.is_crash]
 OTHERS = [name for name, c in CRASHES.items() if not c.is_crash]
@@ -112,12 +100,12 @@ def test_the_kind_is_where_the_force_comes_from(name):
 @pytest.mark.parametrize(
     ("crash", "yaw"),
     [
-        (pole_impact(offset=0.4), 1.0),  # the right is held: it turns to the right
-        (pole_impact(offset=-0.4), -1.0),
-        (frontal_impact(), 0.0),
-        (oblique_impact(direction_deg=-30.0, arm=0.4), 1.0),
-        (side_impact(direction_deg=-90.0, arm=0.3), 1.0),  # pushed to the right ahead
-        (rear_impact(offset=0.2), -1.0),  # pushed forward on the right
+        (crash_scenario("pole", offset=0.4), 1.0),  # the right is held: it turns to the right
+        (crash_scenario("pole", offset=-0.4), -1.0),
+        (crash_scenario("frontal"), 0.0),
+        (crash_scenario("oblique", direction_deg=-30.0, arm=0.4), 1.0),
+        (crash_scenario("side", direction_deg=-90.0, arm=0.3), 1.0),  # pushed to the right ahead
+        (crash_scenario("rear", offset=0.2), -1.0),  # pushed forward on the right
     ],
 )
 def test_it_turns_to_the_side_that_the_blow_makes_it(crash, yaw):
@@ -127,7 +115,7 @@ def test_it_turns_to_the_side_that_the_blow_makes_it(crash, yaw):
 
 def test_a_car_that_skids_left_side_first_rolls_to_the_left():
     for skid, side in ((-80.0, 1.0), (80.0, -1.0)):
-        crash = rollover(skid_deg=skid)
+        crash = crash_scenario("rollover", skid_deg=skid)
         k = state(crash.motion, crash.start, pulse_end(crash, crash.start))
         sideways = in_vehicle(k, 0, k.velocity[0])[1]
         assert np.sign(sideways) == side
@@ -139,7 +127,7 @@ def test_a_car_that_skids_left_side_first_rolls_to_the_left():
 
 def test_a_setting_moves_the_crash_and_changes_nothing_that_is_felt():
     setting = Setting(Origin(-30.0, 60.0, 5.0), heading_deg=135.0, stand=7.0, coast=1.25)
-    here, there = CRASHES["pole"], pole_impact(setting=setting)
+    here, there = CRASHES["pole"], crash_scenario("pole", setting=setting)
     later = 7.0 + 1.25 - 3.0 - 0.5
     assert there.start == pytest.approx(here.start + later, abs=1e-15)
     t = np.linspace(here.start, here.start + 0.5, 26)
@@ -152,7 +140,7 @@ def test_a_setting_moves_the_crash_and_changes_nothing_that_is_felt():
 
 
 def test_without_friction_it_goes_on_as_the_blow_left_it():
-    crash = pole_impact(setting=Setting(friction=0.0, after=2.0), pitch_deg=0.0)
+    crash = crash_scenario("pole", setting=Setting(friction=0.0, after=2.0), pitch_deg=0.0)
     end = pulse_end(crash, crash.start)
     assert crash.motion.duration == pytest.approx(end + 2.0, abs=1e-14)
     k = state(crash.motion, end, crash.motion.duration)
@@ -161,7 +149,7 @@ def test_without_friction_it_goes_on_as_the_blow_left_it():
 
 
 def test_brakes_hold_a_constant_deceleration():
-    crash = hard_braking(20.0, 9.0)
+    crash = crash_scenario("hard-braking", entry_speed=20.0, deceleration=9.0)
     pulses = [p for p in crash.motion.pulses if p.start >= crash.start and any(p.velocity_change)]
     first, last = pulses[0], pulses[-1]
     t = np.linspace(first.start + 0.5 * first.length, last.end - 0.5 * last.length, 101)
@@ -174,7 +162,7 @@ def test_brakes_hold_a_constant_deceleration():
 
 
 def test_second_of_two_impacts_comes_from_where_it_says_though_the_car_has_turned():
-    crash = two_impacts(between=0.5)
+    crash = crash_scenario("two-impacts", between=0.5)
     one, two = crash.impacts
     assert two == pytest.approx(pulse_end(crash, one) + 0.5, abs=1e-14)
     k = state(crash.motion, two, pulse_end(crash, two))
@@ -208,13 +196,16 @@ def test_a_lean_and_a_shift_end_where_they_say():
 @pytest.mark.parametrize(
     ("make", "names"),
     [
-        (lambda: pole_impact(entry_speed=-1.0), "entry_speed"),
-        (lambda: oblique_impact(direction_deg=120.0), "direction_deg"),
-        (lambda: hard_braking(20.0, 0.0), "deceleration"),
-        (lambda: kerb(0.0), "entry_speed"),
+        (lambda: crash_scenario("pole", entry_speed=-1.0), "entry_speed"),
+        (lambda: crash_scenario("oblique", direction_deg=120.0), "direction_deg"),
+        (
+            lambda: crash_scenario("hard-braking", deceleration=0.0),
+            "deceleration",
+        ),
+        (lambda: crash_scenario("kerb", entry_speed=0.0), "entry_speed"),
         (lambda: Setting(stand=-1.0), "stand"),
         (lambda: Setting(towing=0.0), "towing"),
-        (lambda: pole_impact(length=0.0), "length"),
+        (lambda: crash_scenario("pole", length=0.0), "length"),
     ],
 )
 def test_what_cannot_be_is_refused(make, names):

@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
-
-from strapdown.errors import ConfigError
-from strapdown.frames import place_difference
-from strapdown.simulation.gnss import (
+from tests.gnss_faults import (
     Frozen,
     GrowingBias,
     Outage,
@@ -15,6 +11,8 @@ from strapdown.simulation.gnss import (
     WrongSd,
     inject_gnss_faults,
 )
+
+from strapdown.frames import place_difference
 from strapdown.tables import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD, check_gnss, gnss_table
 
 TIME = np.arange(0.0, 400.0, 0.5)
@@ -75,19 +73,3 @@ def test_a_wrong_precision_leaves_the_fixes():
     np.testing.assert_allclose(out[POSITION_SD], TABLE[POSITION_SD] / 3.0, rtol=1e-15)
     np.testing.assert_allclose(out[VELOCITY_SD], TABLE[VELOCITY_SD] * 2.0, rtol=1e-15)
     assert out[[*GEODETIC, *VELOCITY]].equals(TABLE[[*GEODETIC, *VELOCITY]])
-
-
-@pytest.mark.parametrize(
-    ("make", "quantity"),
-    [
-        (lambda: Outage(5.0, 5.0), "begin, end"),
-        (lambda: Outliers(share=1.5), "share"),
-        (lambda: GrowingBias(rate=(1.0, 2.0)), "rate"),
-        (lambda: WrongSd(position_factor=-1.0), "position_factor"),
-        (lambda: inject_gnss_faults(TABLE, [Frozen(500.0, 600.0)]), "Frozen"),
-        (lambda: inject_gnss_faults(TABLE, [Outage()]), "Outage"),
-    ],
-)
-def test_what_cannot_be_is_refused(make, quantity):
-    with pytest.raises(ConfigError, match=quantity):
-        make()

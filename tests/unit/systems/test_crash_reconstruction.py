@@ -10,12 +10,10 @@ import pytest
 from strapdown import CrashUnit, Entry, Mounting, TriadUncertainty, reconstruct_crash, sample_paths
 from strapdown.crash.reference_path import compare_with_reference
 from strapdown.errors import ConfigError, DataError
-from strapdown.simulation.crash_motion import CrashMotion, HaversinePulse
-from strapdown.simulation.crash_recording import record_crash
-from strapdown.simulation.crash_scenarios import CRASHES
+from strapdown.simulation.crash_motion import CRASHES, CrashMotion, HaversinePulse
+from strapdown.simulation.crash_recording import paper_units, record_crash
 from strapdown.simulation.earth_motion import Origin
 from strapdown.simulation.mounted_motion import MountedMotion
-from strapdown.simulation.recorder_design import paper_units
 from strapdown.tables import NED
 
 DESIGNS = {d.name: d for d in paper_units()}

@@ -9,8 +9,13 @@ from typing import ClassVar
 import numpy as np
 import pandas as pd
 
-from strapdown.navigation.measurements.measurement import DISPLACEMENT, Epochs, TabulatedMeasurement, View
 from strapdown.estimation.covariance import Observation
+from strapdown.navigation.measurements.measurement import (
+    DISPLACEMENT,
+    Epochs,
+    TabulatedMeasurement,
+    View,
+)
 from strapdown.tables.checks import check_columns, index_of, source_of, values_of
 
 

@@ -290,7 +290,7 @@ def _channels(
 
 def _unit(at: KeyPath, kind: str, triad: TriadSpec, written: Written) -> None:
     # Unit spellings of other programs are part of the readers, loaded only where a case is read.
-    from strapdown.formats.unit_words import unit_of
+    from strapdown.formats.columns import unit_of
 
     if triad.unit is not None:
         unit = unit_of(triad.unit) or triad.unit

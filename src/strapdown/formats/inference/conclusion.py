@@ -1,4 +1,4 @@
-"""An inference from numbers, with its probability and evidence."""
+"""Inference from numbers: conclusions; clock and stamps; accelerometer units from gravity."""
 
 from __future__ import annotations
 
@@ -7,8 +7,13 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
+from strapdown.constants import MAD_TO_SD, STANDARD_GRAVITY, TIME_UNITS
 from strapdown.errors import Finding
+
+__all__ = ["THRESHOLD", "Inference", "conclude", "evidence", "posterior"]
+
 
 K = TypeVar("K", bound=Hashable)
 
@@ -19,8 +24,6 @@ THRESHOLD = 0.99
 MODEL_DOUBT = 1e-4
 # Less probable answers are not shown.
 LEAST_SHARE = 0.005
-
-__all__ = ["THRESHOLD", "Inference", "conclude", "evidence", "posterior"]
 
 
 @dataclass(frozen=True)
@@ -59,12 +62,8 @@ class Inference:
     def finding(self, code: str = "io.inferred", **where: Any) -> Finding:
         """Return the inference as a note.
 
-        Parameters
-        ----------
-        code : str
-            Code whose message shows `value`, `confidence` and `evidence`.
-        **where
-            Location and further data, as for a `Finding`.
+        `code`: code whose message shows `value`, `confidence` and `evidence`. `**where`: location
+        and further data, as for a `Finding`.
         """
         return Finding(
             code,
@@ -98,15 +97,8 @@ def evidence(code: str, **values: Any) -> Finding:
 def posterior(log_weights: dict[K, float]) -> dict[K, float]:
     """Normalize logarithms of prior times likelihood to probabilities, in descending order.
 
-    Parameters
-    ----------
-    log_weights : dict
-        Hypothesis to natural logarithm.
-
-    Returns
-    -------
-    dict
-        Hypothesis to probability. A total of 1e-4 is spread over all: the models may be wrong.
+    `log_weights`: hypothesis to natural logarithm. Returns hypothesis to probability. A total of
+    1e-4 is spread over all: the models may be wrong.
     """
     if not log_weights:
         return {}
@@ -125,14 +117,339 @@ def conclude(
 ) -> Inference:
     """Make an `Inference` of the most probable answer.
 
-    Parameters
-    ----------
-    quantity : str
-    probabilities : dict
-        The most probable first, as from `posterior`.
-    evidence : tuple of Finding
-    flag : str
+    `probabilities`: the most probable first, as from `posterior`.
     """
     (value, confidence), *others = probabilities.items()
     alternatives = tuple((v, p) for v, p in others if p >= 1e-4)
     return Inference(quantity, value, confidence, evidence, alternatives, flag)
+
+
+# Inference of the unit of time stamps, their rate, and their faults.
+
+
+Array = NDArray[np.float64]
+
+# Prior of logging rates: log10 of a density over log10 of the rate in Hz. Phones, boards and
+# navigation units keep 10 to 1000 Hz, crash recorders 10 to 20 kHz; a rotation is not logged every
+# ten seconds.
+_RATE = np.log10([1e-3, 0.01, 0.1, 1.0, 5.0, 20.0, 1e3, 2e3, 5e3, 1e4, 5e4, 1e6])
+_RATE_DENSITY = np.array([-9.0, -7.0, -4.5, -1.5, -0.5, 0.0, 0.0, -0.8, -1.4, -1.6, -4.0, -8.0])
+# Prior of the unit of unlabeled clocks; minutes occur in tables written by hand.
+_PRIOR = {"s": 0.5, "ms": 0.25, "us": 0.15, "ns": 0.1, "min": 1e-6}
+# Probability of fractional stamps in each unit.
+_FRACTIONAL = {"s": 1.0, "ms": 0.6, "us": 0.1, "ns": 0.02, "min": 1.0}
+# A first stamp within these years is rarely a coincidence; clocks of 1970 are common.
+_EPOCH = (946_684_800.0, 2_366_841_600.0)  # 2000 to 2045
+_EPOCH_RATIO = 30.0
+COUNTER_BITS = (16, 24, 31, 32)
+
+
+def time_unit_probabilities(stamps: NDArray[Any]) -> dict[str, float]:
+    """Compute the probability of each unit of time, from the mean step and the first stamp.
+
+    `stamps` ((n,)): finite, as in the log. Returns keys of `constants.TIME_UNITS`, the most
+    probable first; empty if time does not advance.
+    """
+    step = mean_step(stamps)
+    if not step > 0:
+        return {}
+    fractional = stamps.dtype.kind == "f" and bool((stamps[:1000] % 1.0 != 0).any())
+    first = float(stamps[0])
+    weights = {}
+    for unit, factor in TIME_UNITS.items():
+        rate = -np.log10(step * factor)
+        log10 = float(np.interp(rate, _RATE, _RATE_DENSITY)) + np.log10(_PRIOR[unit])
+        if fractional:
+            log10 += np.log10(_FRACTIONAL[unit])
+        if _EPOCH[0] <= first * factor <= _EPOCH[1]:
+            log10 += np.log10(_EPOCH_RATIO)
+        weights[unit] = float(np.log(10.0) * log10)
+    return posterior(weights)
+
+
+def infer_time_unit(stamps: NDArray[Any]) -> Inference:
+    """Infer the unit of time from the stamps alone.
+
+    `stamps` ((n,)): finite, as in the log.
+    """
+    found = time_unit_probabilities(stamps)
+    if not found:
+        static = (evidence("io.evidence-time-does-not-advance"),)
+        return Inference("time_unit", None, 1.0, static, (), "--time-unit")
+    step = mean_step(stamps)
+    return conclude(
+        "time_unit", dict(found), time_evidence(stamps, step, next(iter(found))), "--time-unit"
+    )
+
+
+def time_evidence(stamps: NDArray[Any], step: float, unit: str) -> tuple[Finding, ...]:
+    """List the evidence of the stamps for a unit."""
+    factor = TIME_UNITS[unit]
+    told = [evidence("io.evidence-mean-step", step=step, rate_hz=1.0 / (step * factor))]
+    if _EPOCH[0] <= float(stamps[0]) * factor <= _EPOCH[1]:
+        year = 1970 + float(stamps[0]) * factor / 31_556_952.0
+        told.append(evidence("io.evidence-year-of-first-stamp", year=int(year)))
+    return tuple(told)
+
+
+def mean_step(stamps: NDArray[Any]) -> float:
+    """Average the forward steps within 50 times their median; the clock may be set between."""
+    if stamps.size < 2:
+        return 0.0
+    exact = stamps.astype(np.int64) if stamps.dtype.kind in "iub" else stamps
+    steps = np.diff(exact).astype(np.float64)
+    forward = steps[steps > 0]
+    if not forward.size:
+        return 0.0
+    # Bursts have a median far below the mean; the 90 % quantile covers both.
+    usual = forward[forward <= 50.0 * np.quantile(forward, 0.9)]
+    # Rows of one burst that share a stamp count, too.
+    repeats = int((steps == 0).sum())
+    return float(usual.sum() / (usual.size + repeats))
+
+
+def infer_rate(stamps: NDArray[Any], unit: str) -> Inference:
+    """Infer the nominal sampling rate in Hz, with its regularity.
+
+    `stamps` ((n,)). `unit`: of the stamps.
+    """
+    step = mean_step(stamps) * TIME_UNITS[unit]
+    exact = stamps.astype(np.int64) if stamps.dtype.kind in "iub" else stamps
+    steps = np.diff(exact).astype(np.float64) * TIME_UNITS[unit]
+    forward = steps[steps > 0]
+    if not (step > 0):
+        static = (evidence("io.evidence-time-does-not-advance"),)
+        return Inference("rate", None, 1.0, static, (), "--rate")
+    median = float(np.median(forward))
+    within = float(np.mean(np.abs(forward - median) <= 0.1 * median))
+    missing = float(np.maximum(np.round(forward / step) - 1.0, 0.0).sum())
+    told = (
+        evidence("io.evidence-steps", mean_ms=1e3 * step, median_ms=1e3 * median),
+        evidence("io.evidence-regular-steps", percent=100 * within),
+        evidence("io.evidence-missing-samples", missing=missing),
+    )
+    # With bursts the mean is the sensor's rate; with losses the median is.
+    nominal = 1.0 / median if within > 0.5 else 1.0 / step
+    return Inference("rate", nominal, 1.0 - 1e-4 if within > 0.5 else 0.9, told, (), "--rate")
+
+
+def infer_time_faults(stamps: NDArray[Any]) -> Inference:
+    """Count faults of stamps: repeated, reversed, wrapped, constant, in bursts, jumps.
+
+    `stamps` ((n,)).
+    """
+    exact = stamps.astype(np.int64) if stamps.dtype.kind in "iub" else stamps.astype(np.float64)
+    steps = np.diff(exact).astype(np.float64)
+    forward = steps[steps > 0]
+    faults: list[str] = []
+    if not forward.size:
+        faults.append("constant stamps")
+    else:
+        usual = float(np.median(forward))
+        mean = mean_step(stamps)
+        back = np.flatnonzero(steps < 0)
+        bits = [wrap_bits(float(stamps[k]), float(steps[k]), usual) for k in back]
+        wrapped = [b for b in bits if b]
+        if repeated := int((steps == 0).sum()):
+            faults.append(f"{repeated} repeated")
+        if wrapped:
+            faults.append(f"{len(wrapped)} wrapped (a counter of {wrapped[0]} bits)")
+        if len(back) > len(wrapped):
+            faults.append(f"{len(back) - len(wrapped)} backwards")
+        if jumps := int((forward > max(50.0 * usual, 10.0 * mean)).sum()):
+            faults.append(f"{jumps} jump{'s' if jumps > 1 else ''}")
+        if usual < 0.5 * mean or (repeated > 0.3 * steps.size):
+            faults.append("bursts")
+    told = evidence("io.evidence-count-of-steps", steps=steps.size)
+    return Inference(
+        "time_faults",
+        ", ".join(faults) or "none",
+        1.0 - 1e-4,
+        (told,),
+        (),
+        "--repair" if faults else "",
+    )
+
+
+def wrap_bits(before: float, step: float, usual: float) -> int | None:
+    """Return the width of the counter that wrapped in this step, or None."""
+    for bits in COUNTER_BITS:
+        if 0.0 < step + 2.0**bits <= 50.0 * usual and 0 <= before < 2.0**bits:
+            return bits
+    return None
+
+
+# Inference of an accelerometer's unit and form, from gravity.
+
+
+# Scales without the sign. Motion cannot decide the sign, because f and -f rotate alike in the body:
+# it is a separate question.
+SCALES = {"m/s2": 1.0, "g": STANDARD_GRAVITY, "mg": 1e-3 * STANDARD_GRAVITY}
+_GRAVITY_PRIOR = {"m/s2": 0.6, "g": 0.37, "mg": 0.03}
+# Prior of the content of a log under these names.
+_PRIOR_FORM = {"rate": 0.93, "linear": 0.03, "increment": 0.01, "other": 0.03}
+# Raw counts per g of 8 to 16 bits; 1024 is close enough to mg.
+_COUNTS = (256.0, 1024.0, 2048.0, 4096.0, 8192.0, 16384.0)
+_PRIOR_COUNTS = 0.03
+_BROKEN_COUNTS = 0.05  # probability of fractional counts
+# Probability of integers only, for each unit.
+_WHOLE = {"m/s2": 1e-4, "g": 1e-4, "mg": 0.7}
+# Scale and offset error of low-cost sensors: 3 % and 80 mg (MPU-6050 data sheet, section 6.2).
+_ERROR = 0.04  # of g
+_DECADES = 12.0  # range of scales for unknown units
+PIECE = 0.2  # s, interval of a mean vector
+
+
+def piece_means(values: Array, per_piece: int) -> Array:
+    """Average over consecutive intervals of equally many samples, (m, 3)."""
+    count = max(len(values) // per_piece, 1)
+    per_piece = min(per_piece, len(values))
+    whole = values[: count * per_piece].reshape(count, per_piece, -1)
+    return np.asarray(whole.mean(axis=1), dtype=np.float64)
+
+
+def infer_accel(accel: Array, step: float | None) -> tuple[Inference, Inference, Inference, float]:
+    """Infer unit, form, and presence of gravity.
+
+    `accel` ((n, 3)): finite, as in the log. `step` (s): mean step, if known. Returns `unit`,
+    `form`, `gravity`: the form is ``rate`` or ``increment``; `magnitude`: median norm of the
+    accelerometer in its own unit.
+
+    The norm of short means stays at 9.8 m/s² in a sensor that is carried, up to the offset of the
+    sensor and the part of the motion that does not average out; its spread over the log measures
+    the latter. Without gravity it may have any value, and its spread is as large as its mean.
+    """
+    pieces = piece_means(accel, max(round(PIECE / step), 1) if step else 10)
+    norms = np.linalg.norm(pieces, axis=1)
+    usual = float(np.median(norms))
+    flag = "--accel-unit"
+    if not usual > 0:
+        nothing = (evidence("io.evidence-all-zero"),)
+        return (
+            Inference("accel_unit", None, 1.0, nothing, (), flag),
+            Inference("accel_form", None, 1.0, nothing),
+            Inference("gravity", "removed", 0.5, nothing),
+            usual,
+        )
+    whole = bool((accel == np.round(accel)).all())
+    spread = MAD_TO_SD * float(np.median(np.abs(norms - usual))) / usual
+    # The median over m means is more accurate than one, but the effect of motion is one-sided. A
+    # short log cannot measure its spread, and a crash is shorter than one interval.
+    few = 2.0 / len(norms) if step else 0.4
+    sd = np.hypot(np.hypot(_ERROR, 0.5 * spread), few) / np.log(10.0)
+    where = np.log10(usual)
+    # Without gravity the mean vectors are those of random motion, whose norm has a relative spread
+    # of 0.4 or more; a constant offset is possible, and small.
+    swings = min(spread / 0.3, 1.0) ** 2
+    direction = float(np.linalg.norm(pieces.mean(axis=0))) / usual
+    # Acceleration without gravity averages to zero, because velocities stay bounded.
+    lasting = 0.01 if direction > 0.7 and len(norms) > 20 else 1.0
+    # With gravity the motion of a hand or a car spreads the norm by a tenth.
+    calm = float(np.exp(-spread / 0.12)) if len(norms) >= 5 else 0.1
+    weights: dict[tuple[str | None, str], float] = {}
+
+    def add(unit: str | None, form: str, prior: float, density: float) -> None:
+        weights[unit, form] = float(np.log(max(prior * density, 1e-300)))
+
+    for unit, scale in SCALES.items():
+        prior = _GRAVITY_PRIOR[unit] * (_WHOLE[unit] if whole else 1.0)
+        off = (where - np.log10(STANDARD_GRAVITY / scale)) / sd
+        # A cubic tail, for sensors that shake and turn more than the median spread shows.
+        peak = 0.45 / sd / (1.0 + off * off / 3.0) ** 2
+        add(unit, "rate", prior * _PRIOR_FORM["rate"], calm * peak)
+        si = usual * scale
+        broad = 0.25 * min(1.0, 10.0 / si) ** 2 * min(1.0, si / 1e-3)
+        offset = broad * min(1.0, 0.3 / si) ** 3  # constant offset other than gravity
+        add(
+            unit,
+            "linear",
+            prior * _PRIOR_FORM["linear"],
+            swings * lasting * broad + (1.0 - swings) * offset,
+        )
+        if step:
+            off = (where - np.log10(STANDARD_GRAVITY * step / scale)) / sd
+            add(
+                unit,
+                "increment",
+                prior * _PRIOR_FORM["increment"],
+                calm * 0.45 / sd / (1.0 + off * off / 3.0) ** 2,
+            )
+    for k, count in enumerate(_COUNTS):
+        off = (where - np.log10(count)) / sd
+        prior = _PRIOR_COUNTS / len(_COUNTS) * (1.0 if whole else _BROKEN_COUNTS)
+        add(None, f"counts {k}", prior, calm * 0.45 / sd / (1.0 + off * off / 3.0) ** 2)
+    add(None, "other", _PRIOR_FORM["other"], (calm + swings) / _DECADES)
+    found = posterior(weights)
+    units = _summed(found, 0)
+    forms = _summed(found, 1)
+    counted = sum(p for f, p in forms.items() if str(f).startswith("counts"))
+    forms["rate"] = forms.get("rate", 0.0) + counted
+    norm = {"piece": PIECE, "norm": usual, "spread_percent": 100 * spread}
+    best = next(iter(units))
+    if best is not None:
+        said = evidence("io.evidence-norm", **norm, unit=best, si=usual * SCALES[best])
+    else:
+        said = evidence("io.evidence-norm-of-no-unit", **norm, units=list(SCALES))
+    told = (said,)
+    gravity = posterior_of(
+        {
+            "present": forms.get("rate", 0.0) + forms.get("increment", 0.0),
+            "removed": forms.get("linear", 0.0),
+            None: forms.get("other", 0.0),
+        }
+    )
+    form = posterior_of(
+        {
+            "rate": forms.get("rate", 0.0) + forms.get("linear", 0.0),
+            "increment": forms.get("increment", 0.0),
+            None: forms.get("other", 0.0),
+        }
+    )
+    tell = (*told, evidence("io.evidence-mean-vector", share=direction))
+    return (
+        conclude("accel_unit", units, told, flag),
+        conclude("accel_form", form, told),
+        conclude("gravity", gravity, tell),
+        usual,
+    )
+
+
+def posterior_of(probabilities: dict[str | None, float]) -> dict[str | None, float]:
+    """Sort probabilities in descending order."""
+    return dict(sorted(probabilities.items(), key=lambda p: -p[1]))
+
+
+def _summed(found: dict[tuple[str | None, str], float], key: int) -> dict[str | None, float]:
+    out: dict[str | None, float] = {}
+    for hypothesis, p in found.items():
+        out[hypothesis[key]] = out.get(hypothesis[key], 0.0) + p
+    return posterior_of(out)
+
+
+def infer_up(accel: Array, step: float | None) -> Inference:
+    """Infer which sensor axis points up most of the time, for accelerometers that read +1 g up.
+
+    `accel` ((n, 3)). `step` (s).
+
+    A sensor of the opposite sign (iOS) gives the same numbers upside down. The share of such
+    sensors, a twentieth, limits the confidence; the flag is left to the user.
+    """
+    pieces = piece_means(accel, max(round(1.0 / step), 1) if step else 100)
+    norms = np.linalg.norm(pieces, axis=1, keepdims=True)
+    units = pieces / np.where(norms > 0, norms, 1.0)
+    # Within 30 deg of an axis; in more than half of the log it is the sensor's usual attitude.
+    shares = {
+        f"{'-' if sign < 0 else ''}{'xyz'[k]}": float(np.mean(sign * units[:, k] > np.sqrt(0.75)))
+        for k in range(3)
+        for sign in (1.0, -1.0)
+    }
+    best = max(shares, key=lambda a: shares[a])
+    share = shares[best]
+    told = (
+        evidence("io.evidence-axis-up", axis=best, percent=100 * share),
+        evidence("io.evidence-sign-turns-up-down"),
+    )
+    if share <= 0.5:
+        return Inference("up_axis", None, 1.0 - share, told[:1], (), "--axes")
+    other = best[1:] if best.startswith("-") else f"-{best}"
+    return Inference("up_axis", best, 0.95 * share, told, ((other, 0.05),), "--axes")

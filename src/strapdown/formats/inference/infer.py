@@ -10,20 +10,24 @@ from numpy.typing import NDArray
 
 from strapdown.constants import MAG_UNITS, TIME_UNITS
 from strapdown.errors import DataError
+from strapdown.formats.arrays import numbers, ticks_of
+from strapdown.formats.columns import parse_unit
 from strapdown.formats.find_columns import AXES, Column, find_columns
-from strapdown.formats.inference.clock import (
+from strapdown.formats.inference.conclusion import (
+    Inference,
+    conclude,
+    evidence,
+    infer_accel,
     infer_rate,
     infer_time_faults,
+    infer_up,
     mean_step,
+    posterior,
     time_evidence,
     time_unit_probabilities,
 )
-from strapdown.formats.inference.conclusion import Inference, conclude, evidence, posterior
-from strapdown.formats.inference.gravity import infer_accel, infer_up
 from strapdown.formats.inference.rotation_rate import infer_gyro
-from strapdown.formats.numbers import numbers, ticks_of
 from strapdown.formats.recording import RawLog, ReadOptions
-from strapdown.formats.unit_words import parse_unit
 
 Array = NDArray[np.float64]
 # Longer logs are sampled in parts with this many rows in total.
@@ -55,24 +59,10 @@ class Signals:
 def infer(raw: RawLog, options: ReadOptions | None = None) -> tuple[Inference, ...]:
     """Infer from the numbers of a log, regardless of its statements.
 
-    Parameters
-    ----------
-    raw : RawLog
-    options : ReadOptions, optional
-        Which columns to use, and the unit of time if known. Stated units of the sensors are
-        ignored: they are inferred from the numbers.
-
-    Returns
-    -------
-    tuple of Inference
-        One for each quantity that the log has numbers for.
-
-    Raises
-    ------
-    ConfigError
-        An option names a column that the log does not have.
-    DataError
-        A value or a stamp is not a number.
+    `options`: which columns to use, and the unit of time if known. Stated units of the sensors are
+    ignored: they are inferred from the numbers. Returns one for each quantity that the log has
+    numbers for. ConfigError: an option names a column that the log does not have. DataError: a
+    value or a stamp is not a number.
     """
     options = options or ReadOptions()
     found = find_columns(raw, options)
@@ -100,16 +90,7 @@ def _triad(raw: RawLog, found: dict[str, Column], triad: str) -> Array | None:
 
 
 def infer_signals(signals: Signals) -> tuple[Inference, ...]:
-    """Infer from the numbers of arrays; see `infer`.
-
-    Parameters
-    ----------
-    signals : Signals
-
-    Returns
-    -------
-    tuple of Inference
-    """
+    """Infer from the numbers of arrays; see `infer`."""
     out: list[Inference] = []
     stamps = _finite(signals.stamps)
     times = _times(signals, stamps)
@@ -311,16 +292,8 @@ class Arm:
 def fit_arm(step: float, gyro: Array, accel: Array) -> Arm | None:
     """Fit a lever arm to an accelerometer.
 
-    Parameters
-    ----------
-    step : float, s
-    gyro, accel : ndarray, (n, 3)
-        Finite, in any units and axes.
-
-    Returns
-    -------
-    Arm or None
-        None if the log is too short or does not rotate.
+    `step` (s). `gyro`, `accel` ((n, 3)): finite, in any units and axes. Returns none if the log is
+    too short or does not rotate.
     """
     gyro, accel = gyro[:LARGEST], accel[:LARGEST]
     size = max(round(PIECE / step), 1)
@@ -368,10 +341,7 @@ _OTHER, _DECADES = 0.05, 12.0
 def infer_mag_unit(mag: Array) -> Inference:
     """Infer the unit of a magnetometer.
 
-    Parameters
-    ----------
-    mag : ndarray, (n, 3)
-        Finite, as in the log.
+    `mag` ((n, 3)): finite, as in the log.
     """
     usual = float(np.median(np.linalg.norm(mag, axis=1)))
     remedy = evidence("io.evidence-unit-in-name")

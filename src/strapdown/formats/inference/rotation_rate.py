@@ -11,8 +11,13 @@ from numpy.typing import NDArray
 from strapdown.constants import GYRO_UNITS, TIME_UNITS
 from strapdown.dsp.running_integral import running_integral
 from strapdown.errors import Finding
-from strapdown.formats.inference.clock import mean_step
-from strapdown.formats.inference.conclusion import Inference, conclude, evidence, posterior
+from strapdown.formats.inference.conclusion import (
+    Inference,
+    conclude,
+    evidence,
+    mean_step,
+    posterior,
+)
 
 Array = NDArray[np.float64]
 
@@ -63,25 +68,11 @@ def infer_gyro(
 ) -> tuple[Inference, Inference, Inference, dict[str, float]]:
     """Infer unit, form and axes of a gyro, and update the probabilities of the units of time.
 
-    Parameters
-    ----------
-    ticks : ndarray, (n,)
-        Increasing stamps from the first, in the log's own unit.
-    gyro : ndarray, (n, 3)
-        In the log's own unit.
-    force : ndarray, (n, 3), or None
-        Accelerometer in units of gravity; None if gravity has been removed.
-    time_units : dict of str to float
-        Probability of each unit of time.
-    increments : float
-        Prior probability of increments instead of rates: that of the accelerometer, which
-        usually has the same form.
-
-    Returns
-    -------
-    unit, form, axes : Inference
-    time_units : dict of str to float
-        Updated probabilities.
+    `ticks` ((n,)): increasing stamps from the first, in the log's own unit. `gyro` ((n, 3)): in the
+    log's own unit. `force` ((n, 3), or None): accelerometer in units of gravity; None if gravity
+    has been removed. `time_units`: probability of each unit of time. `increments`: prior
+    probability of increments instead of rates: that of the accelerometer, which usually has the
+    same form. Returns `time_units`: updated probabilities.
     """
     largest = float(np.quantile(np.linalg.norm(gyro, axis=1), 0.99)) if len(gyro) else 0.0
     # Stationary sensors read zero in any unit; integers are evidence only where they vary.
@@ -234,11 +225,8 @@ for _i, _j, _k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
 def signed_permutations() -> tuple[tuple[str, ...], Array]:
     """List the 48 mappings of the gyro's axes to the accelerometer's, the identity first.
 
-    Returns
-    -------
-    names : tuple of str
-        As ``x,-y,z``: the gyro axis along each axis of the accelerometer.
-    matrices : ndarray, (48, 3, 3)
+    Returns `names`: as ``x,-y,z``: the gyro axis along each axis of the accelerometer; `matrices`
+    ((48, 3, 3)).
     """
     names, matrices = [], []
     for order in itertools.permutations(range(3)):
@@ -319,14 +307,8 @@ class Turn:
 def turns(time: Array, gyro: Array, force: Array) -> tuple[Turn, ...]:
     """Compute the sums of each time scale that the log is long enough for.
 
-    Parameters
-    ----------
-    time : ndarray, (n,), s
-        Increasing.
-    gyro : ndarray, (n, 3)
-        In any unit.
-    force : ndarray, (n, 3)
-        In units of gravity, with either sign.
+    `time` ((n,), s): increasing. `gyro` ((n, 3)): in any unit. `force` ((n, 3)): in units of
+    gravity, with either sign.
     """
     step = np.diff(time)
     # (w x f)_a = e_abc w_b f_c; products of the gyro's axis d and the force's axis c.

@@ -17,7 +17,7 @@ from strapdown.estimation.covariance import Observation
 from strapdown.estimation.error_model import PHYSICAL
 from strapdown.estimation.sensor_blocks import lever_arm, random_walk, time_offset
 from strapdown.estimation.sensor_states import SensorStates
-from strapdown.mechanization.state_error import displacement_between
+from strapdown.mechanization.mechanization import displacement_between
 from strapdown.nav_state import NavState
 from strapdown.navigation.measurements.measurement import (
     DISPLACEMENT,

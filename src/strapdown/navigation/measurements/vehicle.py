@@ -11,8 +11,8 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
-from strapdown._kernels.interval_sums import MEMORY, interval_sums
 from strapdown._kernels.level import AXIS
+from strapdown._kernels.sums import MEMORY, interval_sums
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.estimation.covariance import Observation
 from strapdown.estimation.error_model import PHYSICAL

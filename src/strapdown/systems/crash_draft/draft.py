@@ -25,9 +25,8 @@ from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.events import KMH
 from strapdown.crash.pdof import pdof
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.formats.crash_record import CrashRecord
+from strapdown.formats.crash_record import FACTORS, CrashRecord
 from strapdown.formats.crash_records import read_crash_record
-from strapdown.formats.crash_units import FACTORS
 from strapdown.rotation import within_half_turn
 from strapdown.systems.crash_draft.laboratory import (
     KnownPath,

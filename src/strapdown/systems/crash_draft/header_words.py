@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from strapdown.formats.columns import read_name
-from strapdown.formats.unit_words import unit_of
+from strapdown.formats.columns import read_name, unit_of
 
 __all__ = ["Heading", "read_heading"]
 

@@ -15,7 +15,7 @@ from strapdown.config.toml_text import Page, instant, plain, string
 from strapdown.constants import GYRO_UNITS, STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
-from strapdown.formats.crash_velocity import mean_accelerations_of
+from strapdown.formats.crash_samples import mean_accelerations_of
 from strapdown.formats.named_columns import read_reference_path
 from strapdown.systems.crash_draft.parts import Clock, Part, Skipped
 

@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 
 from strapdown.constants import TIME_UNITS
 from strapdown.errors import DataError
-from strapdown.formats.crash_record import CrashChannel, CrashRecord
-from strapdown.formats.crash_stamps import last_midnight
-from strapdown.formats.crash_units import factor_of
-from strapdown.formats.inference.clock import infer_time_unit, mean_step
-from strapdown.formats.inference.conclusion import THRESHOLD
-from strapdown.formats.stamps import EPOCH
+from strapdown.formats.clocks import EPOCH
+from strapdown.formats.crash_record import CrashChannel, CrashRecord, factor_of
+from strapdown.formats.crash_samples import last_midnight
+from strapdown.formats.inference.conclusion import THRESHOLD, infer_time_unit, mean_step
 from strapdown.systems.crash_draft.header_words import Heading, read_heading
 from strapdown.systems.crash_draft.parts import Clock, Part, Skipped
 from strapdown.systems.crash_draft.triad_kind import pulse_samples

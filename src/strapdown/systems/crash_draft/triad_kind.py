@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.constants import ACCEL_UNITS, GYRO_UNITS, STANDARD_GRAVITY, TIME_UNITS
-from strapdown.formats.inference.conclusion import THRESHOLD, posterior
-from strapdown.formats.inference.gravity import infer_accel
+from strapdown.formats.inference.conclusion import THRESHOLD, infer_accel, posterior
 from strapdown.formats.inference.rotation_rate import infer_gyro
 from strapdown.sensors.saturation import find_limits
 from strapdown.systems.crash_draft.parts import Clock

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.constants import ACCEL_UNITS, GYRO_UNITS, STANDARD_GRAVITY, TIME_UNITS
-from strapdown.formats.crash_units import FACTORS
+from strapdown.formats.crash_record import FACTORS
 from strapdown.formats.inference.conclusion import THRESHOLD
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.saturation import find_limits

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from strapdown import earth, rotation
-from strapdown._kernels.steady_motion import steady_motion
+from strapdown._kernels.sums import steady_motion
 from strapdown.errors import ConfigError, DataError
 from strapdown.estimation.error_model import RotationVectorModel
 from strapdown.estimation.sensor_blocks import accel_bias, accel_scale, gyro_bias, gyro_scale

@@ -11,6 +11,8 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[3]))
 
+from tests.gnss_faults import Frozen, Outage, Outliers, inject_gnss_faults
+
 import town_drive as town
 from strapdown.errors import DataError
 from strapdown.navigation.measurements.gnss import Gnss
@@ -24,7 +26,6 @@ from strapdown.navigation.measurements.gnss_clock import (
 from strapdown.navigation.measurements.gnss_readiness import gnss_readiness
 from strapdown.sensors.triad_errors import ImuErrors
 from strapdown.simulation import simulate_imu
-from strapdown.simulation.gnss import Frozen, Outage, Outliers, inject_gnss_faults
 from strapdown.tables import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD, gnss_table
 
 

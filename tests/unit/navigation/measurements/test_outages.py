@@ -10,14 +10,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[3]))
 
-from aided_drives import drive, error_now, gnss_of, navigator_of, run
-from strapdown.navigation.measurements.barometer import Barometer
-from strapdown.navigation.measurements.gnss import Gnss
-from strapdown.navigation.measurements.heading import Heading
-from strapdown.navigation.measurements.standstill import ZeroRate, ZeroVelocity
-from strapdown.navigation.measurements.vehicle import BodyVelocity, NoSlip, Odometer
-from strapdown.simulation.aiding_sensors import (
-    Compass,
+from tests.aiding_sensors import (
     PressureHeight,
     VelocityLog,
     WheelSpeed,
@@ -26,6 +19,14 @@ from strapdown.simulation.aiding_sensors import (
     simulate_heading,
     simulate_odometer,
 )
+
+from aided_drives import drive, error_now, gnss_of, navigator_of, run
+from strapdown.navigation.gyrocompass import Compass
+from strapdown.navigation.measurements.barometer import Barometer
+from strapdown.navigation.measurements.gnss import Gnss
+from strapdown.navigation.measurements.heading import Heading
+from strapdown.navigation.measurements.standstill import ZeroRate, ZeroVelocity
+from strapdown.navigation.measurements.vehicle import BodyVelocity, NoSlip, Odometer
 
 SEEDS = range(5)
 LOST = 40.0

@@ -11,16 +11,7 @@ from scipy.stats import chi2
 
 sys.path.insert(0, str(Path(__file__).parents[3]))
 
-from aided_drives import GYRO_BIAS, drive, estimate, gnss_of, navigator_of, run
-from strapdown import rotation
-from strapdown.errors import ConfigError
-from strapdown.navigation.measurements.barometer import Barometer
-from strapdown.navigation.measurements.gnss import Gnss
-from strapdown.navigation.measurements.heading import Heading
-from strapdown.navigation.measurements.standstill import ZeroRate, ZeroVelocity
-from strapdown.navigation.measurements.vehicle import BodyVelocity, NoSlip, Odometer
-from strapdown.simulation.aiding_sensors import (
-    Compass,
+from tests.aiding_sensors import (
     PressureHeight,
     VelocityLog,
     WheelSpeed,
@@ -29,6 +20,16 @@ from strapdown.simulation.aiding_sensors import (
     simulate_heading,
     simulate_odometer,
 )
+
+from aided_drives import GYRO_BIAS, drive, estimate, gnss_of, navigator_of, run
+from strapdown import rotation
+from strapdown.errors import ConfigError
+from strapdown.navigation.gyrocompass import Compass
+from strapdown.navigation.measurements.barometer import Barometer
+from strapdown.navigation.measurements.gnss import Gnss
+from strapdown.navigation.measurements.heading import Heading
+from strapdown.navigation.measurements.standstill import ZeroRate, ZeroVelocity
+from strapdown.navigation.measurements.vehicle import BodyVelocity, NoSlip, Odometer
 
 RUNS = 20
 UNTIL = 66.0

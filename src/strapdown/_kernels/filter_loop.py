@@ -1,0 +1,508 @@
+"""Filter loop: a mechanization and the covariance of its errors, over steps and GNSS fixes.
+
+Steps are grouped up to a given time: the mechanization advances step by step, the covariance group
+by group. An open group is kept at the end of a chunk, so that a log may be cut anywhere.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from strapdown._kernels.compensation import compensate, errors_of_states
+from strapdown._kernels.covariance import dense_update, ud_update, udu_matrix, udu_predict, wd_epoch
+from strapdown._kernels.earth import E2, RATE, A, displacement
+from strapdown._kernels.given_arrays import GIVEN
+from strapdown._kernels.growth import grown_covariance, growth_of_step, unfold_growth
+from strapdown._kernels.level import (
+    WANDER,
+    level_place,
+    ned_correct,
+    ned_levels,
+    wander_correct,
+    wander_levels,
+)
+from strapdown._kernels.motion_increments import split_increment
+from strapdown._kernels.ned import COSINE, LAT, PRIME, SINE, ned_advance
+from strapdown._kernels.ned import Q as Q_NB
+from strapdown._kernels.ned import V as V_N
+from strapdown._kernels.psi_model import HELD_ROWS, means_of_steps, psi_dynamics
+from strapdown._kernels.rotation import dcm_from_quat
+from strapdown._kernels.rotation_vector import cross
+from strapdown._kernels.smoothing import (
+    GROWTH,
+    UPDATE,
+    begin_of_move,
+    begin_of_taken,
+    head_row,
+    move_by_growth,
+    pack_covariance,
+)
+from strapdown._kernels.wander import Q_WB, earth_axis, wander_advance
+from strapdown._kernels.wander import V as V_W
+
+# Forms of a covariance: the matrix, by two updates; its factors, by two.
+JOSEPH, PLAIN, UD, WD = 0, 1, 2, 3
+# Status of a call: done; a covariance is due to be recorded; the mechanization diverged; the
+# covariance is invalid; the rows for a smoother are full.
+ALL, NOTE, DIVERGED, BAD, FULL = 0, 1, 2, 3, 4
+# Indices of the times of a loop: of the covariance, of the newest step.
+AT_COVARIANCE, AT_STEP = 0, 1
+# Largest ratio of a group's length to its nominal time.
+BEYOND = 1.000001
+
+
+# Arguments that belong together:
+# - kinds: (mechanization, form, whether the height is held);
+# - model: (terms of gyros, terms of accelerometers, decay, drive, noise of gyros
+#   and of accelerometers (3,), earth, options);
+# - states: (mechanization, the same at the covariance, covariance, sensors, times, newest increment
+#   without errors), which go on in place;
+# - group: (rows of the history, the first at its start; increments), of what is not closed yet;
+# - room: arrays to work in.
+# For a smoother every propagation goes into the rows of `notes` (`smoothing`), of which `noted` are
+# filled; otherwise `notes` is empty.
+
+
+@njit(**GIVEN)
+def growth_of_group(kinds, model, states, group, count, room):
+    """Fill transition and noise over the steps of a group."""
+    which, _, held = kinds
+    gyro_terms, accel_terms, decay, drive, gyro_noise, accel_noise, earth, _ = model
+    open_history, open_rows = group
+    f, growth, work, matrix, level, _, _, _ = room
+    q_at, up = Q_NB, -1.0
+    if which == WANDER:
+        q_at, up = Q_WB, 1.0
+    _, dt = means_of_steps(open_history, q_at, open_rows[:count], 0, math.inf, matrix)
+    middle = count // 2
+    if which == WANDER:
+        wander_levels(open_history[middle : middle + 1], earth, level)
+    else:
+        ned_levels(open_history[middle : middle + 1], earth, level)
+    psi_dynamics(
+        f,
+        level[0],
+        up,
+        matrix,
+        matrix[3],
+        matrix[4],
+        matrix[5],
+        gyro_terms,
+        accel_terms,
+        held,
+        earth,
+    )
+    still = HELD_ROWS if held else 0
+    growth_of_step(f, decay, dt, matrix, gyro_noise, accel_noise, drive, still, growth, work)
+
+
+@njit(**GIVEN)
+def matrix_over_group(states, room):
+    """Propagate a covariance matrix over a group; return -1, or the first invalid state."""
+    return grown_covariance(states[2], room[1], room[2])
+
+
+@njit(cache=True, error_model="numpy")
+def factors_over_group(states, room):
+    """Propagate the factors of a covariance over a group; return -1, or the first invalid state."""
+    _, growth, _, _, _, whole, added, after = room
+    unfold_growth(growth, whole, added)
+    bad = udu_predict(states[2], whole, added, after)
+    states[2][:, :] = after
+    return bad
+
+
+@njit(**GIVEN)
+def begin_group(states, group, count, room):
+    """Begin a group where one of `count` steps ended."""
+    state, at_covariance, _, sensors, times, _ = states
+    open_history, _ = group
+    _, _, _, tail, _ = room[1]
+    for j in range(state.shape[0]):
+        at_covariance[j] = state[j]
+    for j in range(sensors.shape[0]):
+        sensors[j] *= tail[j]
+    for j in range(open_history.shape[1]):
+        open_history[0, j] = open_history[count, j]
+    times[AT_COVARIANCE] = times[AT_STEP]
+
+
+@njit(cache=True, error_model="numpy")
+def close_group(kinds, model, states, group, count, room, notes, noted):
+    """Propagate the covariance over the steps of a group.
+
+    The covariance is (n, n), a matrix or its factors. Return -1, or the first invalid state, and
+    the number of filled rows.
+    """
+    if count == 0:
+        return -1, noted
+    growth_of_group(kinds, model, states, group, count, room)
+    factored = kinds[1] >= UD
+    bad = factors_over_group(states, room) if factored else matrix_over_group(states, room)
+    begin_group(states, group, count, room)
+    if bad < 0 and notes.shape[0] > 0:
+        row, time = notes[noted], states[4][AT_COVARIANCE]
+        head_row(kinds[0], factored, states, time, GROWTH, room[5], row)
+        move_by_growth(room[1], row, states[2].shape[0])
+        noted += 1
+    return bad, noted
+
+
+@njit(cache=True, error_model="numpy")
+def over_steps(
+    kinds,
+    model,
+    states,
+    group,
+    count,
+    room,
+    step,
+    note_at,
+    time,
+    rows,
+    history,
+    notes,
+    noted,
+):
+    """Advance over steps; return the status, steps made, those of the open group, rows filled.
+
+    `time` are the ends of the steps, `rows` their increments; `history` takes a row after each.
+    The call ends early where a group was closed at `note_at` or later. After the arrays of
+    `close_group`, `room` has errors of readings, (7, 3) each, and empty heights.
+    """
+    gyro_terms, accel_terms, _, _, _, _, earth, options = model
+    state, _, _, sensors, times, newest = states
+    open_history, open_rows = group
+    closing, of_gyros, of_accels, heights = room
+    made = 0
+    total = time.shape[0]
+    while made < total:
+        end = made
+        begun = times[AT_COVARIANCE]
+        while (
+            end < total
+            and count + end - made < open_rows.shape[0]
+            and (time[end] - begun <= step * BEYOND or count + end - made == 0)
+        ):
+            end += 1
+        if end == made:
+            if 0 < notes.shape[0] <= noted:
+                return FULL, made, count, noted
+            bad, noted = close_group(kinds, model, states, group, count, closing, notes, noted)
+            count = 0
+            if bad >= 0:
+                return BAD, made, bad, noted
+            if times[AT_COVARIANCE] >= note_at:
+                return NOTE, made, count, noted
+            continue
+        errors_of_states(gyro_terms, sensors, of_gyros)
+        errors_of_states(accel_terms, sensors, of_accels)
+        last = count + end - made
+        new, into = open_rows[count:last], open_history[count + 1 : last + 1]
+        compensate(rows[made:end], of_gyros, of_accels, new)
+        if kinds[0] == WANDER:
+            went, why = wander_advance(state, new, heights, earth, options, into)
+        else:
+            went, why = ned_advance(state, new, heights, earth, options, into)
+        if why != 0:
+            return DIVERGED, made + went, count, noted
+        for i in range(made, end):
+            for j in range(history.shape[1]):
+                history[i, j] = open_history[count + 1 + i - made, j]
+        count = last
+        made = end
+        times[AT_STEP] = time[end - 1]
+        for j in range(newest.shape[0]):
+            newest[j] = open_rows[last - 1, j]
+    return ALL, made, count, noted
+
+
+# The loop with fixes of a GNSS receiver whose errors are white noise.
+
+
+# Layout of a fix: kind, three numbers, three variances.
+CODE, VALUE, VARIANCE = 0, 1, 4
+# Record of an observation: innovation, its expected variance, weight.
+TOLD = 3
+# Status of an invalid observation.
+BAD_FIX = 5
+
+
+@njit(cache=True, error_model="numpy")
+def swept(which, state, earth, gyro_terms, last, c, x, y, w, speed, h):
+    """Add the effect of a lever arm to a velocity and to its sensitivity to the errors; level axes.
+
+    ``W x r`` of the arm r = (x, y, w), with ``W = C w_ib - w_ie`` the rate of the body relative to
+    the Earth; `c` is C_lb, `last` the newest increment.
+    """
+    if which == WANDER:
+        kx, ky, kz = earth_axis(state[0], state[1], state[2], state[3])
+    else:
+        kx, ky, kz = state[COSINE], 0.0, -state[SINE]
+    p, q, r = last[1] / last[0], last[2] / last[0], last[3] / last[0]
+    ix = c[0] * p + c[1] * q + c[2] * r
+    iy = c[3] * p + c[4] * q + c[5] * r
+    iz = c[6] * p + c[7] * q + c[8] * r
+    wx, wy, wz = ix - earth[RATE] * kx, iy - earth[RATE] * ky, iz - earth[RATE] * kz
+    sx, sy, sz = cross(wx, wy, wz, x, y, w)
+    speed[0] += sx
+    speed[1] += sy
+    speed[2] += sz
+    for j in range(3):
+        # By a turn e_j: the arm by -r x e_j, the rate of the body by -(C w_ib) x e_j.
+        ex, ey, ez = 1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2)
+        ax, ay, az = cross(wx, wy, wz, *cross(x, y, w, ex, ey, ez))
+        bx, by, bz = cross(x, y, w, *cross(ix, iy, iz, ex, ey, ez))
+        h[0, 6 + j] += bx - ax
+        h[1, 6 + j] += by - ay
+        h[2, 6 + j] += bz - az
+    for e in range(gyro_terms.shape[0]):
+        m, axis, j = int(gyro_terms[e, 0]), int(gyro_terms[e, 1]), 9 + int(gyro_terms[e, 2])
+        weight = gyro_terms[e, 3]
+        if m > 0:
+            weight *= last[m] / last[0]
+        dx, dy, dz = cross(x, y, w, c[axis], c[3 + axis], c[6 + axis])
+        h[0, j] -= weight * dx
+        h[1, j] -= weight * dy
+        h[2, j] -= weight * dz
+
+
+@njit(cache=True, error_model="numpy")
+def meet_fix(which, state, earth, gyro_terms, last, arm, of_place, fix, turn, z, h, H, R):
+    """Fill the observation of an antenna's fix: computed - measured, north, east, down.
+
+    `arm` is that of the antenna, body axes; `h` is a work array as large as H.
+    """
+    q_at, v_at = (Q_WB, V_W) if which == WANDER else (Q_NB, V_N)
+    lat, lon, alt = level_place(which, state, turn)
+    c = dcm_from_quat(state[q_at], state[q_at + 1], state[q_at + 2], state[q_at + 3])
+    x = c[0] * arm[0] + c[1] * arm[1] + c[2] * arm[2]
+    y = c[3] * arm[0] + c[4] * arm[1] + c[5] * arm[2]
+    w = c[6] * arm[0] + c[7] * arm[1] + c[8] * arm[2]
+    for i in range(3):
+        R[i] = fix[VARIANCE + i]
+        for j in range(h.shape[1]):
+            h[i, j] = 0.0
+    told = np.empty(3)
+    if of_place:
+        told[0], told[1], told[2] = x, y, w
+        z[0], z[1], z[2] = displacement(
+            lat, lon, alt, fix[VALUE], fix[VALUE + 1], fix[VALUE + 2], earth[A], earth[E2]
+        )
+        h[0, 0] = h[1, 1] = h[2, 2] = 1.0
+        # -[arm x]
+        h[0, 7], h[0, 8] = w, -y
+        h[1, 6], h[1, 8] = -w, x
+        h[2, 6], h[2, 7] = y, -x
+    else:
+        for i in range(3):
+            told[i] = state[v_at + i]
+            z[i] = -fix[VALUE + i]
+            h[i, 3 + i] = 1.0
+        if x != 0.0 or y != 0.0 or w != 0.0:
+            swept(which, state, earth, gyro_terms, last, c, x, y, w, told, h)
+    for i in range(3):
+        for j in range(3):
+            z[i] += turn[i, j] * told[j]
+        for j in range(H.shape[1]):
+            H[i, j] = turn[i, 0] * h[0, j] + turn[i, 1] * h[1, j] + turn[i, 2] * h[2, j]
+
+
+@njit(cache=True, error_model="numpy")
+def take_off(which, state, sensors, earth, x):
+    """Remove an estimate from a state and add it to the sensor errors."""
+    if which == WANDER:
+        wander_correct(state, x[:9], earth)
+    else:
+        ned_correct(state, x[:9], earth)
+        s = math.sin(state[LAT])
+        state[SINE], state[COSINE] = s, math.cos(state[LAT])
+        state[PRIME] = 1.0 / math.sqrt(1.0 - earth[E2] * s * s)
+    for j in range(sensors.shape[0]):
+        sensors[j] += x[9 + j]
+
+
+@njit(cache=True, error_model="numpy")
+def mark(form, same_axes, covariance, sensors, turn, P, marked, marked_sensors, marked_sd):
+    """Fill a snapshot: covariance of nine errors in NED, estimates, standard deviations."""
+    if form >= UD:
+        udu_matrix(covariance, P)
+    else:
+        for i in range(P.shape[0]):
+            for j in range(P.shape[1]):
+                P[i, j] = covariance[i, j]
+    for a in range(0, 9, 3):
+        for b in range(0, 9, 3):
+            if same_axes:
+                for i in range(3):
+                    for j in range(3):
+                        marked[a + i, b + j] = P[a + i, b + j]
+                continue
+            for i in range(3):
+                for j in range(3):
+                    total = 0.0
+                    for m in range(3):
+                        for k in range(3):
+                            total += turn[i, m] * P[a + m, b + k] * turn[j, k]
+                    marked[a + i, b + j] = total
+    for j in range(sensors.shape[0]):
+        marked_sensors[j] = sensors[j]
+        marked_sd[j] = math.sqrt(P[9 + j, 9 + j])
+
+
+@njit(cache=True, error_model="numpy")
+def over_fixes(
+    kinds,
+    model,
+    states,
+    group,
+    count,
+    room,
+    step,
+    note_at,
+    interval,
+    time,
+    rows,
+    history,
+    made,
+    notes,
+    noted,
+    same,
+    arm,
+    place_code,
+    fix_time,
+    fixes,
+    told,
+    marked_at,
+    marked,
+    marked_sensors,
+    marked_sd,
+):
+    """Advance over steps and fixes, to the end of either, after the given number of steps.
+
+    `rows` are changed where a fix cuts a step. Return the status, the steps made, those of the open
+    group, the fixes processed, and the rows filled for a smoother. The call ends early as
+    `over_steps`, or where these rows are full. Instants within `same` seconds count as one.
+    """
+    which, form, _ = kinds
+    state, at_covariance, covariance, sensors, times, last = states
+    open_history, _ = group
+    earth = model[6]
+    n, size = 9 + sensors.shape[0], covariance.shape[0]
+    x, z, R = np.empty(size), np.empty(3), np.empty(3)
+    h, H = np.empty((3, size)), np.empty((3, size))
+    turn, P, after = np.empty((3, 3)), np.empty((n, n)), np.empty((size, size))
+    cut = np.empty((2, rows.shape[1]))
+    between = np.empty((1, history.shape[1]))
+    done, total = 0, time.shape[0]
+    while done < fix_time.shape[0]:
+        epoch = fix_time[done]
+        if epoch > times[AT_STEP] + same:
+            if made == total:
+                break
+            end = made
+            while end < total and time[end] < epoch - same:
+                end += 1
+            inside = end < total and time[end] > epoch + same
+            if not inside:
+                end = min(end + 1, total)
+            why, went, count, noted = over_steps(
+                kinds,
+                model,
+                states,
+                group,
+                count,
+                room,
+                step,
+                note_at,
+                time[made:end],
+                rows[made:end],
+                history[made:end],
+                notes,
+                noted,
+            )
+            made += went
+            if why != ALL:
+                return why, made, count, done, noted
+            if inside:
+                split_increment(rows[end], epoch - times[AT_STEP], cut[0], cut[1])
+                why, went, count, noted = over_steps(
+                    kinds,
+                    model,
+                    states,
+                    group,
+                    count,
+                    room,
+                    step,
+                    note_at,
+                    fix_time[done : done + 1],
+                    cut[:1],
+                    between,
+                    notes,
+                    noted,
+                )
+                if went == 1:
+                    for j in range(rows.shape[1]):
+                        rows[end, j] = cut[1, j]
+                if why != ALL:
+                    return why, made, count, done, noted
+            continue
+        if notes.shape[0] > 0 and noted + 2 > notes.shape[0]:
+            return FULL, made, count, done, noted
+        bad, noted = close_group(kinds, model, states, group, count, room[0], notes, noted)
+        count = 0
+        if bad >= 0:
+            return BAD, made, count, done, noted
+        of_place = fixes[done, CODE] == place_code
+        meet_fix(which, state, earth, model[0], last, arm, of_place, fixes[done], turn, z, h, H, R)
+        for j in range(size):
+            x[j] = 0.0
+        for j in range(3):
+            told[done, 2, j] = 1.0
+        if notes.shape[0] > 0:
+            pack_covariance(form >= UD, covariance, P, notes[noted], begin_of_move(n))
+        if form == UD:
+            wrong = ud_update(covariance, x, z, H, R, told[done])
+        elif form == WD:
+            wrong = wd_epoch(
+                covariance, covariance, covariance, False, x, z, H, R, told[done], after
+            )
+            for i in range(size):
+                for j in range(size):
+                    covariance[i, j] = after[i, j]
+        else:
+            wrong = dense_update(covariance, x, z, H, R, form != PLAIN, told[done])
+        if wrong != -1:
+            return BAD_FIX, made, count, done, noted
+        take_off(which, state, sensors, earth, x)
+        level_place(which, state, turn)
+        if notes.shape[0] > 0:
+            head_row(which, form >= UD, states, times[AT_STEP], UPDATE, P, notes[noted])
+            for j in range(n):
+                notes[noted, begin_of_taken(n) + j] = x[j]
+            noted += 1
+        marked_at[done] = times[AT_STEP]
+        mark(
+            form,
+            which != WANDER,
+            covariance,
+            sensors,
+            turn,
+            P,
+            marked[done],
+            marked_sensors[done],
+            marked_sd[done],
+        )
+        for j in range(open_history.shape[1]):
+            open_history[0, j] = state[j]
+        for j in range(state.shape[0]):
+            at_covariance[j] = state[j]
+        if made > 0 and times[AT_STEP] <= time[made - 1] + same:
+            for j in range(history.shape[1]):
+                history[made - 1, j] = state[j]
+        note_at = times[AT_COVARIANCE] + interval
+        done += 1
+    return ALL, made, count, done, noted

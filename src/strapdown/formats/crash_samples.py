@@ -1,0 +1,190 @@
+"""Stamps of crash records in seconds, and mean accelerations from velocity changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown.constants import TIME_UNITS
+from strapdown.errors import DataError, Finding
+from strapdown.formats.clocks import EPOCH
+from strapdown.formats.crash_record import CrashChannel
+from strapdown.formats.inference.conclusion import infer_time_unit
+from strapdown.formats.judge import what_numbers_say
+
+__all__ = ["Clock", "last_midnight", "mean_acceleration", "mean_accelerations_of", "seconds_of"]
+
+
+Array = NDArray[np.float64]
+
+DAY = 86_400.0  # s
+
+
+@dataclass(frozen=True, eq=False)
+class Clock:
+    """A column of stamps, as recorded.
+
+    Attributes
+    ----------
+    name : str
+        Name of the column.
+    stamps : ndarray, (n,)
+        Integer or not, as recorded.
+    unit : str
+        A key of `TIME_UNITS`, or empty if not stated.
+    file : str
+    row : callable
+        Maps the number of a stamp to its row in the file.
+    """
+
+    name: str
+    stamps: NDArray[Any]
+    unit: str
+    file: str
+    row: Callable[[int], int]
+
+
+def seconds_of(clock: Clock) -> tuple[Array, list[Finding]]:
+    """Convert stamps to increasing seconds.
+
+    Returns `seconds` ((n,)): from the origin of the recorder. Where that is more than 1e6 s away (a
+    clock of 1970), from the last midnight of that clock before the first stamp, so that records of
+    one clock that start at different times keep a common time. DataError: a stamp is missing, time
+    does not advance, or the unit is not stated and not evident.
+    """
+    findings: list[Finding] = []
+    stamps = clock.stamps
+    stamps = stamps.astype(np.int64) if stamps.dtype.kind in "iub" else stamps.astype(np.float64)
+    missing = np.flatnonzero(~np.isfinite(stamps))
+    if missing.size:
+        k = int(missing[0])
+        raise DataError(
+            "io.no-stamp-such",
+            file=clock.file,
+            row=clock.row(k),
+            quantity=f"time ({clock.name})",
+            stamps=clock.stamps[k],
+            size=missing.size,
+        )
+    ticks = (stamps - stamps[0]).astype(np.float64)
+    back = np.flatnonzero(np.diff(ticks) <= 0.0)
+    if back.size:
+        k = int(back[0])
+        same = ticks[k] == ticks[k + 1]
+        raise DataError(
+            "io.crash-stamp-repeated" if same else "io.time-goes-back-in-record",
+            file=clock.file,
+            row=clock.row(k + 1),
+            quantity=f"time ({clock.name})",
+            stamps=stamps[k + 1],
+            stamps_2=stamps[k],
+        )
+    unit = clock.unit or _evident(clock, stamps, findings)
+    factor = TIME_UNITS[unit]
+    if abs(float(stamps[0])) * factor <= EPOCH:
+        return stamps.astype(np.float64) * factor, findings
+    midnight = last_midnight(stamps[0].item(), factor)
+    findings.append(
+        Finding(
+            "io.crash-time-from-midnight",
+            file=clock.file,
+            quantity=f"time ({clock.name})",
+            severity="note",
+            midnight=midnight,
+            unit=unit,
+        )
+    )
+    return (stamps - midnight).astype(np.float64) * factor, findings
+
+
+def last_midnight(stamp: float, factor: float) -> float:
+    """Return the stamp of the last midnight of a clock before a stamp.
+
+    `stamp`: in ticks; integers stay integers. `factor` (s): duration of a tick.
+    """
+    day = round(DAY / factor)
+    return stamp // day * day
+
+
+def _evident(clock: Clock, stamps: NDArray[Any], findings: list[Finding]) -> str:
+    said = infer_time_unit(stamps)
+    where = {"file": clock.file, "quantity": f"time ({clock.name})"}
+    if said.settled:
+        findings.append(said.finding("io.crash-time-unit-inferred", **where))
+        return str(said.value)
+    raise DataError("io.crash-time-unit-undecided", **where, **what_numbers_say(said))
+
+
+# Mean accelerations from a table of cumulative velocity changes.
+
+
+# A table that begins one step after time zero omits the row of zeros.
+ONE_STEP = 1.5
+
+
+def mean_acceleration(channel: CrashChannel) -> tuple[Array, Array]:
+    """Compute the mean acceleration over each interval of a velocity channel.
+
+    Parameters
+    ----------
+    channel : CrashChannel
+        Of quantity ``velocity``.
+
+    Returns
+    -------
+    time : ndarray, (n,), s
+        End of each interval, as for sampling ``mean``.
+    acceleration : ndarray, (n,), m/s²
+        Change of velocity over the interval divided by its length; exact for any motion within
+        it.
+
+    Raises
+    ------
+    DataError
+        The quantity is not velocity, there are fewer than two samples, or a value is missing.
+    """
+    if channel.quantity != "velocity":
+        raise DataError(
+            "io.holds-change-velocity-needed",
+            file=channel.file or None,
+            quantity=channel.name,
+            of_what=channel.quantity,
+        )
+    time, velocity = channel.load()
+    bad = np.flatnonzero(~np.isfinite(velocity))
+    if bad.size or velocity.size < 2:
+        k = int(bad[0]) if bad.size else None
+        raise DataError(
+            "io.not-finite-number-2" if k is not None else "io.fewer-than-two-samples",
+            file=channel.file or None,
+            row=channel.row(k) if k is not None else None,
+            quantity=channel.name,
+            velocity=velocity[k] if k is not None else None,
+        )
+    return mean_accelerations_of(time, velocity, from_zero=starts_at_zero(time, channel))
+
+
+def starts_at_zero(time: Array, channel: CrashChannel) -> bool:
+    """Whether the table begins one step after the time zero of its changes."""
+    counted = any("time zero" in r for r in channel.remarks)
+    return counted and time.size > 1 and 0.0 < time[0] <= ONE_STEP * (time[1] - time[0])
+
+
+def mean_accelerations_of(
+    time: ArrayLike, velocity: ArrayLike, *, from_zero: bool = False
+) -> tuple[Array, Array]:
+    """Compute the mean acceleration over each interval.
+
+    `time` ((n,), s): increasing. `velocity` ((n,), m/s). `from_zero`: whether the velocity is a
+    change since time zero: the interval from there to the first stamp then counts, too. Returns
+    `time` ((n - 1,) or (n,), s): end of each interval; `acceleration` (m/s²).
+    """
+    t = np.asarray(time, dtype=np.float64)
+    v = np.asarray(velocity, dtype=np.float64)
+    if from_zero:
+        t, v = np.concatenate([[0.0], t]), np.concatenate([[0.0], v])
+    return t[1:], np.diff(v) / np.diff(t)

@@ -1,0 +1,342 @@
+"""Writers of crash records: ISO MME (ISO/TS 13499), and text tables of recorders and paths."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.constants import GYRO_UNITS
+from strapdown.errors import DataError
+from strapdown.formats import csv
+from strapdown.formats.crash_record import QUANTITIES, CrashChannel, CrashRecord, clean
+from strapdown.formats.mme_codes import FILTERS, LENGTH, NO_CLASS, decode_mme
+from strapdown.formats.mme_reader import (
+    AXIS_NOTE,
+    BODY_NOTE,
+    CHANGE_NOTE,
+    FILTER_NOTE,
+    SAMPLING_NOTE,
+    even_stamps,
+)
+from strapdown.tables import ACCEL, EULER, GYRO, NED, POSITION_SD, VELOCITY
+
+__all__ = [
+    "ACCEL_HEADINGS",
+    "GYRO_HEADINGS",
+    "TIME",
+    "write_mme",
+    "write_path_csv",
+    "write_recorder_csv",
+]
+
+
+Array = NDArray[np.float64]
+
+NOVALUE = "NOVALUE"
+_DIMENSIONS = {
+    "acceleration": "AC",
+    "rate": "AV",
+    "velocity": "VE",
+    "displacement": "DS",
+    "force": "FO",
+    "time": "TI",
+    "other": "00",
+}
+_UNITS = {**QUANTITIES, "acceleration": "m/(s*s)"}
+# RED B reserves digits for signs that differ from those of SAE J211.
+_DIRECTIONS = {"x": "X", "y": "Y", "z": "Z", "-x": "1", "-y": "2", "-z": "3"}
+# Locations by a word that occurs in them, if the word is as specific as the code.
+_PLACES = {
+    "engine": "ENGN",
+    "head": "HEAD",
+    "chest": "CHST",
+    "pelvis": "PELV",
+    "crossmember": "CRME",
+    "tunnel": "TUNN",
+    "b-pillar": "BPIL",
+    "sill": "SILB",
+    "barrier": "FBAR",
+    "sled": "SLED",
+}
+_FILE_NAME = re.compile(r"[^A-Za-z0-9_-]+")
+_SHORTEST = "record"
+LONGEST_FILE_NAME = 40
+MOST_CHANNELS = 999
+
+
+def write_mme(
+    folder: str | Path, record: CrashRecord, *, name: str | None = None
+) -> dict[str, str]:
+    """Write a record as a test in ISO MME.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Output folder: ``NAME.mme``, ``Channel/NAME.chn`` and ``Channel/NAME.001`` and so on.
+    record : CrashRecord
+        Values are written in SI units with the fewest digits that reproduce each exactly. Stamps
+        are written as first stamp and interval if exact, else as a channel of stamps.
+    name : str, optional
+        Base name of the files; by default that of the record.
+
+    Returns
+    -------
+    dict of str to str
+        Name of each channel to its channel code. A name that is a code is kept; others are
+        written to `Laboratory channel code`.
+
+    Raises
+    ------
+    DataError
+        The record has no channels, more than 999, or an infinite value.
+    """
+    # A column of stamps is written together with the channels that use it.
+    channels = [c for c in record.channels if c.quantity != "time"]
+    if not channels or len(channels) > MOST_CHANNELS:
+        raise DataError(
+            "io.channels-iso-mme-holds",
+            file=record.path.name,
+            quantity="channels",
+            count=len(channels),
+            most_channels=MOST_CHANNELS,
+        )
+    stem = _FILE_NAME.sub("_", name if name is not None else record.path.stem).strip("_")
+    stem = stem[:LONGEST_FILE_NAME] or _SHORTEST
+    codes = _codes(channels)
+    texts: list[tuple[str, str, str]] = []
+    clocks: dict[bytes, str] = {}
+    for channel in channels:
+        time, values = channel.load()
+        _check(channel, time, values)
+        even = _even(time)
+        clock = ""
+        if even is None:
+            clock = clocks.setdefault(time.tobytes(), f"10TIRS{len(clocks):02d}0000TI00")
+            if clock not in {code for code, _, _ in texts}:
+                texts.append((clock, "stamps", _file(_stamps_head(clock, time), time)))
+        head = _head(channel, codes[channel.name], values, even, clock)
+        texts.append((codes[channel.name], channel.name, _file(head, values)))
+    inner = Path(folder) / "Channel"
+    inner.mkdir(parents=True, exist_ok=True)
+    (Path(folder) / f"{stem}.mme").write_bytes(_lines(_test(record)))
+    index = {"Instrumentation standard": NOVALUE, "Number of channels": str(len(texts))}
+    for k, (code, title, text) in enumerate(texts, start=1):
+        index[f"Name of channel {k:03d}"] = f"{code} / {clean(title)}"
+        (inner / f"{stem}.{k:03d}").write_bytes(text.encode())
+    (inner / f"{stem}.chn").write_bytes(_lines(index))
+    return codes
+
+
+def _codes(channels: list[CrashChannel]) -> dict[str, str]:
+    """Assign a unique code to each channel; names that are codes are kept."""
+    codes = {c.name: c.name for c in channels if _is_code(c.name)}
+    taken = {code.upper() for code in codes.values()}
+    for channel in channels:
+        if channel.name in codes:
+            continue
+        start, end = _object_and_place(channel), _ending(channel)
+        number = 0
+        while (code := f"{start}{number // 100:02d}{number % 100:02d}00{end}") in taken:
+            number += 1
+        taken.add(code)
+        codes[channel.name] = code
+    return codes
+
+
+def _is_code(name: str) -> bool:
+    known = decode_mme(name)
+    return known is not None and not known.unknown and name == known.code and len(name) == LENGTH
+
+
+def _object_and_place(channel: CrashChannel) -> str:
+    body = channel.body.lower()
+    said = f"{body} {channel.place.lower()}" if body != "vehicle" else channel.place.lower()
+    main = next((code for word, code in _PLACES.items() if word in said), "VEHC")
+    seat = "1" if body.startswith("driver") else "3" if body.startswith("front passenger") else "0"
+    return f"{'B' if body == 'barrier' else '1'}{seat}{main}"
+
+
+def _ending(channel: CrashChannel) -> str:
+    letters = {words: letter for letter, words in FILTERS.items()}
+    direction = _DIRECTIONS.get(channel.axis, "0")
+    return _DIMENSIONS[channel.quantity] + direction + letters.get(channel.low_pass, NO_CLASS)
+
+
+def _check(channel: CrashChannel, time: Array, values: Array) -> None:
+    bad = np.flatnonzero(np.isinf(values) | ~np.isfinite(time))
+    if bad.size or not values.size:
+        raise DataError(
+            "io.not-finite-number" if bad.size else "io.no-samples-2",
+            file=channel.file or None,
+            row=channel.row(int(bad[0])) if bad.size else None,
+            quantity=f"channel {channel.name}",
+            values=values[bad[0]] if bad.size else None,
+        )
+
+
+def _even(time: Array) -> tuple[str, str] | None:
+    """Return first stamp and interval if they reproduce every stamp exactly."""
+    first = _number(float(time[0]))
+    if time.size == 1:
+        return first, "1.0"
+    mean = float(time[-1] - time[0]) / (time.size - 1)
+    if not mean > 0.0:
+        return None
+    rounded = [_number(float(f"{mean:.{digits}g}")) for digits in (3, 6, 9, 12)]
+    for interval in dict.fromkeys((*rounded, _number(mean), _number(float(time[1] - time[0])))):
+        if np.array_equal(even_stamps(first, interval, time.size), time):
+            return first, interval
+    return None
+
+
+def _head(
+    channel: CrashChannel, code: str, values: Array, even: tuple[str, str] | None, clock: str
+) -> dict[str, str]:
+    known = decode_mme(code)
+    assert known is not None
+    unit = _UNITS[channel.quantity] or clean(channel.unit)
+    letter_says = FILTERS.get(code[-1], "")
+    notes = []
+    if channel.sampling:
+        notes.append(SAMPLING_NOTE + channel.sampling)
+    if channel.axis != known.axis and channel.axis:
+        notes.append(AXIS_NOTE + channel.axis)
+    if channel.body != known.body:
+        notes.append(BODY_NOTE + clean(channel.body))
+    if channel.low_pass and channel.low_pass != letter_says:
+        notes.append(FILTER_NOTE + clean(channel.low_pass))
+    # A velocity is noted as a change, so that a reader does not subtract its first value.
+    remarks = [r for r in channel.remarks if r != CHANGE_NOTE]
+    notes += [CHANGE_NOTE] if channel.quantity == "velocity" else []
+    notes += [clean(r) for r in remarks]
+    cut_off = channel.bandwidth
+    return {
+        "Test object number": code[0],
+        "Name of the channel": clean(channel.place) or clean(channel.name),
+        "Laboratory channel code": clean(channel.name),
+        "Customer channel code": NOVALUE,
+        "Channel code": code,
+        "Location": NOVALUE,
+        "Dimension": known.dimension,
+        "Direction": known.direction,
+        "Channel frequency class": clean(channel.low_pass) or NOVALUE,
+        "Unit": unit or NOVALUE,
+        "Reference system": NOVALUE,
+        "Transducer type": NOVALUE,
+        "Transducer id": NOVALUE,
+        "Pre-filter type": NOVALUE,
+        "Cut off frequency": NOVALUE if cut_off is None else _number(cut_off),
+        "Channel amplitude class": NOVALUE
+        if channel.full_scale is None
+        else _number(channel.full_scale),
+        "Reference channel": "explicit" if clock else "implicit",
+        "Reference channel name": clock or NOVALUE,
+        "Data source": NOVALUE,
+        "Data status": NOVALUE,
+        "Sampling interval": NOVALUE if even is None else even[1],
+        "Bit resolution": NOVALUE,
+        "Time of first sample": NOVALUE if even is None else even[0],
+        "Number of samples": str(values.size),
+        **_extremes(values),
+        **{f"Comments#{k}": note for k, note in enumerate(notes)},
+    }
+
+
+def _extremes(values: Array) -> Mapping[str, str]:
+    there = values[np.isfinite(values)]
+    if not there.size:
+        return {}
+    return {
+        "First global maximum value": _number(float(there.max())),
+        "First global minimum value": _number(float(there.min())),
+    }
+
+
+def _stamps_head(code: str, time: Array) -> dict[str, str]:
+    return {
+        "Test object number": "1",
+        "Name of the channel": "stamps",
+        "Channel code": code,
+        "Dimension": "time",
+        "Unit": "s",
+        "Reference channel": "explicit",
+        "Reference channel name": code,
+        "Number of samples": str(time.size),
+    }
+
+
+def _test(record: CrashRecord) -> dict[str, str]:
+    facts = record.facts
+    mass, speed = facts.get("mass_kg", ""), facts.get("speed_m_per_s", "")
+    return {
+        "Data format edition number": "1.6",
+        "Laboratory name": NOVALUE,
+        "Laboratory test ref. number": clean(facts.get("test", "")) or NOVALUE,
+        "Customer name": NOVALUE,
+        "Title": clean(record.title) or NOVALUE,
+        "Medium No./number of media": "1/1",
+        "Timestamp": NOVALUE,
+        "Type of the test": NOVALUE,
+        "Date of the test": NOVALUE,
+        "Number of test objects": "1",
+        "Name of test object 1": clean(facts.get("vehicle", "")) or NOVALUE,
+        "Velocity test object 1": clean(speed) or NOVALUE,
+        "Mass test object 1": clean(mass) or NOVALUE,
+    }
+
+
+def _file(head: Mapping[str, str], values: Array) -> str:
+    lines = [NOVALUE if np.isnan(v) else _number(v) for v in values.tolist()]
+    return _lines(head).decode() + "\n".join(lines) + "\n"
+
+
+def _lines(head: Mapping[str, str]) -> bytes:
+    return "".join(f"{k.partition('#')[0]:<28}:{v}\n" for k, v in head.items()).encode()
+
+
+def _number(value: float) -> str:
+    """Format a number with the fewest digits that reproduce it exactly."""
+    return repr(float(value))
+
+
+# Recorder exports: one text table per triad or path, with units in the headings.
+
+
+TIME = "time [s]"
+ACCEL_HEADINGS = ("ax [m/s2]", "ay [m/s2]", "az [m/s2]")
+GYRO_HEADINGS = ("wx [deg/s]", "wy [deg/s]", "wz [deg/s]")
+
+
+def write_recorder_csv(path: Path, table: pd.DataFrame) -> None:
+    """Write one triad of a recorder.
+
+    `table`: index ``time``, s; columns ``accel_x accel_y accel_z``, m/s², or ``gyro_x gyro_y
+    gyro_z``, rad/s. Accelerations and stamps are reproduced to the last bit; rates, written in
+    deg/s, within rounding.
+    """
+    turns = set(GYRO) <= set(table.columns)
+    values = table[GYRO if turns else ACCEL].to_numpy(dtype=np.float64)
+    if turns:
+        values = values / GYRO_UNITS["deg/s"]
+    headings = GYRO_HEADINGS if turns else ACCEL_HEADINGS
+    columns = {TIME: table.index.to_numpy(dtype=np.float64)}
+    columns |= {name: values[:, k] for k, name in enumerate(headings)}
+    csv.write(path, columns, {})
+
+
+def write_path_csv(path: Path, table: pd.DataFrame) -> None:
+    """Write the path of a point.
+
+    `table`: index ``time``, s; columns ``north east down`` and, if available, ``north_sd east_sd
+    down_sd``, m, ``VN VE VD``, m/s, and ``roll pitch heading``, deg.
+    """
+    columns = {TIME: table.index.to_numpy(dtype=np.float64)}
+    for names, unit in ((NED, "m"), (POSITION_SD, "m"), (VELOCITY, "m/s"), (EULER, "deg")):
+        there = [name for name in names if name in table.columns]
+        columns |= {f"{n} [{unit}]": table[n].to_numpy(dtype=np.float64) for n in there}
+    csv.write(path, columns, {})

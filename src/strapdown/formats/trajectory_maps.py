@@ -1,0 +1,403 @@
+"""Trajectories for maps: GeoJSON (RFC 7946) and KML, thinned and split at the date line."""
+
+from __future__ import annotations
+
+import heapq
+import json
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import escape
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.ellipsoids import WGS84, Ellipsoid
+from strapdown.errors import DataError
+from strapdown.formats.trajectory_csv import one_line
+from strapdown.formats.trajectory_options import TrajectoryFileOptions
+from strapdown.frames import ecef_from_geodetic
+from strapdown.rotation import within_half_turn
+from strapdown.tables import EULER, VELOCITY, check_trajectory, places_of
+
+__all__ = ["Thinned", "cut_at_date_line", "thin", "write_geojson", "write_kml"]
+
+
+Array = NDArray[np.float64]
+
+
+def write_geojson(
+    path: Path,
+    trajectory: pd.DataFrame,
+    *,
+    name: str = "trajectory",
+    options: TrajectoryFileOptions | None = None,
+) -> None:
+    """Write a trajectory as a FeatureCollection: the path, its start and its end.
+
+    Parameters
+    ----------
+    path : Path
+    trajectory : DataFrame
+        A Trajectory table of one row or more, on WGS 84.
+    name : str
+    options : TrajectoryFileOptions, optional
+        With `epoch`, dates are added to the times. More than `most_points` rows are thinned to
+        those that preserve the path best (`thin`).
+
+    Raises
+    ------
+    ConfigError
+        The ellipsoid is not WGS 84.
+    DataError
+        The table is not valid, or has no rows.
+
+    Notes
+    -----
+    Positions are ``[longitude, latitude, height above the ellipsoid]``. A path across the date line
+    is a MultiLineString, cut there (3.1.9). The path's property ``time_s`` has one time per
+    position, in lists like the coordinates, because RFC 7946 discourages times in positions.
+    Longitudes and latitudes have nine decimals (0.1 mm), heights four.
+    """
+    chosen = options or TrajectoryFileOptions()
+    chosen.require_wgs84("GeoJSON")
+    check_trajectory(trajectory)
+    if trajectory.empty:
+        raise DataError("io.trajectory-no-rows")
+    thinned = thin(trajectory, chosen.most_points)
+    title = one_line(name)
+    features = [_end(trajectory, 0, "start", title, chosen)]
+    if len(trajectory) > 1:
+        features = [
+            _path_feature(trajectory, thinned, title, chosen),
+            *features,
+            _end(trajectory, -1, "end", title, chosen),
+        ]
+    lines = ",\n".join(
+        json.dumps(f, ensure_ascii=False, allow_nan=False, separators=(",", ":")) for f in features
+    )
+    text = f'{{"type":"FeatureCollection","features":[\n{lines}\n]}}\n'
+    path.write_bytes(text.encode())
+
+
+def _position(point: Array) -> list[float]:
+    # Avoid negative zeros.
+    return [round(v, d) + 0.0 for v, d in zip(point.tolist(), (9, 9, 4), strict=True)]
+
+
+def _path_feature(
+    trajectory: pd.DataFrame, thinned: Thinned, name: str, options: TrajectoryFileOptions
+) -> dict[str, Any]:
+    kept = trajectory.iloc[thinned.rows]
+    time = kept.index.to_numpy(dtype=np.float64)
+    points = kept[["lon", "lat", "alt"]].to_numpy(dtype=np.float64)
+    parts = cut_at_date_line(np.column_stack([points, time]))
+    coordinates = [[_position(p[:3]) for p in part] for part in parts]
+    times = [part[:, 3].tolist() for part in parts]
+    speed = np.sqrt(np.square(trajectory[VELOCITY].to_numpy(dtype=np.float64)).sum(axis=1))
+    properties: dict[str, Any] = {
+        "name": name,
+        "part": "path",
+        "samples": thinned.samples,
+        "points": len(thinned.rows),
+        "largest_deviation_m": float(f"{thinned.deviation_m:.3g}"),
+        "start_s": float(time[0]),
+        "end_s": float(time[-1]),
+        "largest_speed_m_s": float(speed.max()),
+        "mean_speed_m_s": _mean(trajectory.index.to_numpy(dtype=np.float64), speed),
+        "height": "over the WGS 84 ellipsoid",
+        **_dates(options, {"start_utc": float(time[0]), "end_utc": float(time[-1])}),
+        "time_s": times[0] if len(parts) == 1 else times,
+    }
+    geometry = (
+        {"type": "LineString", "coordinates": coordinates[0]}
+        if len(parts) == 1
+        else {"type": "MultiLineString", "coordinates": coordinates}
+    )
+    return {"type": "Feature", "geometry": geometry, "properties": properties}
+
+
+def _mean(time: Array, values: Array) -> float:
+    return float(np.trapezoid(values, time) / (time[-1] - time[0]))
+
+
+def _dates(options: TrajectoryFileOptions, times: dict[str, float]) -> dict[str, str]:
+    return {} if options.epoch is None else {k: options.date(t) for k, t in times.items()}
+
+
+def _end(
+    trajectory: pd.DataFrame, row: int, part: str, name: str, options: TrajectoryFileOptions
+) -> dict[str, Any]:
+    at = trajectory.iloc[row]
+    time = float(trajectory.index[row])
+    point = at[["lon", "lat", "alt"]].to_numpy(dtype=np.float64).copy()
+    point[:1] = within_half_turn(point[:1])
+    properties = {
+        "name": name,
+        "part": part,
+        "time_s": time,
+        **_dates(options, {"time_utc": time}),
+        **{f"{c}_m_s": float(at[c]) for c in VELOCITY},
+        **{f"{c}_deg": float(at[c]) for c in EULER},
+    }
+    geometry = {"type": "Point", "coordinates": _position(point)}
+    return {"type": "Feature", "geometry": geometry, "properties": properties}
+
+
+# Trajectories as KML, for Google Earth and similar programs.
+
+
+_HEAD = (
+    '<?xml version="1.0" encoding="UTF-8"?>\n'
+    '<kml xmlns="http://www.opengis.net/kml/2.2" xmlns:gx="http://www.google.com/kml/ext/2.2">'
+)
+# Colors are opacity, blue, green, red.
+_STYLE = '<Style id="path"><LineStyle><color>ff2d6fd9</color><width>3</width></LineStyle></Style>'
+
+
+def write_kml(
+    path: Path,
+    trajectory: pd.DataFrame,
+    *,
+    name: str = "trajectory",
+    options: TrajectoryFileOptions | None = None,
+) -> None:
+    """Write a trajectory as OGC KML 2.2: the path, its start and its end.
+
+    Parameters
+    ----------
+    path : Path
+    trajectory : DataFrame
+        A Trajectory table of one row or more, on WGS 84.
+    name : str
+    options : TrajectoryFileOptions, optional
+        With `epoch`, a track with dates (``gx:Track``, Google's extension) is written in
+        addition to the path. More than `most_points` rows are thinned to those that preserve
+        the path best (`thin`).
+
+    Raises
+    ------
+    ConfigError
+        The ellipsoid is not WGS 84.
+    DataError
+        The table is not valid, or has no rows.
+
+    Notes
+    -----
+    Heights of ``altitudeMode`` *absolute* are above the EGM96 geoid (OGC 07-147r2), those of a
+    trajectory above the ellipsoid. The difference, at most 110 m, is subtracted if given as
+    `geoid_undulation`; otherwise the file states that it is not. Longitudes and latitudes have nine
+    decimals (0.1 mm), heights four.
+    """
+    chosen = options or TrajectoryFileOptions()
+    chosen.require_wgs84("KML")
+    check_trajectory(trajectory)
+    if trajectory.empty:
+        raise DataError("io.trajectory-no-rows")
+    thinned = thin(trajectory, chosen.most_points)
+    kept = trajectory.iloc[thinned.rows]
+    points = kept[["lon", "lat", "alt"]].to_numpy(dtype=np.float64).copy()
+    points[:, 0] = within_half_turn(points[:, 0])
+    points[:, 2] -= chosen.geoid_undulation or 0.0
+    time = kept.index.to_numpy(dtype=np.float64)
+    lines = [
+        _HEAD,
+        "<Document>",
+        f"<name>{escape(one_line(name))}</name>",
+        f"<description>{escape(_description(thinned, chosen))}</description>",
+        _STYLE,
+    ]
+    if len(points) > 1:
+        lines += _path_placemark(points)
+        if chosen.epoch is not None:
+            lines += _track(points, [chosen.date(t) for t in time.tolist()])
+    ends = [("start", 0)] + ([("end", -1)] if len(points) > 1 else [])
+    for label, row in ends:
+        stamp = "" if chosen.epoch is None else _stamp(chosen.date(float(time[row])))
+        lines.append(
+            f"<Placemark><name>{label}</name><description>{time[row]:.9g} s</description>{stamp}"
+            f"<Point><altitudeMode>absolute</altitudeMode><coordinates>"
+            f"{_coordinates(points[row], ',')}</coordinates></Point></Placemark>"
+        )
+    lines += ["</Document>", "</kml>"]
+    path.write_bytes(("\n".join(lines) + "\n").encode())
+
+
+def _description(thinned: Thinned, options: TrajectoryFileOptions) -> str:
+    heights = (
+        "Heights are over the WGS 84 ellipsoid, and KML counts them from the EGM96 geoid: what "
+        "is shown is too high by the height of the geoid over the ellipsoid there, -110 to 90 m."
+        if options.geoid_undulation is None
+        else f"Heights are over the geoid: {options.geoid_undulation:.9g} m, the same everywhere, "
+        "was taken off the heights over the WGS 84 ellipsoid."
+    )
+    return f"{thinned.sentence} {heights}"
+
+
+def _coordinates(point: Array, separator: str) -> str:
+    # Avoid negative zeros.
+    lon, lat, alt = (round(v, d) + 0.0 for v, d in zip(point.tolist(), (9, 9, 4), strict=True))
+    return separator.join((_plain(lon, 9), _plain(lat, 9), _plain(alt, 4)))
+
+
+def _plain(value: float, decimals: int) -> str:
+    text = f"{value:.{decimals}f}".rstrip("0").rstrip(".")
+    return text or "0"
+
+
+def _path_placemark(points: Array) -> list[str]:
+    parts = [
+        [
+            "<LineString><altitudeMode>absolute</altitudeMode><coordinates>",
+            *(_coordinates(p, ",") for p in part),
+            "</coordinates></LineString>",
+        ]
+        for part in cut_at_date_line(points)
+    ]
+    inner = [line for part in parts for line in part]
+    if len(parts) > 1:
+        inner = ["<MultiGeometry>", *inner, "</MultiGeometry>"]
+    return ["<Placemark><name>path</name><styleUrl>#path</styleUrl>", *inner, "</Placemark>"]
+
+
+def _track(points: Array, dates: list[str]) -> list[str]:
+    return [
+        "<Placemark><name>track</name><styleUrl>#path</styleUrl>",
+        "<gx:Track><altitudeMode>absolute</altitudeMode>",
+        *(f"<when>{date}</when>" for date in dates),
+        *(f"<gx:coord>{_coordinates(p, ' ')}</gx:coord>" for p in points),
+        "</gx:Track></Placemark>",
+    ]
+
+
+def _stamp(date: str) -> str:
+    return f"<TimeStamp><when>{date}</when></TimeStamp>"
+
+
+# Splitting of a line on a map where it crosses the date line.
+
+
+def cut_at_date_line(points: Array) -> list[Array]:
+    """Cut a line so that no part crosses the date line (RFC 7946, 3.1.9).
+
+    `points` ((n, m)): two or more; longitude in deg first, then any values to interpolate with it.
+    Between points the line takes the shorter way around. Returns (k, m), parts with longitudes
+    within -180 to 180 deg, of two points or more; at a crossing one part ends at 180 or -180 deg
+    and the next begins at the other.
+    """
+    lon = np.degrees(np.unwrap(np.radians(points[:, 0])))
+    # Longitudes within a turn already are kept to the last digit.
+    turns = np.round((lon - points[:, 0]) / 360.0)
+    line = points.copy()
+    line[:, 0] += 360.0 * turns
+    whole = _with_crossings(line)
+    middle = 0.5 * (whole[:-1, 0] + whole[1:, 0])
+    cells = np.floor((middle + 180.0) / 360.0).astype(np.int64)
+    # A section along the date line itself stays with the part before it.
+    for k in np.flatnonzero(np.remainder(middle, 360.0) == 180.0):
+        cells[k] = cells[k - 1] if k else cells[k]
+    parts = []
+    starts = np.r_[0, np.flatnonzero(np.diff(cells)) + 1, len(cells)]
+    for first, end in pairwise(starts.tolist()):
+        part = whole[first : end + 1].copy()
+        part[:, 0] -= 360.0 * cells[first]
+        parts.append(part)
+    return parts
+
+
+def _with_crossings(line: Array) -> Array:
+    """Insert a point wherever the line crosses 180 deg, plus any number of turns."""
+    rows = [line[:1]]
+    for a, b in pairwise(line):
+        low, high = sorted((a[0], b[0]))
+        # The only odd multiple of 180 deg within a step of less than half a turn.
+        edge = 360.0 * np.ceil((low - 180.0) / 360.0) + 180.0
+        if low < edge < high:
+            crossing = a + (edge - a[0]) / (b[0] - a[0]) * (b - a)
+            crossing[0] = edge
+            rows.append(crossing[None])
+        rows.append(b[None])
+    return np.concatenate(rows)
+
+
+# Thinning of a trajectory for a map, with the largest deviation.
+
+
+# Limit of rows examined per split, so that the time is proportional to the length of a track.
+LONGEST_PIECE = 4096
+
+
+@dataclass(frozen=True)
+class Thinned:
+    """Rows that represent a trajectory on a map.
+
+    Attributes
+    ----------
+    rows : ndarray of int
+        In order, including both ends.
+    samples : int
+        Number of rows of the trajectory.
+    deviation_m : float, m
+        Largest distance of a dropped position from the straight line between its neighbors, at
+        its own time.
+    """
+
+    rows: NDArray[np.intp]
+    samples: int
+    deviation_m: float
+
+    @property
+    def sentence(self) -> str:
+        """Summary of the dropped rows, for reports."""
+        if len(self.rows) == self.samples:
+            return f"All {self.samples} points."
+        return (
+            f"{len(self.rows)} of {self.samples} points; those left out lie within "
+            f"{self.deviation_m:.2g} m of the line between their neighbours, at their own time."
+        )
+
+
+def thin(trajectory: pd.DataFrame, most: int, ellipsoid: Ellipsoid = WGS84) -> Thinned:
+    """Choose the rows that preserve a trajectory's path best.
+
+    `trajectory`: a Trajectory table. `most`: number of rows to keep; all if there are not more.
+
+    Splitting by Douglas and Peucker (Cartographica 10 (1973) 112-122), the farthest row first,
+    until the requested number is reached, with the distance at equal times (Meratnia and de By,
+    EDBT 2004, doi:10.1007/978-3-540-24741-8_44), which preserves stops. Distances are along the
+    axes of the Earth. A long trajectory is first split into even parts.
+    """
+    n = len(trajectory)
+    if n <= most:
+        return Thinned(np.arange(n), n, 0.0)
+    time = trajectory.index.to_numpy(dtype=np.float64)
+    place = ecef_from_geodetic(places_of(trajectory), ellipsoid=ellipsoid)
+    pieces = max(1, min(-(-n // LONGEST_PIECE), (most - 1) // 2))
+    kept = sorted({int(k) for k in np.linspace(0, n - 1, pieces + 1).round()})
+    heap: list[tuple[float, int, int, int]] = []
+
+    def push(first: int, last: int) -> None:
+        if last - first > 1:
+            distance, at = _farthest(time, place, first, last)
+            heapq.heappush(heap, (-distance, first, last, at))
+
+    for first, last in pairwise(list(kept)):
+        push(first, last)
+    while heap and len(kept) < most and heap[0][0] < 0.0:
+        _, first, last, at = heapq.heappop(heap)
+        kept.append(at)
+        push(first, at)
+        push(at, last)
+    return Thinned(np.array(sorted(kept)), n, -heap[0][0] if heap else 0.0)
+
+
+def _farthest(time: Array, place: Array, first: int, last: int) -> tuple[float, int]:
+    """Find the position farthest from the line at its time; return distance and row."""
+    inner = slice(first + 1, last)
+    share = (time[inner] - time[first]) / (time[last] - time[first])
+    line = place[first] + share[:, None] * (place[last] - place[first])
+    squares = np.square(place[inner] - line).sum(axis=1)
+    worst = int(np.argmax(squares))
+    return float(np.sqrt(squares[worst])), first + 1 + worst
