@@ -11,6 +11,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[3]))
 
 from tests.aiding_sensors import (
+    Compass,
     PressureHeight,
     VelocityLog,
     WheelSpeed,
@@ -21,7 +22,6 @@ from tests.aiding_sensors import (
 )
 
 from aided_drives import drive, error_now, gnss_of, navigator_of, run
-from strapdown.navigation.gyrocompass import Compass
 from strapdown.navigation.measurements.barometer import Barometer
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.measurements.heading import Heading

@@ -12,6 +12,7 @@ from scipy.stats import chi2
 sys.path.insert(0, str(Path(__file__).parents[3]))
 
 from tests.aiding_sensors import (
+    Compass,
     PressureHeight,
     VelocityLog,
     WheelSpeed,
@@ -24,7 +25,6 @@ from tests.aiding_sensors import (
 from aided_drives import GYRO_BIAS, drive, estimate, gnss_of, navigator_of, run
 from strapdown import rotation
 from strapdown.errors import ConfigError
-from strapdown.navigation.gyrocompass import Compass
 from strapdown.navigation.measurements.barometer import Barometer
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.measurements.heading import Heading
