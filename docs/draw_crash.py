@@ -11,6 +11,7 @@ import pandas as pd
 
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.entry import Entry
+from strapdown.crash.reconstruction import reconstruct_crash
 from strapdown.report.chart import (
     AXIS_COLOURS,
     BLACK,
@@ -27,7 +28,6 @@ from strapdown.simulation import point_kinematics
 from strapdown.simulation.crash_recording import record_crash
 from strapdown.simulation.crash_scenarios import find_crash
 from strapdown.simulation.recorder_design import paper_units
-from strapdown.systems.crash_reconstruction import reconstruct_crash
 from strapdown.tables import NED, VELOCITY
 
 SEED = 3

@@ -14,13 +14,13 @@ from tests.unit.crash.assumed_case import (
 )
 
 from strapdown.crash.entry import Entry
+from strapdown.crash.reconstruction import reconstruct_crash
 from strapdown.sensors.crash_unit import Assumed, Mounting
 from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.simulation.crash_recording import record_crash
 from strapdown.simulation.crash_scenarios import find_crash
 from strapdown.simulation.mounted_motion import MountedMotion
 from strapdown.simulation.recorder_design import paper_units
-from strapdown.systems.crash_reconstruction import reconstruct_crash
 from strapdown.tables import NED, VELOCITY
 
 CASES = 300

@@ -132,7 +132,7 @@ def test_what_a_sentence_shows_is_given_where_it_is_raised():
 
 #: Where findings are shown to people: a terminal, a report, the comments of a proposed case file.
 #: The last writes the events of a run in words, which are shown and never read.
-SHOWN = ("cli", "report", "api", "systems/crash_draft", "systems/sins/chain.py")
+SHOWN = ("cli", "report", "api", "crash/template", "crash/record_parts", "systems/sins/chain.py")
 ON_REQUEST = ("__str__", "__repr__")
 
 

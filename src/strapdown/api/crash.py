@@ -14,10 +14,10 @@ import pandas as pd
 from strapdown.bundle.seal import Seal
 from strapdown.config.crash_case import CaseSpec
 from strapdown.config.crash_case_file import read_case_spec
-from strapdown.crash.unit_reconstruction import UnitReconstruction
+from strapdown.crash.case import CaseResult, run_case
+from strapdown.crash.reconstruction import UnitReconstruction
 from strapdown.errors import ConfigError
 from strapdown.report.crash_case import write_crash
-from strapdown.systems.crash_case import CaseResult, run_case
 from strapdown.systems.progress import Progress, silent
 
 if TYPE_CHECKING:

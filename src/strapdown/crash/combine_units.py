@@ -10,10 +10,8 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.alignment.levelling import level
-from strapdown.crash.at_point import PointKinematics
-from strapdown.crash.compare_units import clipped_axes
-from strapdown.crash.unit_differences import TINY, floored
-from strapdown.crash.unit_effects import SampleEffects, level_turned_by
+from strapdown.crash.consistency import TINY, clipped_axes, floored
+from strapdown.crash.measuring_point import PointKinematics, SampleEffects, level_turned_by
 from strapdown.errors import ConfigError, DataError
 from strapdown.results.rests import RestStretch
 from strapdown.sensors.pre_crash import Levelling

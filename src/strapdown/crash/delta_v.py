@@ -10,9 +10,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.crash.acceleration import Acceleration
+from strapdown.crash.acceleration import Acceleration, check_within, window_weights
 from strapdown.crash.events import CrashEvent
-from strapdown.crash.window_weights import check_within, window_weights
 from strapdown.dsp.running_integral import running_integral
 from strapdown.errors import ConfigError, DataError
 from strapdown.tables.checks import VELOCITY, index_of, source_of, values_of

@@ -13,7 +13,6 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.crash.at_point import PointKinematics
 from strapdown.crash.entry import (
     ACCEL_BIAS,
     ATTITUDE,
@@ -24,15 +23,18 @@ from strapdown.crash.entry import (
 from strapdown.crash.entry import (
     VELOCITY as VELOCITY_COLUMNS,
 )
-from strapdown.crash.entry_estimate import Estimate, Fixes, estimate
-from strapdown.crash.entry_sensitivity import (
+from strapdown.crash.entry_estimate import (
     AVERAGED,
     RECOVERY,
     EntryPriors,
+    Estimate,
+    Fixes,
     between,
+    estimate,
     judge_fixes,
     record_of_fixes,
 )
+from strapdown.crash.measuring_point import PointKinematics
 from strapdown.ellipsoids import WGS84
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.evaluation.control_points import rigid_fit

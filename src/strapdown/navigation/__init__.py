@@ -25,7 +25,7 @@ load_on_first_use(
     __name__,
     {
         "engine": "LostCovarianceError",
-        "filter_options": "Correction ClosedLoop OpenLoop",
+        "filter_options": "ClosedLoop Correction OpenLoop",
         "navigator": "Navigator",
         "record": "NavigationChunk",
     },

@@ -10,11 +10,11 @@ import pytest
 
 import strapdown as sd
 from strapdown.config.crash_case_file import read_case_spec
+from strapdown.crash.case import run_case
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats.log_writers import LOG_WRITERS
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.simulation import Origin, StationaryMotion, simulate_imu
-from strapdown.systems.crash_case import run_case
 
 SITE = (55.75, 37.62, 150.0)
 SENSOR = "fog-1000"

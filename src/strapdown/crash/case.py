@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from strapdown.bundle.seal import sha256
 from strapdown.config.crash_case import AssumedSpec, CaseSpec, ReferenceSpec, TriadSpec, UnitSpec
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.delta_v import delta_v
@@ -16,12 +17,25 @@ from strapdown.crash.delta_v_bound import body_delta_v_bound
 from strapdown.crash.entry import Entry
 from strapdown.crash.events import EventRule
 from strapdown.crash.gnss_entry import GnssEntry
-from strapdown.crash.monte_carlo import PathSamples, sample_paths
-from strapdown.crash.path import CrashPath
-from strapdown.crash.reference_path import PathComparison, compare_with_reference
-from strapdown.crash.severity import SEVERITY_MODELS, find_severity_model
-from strapdown.crash.severity_model import InjuryRisk, SeverityModel, injury_risk
-from strapdown.crash.unit_reconstruction import UnitReconstruction
+from strapdown.crash.path import (
+    CrashPath,
+    PathComparison,
+    PathSamples,
+    compare_with_reference,
+    sample_paths,
+)
+from strapdown.crash.reconstruction import (
+    CrashReconstruction,
+    UnitReconstruction,
+    reconstruct_crash,
+)
+from strapdown.crash.severity import (
+    SEVERITY_MODELS,
+    InjuryRisk,
+    SeverityModel,
+    find_severity_model,
+    injury_risk,
+)
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.crash_record import CrashRecord
 from strapdown.formats.crash_records import read_crash_record
@@ -29,11 +43,9 @@ from strapdown.formats.crash_triad import triad_of_channels
 from strapdown.formats.gnss_files import files_of_fixes, read_gnss
 from strapdown.formats.named_columns import read_reference_path
 from strapdown.results.inputs import InputFiles
-from strapdown.sensors.catalogue import load_sensor
+from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.crash_unit import Assumed, CrashUnit, Mounting, RecordedTriad
 from strapdown.sensors.uncertainty import stated_uncertainty
-from strapdown.systems.attitude_source import input_files, sensor_file
-from strapdown.systems.crash_reconstruction import CrashReconstruction, reconstruct_crash
 from strapdown.systems.one_thread import one_thread
 from strapdown.systems.progress import Progress, silent
 
@@ -208,14 +220,18 @@ def _triads(spec: CaseSpec) -> Iterator[TriadSpec]:
 def _inputs(
     spec: CaseSpec, case_file: Path | None, records: dict[str, CrashRecord]
 ) -> tuple[InputFiles, ...]:
-    found = [] if case_file is None else [input_files("case", str(case_file), (case_file,))]
-    found += [input_files("record", path, record.files) for path, record in records.items()]
-    for sensor in dict.fromkeys(t.sensor for t in _triads(spec)):
-        found += sensor_file(sensor)
+    sensors = (t.sensor for t in _triads(spec) if t.sensor is not None)
+    given = [] if case_file is None else [("case", str(case_file), (case_file,))]
+    given += [("record", path, record.files) for path, record in records.items()]
+    # Only the files of sensors that are not of the catalogue.
+    given += [("sensor", s, (Path(s),)) for s in dict.fromkeys(sensors) if s.lower() not in SENSORS]
     others = [("reference", r.path) for r in spec.references if r.path is not None]
     others += [("fixes", spec.entry.path)] if spec.entry.path is not None else []
-    found += [input_files(role, path, files_of_fixes(path)) for role, path in dict.fromkeys(others)]
-    return tuple(found)
+    given += [(role, path, files_of_fixes(path)) for role, path in dict.fromkeys(others)]
+    return tuple(
+        InputFiles(role, Path(path), files, tuple(sha256(file) for file in files))
+        for role, path, files in given
+    )
 
 
 def _entry(spec: CaseSpec) -> Entry | GnssEntry | None:
