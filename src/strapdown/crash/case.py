@@ -116,10 +116,6 @@ def run_case(
     progress : callable, optional
         Called with a stage and the share that is done.
 
-    Returns
-    -------
-    CaseResult
-
     Raises
     ------
     ConfigError
@@ -175,13 +171,7 @@ def run_case(
 
 
 def whole_records(spec: CaseSpec) -> tuple[dict[str, CrashRecord], CaseSpec]:
-    """Read the records of a case, and name each of several files by its folder.
-
-    Raises
-    ------
-    ConfigError, DataError
-        As `read_crash_record`.
-    """
+    """Read the records of a case, and name each of several files by its folder."""
     read = {t.path: read_crash_record(t.path) for t in _triads(spec)}
     moved = {path: str(_whole(path, record)) for path, record in read.items()}
     units = tuple(
@@ -305,13 +295,8 @@ def case_unit(spec: UnitSpec, records: Mapping[str, CrashRecord]) -> CrashUnit:
 
     Parameters
     ----------
-    spec : UnitSpec
     records : dict of str to CrashRecord
         By path.
-
-    Returns
-    -------
-    CrashUnit
 
     Raises
     ------
@@ -385,12 +370,10 @@ class ReferenceAnswer:
 
     Attributes
     ----------
-    spec : ReferenceSpec
     unit : str
         Unit of the answer.
     table : DataFrame or None
         Reference path as read.
-    path : PathComparison or None
     span : tuple of float, s
         Span of a delta-v.
     delta_v, sd : float, m/s
@@ -419,15 +402,9 @@ def compare_reference(
 
     Parameters
     ----------
-    spec : ReferenceSpec
-    unit : UnitReconstruction
     gravity : float, m/s²
     tables : dict of str to DataFrame
         Reference paths, by path of their file.
-
-    Returns
-    -------
-    ReferenceAnswer
 
     Raises
     ------
@@ -494,8 +471,6 @@ class SeverityAnswer:
 
     Attributes
     ----------
-    model : SeverityModel
-    risk : InjuryRisk or None
     because : Finding or None
         Why there is no risk.
     """
@@ -523,7 +498,6 @@ def case_severity(spec: CaseSpec, unit: UnitReconstruction) -> tuple[SeverityAns
 
     Parameters
     ----------
-    spec : CaseSpec
     unit : UnitReconstruction
         Its event with the largest delta-v is used.
 

@@ -263,7 +263,6 @@ class SampleWeights:
         For the mean stationary specific force.
     tilt : float
         For the stationary attitude, as far as it does not follow from that force.
-    rate : float
     """
 
     force: Array

@@ -73,7 +73,6 @@ class VelocityIncrements:
         Effect of one standard deviation of each on the values.
     turned_effects : ndarray, (3 m, p), rad
         The same for `turned`.
-    noise : NoiseOfSums
     lever : ndarray, (3 m, 3), 1/s
         Effect of a position error (true minus stated) on the values.
     """
@@ -261,7 +260,6 @@ def velocity_increments(unit: PointKinematics, edges: Array) -> VelocityIncremen
 
     Parameters
     ----------
-    unit : PointKinematics
     edges : ndarray, (m + 1,), s
 
     Returns
@@ -439,10 +437,6 @@ def mounting_rotation(first: VelocityIncrements, second: VelocityIncrements) -> 
     first, second : VelocityIncrements
         Between the same edges.
 
-    Returns
-    -------
-    MountingRotation
-
     Notes
     -----
     The least-squares rotation (Wahba 1965, doi:10.1137/1007077) by singular values (Markley
@@ -511,10 +505,8 @@ def rotation_findings(
 
     Parameters
     ----------
-    found : MountingRotation
     stated_sd : float, rad
         Stated standard deviation of each angle between the two.
-    first, second : str
 
     Returns
     -------
@@ -593,10 +585,6 @@ def check_lever_arm(first: VelocityIncrements, second: VelocityIncrements) -> Le
     first, second : VelocityIncrements
         Moved to one point with the stated positions, between the same edges.
 
-    Returns
-    -------
-    LeverArmCheck
-
     Notes
     -----
     Units moved with position errors e₁ and e₂ (true minus stated) differ by
@@ -632,16 +620,10 @@ def lever_arm_findings(
 
     Parameters
     ----------
-    check : LeverArmCheck
     stated_sd : float, m
         Stated standard deviation of each coordinate of the relative position.
     stated : ndarray, (3,), m
         Position of the first minus that of the second.
-    first, second : str
-
-    Returns
-    -------
-    list of Finding
     """
     found = []
     along = check.directions.T @ check.correction
@@ -744,10 +726,6 @@ def match_axes(first: VelocityIncrements, second: VelocityIncrements) -> AxisMat
         Between the same edges; gravity is included, so that a stationary interval separates up
         from down.
 
-    Returns
-    -------
-    AxisMatch
-
     Notes
     -----
     Least squares over the intervals with the full covariance of the difference, since a bias is
@@ -802,13 +780,8 @@ def axis_findings(match: AxisMatch, first: str, second: str) -> list[Finding]:
 
     Parameters
     ----------
-    match : AxisMatch
     first, second : str
         Names of the units.
-
-    Returns
-    -------
-    list of Finding
     """
     kind = match.kind
     if kind == "agree":
@@ -879,10 +852,6 @@ def compare_units(
         two samples. The test is equivalent to one of the delta-V curve at the interval edges.
     level : float
         Probability below which a difference counts as a disagreement.
-
-    Returns
-    -------
-    UnitComparison
 
     Notes
     -----
@@ -1170,7 +1139,6 @@ class UnitPair:
 
     Attributes
     ----------
-    first, second : str
     edges : ndarray, (m + 1,), s
     difference : ndarray, (m + 1, 3), m/s
         Integral of the first unit's specific force minus the second's, vehicle axes, from the
@@ -1184,12 +1152,8 @@ class UnitPair:
         Zero if none remain.
     probability : float
         Probability of a chi-square at least this large if the stated uncertainty is right.
-    agree : bool
-    axes : AxisMatch
-    turned : MountingRotation
     lever_arm : LeverArmCheck
         These three are not meaningful where either assumes an axis or the rates.
-    findings : tuple of Finding
     """
 
     first: str
@@ -1215,7 +1179,6 @@ class UnitAgainstAll:
 
     Attributes
     ----------
-    name : str
     difference, sd : ndarray, (m + 1, 3), m/s
         Its delta-V minus that of the combination, and the stated standard deviation of the
         difference, which accounts for common errors. NaN along axes that it, or all, assume.
@@ -1238,16 +1201,12 @@ class UnitComparison:
     Attributes
     ----------
     edges : ndarray, (m + 1,), s
-    pairs : tuple of UnitPair
     combined : ndarray, (m + 1, 3), m/s
         Delta-V of the optimally weighted combination, gravity included, body axes; NaN along
         axes that all units assume.
     combined_sd : ndarray, (m + 1, 3), m/s
-    against : tuple of UnitAgainstAll
     chi_square, freedom, probability
         All units against the combination.
-    agree : bool
-    findings : tuple of Finding
     """
 
     edges: Array = field(repr=False)
@@ -1327,7 +1286,6 @@ def clipped_axes(unit: PointKinematics, window: tuple[float, float]) -> Flags:
 
     Parameters
     ----------
-    unit : PointKinematics
     window : (float, float), s
 
     Returns
@@ -1350,7 +1308,6 @@ def clipped_pieces(unit: PointKinematics, edges: Array) -> Flags:
 
     Parameters
     ----------
-    unit : PointKinematics
     edges : ndarray, (m + 1,), s
 
     Returns

@@ -153,10 +153,6 @@ class TippingBody:
         since : float, s, optional
             Earlier samples are integrated but not counted.
 
-        Returns
-        -------
-        RollMotion
-
         Raises
         ------
         DataError
@@ -221,7 +217,6 @@ class CrashType:
         a border.
     side : {'front', 'right', 'rear', 'left'}
         From the estimated direction alone.
-    direction : Pdof
     interval : AngleInterval or None
         Of the horizontal direction, 95 %; None without a covariance.
     margin_deg : float, deg
@@ -395,8 +390,6 @@ def classify_crashes(
     ------
     ConfigError
         The number of changes or covariances differs from that of events; or as `classify_crash`.
-    DataError
-        As `classify_crash`.
     """
     if len(changes) != len(events) or (covariances is not None and len(covariances) != len(events)):
         raise ConfigError(

@@ -128,10 +128,6 @@ def delta_v(
     across_gaps : bool
         Bridge gaps of the record by linear interpolation.
 
-    Returns
-    -------
-    DeltaV
-
     Raises
     ------
     DataError
@@ -174,18 +170,7 @@ def event_delta_v(
 
     Parameters
     ----------
-    acceleration : Acceleration
-    event : CrashEvent
     across_gaps : bool
-        As `delta_v`.
-
-    Returns
-    -------
-    DeltaV
-
-    Raises
-    ------
-    DataError
         As `delta_v`.
     """
     return delta_v(acceleration, event.time_zero, event.end, across_gaps=across_gaps)
@@ -198,7 +183,6 @@ def cumulative_delta_v(
 
     Parameters
     ----------
-    acceleration : Acceleration
     start, end : float, s
         Within the record.
     every : float, s, optional
@@ -254,10 +238,6 @@ def trailing_delta_v(
         number of samples, its start is interpolated.
     start, end : float, s, optional
         Range of the window ends; by default wherever the record reaches back far enough.
-
-    Returns
-    -------
-    TrailingDeltaV
 
     Raises
     ------
@@ -378,15 +358,7 @@ class VelocityCourse:
 def _largest(
     course: Callable[[Array], Polynomials], breaks: Array, low: float, high: float
 ) -> float:
-    """Instant in an interval at which the length of a vector of quadratics is largest.
-
-    Parameters
-    ----------
-    course : callable
-        Value, slope and half the curvature at instants between breaks.
-    breaks : ndarray
-    low, high : float
-    """
+    """Instant in an interval at which the length of a vector of quadratics is largest."""
     nodes = np.unique(np.r_[low, breaks[(breaks > low) & (breaks < high)], high])
     sizes = np.sqrt((course(nodes)[0] ** 2).sum(axis=1))
     best = int(np.argmax(sizes))
@@ -485,7 +457,6 @@ def maximum_delta_v(acceleration: Acceleration, event: CrashEvent) -> MaximumDel
     ----------
     acceleration : Acceleration
         In the frame ``body`` or ``impact``.
-    event : CrashEvent
 
     Returns
     -------

@@ -151,12 +151,7 @@ def _at(time: Array, values: Array, instant: float) -> Array:
 
 
 def _noise_between(path: CrashPath, start: float, end: float) -> Array:
-    """Covariance of the change of velocity between two instants from noise.
-
-    Noise on the force is independent from step to step, so that its variances subtract; the
-    attitude error from gyro noise before the window still acts within it. A window before the
-    entry is treated alike, in reverse order.
-    """
+    """Covariance of the change of velocity between two instants from noise."""
     noise, entry = path.noise_covariance[None], path.time[path.anchor]
     if end <= entry + 1e-9:
         start, end = end, start

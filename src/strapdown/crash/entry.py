@@ -252,9 +252,6 @@ class EntryState:
         where not measured or not used).
     chi_square : float
         Of the residuals of all used fixes, with their weights, and the priors.
-    degrees_of_freedom : int
-    iterations : int
-    findings : tuple of Finding
     """
 
     state: NavState

@@ -101,7 +101,6 @@ def at_fixes(course: Course, errors: SensorErrors, instants: Array) -> Array:
 
     Parameters
     ----------
-    course : Course
     errors : SensorErrors
         Of q parameters.
     instants : ndarray, (m,), s
@@ -135,8 +134,6 @@ def noise_between_fixes(
 
     Parameters
     ----------
-    course : Course
-    gyro, accel : TriadUncertainty
     instants : ndarray, (m,), s
         Decreasing, from the end of the course.
 
@@ -502,20 +499,14 @@ def estimate(
 
     Parameters
     ----------
-    mechanization : NorthEastDown
     imu : DataFrame
         Up to the anchor.
     fixes : Fixes
         Within the record.
     guess : NavState
         At the anchor.
-    priors : EntryPriors
     arm : ndarray, (3,), m
         Lever arm of the antenna.
-
-    Returns
-    -------
-    Estimate
 
     Raises
     ------
@@ -842,13 +833,8 @@ def adjust(problem: Problem, weights: Array) -> Adjustment:
 
     Parameters
     ----------
-    problem : Problem
     weights : ndarray, (m, g)
         A group of weight w gets additional independent noise of ``1/w - 1`` times its variances.
-
-    Returns
-    -------
-    Adjustment
 
     Notes
     -----
@@ -908,7 +894,6 @@ def weigh(problem: Problem, adjustment: Adjustment, weights: Array) -> tuple[Arr
 
     Parameters
     ----------
-    problem : Problem
     adjustment : Adjustment
         With the current weights.
     weights : ndarray, (m, g)

@@ -202,7 +202,6 @@ class CrashEvents:
     ----------
     events : tuple of CrashEvent
         In order of time; the last one may last beyond the record.
-    rule : EventRule
     woken : int
         Number of times the wake threshold was exceeded without an event: potholes, curbs, doors.
     largest_change : float, m/s
@@ -211,8 +210,6 @@ class CrashEvents:
     largest_axis : {'longitudinal', 'lateral'}
     largest_time : float, s
         End of that window; NaN without any change.
-    source : str or None
-    findings : tuple of Finding
     """
 
     events: tuple[CrashEvent, ...]
@@ -408,7 +405,6 @@ class EventDetector:
 
     Parameters
     ----------
-    rule : EventRule
     sampling : {'instantaneous', 'mean'}
         Whether a sample is the value at its stamp or the mean over the interval ending there.
     noise : float or (3,), m/s²
@@ -547,11 +543,6 @@ class EventDetector:
         -------
         tuple of CrashEvent
             Events that ended in it.
-
-        Raises
-        ------
-        DataError
-            As `update`; then no sample of the chunk is processed.
         """
         try:
             stamps = np.asarray(time, dtype=np.float64)

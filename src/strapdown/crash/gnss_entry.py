@@ -91,10 +91,6 @@ def entry_state_from_gnss(
     ellipsoid : str
         Reference ellipsoid of the positions, one of `ellipsoids.ELLIPSOIDS`.
 
-    Returns
-    -------
-    EntryState
-
     Raises
     ------
     DataError
@@ -293,8 +289,6 @@ def start_from_gnss(
 
     Parameters
     ----------
-    at : PointKinematics
-    given : GnssEntry
     point : sequence of float, (3,), m
         New point of the unit, vehicle axes from the vehicle's origin.
 
@@ -309,11 +303,6 @@ def start_from_gnss(
         With joint covariance of attitude, velocity and biases.
     state : EntryState
         The estimate, with every fix and the reason why it was used or not.
-
-    Raises
-    ------
-    DataError, ConfigError, DivergenceError
-        As `entry_state_from_gnss`; or an axis or the turning of the unit is assumed.
     """
     unit = None if at.prepared is None else at.prepared.unit
     if unit is None or unit.gyro is None:
@@ -417,7 +406,6 @@ def first_guesses(
         From a level, stationary start heading north, up to the anchor.
     fixes : Fixes
         The accepted fixes.
-    priors : EntryPriors
 
     Returns
     -------

@@ -174,7 +174,6 @@ def first_reach(time: Array, values: Array, slopes: Array, level: float) -> floa
     Parameters
     ----------
     time, values, slopes : ndarray, (n,)
-    level : float
 
     Returns
     -------
@@ -393,10 +392,6 @@ def asi(
         meaning is -3 dB there for the whole filter. Two passes of 13 Hz each smooth more and
         give smaller values on short pulses.
 
-    Returns
-    -------
-    Asi
-
     Raises
     ------
     DataError
@@ -464,10 +459,6 @@ def hic(time: ArrayLike, accel: ArrayLike, *, longest: float = 0.015) -> Hic:
     longest : float, s
         0.015 for HIC15, 0.036 for HIC36.
 
-    Returns
-    -------
-    Hic
-
     Raises
     ------
     DataError
@@ -515,7 +506,6 @@ class Olc:
         Deceleration of the ideally restrained occupant, in g; None where the pulse is too weak.
     restraint_from, restraint_to : float, s, or None
         Instants, from the start, between which the restraint acts.
-    findings : tuple of Finding
     """
 
     value_g: float | None
@@ -543,10 +533,6 @@ def olc(
         First contact.
     free, whole : float, m
         Travel of the occupant relative to the vehicle before the restraint acts, and in total.
-
-    Returns
-    -------
-    Olc
 
     Raises
     ------
@@ -619,7 +605,6 @@ class FlailSpace:
     ora_x_g, ora_y_g : float or None
         Ridedown acceleration of the vehicle: the 10 ms mean of greatest magnitude after the
         impact, in g, signed.
-    findings : tuple of Finding
     """
 
     oiv_x: float
@@ -650,10 +635,6 @@ def flail_space(
         First contact.
     forward, sideways : float, m
         Flail space; the same to the rear and to the left.
-
-    Returns
-    -------
-    FlailSpace
 
     Raises
     ------
@@ -738,7 +719,6 @@ class Thiv:
         On the record's clock: start of the window, or the instant of the filtered peak.
     largest : float, m/s
         Greatest velocity of the head relative to the vehicle up to its impact, or to the end.
-    findings : tuple of Finding
     """
 
     velocity: float | None
@@ -778,10 +758,6 @@ def thiv(
     forward, sideways : float, m
         Flight distance of the head to the surfaces.
     phd_average : {'mean_10ms', 'butterworth_10hz'}
-
-    Returns
-    -------
-    Thiv
 
     Raises
     ------

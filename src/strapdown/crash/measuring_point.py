@@ -38,7 +38,6 @@ def unit_effects(prepared: PreparedUnit, moved: MovedImu, *, time_sd: float = 0.
 
     Parameters
     ----------
-    prepared : PreparedUnit
     moved : MovedImu
         The same unit moved to the point: `move_unit`.
     time_sd : float, s
@@ -383,7 +382,6 @@ class AssumedEffect:
 
     Attributes
     ----------
-    name, contributor : str
     force : ndarray, (n, 3), m/s², or None
     rate : ndarray, (n, 3), rad/s, or None
     """
@@ -396,10 +394,6 @@ class AssumedEffect:
 
 def assumed_effects(prepared: PreparedUnit) -> Iterator[AssumedEffect]:
     """List the unknowns of a unit's assumptions.
-
-    Parameters
-    ----------
-    prepared : PreparedUnit
 
     Yields
     ------
@@ -477,10 +471,6 @@ TRIAD_CURVES_AXES = "xyz"
 
 def triad_curves(triad: RecordedTriad) -> Iterator[tuple[str, str, list[AxisCurve]]]:
     """List scale factor, misalignment and nonlinearity of a triad.
-
-    Parameters
-    ----------
-    triad : RecordedTriad
 
     Yields
     ------
@@ -625,11 +615,8 @@ class PointKinematics:
 
     Attributes
     ----------
-    name : str
     imu : DataFrame
         Imu table in vehicle axes, time from the common trigger.
-    effects : SampleEffects
-    levelling : Levelling
     rest : RestStretch, optional
     rest_accel_sd : float, m/s²
         Standard deviation of the vehicle's own acceleration over the stationary interval.
@@ -724,10 +711,6 @@ def at_point(
         trigger.
     window : float, s, optional
         Of the derivative, as in `move_imu`.
-
-    Returns
-    -------
-    PointKinematics
     """
     moved = move_unit(prepared, point, window=window)
     axes, turns = unmeasured_axes(prepared.unit), unmeasured_turns(prepared.unit)

@@ -51,7 +51,6 @@ class IntegrationSegment:
 
     Attributes
     ----------
-    backward : bool
     time : ndarray, (k + 1,), s
         In the order of integration.
     state : ndarray
@@ -134,7 +133,6 @@ def make_leg(
 
     Parameters
     ----------
-    mechanization : NorthEastDown
     start : NavState
         At the first sample of `rows`, or at the last where the segment runs backward.
     imu : DataFrame
@@ -143,7 +141,6 @@ def make_leg(
         On the same samples.
     rows : slice
         Samples of the segment, at least one; one sample is a segment without a step.
-    backward : bool
 
     Raises
     ------
@@ -358,10 +355,6 @@ def reconstruct_path(
         The mean rate up to `level_time` was subtracted as bias, and with it the Earth rate
         in the attitude at that time.
 
-    Returns
-    -------
-    CrashPath
-
     Raises
     ------
     DataError
@@ -423,10 +416,7 @@ def reconstruct_path(
 
 @dataclass(frozen=True, eq=False)
 class _Begin:
-    """State at the entry, its errors from sensors and leveling, and their names.
-
-    Includes the rate missing from all samples, vehicle axes.
-    """
+    """State at the entry, its errors from sensors and leveling, and their names."""
 
     state: NavState
     names: tuple[str, ...]
@@ -603,7 +593,6 @@ def path_rows(imu: pd.DataFrame, at: float, window: Sequence[float] | None) -> t
 
     Parameters
     ----------
-    imu : DataFrame
     at : float, s
         Instant of the entry.
     window : (float, float), s, optional
@@ -818,10 +807,6 @@ def sample_paths(
         runs extends a smaller one with the same seed.
     workers : int, optional
         Threads; by default all cores.
-
-    Returns
-    -------
-    PathSamples
 
     Raises
     ------

@@ -148,10 +148,6 @@ def ned_pdof(change: DeltaV | ArrayLike, heading_deg: float) -> NedPdof:
     heading_deg : float, deg
         Of the vehicle at the impact.
 
-    Returns
-    -------
-    NedPdof
-
     Raises
     ------
     ConfigError
@@ -208,11 +204,6 @@ def pdof_sd(change: DeltaV | ArrayLike, covariance: ArrayLike) -> tuple[float, f
     horizontal_sd, vertical_sd : float, deg
         ``sqrt(G P G^T)``. Valid while the change is large compared with its uncertainty;
         `pdof_interval` has no such condition.
-
-    Raises
-    ------
-    DataError
-        As `pdof_gradient`; or `covariance` is not a covariance.
     """
     gradient = pdof_gradient(change)
     spread = gradient @ covariance_of(covariance) @ gradient.T
@@ -460,7 +451,6 @@ class PdofInterval:
 
     Attributes
     ----------
-    horizontal, vertical : AngleInterval
     level : float
         Coverage probability of each.
     """

@@ -102,10 +102,6 @@ def prepare_unit(
     margin, hysteresis, fade
         As `merge_ranges`.
 
-    Returns
-    -------
-    PreparedUnit
-
     Raises
     ------
     DataError
@@ -417,11 +413,6 @@ def prepare_together(
         whose record begins after the lender's stationary interval is leveled by the lender: roll
         and pitch are propagated with the gyro to the start of the borrower's record, with their
         standard deviation.
-
-    Raises
-    ------
-    DataError, ConfigError
-        As `prepare_unit`.
     """
     names = {u.unit.name for u in together.units}
     common = {k: v for k, v in options.items() if k not in names}

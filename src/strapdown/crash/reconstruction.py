@@ -48,10 +48,6 @@ Row = tuple[str, str, float, float, float]
 def summary_table(units: Sequence[UnitReconstruction]) -> pd.DataFrame:
     """Changes of velocity, directions of force and ends of the path, with 95 % bounds.
 
-    Parameters
-    ----------
-    units : sequence of UnitReconstruction
-
     Returns
     -------
     DataFrame
@@ -375,11 +371,8 @@ def entry_findings(
 
     Parameters
     ----------
-    at_point : PointKinematics
-    entry : Entry or None
     path : CrashPath
         The path from this entry.
-    events : CrashEvents
     mechanization : NorthEastDown, optional
     """
     if entry is None:

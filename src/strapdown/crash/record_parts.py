@@ -89,7 +89,6 @@ class Part:
         ``acceleration``, ``rate`` or ``velocity`` (delta-V of event data recorders).
     channels : dict of str to str
         Axis to name of the channel, without missing axes.
-    clock : Clock
     unit, why : str
         Unit (empty where not settled); evidence for kind and axes.
     time : ndarray, (n,), s

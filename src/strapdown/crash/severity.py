@@ -151,10 +151,6 @@ def injury_risk(
     outside : {'refuse', 'tell'}
         Action where the model is not valid: an error, or a finding with the number.
 
-    Returns
-    -------
-    InjuryRisk
-
     Raises
     ------
     DataError
@@ -397,10 +393,6 @@ def load_severity_model(path: str | Path) -> SeverityModel:
         square), or, for a category, ``input``, ``equals`` and ``coefficient``. ``[validity]`` gives
         ``input = [least, greatest]`` in the unit of its term, ``[applies]`` gives
         ``input = ["category", ...]``.
-
-    Returns
-    -------
-    SeverityModel
 
     Raises
     ------

@@ -73,7 +73,6 @@ class Draft:
     asked, to_check : tuple of Asked
         Questions that the user has to answer, and consequences of found or assumed values to
         confirm.
-    left_out : tuple of Skipped
     findings : tuple of Finding
         Findings about the records.
     """
@@ -120,7 +119,6 @@ def draft_case(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> D
 
     Parameters
     ----------
-    records : sequence of CrashRecord
     folder : str or Path
         Folder of the case file; record paths are relative to it.
 
@@ -333,13 +331,10 @@ class Unit:
 
     Attributes
     ----------
-    name : str
     accelerometers : tuple of Part
         In order of increasing range.
-    gyro : Part or None
     gyro_from : str
         Name of the unit whose gyro it uses; empty if it has its own or none.
-    impact : Impact
     ends : tuple of RangeEnds
         Of each accelerometer, and of the gyro last.
     why : tuple of str
@@ -708,7 +703,6 @@ class Impact(NamedTuple):
         The resting value.
     rest, grade : (float, float) or None, s; str
         ``still``, ``steady``, or empty.
-    sitting : Sitting or None
     more : int
         Events after the first.
     """
@@ -893,10 +887,7 @@ SIDES = ("the front", "the right", "the rear", "the left")
 
 
 def _turning(unit: Unit, part: Part) -> dict[str, Any] | None:
-    """Turn about the vertical in the half second after the impact by a gyro, in words.
-
-    None without a rest or a turn that can be seen. Independent of the heading of the mounting.
-    """
+    """Turn about the vertical in the half second after the impact by a gyro, in words."""
     sitting, zero = unit.impact.sitting, unit.impact.trigger
     if part is not unit.gyro or sitting is None or len(part.axes) < 3 or not unit.impact.found:
         return None
@@ -925,11 +916,7 @@ def _turning(unit: Unit, part: Part) -> dict[str, Any] | None:
 
 
 def _face(units: Sequence[Unit]) -> list[Unit]:
-    """Find the heading of each unit's mounting, of the four right angles.
-
-    Assumed zero where the columns are named x, y, z, the vertical is along z, and the impact then
-    is frontal; the others agree with the first known heading.
-    """
+    """Find the heading of each unit's mounting, of the four right angles."""
     out = [_own_heading(unit) for unit in units]
     first = next((u for u in out if u.heading_deg is not None), None)
     if first is None or first.heading_deg is None:
