@@ -109,23 +109,7 @@ class Acceleration:
         return [g for g in find_gaps(self.time) if g.start < end and g.end > start]
 
     def along(self, heading_deg: float) -> Acceleration:
-        """Return a north-east-down record resolved along and across one heading.
-
-        Parameters
-        ----------
-        heading_deg : float, deg
-            Of the vehicle at the impact.
-
-        Returns
-        -------
-        Acceleration
-            In the frame ``impact``: forward and right in the horizontal plane, down.
-
-        Raises
-        ------
-        ConfigError
-            The record is not resolved in north-east-down.
-        """
+        """Resolve a north-east-down record forward and right at one heading, deg: ``impact``."""
         if self.frame != "ned":
             raise ConfigError(
                 "crash.record-frame-heading-turns-north",
@@ -180,17 +164,9 @@ def body_acceleration(imu: pd.DataFrame, at_rest: Sequence[float]) -> Accelerati
 
 
 def force_at_rest(roll_deg: float, pitch_deg: float, gravity: float) -> Array:
-    """Specific force of an unbiased stationary sensor, from the leveling.
+    """Specific force of an unbiased stationary sensor at a roll and pitch, deg: (3,), m/s².
 
-    Parameters
-    ----------
-    roll_deg, pitch_deg : float, deg
-    gravity : float, m/s²
-
-    Returns
-    -------
-    ndarray, (3,), m/s²
-        For `body_acceleration`, where a record has no stationary interval.
+    For `body_acceleration`, where a record has no stationary interval.
     """
     q = rotation.conjugate(rotation.quaternion_from_euler([roll_deg, pitch_deg, 0.0]))
     return rotation.rotate(q, np.array([0.0, 0.0, -gravity]))
@@ -229,26 +205,9 @@ def resolved_acceleration(imu: pd.DataFrame, q_nb: ArrayLike, gravity: float) ->
 def attitude_of_samples(
     q_nb: ArrayLike, sampling: str, samples: int, source: str | None = None
 ) -> Array:
-    """Attitude for rotating each sample: at its stamp, or in the middle of its interval.
+    """Attitude for rotating each sample, (n, 4): at its stamp, or in the middle of its interval.
 
-    Parameters
-    ----------
-    q_nb : array_like, (n, 4)
-        At the stamps.
-    sampling : {'instantaneous', 'mean'}
-    samples : int
-        Number of samples.
-    source : str, optional
-        Name for messages.
-
-    Returns
-    -------
-    ndarray, (n, 4)
-
-    Raises
-    ------
-    DataError
-        There is not one rotation per sample.
+    `q_nb`, (n, 4), is at the stamps. `DataError`: there is not one rotation per sample.
     """
     q = rotation.normalise(q_nb)
     if q.shape != (samples, 4):
@@ -363,23 +322,8 @@ def _upto(time: Array, instant: float, sampling: str) -> Array:
 def resolved_weights(weights: ArrayLike, q_nb: ArrayLike, sampling: str) -> Array:
     """Gradient of a delta-V in north-east-down with respect to the samples in body axes.
 
-    Parameters
-    ----------
-    weights : array_like, (n,), s
-        As `window_weights`.
-    q_nb : array_like, (n, 4)
-        Attitude at every stamp, as `resolved_acceleration` takes it.
-    sampling : {'instantaneous', 'mean'}
-
-    Returns
-    -------
-    ndarray, (n, 3, 3), s
-        ``G``: an error ``e[k]`` of the samples, (3,), changes the delta-V by ``sum G[k] @ e[k]``.
-
-    Raises
-    ------
-    DataError
-        The number of rotations differs from that of samples.
+    `weights`, (n,), s, as `window_weights`; `q_nb`, (n, 4), at the stamps. Returns ``G``, (n, 3,
+    3), s: an error ``e[k]`` of the samples changes the delta-V by ``sum G[k] @ e[k]``.
     """
     w = as_array(weights, None, "weights")
     q = attitude_of_samples(q_nb, sampling, len(w))
@@ -397,22 +341,9 @@ NOISE = "sensor noise"
 def by_contributor(
     values: Array, columns: Sequence[str], contributors: Sequence[str], more: Mapping[str, Array]
 ) -> pd.DataFrame:
-    """Sum the values of each contributor.
+    """Sum values, (p, k), of unknowns by contributor, in order of occurrence.
 
-    Parameters
-    ----------
-    values : ndarray, (p, k)
-        Of each unknown: variances, or products.
-    columns : sequence of str, (k,)
-    contributors : sequence of str, (p,)
-        The contributor of each unknown.
-    more : dict of ndarray, (k,)
-        Additional values without an unknown, by contributor.
-
-    Returns
-    -------
-    DataFrame
-        Indexed by contributor, in the order in which they first occur.
+    `more`: additional values, (k,), without an unknown, by contributor.
     """
     lines = pd.DataFrame(values, columns=list(columns))
     table = lines.groupby(list(contributors), sort=False).sum()

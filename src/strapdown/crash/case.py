@@ -291,19 +291,10 @@ TRIADS = {"acceleration": "accel", "rate": "gyro"}
 
 
 def case_unit(spec: UnitSpec, records: Mapping[str, CrashRecord]) -> CrashUnit:
-    """Build a unit from its specification in the case.
+    """Build a unit from its specification in the case, and the records by path.
 
-    Parameters
-    ----------
-    records : dict of str to CrashRecord
-        By path.
-
-    Raises
-    ------
-    DataError
-        A channel is missing, or cannot be used.
-    ConfigError
-        A sensor, a key or a number is invalid.
+    Raises `DataError` for a channel that is missing or unusable, `ConfigError` for an invalid
+    sensor, key or number.
     """
     count = len(spec.accelerometers)
     accelerometers = tuple(
@@ -366,20 +357,10 @@ AXES = {"forward": (1.0, 0.0, 0.0), "right": (0.0, 1.0, 0.0)}
 
 @dataclass(frozen=True, eq=False)
 class ReferenceAnswer:
-    """Comparison of one unit's answer with a reference.
+    """Comparison of one unit's answer with a reference: a path, or a delta-V over a span in s.
 
-    Attributes
-    ----------
-    unit : str
-        Unit of the answer.
-    table : DataFrame or None
-        Reference path as read.
-    span : tuple of float, s
-        Span of a delta-v.
-    delta_v, sd : float, m/s
-        Computed over the span; NaN for a path.
-    consistent : bool
-        Whether the difference is within the 95 % bound of both together.
+    `delta_v` and `sd`, m/s, are NaN for a path. `consistent`: the difference is within the 95 %
+    bound of both together.
     """
 
     spec: ReferenceSpec
@@ -398,20 +379,9 @@ def compare_reference(
     gravity: float,
     tables: Mapping[str, pd.DataFrame],
 ) -> ReferenceAnswer:
-    """Compare one unit with one reference.
+    """Compare one unit with one reference; `tables` are reference paths as read, by path.
 
-    Parameters
-    ----------
-    gravity : float, m/s²
-    tables : dict of str to DataFrame
-        Reference paths, by path of their file.
-
-    Raises
-    ------
-    DataError
-        The reference and the record have no time in common.
-    ConfigError
-        The span of a delta-v is not stated, and there is no event.
+    `DataError`: path and reference do not overlap.
     """
     if spec.path is not None:
         table = tables[spec.path]
@@ -494,22 +464,10 @@ def main_event(unit: UnitReconstruction) -> int | None:
 
 
 def case_severity(spec: CaseSpec, unit: UnitReconstruction) -> tuple[SeverityAnswer, ...]:
-    """Evaluate the models that the case names, or all that fit the type of the crash.
+    """Evaluate the models that the case names, or all that fit the type of the severest event.
 
-    Parameters
-    ----------
-    unit : UnitReconstruction
-        Its event with the largest delta-v is used.
-
-    Returns
-    -------
-    tuple of SeverityAnswer
-        Empty without an event. A model that is not valid here, or lacks an input, states why.
-
-    Raises
-    ------
-    ConfigError
-        A model is unknown.
+    Empty without an event. A model that is not valid here, or lacks an input, states why.
+    `ConfigError`: a model is unknown.
     """
     number = main_event(unit)
     if number is None:

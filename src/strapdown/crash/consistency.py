@@ -57,24 +57,11 @@ FLOOR, TINY = 1e-12, 1e-30
 
 @dataclass(frozen=True, eq=False)
 class VelocityIncrements:
-    """Integrals of a unit's specific force and rates over intervals.
+    """Integrals of a unit's specific force and rates over m intervals; rows by interval, then axis.
 
-    Rows of the matrices are ordered by interval, then axis.
-
-    Attributes
-    ----------
-    edges : ndarray, (m + 1,), s
-    values : ndarray, (m, 3), m/s
-    turned : ndarray, (m, 3), rad
-        Integrals of the rates.
-    names, contributors : tuple of str
-        Of p unknowns, as in `SampleEffects`.
-    effects : ndarray, (3 m, p), m/s
-        Effect of one standard deviation of each on the values.
-    turned_effects : ndarray, (3 m, p), rad
-        The same for `turned`.
-    lever : ndarray, (3 m, 3), 1/s
-        Effect of a position error (true minus stated) on the values.
+    `values`, (m, 3), m/s, and `turned`, (m, 3), rad, between `edges`, (m + 1,), s; the effect of
+    one standard deviation of each of p unknowns on them, (3 m, p); `lever`, (3 m, 3), 1/s: effect
+    of a position error (true minus stated) on the values.
     """
 
     edges: Array
@@ -118,21 +105,11 @@ def joint_covariance(
     of: str = "force",
     without: Collection[str] = (),
 ) -> Array:
-    """Covariance of the increments of several units together.
+    """Covariance, (3 m k, 3 m k), of the increments of k units together, between the same edges.
 
-    Parameters
-    ----------
-    increments : sequence of VelocityIncrements
-        For k units, between the same edges.
-    of : {'force', 'rate'}
-    without : collection of str
-        Contributors to leave out.
-
-    Returns
-    -------
-    ndarray, (3 m k, 3 m k)
-        Unknowns of the same name are one unknown, and the noise of a gyro that several units
-        borrow is common, as far as they use the same samples.
+    Unknowns of the same name are one unknown, and the noise of a gyro that several units borrow is
+    common, as far as they use the same samples. `of` is ``force`` or ``rate``; `without`:
+    contributors to leave out.
     """
     columns: dict[str, int] = {}
     gyros: dict[tuple[str, int], list[int]] = {}
@@ -171,21 +148,10 @@ def difference_covariance(
     without: Collection[str] = (),
     turn: Array | None = None,
 ) -> Array:
-    """Covariance of the increments of one unit minus those of another.
+    """Covariance, (..., 3 m, 3 m), of the increments of one unit minus those of another.
 
-    Parameters
-    ----------
-    first, second : VelocityIncrements
-        Between the same edges.
-    of, without
-        As `joint_covariance`.
-    turn : ndarray, (..., 3, 3), optional
-        Rotation applied to the increments of the second unit.
-
-    Returns
-    -------
-    ndarray, (..., 3 m, 3 m)
-        Common errors cancel.
+    Common errors cancel. `of`, `without` as `joint_covariance`; `turn`, (..., 3, 3): rotation
+    applied to the increments of the second unit.
     """
     size, pieces = first.values.size, len(first.values)
     turned = np.eye(3) if turn is None else turn
@@ -256,17 +222,7 @@ def common_edges(
 
 
 def velocity_increments(unit: PointKinematics, edges: Array) -> VelocityIncrements:
-    """Integrate a unit's specific force and rates between edges.
-
-    Parameters
-    ----------
-    edges : ndarray, (m + 1,), s
-
-    Returns
-    -------
-    VelocityIncrements
-        In body axes, which rotate; two units on one body share them at every instant.
-    """
+    """Integrate a unit's specific force and rates between edges, (m + 1,), s, in body axes."""
     sampling = str(unit.imu.attrs["sampling"])
     weights = np.array(
         [window_weights(unit.time, *piece, sampling) for piece in itertools.pairwise(edges)]
@@ -305,17 +261,10 @@ def chi_square_tail(chi_square: float, freedom: int) -> float:
 class NoiseOfSums:
     """Noise of m weighted sums of specific force and rates; rows by sum, then axis.
 
-    Attributes
-    ----------
-    of_force : ndarray, (3 m, 3 m), (m/s)²
-        Covariance of the sums of the specific force from accelerometer noise.
-    through_arm : ndarray, (3 m, q), m/s
-        Effect of one standard deviation of each of q independent numbers, the gyro noise, on
-        the sums through the lever arm.
-    turned : ndarray, (3 m, q), rad
-        The same for the sums of the rates.
-    gyro : str
-        Name of the unit that has the gyro: units that borrow it have the same numbers.
+    `of_force`, (3 m, 3 m), (m/s)²: covariance from accelerometer noise. `through_arm`, m/s, and
+    `turned`, rad, (3 m, q): effect of one standard deviation of each of q independent numbers, the
+    gyro noise, on the sums of force through the lever arm and on those of the rates. Units that
+    borrow a `gyro` have the same numbers.
     """
 
     of_force: Array
@@ -331,19 +280,10 @@ class NoiseOfSums:
 
 
 def noise_of_sums(at_point: PointKinematics, weights: Array) -> NoiseOfSums:
-    """Compute the effect of the sample noise on weighted sums of samples.
+    """Compute the effect of the sample noise on sums of samples with weights, (m, n), s.
 
-    Parameters
-    ----------
-    at_point : PointKinematics
-        A unit, or a combination, whose samples are taken as independent.
-    weights : ndarray, (m, n), s
-
-    Returns
-    -------
-    NoiseOfSums
-        Gyro noise through the lever arm keeps its correlation from sample to sample: it nearly
-        cancels in a change of velocity.
+    Gyro noise through the lever arm keeps its correlation from sample to sample: it nearly cancels
+    in a change of velocity.
     """
     m = len(weights)
     prepared, moved, effects = at_point.prepared, at_point.moved, at_point.effects
@@ -400,17 +340,10 @@ MOST_SD = 0.2  # rad
 class MountingRotation:
     """Rotation from the axes of the second unit to those of the first.
 
-    Attributes
-    ----------
-    matrix : ndarray, (3, 3)
-    vector_deg : ndarray, (3,), deg
-        The same as a rotation vector.
-    covariance : ndarray, (3, 3), rad²
-        Of a small rotation about the axes of the first unit; unobserved directions have a
-        variance of pi².
-    misfit : float
-        Root of the residuals' chi-square over its degrees of freedom; where it exceeds one, the
-        covariance has been multiplied by its square.
+    `matrix`, (3, 3); `vector_deg`, (3,), the same as a rotation vector; `covariance`, (3, 3), rad²,
+    of a small rotation about the axes of the first unit, with a variance of pi² for unobserved
+    directions. `misfit`: root of the residuals' chi-square over its degrees of freedom; where it
+    exceeds one, the covariance has been multiplied by its square.
     """
 
     matrix: Array
@@ -501,17 +434,9 @@ def _refine(
 def rotation_findings(
     found: MountingRotation, stated_sd: float, first: str, second: str
 ) -> list[Finding]:
-    """Report a rotation between the units beyond the stated mounting uncertainty.
+    """Report a rotation between the units beyond four standard deviations.
 
-    Parameters
-    ----------
-    stated_sd : float, rad
-        Stated standard deviation of each angle between the two.
-
-    Returns
-    -------
-    list of Finding
-        Empty where it is within four standard deviations, or unknown.
+    `stated_sd`, rad: stated standard deviation of each angle between the two.
     """
     vector = np.radians(found.vector_deg)
     values, vectors = np.linalg.eigh(found.covariance)
@@ -549,20 +474,9 @@ LEVER_ARM_CHECK_MOST_SD = 0.1  # m
 class LeverArmCheck:
     """Correction of the stated lever arm between two units.
 
-    Attributes
-    ----------
-    correction : ndarray, (3,), m
-        To be added to the stated (position of the first minus position of the second), vehicle
-        axes; meaningful along `told` only.
-    directions : ndarray, (3, 3)
-        Columns: directions in which the estimate is uncorrelated, the most certain first.
-    sd : ndarray, (3,), m
-        Along each of these; infinite where the vehicle did not turn.
-    told : ndarray of bool, (3,)
-        Whether the standard deviation is below 0.1 m.
-    misfit : float
-        Root of the residuals' chi-square over its degrees of freedom; where it exceeds one, the
-        sds were multiplied by it.
+    `correction`, (3,), m, vehicle axes, to be added to the position of the first minus that of the
+    second; meaningful along the columns of `directions`, (3, 3), that are `told`: with an `sd`
+    below 0.1 m. `misfit` as `MountingRotation`, applied to the sds.
     """
 
     correction: Array
@@ -618,12 +532,8 @@ def lever_arm_findings(
 ) -> list[Finding]:
     """Report positions that the motion contradicts; empty where they are not observable.
 
-    Parameters
-    ----------
-    stated_sd : float, m
-        Stated standard deviation of each coordinate of the relative position.
-    stated : ndarray, (3,), m
-        Position of the first minus that of the second.
+    `stated`, (3,), m: position of the first minus that of the second; `stated_sd`, m, of each
+    coordinate.
     """
     found = []
     along = check.directions.T @ check.correction
@@ -666,18 +576,11 @@ AXES = ("forward", "right", "down")
 class AxisMatch:
     """Signed permutation of a unit's axes that agrees best with another unit.
 
-    Attributes
-    ----------
-    accelerometers, gyro : ndarray, (3, 3)
-        Maps the readings of the second unit to the axes of the first; the identity where they
-        agree or where the motion cannot decide.
-    accelerometers_lead, gyro_lead : float
-        Excess chi-square of the identity over this permutation; zero for the identity.
-    accelerometers_sure, gyro_sure : float
-        Posterior probability among all 48 with equal priors.
-    ambiguous : tuple of str
-        Axes of the first unit that the accelerometers leave ambiguous: other permutations fit
-        within three standard deviations.
+    `accelerometers`, `gyro`, (3, 3), map the readings of the second unit to the axes of the first
+    (identity where they agree or the motion cannot decide); `..._lead`: excess chi-square of the
+    identity over it; `..._sure`: posterior probability among all 48 with equal priors. `ambiguous`:
+    axes of the first unit for which other permutations fit the accelerometers within three standard
+    deviations.
     """
 
     accelerometers: Array
@@ -1135,25 +1038,14 @@ def _odd_one(units: Sequence[PointKinematics], pairs: Sequence[UnitPair]) -> lis
 
 @dataclass(frozen=True, eq=False)
 class UnitPair:
-    """Comparison of two units at their common point.
+    """Comparison of two units at their common point; NaN along axes that either assumes.
 
-    Attributes
-    ----------
-    edges : ndarray, (m + 1,), s
-    difference : ndarray, (m + 1, 3), m/s
-        Integral of the first unit's specific force minus the second's, vehicle axes, from the
-        first edge; intervals in which either was clipped contribute zero.
-    sd : ndarray, (m + 1, 3), m/s
-        From the uncertainty stated for both. NaN along axes that either assumes, here and below.
-    force_difference, force_sd : ndarray, (m, 3), m/s²
-        Means over each interval; NaN where either was clipped.
-    chi_square, freedom : float, int
-        Over the remaining intervals and the axes that both measure, with their covariance.
-        Zero if none remain.
-    probability : float
-        Probability of a chi-square at least this large if the stated uncertainty is right.
-    lever_arm : LeverArmCheck
-        These three are not meaningful where either assumes an axis or the rates.
+    `difference`, `sd`, (m + 1, 3), m/s: integral of the first unit's specific force minus the
+    second's, vehicle axes, from the first edge; intervals in which either was clipped contribute
+    zero. `force_difference`, `force_sd`, (m, 3), m/s²: means over each interval; NaN where either
+    was clipped. `chi_square`, `freedom` over the remaining intervals and common axes; `probability`
+    of one at least this large if the stated uncertainty is right. `axes`, `turned`, `lever_arm` are
+    not meaningful where either assumes an axis.
     """
 
     first: str
@@ -1175,15 +1067,9 @@ class UnitPair:
 
 @dataclass(frozen=True, eq=False)
 class UnitAgainstAll:
-    """One unit against the combination of all.
+    """One unit against the combination of all: delta-V differences and sd, (m + 1, 3), m/s.
 
-    Attributes
-    ----------
-    difference, sd : ndarray, (m + 1, 3), m/s
-        Its delta-V minus that of the combination, and the stated standard deviation of the
-        difference, which accounts for common errors. NaN along axes that it, or all, assume.
-    chi_square, freedom, probability
-        As `UnitPair`.
+    NaN along axes that it, or all, assume. Chi-square as `UnitPair`.
     """
 
     name: str
@@ -1198,15 +1084,9 @@ class UnitAgainstAll:
 class UnitComparison:
     """Comparison of all units of a vehicle at one point.
 
-    Attributes
-    ----------
-    edges : ndarray, (m + 1,), s
-    combined : ndarray, (m + 1, 3), m/s
-        Delta-V of the optimally weighted combination, gravity included, body axes; NaN along
-        axes that all units assume.
-    combined_sd : ndarray, (m + 1, 3), m/s
-    chi_square, freedom, probability
-        All units against the combination.
+    `combined`, `combined_sd`, (m + 1, 3), m/s: delta-V of the optimally weighted combination at
+    `edges`, gravity included, body axes; NaN along axes that all units assume. Chi-square of all
+    units against it.
     """
 
     edges: Array = field(repr=False)
@@ -1252,16 +1132,7 @@ def measured_axes(basis: Array) -> NDArray[np.bool_]:
 
 
 def chi_square_along(basis: Array, difference: Array, covariance: Array) -> tuple[float, int]:
-    """Chi-square of a difference along some directions, and its degrees of freedom.
-
-    Parameters
-    ----------
-    basis : ndarray, (3, r)
-        Orthonormal columns.
-    difference : ndarray, (3 m,)
-        By interval, then axis.
-    covariance : ndarray, (3 m, 3 m)
-    """
+    """Chi-square of a difference, (3 m,), along a basis, (3, r), and its degrees of freedom."""
     if basis.shape[1] < 3:
         along = np.kron(np.eye(difference.size // 3), basis)
         difference, covariance = along.T @ difference, along.T @ covariance @ along
@@ -1282,16 +1153,9 @@ LEAST_SHARE = 0.01
 
 
 def clipped_axes(unit: PointKinematics, window: tuple[float, float]) -> Flags:
-    """Along which of the vehicle's axes a unit was clipped in a window.
+    """Along which of the vehicle's axes, (3,), a unit was clipped in a window, s.
 
-    Parameters
-    ----------
-    window : (float, float), s
-
-    Returns
-    -------
-    ndarray of bool, (3,)
-        All False for a mean of several units. A clipped gyro affects all axes and is not included.
+    All False for a mean of several units. A clipped gyro affects all axes and is not included.
     """
     prepared = unit.prepared
     if prepared is None:
@@ -1304,18 +1168,11 @@ def clipped_axes(unit: PointKinematics, window: tuple[float, float]) -> Flags:
 
 
 def clipped_pieces(unit: PointKinematics, edges: Array) -> Flags:
-    """In which time intervals the readings of a unit are affected by clipping.
+    """In which intervals between edges, (m,), the readings of a unit are affected by clipping.
 
-    Parameters
-    ----------
-    edges : ndarray, (m + 1,), s
-
-    Returns
-    -------
-    ndarray of bool, (m,)
-        Whether a clipped sample of accelerometers or gyro, or a neighbor of one, contributes to
-        the interval. Neighbors: the gyro samples that form one angular acceleration, and the
-        accelerometer sample up to which the line between samples extends.
+    By a clipped sample of accelerometers or gyro, or a neighbor of one: the gyro samples that form
+    one angular acceleration, and the accelerometer sample up to which the line between samples
+    extends.
     """
     prepared = unit.prepared
     if prepared is None:

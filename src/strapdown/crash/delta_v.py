@@ -74,19 +74,7 @@ class DeltaV:
         return math.hypot(float(self.vector[0]), float(self.vector[1]))
 
     def noise_covariance(self, noise: ArrayLike) -> Array:
-        """Covariance from white noise of the samples alone.
-
-        Parameters
-        ----------
-        noise : array_like, m/s²
-            Standard deviation of a sample: one number, (3,), or (n, 3).
-
-        Returns
-        -------
-        ndarray, (3, 3), m²/s²
-            Diagonal: ``sum(weights² noise²)``. The error budget holds all other errors of a
-            sensor.
-        """
+        """Covariance, (3, 3), m²/s², from white noise alone: sd, m/s², one, (3,) or (n, 3)."""
         sds = np.broadcast_to(np.asarray(noise, dtype=np.float64), (len(self.weights), 3))
         return np.diag(self.weights**2 @ sds**2)
 
@@ -401,18 +389,10 @@ RECORDED, SEARCHED, BEYOND_END, EVERY = 0.250, 0.300, 0.030, 0.010
 
 @dataclass(frozen=True)
 class MaximumDeltaV:
-    """Largest cumulative changes of velocity of an event (49 CFR 563.5(b)).
+    """Largest cumulative changes of velocity of an event (49 CFR 563.5(b)), m/s.
 
-    Attributes
-    ----------
-    longitudinal, lateral : float, m/s
-        Signed.
-    resultant : float, m/s
-        Largest of the vector sum of the two at one instant.
-    longitudinal_time, lateral_time, resultant_time : float, s
-        From time zero.
-    searched : float, s
-        Searched time from time zero.
+    Longitudinal and lateral signed, resultant of both at one instant; times, s, and the searched
+    time from time zero.
     """
 
     longitudinal: float
@@ -453,21 +433,9 @@ def recorder_delta_v(acceleration: Acceleration, event: CrashEvent) -> pd.DataFr
 def maximum_delta_v(acceleration: Acceleration, event: CrashEvent) -> MaximumDeltaV:
     """Largest cumulative change of velocity since time zero, and the time to it.
 
-    Parameters
-    ----------
-    acceleration : Acceleration
-        In the frame ``body`` or ``impact``.
-
-    Returns
-    -------
-    MaximumDeltaV
-        Searched over 300 ms, to 30 ms after the end of the event, or to the end of the
-        record, whichever is least (49 CFR 563.5(b), 563.8 Table III).
-
-    Raises
-    ------
-    DataError
-        Time zero is not within the record.
+    In the frame ``body`` or ``impact``, over 300 ms, to 30 ms after the end of the event, or to the
+    end of the record, whichever is least (49 CFR 563.5(b), 563.8 Table III). `DataError`: time zero
+    is not in the record.
     """
     zero = event.time_zero
     check_within(acceleration.time, zero, zero, acceleration.source)
@@ -490,24 +458,10 @@ def maximum_delta_v(acceleration: Acceleration, event: CrashEvent) -> MaximumDel
 
 
 def trajectory_delta_v(trajectory: pd.DataFrame, start: float, end: float) -> DeltaV:
-    """Change of velocity between two instants of a navigated trajectory.
+    """Change of velocity between two instants of a navigated trajectory, in the frame ``ned``.
 
-    Parameters
-    ----------
-    trajectory : DataFrame
-        Trajectory table at the reference point; its velocities do not contain gravity.
-    start, end : float, s
-        Within the trajectory; the velocity is interpolated linearly.
-
-    Returns
-    -------
-    DeltaV
-        In the frame ``ned``; the weights are those of the velocities.
-
-    Raises
-    ------
-    DataError
-        The window is empty or extends beyond the trajectory.
+    The velocity is interpolated linearly; the weights are those of the velocities. `DataError`: the
+    window is empty or extends beyond the trajectory.
     """
     check_trajectory(trajectory)
     time, source = index_of(trajectory), source_of(trajectory)

@@ -44,15 +44,7 @@ PIECE = 0.25
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """A run reduced to the data for the sensitivities, at n stamps ending at the anchor.
-
-    Attributes
-    ----------
-    time : ndarray, (n,), s
-    C_nb : ndarray, (n, 3, 3)
-    rate, force : ndarray, (n, 3), rad/s, m/s²
-        Corrected for the biases estimated so far.
-    """
+    """A run at n stamps ending at the anchor: attitude, rate and force without biases."""
 
     time: Array
     C_nb: Array
@@ -62,14 +54,7 @@ class Course:
 
 @dataclass(frozen=True, eq=False)
 class SensorErrors:
-    """Unknown constants of the two triads beyond their biases, as linear maps.
-
-    Attributes
-    ----------
-    gyro, accel : ndarray, (n, 3, q)
-        Effect of unit parameters on the rate and the specific force at each stamp.
-    sd : ndarray, (q,)
-    """
+    """Effect of q parameters beyond the biases on rate and force, (n, 3, q), and their sd."""
 
     gyro: Array
     accel: Array
@@ -97,18 +82,9 @@ def sensor_errors(gyro: TriadUncertainty, accel: TriadUncertainty, course: Cours
 
 
 def at_fixes(course: Course, errors: SensorErrors, instants: Array) -> Array:
-    """Derivatives of position, velocity and attitude at instants.
+    """Derivatives, (m, 9, 15 + q), of position, velocity and attitude at instants, (m,), s.
 
-    Parameters
-    ----------
-    errors : SensorErrors
-        Of q parameters.
-    instants : ndarray, (m,), s
-
-    Returns
-    -------
-    ndarray, (m, 9, 15 + q)
-        By the 15 states of `EntryState.covariance` at the anchor, and by the parameters.
+    By the 15 states of `EntryState.covariance` at the anchor, and by q sensor parameters.
     """
     n, q = len(course.time), len(errors.sd)
     pushed = np.einsum("nij,nj->ni", course.C_nb, course.force)
@@ -132,18 +108,9 @@ def noise_between_fixes(
 ) -> tuple[Array, Array]:
     """Effect of sensor noise on position, velocity and attitude, integrated backward.
 
-    Parameters
-    ----------
-    instants : ndarray, (m,), s
-        Decreasing, from the end of the course.
-
-    Returns
-    -------
-    carry : ndarray, (m, 9, 9)
-        Error transition from the preceding instant, in this order, to each; of the first from
-        the anchor.
-    driven : ndarray, (m, 9, 9)
-        Covariance of the noise added between them, as impulses at the middle of intervals.
+    `instants`, (m,), s, decreasing from the end of the course. Returns the error transition from
+    the preceding instant to each, (m, 9, 9), of the first from the anchor; and the covariance of
+    the noise added between them, as impulses at the middle of intervals.
     """
     pushed = np.einsum("nij,nj->ni", course.C_nb, course.force)
     gained = back_integral(course.time, pushed)
@@ -322,20 +289,11 @@ RECOVERY = 1.0
 
 
 def strain(run: NavigationRun) -> tuple[Array, Array]:
-    """Acceleration and jerk of a run, free of gravity.
+    """Acceleration, m/s², and jerk, m/s³, of a run, free of gravity, (n,) each.
 
-    Parameters
-    ----------
-    run : NavigationRun
-        Heading and velocity are arbitrary: only changes of the velocity count.
-
-    Returns
-    -------
-    acceleration, jerk : ndarray, (n,), m/s², m/s³
-        At each stamp, from the samples up to it: lengths of ``(v(t) - v(t-h)) / h`` and of
-        ``(v(t) - 2 v(t-h) + v(t-2h)) / h²`` with h = 50 ms; zero where the run begins later.
-        White noise of density N gives a jerk of ``√(2/h) N/h`` on each axis: 3.6 m/s³ for
-        0.028 m/s²/√Hz. The first zero of the mean is at 20 Hz.
+    Lengths of ``(v(t) - v(t-h)) / h`` and ``(v(t) - 2 v(t-h) + v(t-2h)) / h²`` with h = 50 ms; zero
+    where the run begins later. White noise of density N gives a jerk of ``√(2/h) N/h`` on each
+    axis: 3.6 m/s³ for 0.028 m/s²/√Hz. The first zero of the mean is at 20 Hz.
     """
     time, velocity = run.time, run.history[:, 3:6]
 
@@ -353,23 +311,9 @@ def strain(run: NavigationRun) -> tuple[Array, Array]:
 def judge_fixes(
     instants: Array, quality: Array, run: NavigationRun, impact: float, anchor: float, slack: float
 ) -> list[tuple[Finding, ...]]:
-    """Return for each fix the reasons why it is rejected.
+    """Return for each fix, by its instant of validity in s, the reasons why it is rejected.
 
-    Parameters
-    ----------
-    instants : ndarray, (m,), s
-        Instants of validity of the fixes, from the beginning of the run on.
-    quality : ndarray, (m,)
-    run : NavigationRun
-        Up to the anchor.
-    impact, anchor : float, s
-    slack : float, s
-        Possible error of an instant.
-
-    Returns
-    -------
-    list of tuple of Finding
-        Empty where the fix is accepted.
+    `run` goes up to the anchor; `slack`, s, is the possible error of an instant.
     """
     acceleration, jerk = strain(run)
     hard, rough = acceleration > LARGEST_ACCELERATION, jerk > LARGEST_JERK
@@ -452,15 +396,7 @@ LONGEST_TURN = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Fixes:
-    """Accepted GNSS fixes.
-
-    Attributes
-    ----------
-    instants : ndarray, (m,), s
-    place : ndarray, (m, 3), deg, deg, m
-    velocity : ndarray, (m, 3), m/s
-    sd : ndarray, (m, 6), m, m/s
-    """
+    """Accepted GNSS fixes: instants, s; position, deg, m; velocity, m/s; sd, (m, 6), m, m/s."""
 
     instants: Array
     place: Array
@@ -495,23 +431,10 @@ def estimate(
     priors: EntryPriors,
     arm: Array,
 ) -> Estimate:
-    """Estimate the state at the end of a record and the other unknowns from a guess.
+    """Estimate the state at the end of a record and the other unknowns from a guess there.
 
-    Parameters
-    ----------
-    imu : DataFrame
-        Up to the anchor.
-    fixes : Fixes
-        Within the record.
-    guess : NavState
-        At the anchor.
-    arm : ndarray, (3,), m
-        Lever arm of the antenna.
-
-    Raises
-    ------
-    DivergenceError
-        The iteration does not converge, or a run diverges.
+    `arm`, (3,), m: lever arm of the antenna. `DivergenceError`: the iteration does not converge, or
+    a run diverges.
     """
     search = _Search(mechanization, imu, fixes, guess, priors, arm)
     weights, settled = np.ones((len(fixes.instants), 2)), 0
@@ -758,34 +681,24 @@ _TOGETHER = 0.7
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Linearized fixes and priors at the current parameters.
-
-    m fixes in the order of the filter, with up to w rows each; p constants, s states.
+    """Linearized fixes and priors: m fixes of up to w rows in filter order, p constants, s states.
 
     Attributes
     ----------
-    residuals : ndarray, (m, w)
-    by_constants : ndarray, (m, w, p)
-        Derivatives by the constants.
-    by_states : ndarray, (m, w, s)
-        And by the states.
-    noise : ndarray, (m, w)
-        Variances of the independent noise of each fix.
-    variance : ndarray, (m, w)
-        Total error variance of the fix, which the weights scale.
+    residuals, by_constants, by_states : ndarray, (m, w), (m, w, p), (m, w, s)
+        With the derivatives.
+    noise, variance : ndarray, (m, w)
+        Of the independent noise of each fix; total of the fix, which the weights scale.
     there : ndarray of bool, (m, w)
         Which components were measured.
     groups : ndarray of int, (w,)
         0 or more for rows that are weighted together, -1 for rows that keep full weight.
-    carry : ndarray, (m, s, s)
-        Transition from the state at the preceding fix to this one; of the first from zero time.
-    driven : ndarray, (m, s, s)
-        Covariance of the process noise added over the interval.
+    carry, driven : ndarray, (m, s, s)
+        Transition from the preceding fix (of the first from zero time); noise added on the way.
     first : ndarray, (s, s)
         Covariance of the states at zero time.
-    prior_sd : ndarray, (p,)
-    prior_residuals : ndarray, (p,)
-        Prior minus current parameters.
+    prior_sd, prior_residuals : ndarray, (p,)
+        Residuals: prior minus current parameters.
     """
 
     residuals: Array
@@ -804,21 +717,11 @@ class Problem:
 
 @dataclass(frozen=True, eq=False)
 class Adjustment:
-    """One least-squares step.
+    """One least-squares step of the constants, (p,), with covariance and chi-square.
 
-    Attributes
-    ----------
-    step : ndarray, (p,)
-        To be added to the constants.
-    covariance : ndarray, (p, p)
-    chi_square : float
-        Over all rows and the priors; degrees of freedom: number of rows less number of
-        constants without prior.
-    apart : ndarray, (m, w)
-        Difference of each row from the prediction by all others and the priors, times
-        `certainty`.
-    certainty : ndarray, (m, w, w)
-        Inverse of the covariance of that difference.
+    The chi-square is over all rows and the priors; degrees of freedom: number of rows less number
+    of constants without prior. `apart`, (m, w): difference of each row from the prediction by all
+    others and the priors, times `certainty`, (m, w, w), the inverse of its covariance.
     """
 
     step: Array
@@ -829,20 +732,13 @@ class Adjustment:
 
 
 def adjust(problem: Problem, weights: Array) -> Adjustment:
-    """Solve for one step of the constants.
+    """Solve for one step of the constants; a group of weight w has additional noise ``1/w - 1``.
 
-    Parameters
-    ----------
-    weights : ndarray, (m, g)
-        A group of weight w gets additional independent noise of ``1/w - 1`` times its variances.
-
-    Notes
-    -----
-    Covariance filter; `apart` and `certainty` by the backward recursion of the smoothations
-    (de Jong 1989, Journal of the American Statistical Association 84, 1085): with
-    innovation v of covariance F, gain K and ``L = I - K H``,
-    ``u = F^-1 v - K^T r``, ``M = F^-1 + K^T N K``, ``r <- H^T F^-1 v + L^T r``,
-    ``N <- H^T F^-1 H + L^T N L``, r and N carried back by the transposed transition.
+    Covariance filter; `apart` and `certainty` by the backward recursion of the smoothations (de
+    Jong 1989, Journal of the American Statistical Association 84, 1085): with innovation v of
+    covariance F, gain K and ``L = I - K H``, ``u = F^-1 v - K^T r``, ``M = F^-1 + K^T N K``, ``r <-
+    H^T F^-1 v + L^T r``, ``N <- H^T F^-1 H + L^T N L``, r and N carried back by the transposed
+    transition.
     """
     m, _, p = problem.by_constants.shape
     s = problem.by_states.shape[2]
@@ -890,28 +786,13 @@ def adjust(problem: Problem, weights: Array) -> Adjustment:
 
 
 def weigh(problem: Problem, adjustment: Adjustment, weights: Array) -> tuple[Array, Array]:
-    """Compute the robust weights of the groups.
+    """Compute the robust weights, (m, g), of the groups for the next step, and their misfits.
 
-    Parameters
-    ----------
-    adjustment : Adjustment
-        With the current weights.
-    weights : ndarray, (m, g)
-
-    Returns
-    -------
-    weights : ndarray, (m, g)
-        For the next step; final when they no longer change.
-    misfits : ndarray, (m, g)
-        Root of the squared Mahalanobis distance of each group, at full weight, from the
-        prediction by all others at theirs; NaN where not measured.
-
-    Notes
-    -----
-    The scheme IGG III (Yang, Song and Xu 2002, Journal of Geodesy 76, 353),
-    ``k0/t ((k1 - t)/(k1 - k0))²`` from k0 to k1, with chi-square quantiles as k0 and k1. A group
-    still at full weight loses weight only if no other has a much larger misfit, so that a false
-    fix does not take its neighbors with it.
+    Misfit: root of the squared Mahalanobis distance of each group, at full weight, from the
+    prediction by all others at theirs; NaN where not measured. IGG III (Yang, Song and Xu 2002,
+    Journal of Geodesy 76, 353), ``k0/t ((k1 - t)/(k1 - k0))²`` from k0 to k1, with chi-square
+    quantiles as k0 and k1. A group still at full weight loses weight only if no other has a much
+    larger misfit, so that a false fix does not take its neighbors with it.
     """
     from scipy.stats import chi2
 

@@ -502,23 +502,10 @@ class EventDetector:
         return float(state[kernel.MOST]), axis, float(state[kernel.MOST_TIME])
 
     def update(self, time: float, accel: Array | Sequence[float]) -> tuple[CrashEvent, ...]:
-        """Process one sample.
+        """Process one sample: time, s, later than the preceding; acceleration, (3,), m/s².
 
-        Parameters
-        ----------
-        time : float, s
-            Later than that of the preceding sample.
-        accel : array_like, (3,), m/s²
-
-        Returns
-        -------
-        tuple of CrashEvent
-            Events ended by this sample, usually none.
-
-        Raises
-        ------
-        DataError
-            Time does not increase, or a number is not finite. The sample is then not processed.
+        Returns the events ended by it. `DataError`: time does not increase, or a number is not
+        finite; the sample is then not processed.
         """
         held = self._held
         if 0 < held < len(self._rows) and np.shape(accel) == (3,):
@@ -532,18 +519,7 @@ class EventDetector:
         return self.extend([time], [accel])  # type: ignore[arg-type]
 
     def extend(self, time: ArrayLike, accel: ArrayLike) -> tuple[CrashEvent, ...]:
-        """Process a chunk of a record.
-
-        Parameters
-        ----------
-        time : array_like, (n,), s
-        accel : array_like, (n, 3), m/s²
-
-        Returns
-        -------
-        tuple of CrashEvent
-            Events that ended in it.
-        """
+        """Process a chunk of a record, (n,), s, and (n, 3), m/s², as `update`: all or none."""
         try:
             stamps = np.asarray(time, dtype=np.float64)
             values = np.asarray(accel, dtype=np.float64)

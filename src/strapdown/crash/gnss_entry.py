@@ -400,19 +400,9 @@ def first_guesses(
 ) -> tuple[list[NavState], list[Finding]]:
     """Guess position and velocity from the last fixes, and one or two headings.
 
-    Parameters
-    ----------
-    turned : NavigationRun
-        From a level, stationary start heading north, up to the anchor.
-    fixes : Fixes
-        The accepted fixes.
-
-    Returns
-    -------
-    guesses : list of NavState
-        Heading from the priors, or the direction of travel; and, where it differs, the heading
-        for which the velocity changes of the sensors agree best with those of the fixes.
-    findings : list of Finding
+    `turned` runs from a level, stationary start heading north up to the anchor. Headings: of the
+    priors, or the direction of travel; and, where it differs, the one for which the velocity
+    changes of the sensors agree best with those of the fixes.
     """
     velocity = _velocities(fixes)
     late = np.median(velocity[-_LAST:], axis=0)

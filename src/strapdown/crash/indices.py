@@ -36,22 +36,10 @@ SAME_STEP = 0.02
 def checked(
     time: ArrayLike, values: ArrayLike, width: int | None, quantity: str
 ) -> tuple[Array, Array]:
-    """Return stamps and values as arrays.
+    """Return stamps, (n,), s, and values, (n,) or (n, width), as arrays.
 
-    Parameters
-    ----------
-    time : array_like, (n,), s
-    values : array_like, (n,) or (n, width)
-    width : int or None
-        None for one number per sample.
-    quantity : str
-        For messages.
-
-    Raises
-    ------
-    DataError
-        The shapes disagree, a value is not finite, time does not increase, or there are fewer
-        than two samples.
+    `DataError`: shapes disagree, a value is not finite, time does not increase, or fewer than two
+    samples.
     """
     t, v = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
     wanted = (t.size,) if width is None else (t.size, width)
@@ -127,16 +115,8 @@ def from_start(time: Array, values: Array, start: float, quantity: str) -> tuple
 def integrals(time: Array, values: Array) -> tuple[Array, Array]:
     """First and second integral from the first sample, exact for values linear between samples.
 
-    Parameters
-    ----------
-    time : ndarray, (n,), s
-    values : ndarray, (n,) or (n, k)
-
-    Returns
-    -------
-    first, second : ndarray
-        Of the shape of `values`, zero at the first sample. Over a step h from a0 to a1 the
-        first grows by ``h (a0 + a1)/2`` and the second by ``h v0 + h² (2 a0 + a1)/6``.
+    Over a step h from a0 to a1 the first grows by ``h (a0 + a1)/2``, the second by ``h v0 + h² (2
+    a0 + a1)/6``.
     """
     h = np.diff(time).reshape(-1, *([1] * (values.ndim - 1)))
     first = running_integral(time, values)
@@ -151,12 +131,6 @@ def cubic(time: Array, values: Array, slopes: Array, at: float) -> tuple[float, 
     """Value and slope between samples, on the cubic through the two neighbors.
 
     Exact for the double integral of an acceleration that is linear between samples.
-
-    Parameters
-    ----------
-    time, values, slopes : ndarray, (n,)
-    at : float
-        Within the record.
     """
     k = int(np.clip(np.searchsorted(time, at, side="right") - 1, 0, time.size - 2))
     h = float(time[k + 1] - time[k])
@@ -169,16 +143,9 @@ def cubic(time: Array, values: Array, slopes: Array, at: float) -> tuple[float, 
 
 
 def first_reach(time: Array, values: Array, slopes: Array, level: float) -> float | None:
-    """Return the first instant at which a quantity reaches a level from below.
+    """Return the first instant at which a quantity reaches a level from below, or None.
 
-    Parameters
-    ----------
-    time, values, slopes : ndarray, (n,)
-
-    Returns
-    -------
-    float or None
-        None where it stays below. A crossing and return within one step is not detected.
+    A crossing and return within one step is not detected.
     """
     above = np.flatnonzero(values >= level)
     if not above.size:
@@ -201,25 +168,9 @@ def first_reach(time: Array, values: Array, slopes: Array, level: float) -> floa
 
 
 def moving_means(time: Array, values: Array, width: float) -> tuple[Array, Array]:
-    """Means over every window that begins or ends at a sample.
+    """Means over every window of a width, s, that begins or ends at a sample; and their begins.
 
-    Parameters
-    ----------
-    time : ndarray, (n,), s
-    values : ndarray, (n,) or (n, k)
-    width : float, s
-        Need not be an integer number of samples.
-
-    Returns
-    -------
-    starts : ndarray, (m,), s
-        Where the windows begin, ascending.
-    means : ndarray, (m,) or (m, k)
-
-    Raises
-    ------
-    DataError
-        The record is shorter than the window.
+    `DataError`: the record is shorter than the window.
     """
     # Stamps are sums of steps: a record as long as its window may be shorter by rounding.
     last = time[-1] - width
@@ -245,17 +196,8 @@ def moving_means(time: Array, values: Array, width: float) -> tuple[Array, Array
 def largest_mean(time: Array, values: Array, width: float) -> tuple[float, float]:
     """Return the mean of greatest magnitude, signed, and the start of its window.
 
-    Exact for a record that is linear between samples: between two neighboring windows the mean
-    is a parabola, whose vertex is where the values at both ends of the window are equal.
-
-    Parameters
-    ----------
-    time, values : ndarray, (n,)
-    width : float, s
-
-    Returns
-    -------
-    mean, start : float
+    Exact for a record that is linear between samples: between two neighboring windows the mean is a
+    parabola, whose vertex is where the values at both ends of the window are equal.
     """
     starts, means = moving_means(time, values, width)
     slope = np.interp(starts + width, time, values) - np.interp(starts, time, values)
@@ -294,30 +236,12 @@ PASS_SHARE = (math.sqrt(2.0) - 1.0) ** 0.25
 
 
 def four_pole(time: Array, values: Array, frequency: float, cutoff: str = "whole") -> Array:
-    """Filter forward and backward with two poles each.
+    """Filter forward and backward with two poles each; uniform steps.
 
-    Parameters
-    ----------
-    time : ndarray, (n,), s
-        Uniform steps.
-    values : ndarray, (n,) or (n, k)
-    frequency : float, Hz
-    cutoff : {'whole', 'pass'}
-        Whether the whole filter is 3 dB down there, or each pass (6 dB for the whole).
-
-    Returns
-    -------
-    ndarray
-        Of the shape of `values`. The record is extended at both ends by its point reflection,
-        by 0.5 s or as much as there is, so that a record that is stationary at its ends starts
-        and stops without a transient.
-
-    Raises
-    ------
-    DataError
-        The steps are not uniform, or the record is sampled at less than ten times the frequency.
-    ConfigError
-        `cutoff` is unknown.
+    `cutoff`: ``whole``: the whole filter is 3 dB down at the frequency, Hz; ``pass``: each pass (6
+    dB for the whole). The record is extended at both ends by its point reflection, by 0.5 s or as
+    much as there is, so that one that is stationary at its ends starts and stops without a
+    transient. `DataError`: steps are not uniform, or the rate is less than ten times the frequency.
     """
     from scipy.signal import butter, sosfiltfilt
 

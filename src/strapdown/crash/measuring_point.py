@@ -395,21 +395,18 @@ class AssumedEffect:
 def assumed_effects(prepared: PreparedUnit) -> Iterator[AssumedEffect]:
     """List the unknowns of a unit's assumptions.
 
-    Yields
-    ------
-    AssumedEffect
-        Of the vehicle: units that lack the same axes have the same unknowns. For rotation, two
-        time functions about each vehicle axis (`Assumed`) and the second-order effect; for
-        missing axes, two along each.
+    Of the vehicle: units that lack the same axes have the same unknowns. For rotation, two time
+    functions about each vehicle axis (`Assumed`) and the second-order effect; for missing axes, two
+    along each.
 
     Notes
     -----
     A specific force f rotated by φ about e keeps ``f - φ²/2 (f - e (e·f))`` to second order:
     rotations of 5 deg always shorten a change of velocity by 0.4 %, while the first order only
-    deflects it. ``φ²/2`` has the mean ``sd²/2`` and the standard deviation ``sd²/√2``. The means
-    of all axes are taken as one unknown about zero, the deviations as one each, so that the total
-    mean square is right; as it is one-sided, 6.5 % lie beyond the 95 % bound. Products of a
-    rotation and a missing axis are neglected: 4 deg and 0.8 m/s give 0.03 m/s.
+    deflects it. ``φ²/2`` has the mean ``sd²/2`` and the standard deviation ``sd²/√2``. The means of
+    all axes are one unknown about zero, the deviations one each, so that the total mean square is
+    right; as it is one-sided, 6.5 % lie beyond the 95 % bound. Products of a rotation and a missing
+    axis are neglected: 4 deg and 0.8 m/s give 0.03 m/s.
     """
     unit = prepared.unit
     time = prepared.imu.index.to_numpy(dtype=np.float64)
@@ -470,15 +467,9 @@ TRIAD_CURVES_AXES = "xyz"
 
 
 def triad_curves(triad: RecordedTriad) -> Iterator[tuple[str, str, list[AxisCurve]]]:
-    """List scale factor, misalignment and nonlinearity of a triad.
+    """List scale factor, misalignment and nonlinearity of a triad where their sd is not zero.
 
-    Yields
-    ------
-    name : str
-    contributor : str
-        Line of the error budget.
-    curves : list of (axis, end of the name, curve)
-        Curves with a nonzero standard deviation.
+    Yields name, line of the error budget, and curves as (axis, end of the name, curve).
     """
     sd = triad.uncertainty
     scale, skew = sd.axis("scale"), sd.axis("misalignment")
@@ -584,19 +575,9 @@ class SampleEffects:
 
 
 def level_turned_by(rest: Array, level: Array) -> Array:
-    """Tilt of the level caused by an error of the stationary force it was computed from.
+    """Tilt of the level, (..., 3), rad, by an error of the stationary force, (..., 3), m/s².
 
-    Parameters
-    ----------
-    rest : ndarray, (..., 3), m/s²
-        Vehicle axes.
-    level : ndarray, (3, 3)
-        From vehicle axes into local level, heading zero.
-
-    Returns
-    -------
-    ndarray, (..., 3), rad
-        Rotation vector in local level.
+    `level`, (3, 3), is from vehicle axes into local level, heading zero.
     """
     felt = rest @ level.T / GRAVITY
     return np.stack([-felt[..., 1], felt[..., 0], np.zeros(felt.shape[:-1])], axis=-1)

@@ -46,19 +46,15 @@ class IntegrationSegment:
     """Increments of a segment, the effects of the unknowns on them, and the resulting states.
 
     A backward segment is a motion of its own, with opposite velocity on an Earth that rotates the
-    other way; `errors`, `noise_covariance` and values read from `nominal` are reversed by the
-    code that joins the segments.
+    other way; `errors`, `noise_covariance` and values read from `nominal` are reversed by the code
+    that joins them.
 
     Attributes
     ----------
     time : ndarray, (k + 1,), s
         In the order of integration.
-    state : ndarray
-        Kernel state at the start.
-    rows : ndarray, (k, 10)
-        Motion increments.
-    nominal : ndarray, (k + 1, 10)
-        States of the kernel.
+    state, rows, nominal : ndarray
+        Kernel state at the start, motion increments (k, 10), states (k + 1, 10).
     effects : ndarray, (p, 6, k)
         Effect of one standard deviation of each unknown on angle and velocity of each step.
     noise_sd : ndarray, (6, k)
@@ -131,21 +127,9 @@ def make_leg(
 ) -> IntegrationSegment:
     """Cut a segment out of a record and navigate it.
 
-    Parameters
-    ----------
-    start : NavState
-        At the first sample of `rows`, or at the last where the segment runs backward.
-    imu : DataFrame
-        Imu table at the reference point.
-    effects : SampleEffects
-        On the same samples.
-    rows : slice
-        Samples of the segment, at least one; one sample is a segment without a step.
-
-    Raises
-    ------
-    DivergenceError
-        The path left the range of the mechanization.
+    `start` is at the first sample of `rows`, or at the last where the segment runs backward; one
+    sample is a segment without a step. `DivergenceError`: the path left the range of the
+    mechanization.
     """
     part = imu.iloc[rows]
     part.attrs = dict(imu.attrs)
@@ -285,22 +269,9 @@ class CrashPath:
         return pd.DataFrame(values, index=self.table.index, columns=[*NED, *VELOCITIES, *EULER])
 
     def variances(self, row: int = -1) -> pd.DataFrame:
-        """Variance contributed by each contributor at a sample.
+        """Variance by contributor at a sample, columns as `ERROR`: rad², (m/s)², m².
 
-        Parameters
-        ----------
-        row : int
-
-        Returns
-        -------
-        DataFrame
-            Indexed by contributor, columns as `ERROR`: rad², (m/s)², m². The column sums are
-            the diagonal of `covariance`.
-
-        Raises
-        ------
-        ConfigError
-            The sample does not exist.
+        The column sums are the diagonal of `covariance`. `ConfigError`: the sample does not exist.
         """
         if not -len(self.time) <= row < len(self.time):
             raise ConfigError("crash.no-sample", quantity="row", at_row=row, count=len(self.time))
@@ -589,24 +560,10 @@ WINDOW = (-0.1, 0.75)
 
 
 def path_rows(imu: pd.DataFrame, at: float, window: Sequence[float] | None) -> tuple[int, int, int]:
-    """Find the first sample, the entry sample and the last sample of a path.
+    """Find the first sample, the sample nearest to the entry, and the last sample of a path.
 
-    Parameters
-    ----------
-    at : float, s
-        Instant of the entry.
-    window : (float, float), s, optional
-        By default `WINDOW`, as far as recorded.
-
-    Returns
-    -------
-    first, anchor, last : int
-        The entry sample is the one nearest to the entry, and always within the path.
-
-    Raises
-    ------
-    DataError
-        The record does not contain the entry or the window.
+    `at`, s, is the instant of the entry; the window is by default `WINDOW`, as far as recorded.
+    `DataError`: the record does not contain the entry or the window.
     """
     time = imu.index.to_numpy(dtype=np.float64)
     slack = 1e-9 + 0.5 * float(np.median(np.diff(time))) if len(time) > 1 else 0.0
@@ -654,18 +611,11 @@ def _usual(time: Array, at: float) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False)
 class ToStamp:
-    """Motion from the instant of an entry to a sample.
+    """Motion from the instant of an entry to a sample, `length` s later (negative: earlier).
 
-    Attributes
-    ----------
-    length : float, s
-        Negative where the sample is earlier.
-    turn : ndarray, (3,), rad
-        Rotation vector of the body, body axes.
-    push : ndarray, (3,), m/s
-        Integral of the specific force, in body axes at mid-interval.
-    turn_errors, push_errors : ndarray, (p, 3)
-        Effect of one standard deviation of each unknown on them.
+    `turn`, (3,), rad, rotation vector in body axes; `push`, (3,), m/s, integral of the specific
+    force in body axes at mid-interval; with the effect of one standard deviation of each unknown on
+    them, (p, 3).
     """
 
     length: float
@@ -692,21 +642,10 @@ class ToStamp:
         return np.asarray(self.felt(q_nb) + np.array([0.0, 0.0, GRAVITY * self.length]))
 
     def carried(self, errors: Array, q_nb: Array, *, turned: bool) -> Array:
-        """Propagate errors from the entry to the sample.
+        """Propagate errors, (p, 9), from the entry to the sample, unknowns of the samples first.
 
-        Parameters
-        ----------
-        errors : ndarray, (p, 9)
-            Rotation vector in local level, velocity, position; unknowns of the samples first.
-        q_nb : ndarray, (4,)
-            Attitude at the sample.
-        turned : bool
-            Whether the attitude error is that at the entry; otherwise it is that at the sample.
-
-        Returns
-        -------
-        ndarray, (p, 9)
-            First order. Position growth within half a step is neglected.
+        `turned`: the attitude error is that at the entry, otherwise that at the sample. First
+        order; position growth within half a step is neglected.
         """
         out, own = errors.copy(), slice(0, len(self.turn_errors))
         C = rotation.dcm_from_quaternion(q_nb)
@@ -719,18 +658,9 @@ class ToStamp:
 
 
 def to_stamp(imu: pd.DataFrame, effects: SampleEffects, instant: float, row: int) -> ToStamp:
-    """Integrate from an instant between two samples to one of these samples.
+    """Integrate from an instant between two samples to one of these, `row`.
 
-    Parameters
-    ----------
-    imu : DataFrame
-        Imu table; interpolated as in `window_weights`.
-    effects : SampleEffects
-        On the same samples.
-    instant : float, s
-        Before the first or after the last sample, its values are held.
-    row : int
-        Of the sample.
+    Interpolated as in `window_weights`; beyond the record its first or last value is held.
     """
     time = imu.index.to_numpy(dtype=np.float64)
     length = float(time[row] - instant)

@@ -165,22 +165,9 @@ def ned_pdof(change: DeltaV | ArrayLike, heading_deg: float) -> NedPdof:
 
 
 def pdof_gradient(change: DeltaV | ArrayLike) -> Array:
-    """Gradient of the two angles with respect to the change of velocity.
+    """Gradient of horizontal and vertical angle, (2, 3), deg per m/s, by the change of velocity.
 
-    Parameters
-    ----------
-    change : DeltaV or array_like, (3,), m/s
-        In any frame.
-
-    Returns
-    -------
-    ndarray, (2, 3), deg per m/s
-        Of the horizontal and the vertical angle.
-
-    Raises
-    ------
-    DataError
-        The change is vertical: its horizontal direction has no gradient.
+    `DataError`: the change is vertical, so that its horizontal direction has no gradient.
     """
     x, y, z = vector_of(change, ("body", "impact", "ned")).tolist()
     h2 = x * x + y * y
@@ -191,19 +178,10 @@ def pdof_gradient(change: DeltaV | ArrayLike) -> Array:
 
 
 def pdof_sd(change: DeltaV | ArrayLike, covariance: ArrayLike) -> tuple[float, float]:
-    """Standard deviations of the two angles, to first order.
+    """Standard deviations of horizontal and vertical angle, deg, to first order: ``sqrt(G P G^T)``.
 
-    Parameters
-    ----------
-    change : DeltaV or array_like, (3,), m/s
-    covariance : array_like, (3, 3), m²/s²
-        Of the change.
-
-    Returns
-    -------
-    horizontal_sd, vertical_sd : float, deg
-        ``sqrt(G P G^T)``. Valid while the change is large compared with its uncertainty;
-        `pdof_interval` has no such condition.
+    Valid while the change is large compared with its uncertainty; `pdof_interval` has no such
+    condition.
     """
     gradient = pdof_gradient(change)
     spread = gradient @ covariance_of(covariance) @ gradient.T
@@ -238,16 +216,8 @@ def covariance_of(given: ArrayLike) -> Array:
 class PdofConvention:
     """Convention for a horizontal direction.
 
-    Attributes
-    ----------
-    meaning : str
-        Description for users, with the source.
-    to : bool
-        Direction in which the force pushes, instead of the one from which it comes.
-    clockwise : bool
-        Seen from above.
-    full_turn : bool
-        In [0, 360) instead of (-180, 180].
+    In which the force pushes (`to`) or from which it comes; clockwise seen from above or not; in
+    [0, 360) (`full_turn`) or (-180, 180].
     """
 
     meaning: str
@@ -351,46 +321,17 @@ def from_convention(angle_deg: float, name: str) -> float:
 
 
 def clock_of(horizontal_deg: float) -> int:
-    """Hour that a force came from, 1 to 12.
+    """Hour that a force came from, 1 to 12, by its direction, deg clockwise from the front.
 
-    Parameters
-    ----------
-    horizontal_deg : float, deg
-        Clockwise from the front.
-
-    Returns
-    -------
-    int
-        The nearest hour, each 30 deg wide: 12 is the front, 3 the right (the clock of the
-        Collision Deformation Classification, SAE J224, columns 1 and 2). A direction on the
-        border belongs to the next hour clockwise: 15 deg is 1 o'clock, 345 deg is 12.
-
-    Raises
-    ------
-    ConfigError
-        The angle is not finite.
+    The nearest hour, each 30 deg wide: 12 is the front, 3 the right (Collision Deformation
+    Classification, SAE J224, columns 1 and 2). A border belongs to the next hour clockwise: 15 deg
+    is 1 o'clock, 345 deg is 12.
     """
     return (math.floor(_finite(horizontal_deg) / 30.0 + 0.5) - 1) % 12 + 1
 
 
 def direction_of_clock(hour: int) -> float:
-    """Middle of an hour, deg, in (-180, 180].
-
-    Parameters
-    ----------
-    hour : int
-        1 to 12.
-
-    Returns
-    -------
-    float, deg
-        Within 15 deg of the coded direction.
-
-    Raises
-    ------
-    ConfigError
-        The number is not an hour from 1 to 12.
-    """
+    """Middle of an hour, 1 to 12, deg in (-180, 180]: within 15 deg of the coded direction."""
     if hour not in range(1, 13):
         raise ConfigError("crash.no-hour", quantity="clock", hour=hour)
     return _wrapped(30.0 * hour, False)

@@ -394,25 +394,12 @@ def prepare_together(
     gravity: float,
     options: Mapping[str, Any],
 ) -> list[PointKinematics]:
-    """Prepare units and move them to a point.
+    """Prepare units, each over its own record, and move them to a point, (3,), m, vehicle axes.
 
-    Parameters
-    ----------
-    together : SynchronisedUnits
-        Each over its own record.
-    point : sequence of float, (3,), m
-        Vehicle axes, from the vehicle's origin.
-    gravity : float, m/s²
-    options : mapping
-        Options of `prepare_unit` for all units; under the name of a unit, a mapping of its own.
-
-    Returns
-    -------
-    list of PointKinematics
-        In the order of the units. A unit that borrows its gyro, is not leveled by an option, and
-        whose record begins after the lender's stationary interval is leveled by the lender: roll
-        and pitch are propagated with the gyro to the start of the borrower's record, with their
-        standard deviation.
+    `options`: of `prepare_unit` for all units; under the name of a unit, a mapping of its own. A
+    unit that borrows its gyro, is not leveled by an option, and whose record begins after the
+    lender's stationary interval is leveled by the lender: roll and pitch are propagated with the
+    gyro to the start of the borrower's record, with their standard deviation.
     """
     names = {u.unit.name for u in together.units}
     common = {k: v for k, v in options.items() if k not in names}
@@ -496,26 +483,10 @@ def _attitude_at_start(
 def level_at_rest(rest: RestStretch, unknown: float, gravity: float, source: str) -> Levelling:
     """Roll and pitch from the mean specific force, with the sd from its noise.
 
-    Parameters
-    ----------
-    rest : RestStretch
-        In vehicle axes.
-    unknown : float, m/s²
-        Standard deviation of the vehicle's own acceleration over the interval, each axis.
-    gravity : float, m/s²
-    source : str
-        For messages.
-
-    Returns
-    -------
-    Levelling
-        The sd is that of the worse of the two angles: an acceleration error e perpendicular to
-        the specific force tilts the level by ``e / g`` (roll: divided by ``cos(pitch)``).
-
-    Raises
-    ------
-    DataError
-        The length differs from gravity by more than 20 %.
+    `unknown`, m/s²: standard deviation of the vehicle's own acceleration over the interval, each
+    axis. The sd is that of the worse of the two angles: an acceleration error e perpendicular to
+    the specific force tilts the level by ``e / g`` (roll: divided by ``cos(pitch)``). `DataError`:
+    the length differs from gravity by more than 20 %.
     """
     assert rest.accel_mean is not None and rest.accel_mean_sd is not None
     try:
@@ -541,26 +512,12 @@ def from_stated_attitude(
     unknown: float,
     gravity: float,
 ) -> tuple[Levelling, Array | None]:
-    """Bias of the lowest range from gravity in a stated attitude.
+    """Bias of the lowest range from gravity in a stated attitude: (roll, pitch, sd), deg.
 
-    Parameters
-    ----------
-    stated : (roll, pitch, sd), deg
-    rest : RestStretch, optional
-        In vehicle axes.
-    bias_sd : ndarray, (3,), m/s²
-        Stated sd of the bias of the lowest range, vehicle axes.
-    unknown : float, m/s²
-        As `level_at_rest`.
-    gravity : float, m/s²
-
-    Returns
-    -------
-    levelling : Levelling
-    shift : ndarray, (3,), m/s², or None
-        Stationary reading of the lowest range minus gravity in that attitude; None where there is
-        no stationary interval, or where the stated bias is more accurate than ``g`` times the sd
-        of the attitude.
+    `bias_sd`, (3,), m/s²: stated sd of that bias, vehicle axes; `unknown` as `level_at_rest`.
+    Returns the leveling and the stationary reading minus gravity in that attitude, (3,), m/s²; None
+    where there is no stationary interval, or where the stated bias is more accurate than ``g``
+    times the sd of the attitude.
     """
     roll, pitch, sd = stated
     levelling = Levelling(float(roll), float(pitch), float(sd), from_rest=False)
@@ -578,23 +535,10 @@ def with_gravity(
     levelling: tuple[float, float, float] | None,
     gravity: float,
 ) -> UnitArrays:
-    """Add the gravity component along assumed axes.
+    """Add the gravity component along assumed axes, in sensor axes.
 
-    Parameters
-    ----------
-    unit : CrashUnit
-        Its triads give the assumed axes.
-    data : UnitArrays
-        Arrays of the unit, sensor axes.
-    levelling : (roll, pitch, sd), deg, optional
-        Of the stationary vehicle.
-    gravity : float, m/s²
-
-    Raises
-    ------
-    DataError
-        There is such an axis and no leveling is stated: two accelerometer axes do not determine
-        the attitude.
+    `levelling`: (roll, pitch, sd), deg, of the stationary vehicle. `DataError`: there is such an
+    axis and no leveling is stated, as two accelerometer axes do not determine the attitude.
     """
     absent = list(unit.accelerometers[0].absent)
     if not absent:
@@ -617,30 +561,12 @@ def with_gravity(
 def gravity_correction(
     rest: RestStretch, uncertainty: TriadUncertainty, unknown: float, gravity: float
 ) -> tuple[float, Array] | None:
-    """Correction that makes the stationary specific force as long as gravity.
+    """Correction that makes the stationary specific force as long as gravity, and its direction.
 
-    Parameters
-    ----------
-    rest : RestStretch
-        In vehicle axes.
-    uncertainty : TriadUncertainty
-        Of the lowest range.
-    unknown : float, m/s²
-        As `level_at_rest`.
-    gravity : float, m/s²
-
-    Returns
-    -------
-    correction : float, m/s²
-        To be added along the direction.
-    direction : ndarray, (3,)
-        Of the mean specific force, vehicle axes.
-
-    Notes
-    -----
-    It removes the bias along the vertical and the scale-factor error on gravity, as long as the
-    body does not turn. None over a steady interval whose own acceleration is less certain than
-    that bias and scale factor.
+    m/s², and (3,) in vehicle axes. It removes the bias along the vertical and the scale-factor
+    error on gravity, as long as the body does not turn. None over a steady interval whose own
+    acceleration (`unknown`, as `level_at_rest`) is less certain than bias and scale factor of the
+    lowest range.
     """
     assert rest.accel_mean is not None
     mean = np.asarray(rest.accel_mean)

@@ -33,18 +33,8 @@ OUTSIDE = ("refuse", "tell")
 class Term:
     """One term of the logit.
 
-    Attributes
-    ----------
-    input : str
-        Name of the input: ``delta_v``, ``age``, ``crash_type``.
-    coefficient : float
-        Per unit of the transformed input; for a category, added where it matches.
-    unit : str
-        Of the input in the source's table; empty for a category.
-    transform : {'identity', 'log', 'square'}
-        Applied to the input in its unit; log is natural.
-    equals : str, optional
-        The category; such a term has no unit.
+    `coefficient` is per unit of the transformed input (log is natural), `unit` that of the source's
+    table; for a category (`equals`) it is added where the input matches.
     """
 
     input: str
