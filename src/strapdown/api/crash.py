@@ -162,9 +162,7 @@ class CrashRun(CaseResult):
 
 
 def reconstruct(
-    case: str | Path | CaseSpec,
-    *others: str | Path | CaseSpec,
-    progress: Progress = silent,
+    case: str | Path | CaseSpec, *others: str | Path | CaseSpec, progress: Progress = silent
 ) -> CrashRun:
     """Reconstruct a crash: delta-V, direction of force, severity and path, with 95 % bounds.
 

@@ -325,11 +325,7 @@ def _assumed(spec: AssumedSpec) -> Assumed:
 
 
 def _triad(
-    unit: UnitSpec,
-    spec: TriadSpec,
-    records: Mapping[str, CrashRecord],
-    quantity: str,
-    name: str,
+    unit: UnitSpec, spec: TriadSpec, records: Mapping[str, CrashRecord], quantity: str, name: str
 ) -> RecordedTriad:
     table = triad_of_channels(
         records[spec.path],

@@ -100,10 +100,7 @@ class VelocityIncrements:
 
 
 def joint_covariance(
-    increments: Sequence[VelocityIncrements],
-    *,
-    of: str = "force",
-    without: Collection[str] = (),
+    increments: Sequence[VelocityIncrements], *, of: str = "force", without: Collection[str] = ()
 ) -> Array:
     """Covariance, (3 m k, 3 m k), of the increments of k units together, between the same edges.
 

@@ -13,16 +13,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.crash.entry import (
-    ACCEL_BIAS,
-    ATTITUDE,
-    GYRO_BIAS,
-    Entry,
-    EntryState,
-)
-from strapdown.crash.entry import (
-    VELOCITY as VELOCITY_COLUMNS,
-)
+from strapdown.crash.entry import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, Entry, EntryState
+from strapdown.crash.entry import VELOCITY as VELOCITY_COLUMNS
 from strapdown.crash.entry_estimate import (
     AVERAGED,
     RECOVERY,
@@ -345,11 +337,7 @@ def _entry(state: EntryState) -> Entry:
         heading_deg=heading % 360.0,
         unknowns=tuple(
             # A larger bias than estimated leaves less for the motion.
-            (
-                f"{CONTRIBUTOR} {k + 1}",
-                CONTRIBUTOR,
-                (*np.r_[c[:6], nothing, -c[6:]].tolist(),),
-            )
+            (f"{CONTRIBUTOR} {k + 1}", CONTRIBUTOR, (*np.r_[c[:6], nothing, -c[6:]].tolist(),))
             for k, c in enumerate(columns)
         ),
         attitude_deg=(roll, pitch),

@@ -296,11 +296,7 @@ class Asi:
 
 
 def asi(
-    time: ArrayLike,
-    accel: ArrayLike,
-    *,
-    average: str = "butterworth_13hz",
-    cutoff: str = "whole",
+    time: ArrayLike, accel: ArrayLike, *, average: str = "butterworth_13hz", cutoff: str = "whole"
 ) -> Asi:
     """Acceleration severity index of the vehicle at a point near its occupants.
 
@@ -722,13 +718,7 @@ def thiv(
     thiv_value = math.hypot(*met)
     phd, phd_at, findings = _after_impact(t, a, at, phd_average)
     return Thiv(
-        thiv_value,
-        at - start,
-        surface,
-        phd,
-        phd_at,
-        max(float(flown.max()), thiv_value),
-        findings,
+        thiv_value, at - start, surface, phd, phd_at, max(float(flown.max()), thiv_value), findings
     )
 
 

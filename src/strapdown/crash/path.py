@@ -366,11 +366,7 @@ def reconstruct_path(
         )
         imu = _turning(imu, begin.missing)
     names = (*effects.names, *begin.names, *(u[0] for u in origin.unknowns))
-    contributors = (
-        *effects.contributors,
-        *begin.contributors,
-        *(u[1] for u in origin.unknowns),
-    )
+    contributors = (*effects.contributors, *begin.contributors, *(u[1] for u in origin.unknowns))
     start = np.zeros((len(names), 9))
     start[: len(begin.errors)] = begin.errors
     if origin.unknowns:
@@ -438,9 +434,7 @@ def _carried(
         )
     if entry is None and level_time is None:
         raise DataError(
-            "crash.entry-speed-unknown",
-            file=imu.attrs.get("source"),
-            quantity="entry speed",
+            "crash.entry-speed-unknown", file=imu.attrs.get("source"), quantity="entry speed"
         )
     still = replace(origin, velocity=(0.0, 0.0, 0.0), heading_deg=0.0)
     begin = _state(still, levelling.roll_deg, levelling.pitch_deg, float(time[at]))

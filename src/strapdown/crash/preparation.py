@@ -235,10 +235,7 @@ def _find_rest(
 
 
 def _range_biases(
-    unit: CrashUnit,
-    data: UnitArrays,
-    limits: Sequence[RangeLimits],
-    rest: RestStretch | None,
+    unit: CrashUnit, data: UnitArrays, limits: Sequence[RangeLimits], rest: RestStretch | None
 ) -> tuple[list[Array], tuple[int | None, ...], tuple[Triad, ...]]:
     """Bias of every range relative to the lowest: each is tied to the next lower one."""
     bias: list[Array] = [np.zeros(3)]
@@ -389,10 +386,7 @@ READ = 2
 
 
 def prepare_together(
-    together: SynchronisedUnits,
-    point: Sequence[float],
-    gravity: float,
-    options: Mapping[str, Any],
+    together: SynchronisedUnits, point: Sequence[float], gravity: float, options: Mapping[str, Any]
 ) -> list[PointKinematics]:
     """Prepare units, each over its own record, and move them to a point, (3,), m, vehicle axes.
 
@@ -530,10 +524,7 @@ def from_stated_attitude(
 
 
 def with_gravity(
-    unit: CrashUnit,
-    data: UnitArrays,
-    levelling: tuple[float, float, float] | None,
-    gravity: float,
+    unit: CrashUnit, data: UnitArrays, levelling: tuple[float, float, float] | None, gravity: float
 ) -> UnitArrays:
     """Add the gravity component along assumed axes, in sensor axes.
 
@@ -674,10 +665,7 @@ def length_findings(unit: CrashUnit, rest: RestStretch, gravity: float) -> list[
 
 
 def saturation_findings(
-    unit: CrashUnit,
-    data: UnitArrays,
-    limits: Sequence[RangeLimits],
-    gyro_limits: RangeLimits,
+    unit: CrashUnit, data: UnitArrays, limits: Sequence[RangeLimits], gyro_limits: RangeLimits
 ) -> list[Finding]:
     """Report clipping of the last range or the gyro, and ranges unlike the stated ones."""
     found = []
