@@ -211,7 +211,9 @@ def _inputs(
     spec: CaseSpec, case_file: Path | None, records: dict[str, CrashRecord]
 ) -> tuple[InputFiles, ...]:
     sensors = (t.sensor for t in _triads(spec) if t.sensor is not None)
-    given = [] if case_file is None else [("case", str(case_file), (case_file,))]
+    given: list[tuple[str, str, tuple[Path, ...]]] = []
+    if case_file is not None:
+        given.append(("case", str(case_file), (case_file,)))
     given += [("record", path, record.files) for path, record in records.items()]
     # Only the files of sensors that are not of the catalogue.
     given += [("sensor", s, (Path(s),)) for s in dict.fromkeys(sensors) if s.lower() not in SENSORS]

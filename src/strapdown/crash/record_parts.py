@@ -345,8 +345,9 @@ def table_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skippe
             origins[name] = float(raw[0])
             raw = raw.astype(np.int64) - np.int64(raw[0])
         factor = factor_of(channel.quantity, channel.unit)
-        scaled = factor is not None and channel.quantity != "time"
-        columns[name] = raw.astype(np.float64) / factor if scaled else raw.astype(np.float64)
+        columns[name] = raw.astype(np.float64)
+        if factor is not None and channel.quantity != "time":
+            columns[name] /= factor
     rows = max((len(v) for v in columns.values()), default=0)
     if rows < LEAST_SAMPLES:
         raise DataError(

@@ -617,7 +617,8 @@ def _fits(peak: float, end: float | None, full: float) -> bool:
 @cache
 def _full_scales(kind: str) -> dict[str, tuple[float, ...]]:
     """Full scales of all sensors of the catalogue with such a triad, SI."""
-    found, own = {}, "accel" if kind == "acceleration" else "gyro"
+    found: dict[str, tuple[float, ...]] = {}
+    own = "accel" if kind == "acceleration" else "gyro"
     for name in SENSORS:
         sensor = load_sensor(name)
         triad = getattr(sensor.imu_errors, own)
