@@ -741,7 +741,7 @@ ZEROED = 0.05
 class Quiet(NamedTuple):
     """Rest of a triad before the event: samples from the first on, mean and sd of each axis."""
 
-    count: int
+    samples: int
     mean: Array
     sd: Array
 
@@ -776,7 +776,7 @@ def accel_unit(values: Array, step: float, quiet: Quiet) -> Answer:
     power of two.
     """
     length = float(np.linalg.norm(quiet.mean))
-    said, form, gravity, _ = infer_accel(values[: quiet.count], step if step > 0 else None)
+    said, form, gravity, _ = infer_accel(values[: quiet.samples], step if step > 0 else None)
     pairs = [(str(v), p) for v, p in ((said.value, said.confidence), *said.alternatives) if v]
     there = gravity.confidence if gravity.value == "present" else 0.0
     there = min(there, form.confidence if form.value == "rate" else 0.0)
@@ -829,7 +829,9 @@ def gyro_unit(time: Array, values: Array, quiet: Quiet) -> Answer:
     The probabilities of `formats.inference` from the largest rates are combined with peak, offset
     and noise at rest, each as a broad normal distribution of the logarithm.
     """
-    crash = slice(max(quiet.count - 1, 0) if quiet.count < len(values) - LEAST_QUIET else 0, None)
+    crash = slice(
+        max(quiet.samples - 1, 0) if quiet.samples < len(values) - LEAST_QUIET else 0, None
+    )
     said, _, _, _ = infer_gyro(time[crash] - time[crash][0], values[crash], None, {"s": 1.0})
     prior = {str(v): p for v, p in ((said.value, said.confidence), *said.alternatives) if v}
     peak = float(np.abs(values - quiet.mean).max())

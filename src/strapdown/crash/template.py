@@ -637,7 +637,7 @@ def error_model(part: Part, ends: RangeEnds, unit: Unit) -> tuple[Mapping[str, f
     values = part.values[:, part.axes]
     quiet = quiet_part(values)
     # From differences between samples, which contain no motion.
-    moved = np.diff(values[: max(quiet.count, 3)], axis=0)
+    moved = np.diff(values[: max(quiet.samples, 3)], axis=0)
     density = float(np.sqrt(np.mean(moved**2) / 2.0) * math.sqrt(part.step))
     known = [e for e in ends.ends if e is not None]
     reached = max([max(p for p in ends.peak if p == p) * HEADROOM, *known])
