@@ -21,7 +21,7 @@ def ratios() -> Iterator[Ratio]:
     from numba import njit
 
     from strapdown._kernels.ned import ROW, ned_advance
-    from strapdown.crash.monte_carlo import sample_paths
+    from strapdown.crash.path import sample_paths
 
     path = _path()
     leg = path.legs[1]
@@ -57,9 +57,9 @@ def ratios() -> Iterator[Ratio]:
 def _path() -> Any:
     """Path of a simulated pole impact from its entry on, with everything that is not known."""
     from strapdown.crash.entry import Entry
+    from strapdown.crash.reconstruction import reconstruct_crash
     from strapdown.simulation.crash_motion import find_crash
     from strapdown.simulation.crash_recording import paper_units, record_crash
-    from strapdown.systems.crash_reconstruction import reconstruct_crash
 
     crash = find_crash("pole")
     design = next(d for d in paper_units() if d.gyro is not None)

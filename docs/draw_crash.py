@@ -11,6 +11,7 @@ import pandas as pd
 
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.entry import Entry
+from strapdown.crash.reconstruction import reconstruct_crash
 from strapdown.report.chart import (
     AXIS_COLOURS,
     BLACK,
@@ -26,7 +27,6 @@ from strapdown.report.svg_chart import draw
 from strapdown.simulation import point_kinematics
 from strapdown.simulation.crash_motion import find_crash
 from strapdown.simulation.crash_recording import paper_units, record_crash
-from strapdown.systems.crash_reconstruction import reconstruct_crash
 from strapdown.tables import NED, VELOCITY
 
 SEED = 3

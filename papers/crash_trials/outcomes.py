@@ -20,11 +20,13 @@ from strapdown.crash import (
     EventChanges,
     UnitReconstruction,
     VelocityChange,
-    at_point,
     ned_pdof,
     pdof,
     prepare_unit,
     reconstruct_unit,
+)
+from strapdown.crash import (
+    measuring_point as at_point,
 )
 from strapdown.earth import gravity
 from strapdown.errors import DataError

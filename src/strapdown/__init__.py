@@ -53,7 +53,8 @@ if TYPE_CHECKING:
     )
     from strapdown.api.reading import GnssFixes, Imu, Streams, read, read_gnss, read_imu
     from strapdown.crash.entry import Entry
-    from strapdown.crash.monte_carlo import sample_paths
+    from strapdown.crash.path import sample_paths
+    from strapdown.crash.reconstruction import CrashReconstruction, reconstruct_crash
     from strapdown.evaluation.trajectory_differences import (
         summarise_differences,
         trajectory_differences,
@@ -72,7 +73,6 @@ if TYPE_CHECKING:
     from strapdown.sensors.imu_health import check_imu_channels
     from strapdown.sensors.redundant_units import vote_units
     from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
-    from strapdown.systems.crash_reconstruction import CrashReconstruction, reconstruct_crash
 
 __version__ = "0.2.0.dev0"
 
@@ -168,9 +168,9 @@ _HOMES = {
     "read": "strapdown.api.reading",
     "read_gnss": "strapdown.api.reading",
     "read_imu": "strapdown.api.reading",
-    "CrashReconstruction": "strapdown.systems.crash_reconstruction",
+    "CrashReconstruction": "strapdown.crash.reconstruction",
     "Entry": "strapdown.crash.entry",
-    "sample_paths": "strapdown.crash.monte_carlo",
+    "sample_paths": "strapdown.crash.path",
     "trajectory_differences": "strapdown.evaluation.trajectory_differences",
     "summarise_differences": "strapdown.evaluation.trajectory_differences",
     "read_log": "strapdown.formats",
@@ -194,7 +194,7 @@ _HOMES = {
     "ImuUncertainty": "strapdown.sensors.uncertainty",
     "vote_units": "strapdown.sensors.redundant_units",
     "TriadUncertainty": "strapdown.sensors.uncertainty",
-    "reconstruct_crash": "strapdown.systems.crash_reconstruction",
+    "reconstruct_crash": "strapdown.crash.reconstruction",
 }
 
 

@@ -14,12 +14,12 @@ from tests.unit.crash.assumed_case import (
 )
 
 from strapdown.crash.entry import Entry
+from strapdown.crash.reconstruction import reconstruct_crash
 from strapdown.sensors.crash_unit import Assumed, Mounting
 from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.simulation.crash_motion import find_crash
 from strapdown.simulation.crash_recording import paper_units, record_crash
 from strapdown.simulation.mounted_motion import MountedMotion
-from strapdown.systems.crash_reconstruction import reconstruct_crash
 from strapdown.tables import NED, VELOCITY
 
 CASES = 300

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from strapdown.crash.entry import Entry
-from strapdown.crash.reference_path import compare_with_reference
+from strapdown.crash.path import compare_with_reference
+from strapdown.crash.reconstruction import reconstruct_crash
 from strapdown.simulation import point_kinematics
 from strapdown.simulation.cameras import film, paper_cameras, path_from_cameras
 from strapdown.simulation.crash_motion import find_crash
 from strapdown.simulation.crash_recording import paper_units, record_crash
-from strapdown.systems.crash_reconstruction import reconstruct_crash
 from strapdown.tables import NED, POSITION_SD
 
 CRASH = find_crash("pole")

@@ -131,7 +131,7 @@ def test_what_a_sentence_shows_is_given_where_it_is_raised():
 
 
 #: Where findings are shown to people: a terminal, a report, the comments of a proposed case file.
-SHOWN = ("cli", "report", "api", "systems/crash_draft")
+SHOWN = ("cli", "report", "api", "crash/template", "crash/record_parts")
 ON_REQUEST = ("__str__", "__repr__")
 
 

@@ -12,9 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from strapdown import Assumed, Entry, Mounting, read_nhtsa, reconstruct_crash, sample_paths
-from strapdown.crash.reference_path import compare_with_reference
-from strapdown.crash.severity import find_severity_model
-from strapdown.crash.severity_model import injury_risk
+from strapdown.crash.path import compare_with_reference
+from strapdown.crash.severity import find_severity_model, injury_risk
 from strapdown.dsp.channel_class import cfc_filter
 from strapdown.errors import StrapdownError
 from strapdown.sensors.crash_unit import RecordedTriad

@@ -6,11 +6,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from strapdown import rotation
-from strapdown.crash.acceleration import Acceleration, body_acceleration, force_at_rest
+from strapdown.crash.acceleration import (
+    Acceleration,
+    body_acceleration,
+    force_at_rest,
+    window_weights,
+)
 from strapdown.crash.delta_v import delta_v, trailing_delta_v
 from strapdown.crash.events import EventRule, detect_events
 from strapdown.crash.pdof import pdof, pdof_interval
-from strapdown.crash.window_weights import window_weights
 from strapdown.tables import imu_table
 
 samplings = st.sampled_from(["instantaneous", "mean"])

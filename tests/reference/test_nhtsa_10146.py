@@ -15,14 +15,8 @@ import pymap3d
 import pytest
 
 from strapdown import rotation
-from strapdown.crash.indices.asi import asi
-from strapdown.crash.indices.flail_space import flail_space
-from strapdown.crash.indices.hic import hic
-from strapdown.crash.indices.olc import olc
-from strapdown.crash.indices.pulse import from_start, integrals
-from strapdown.crash.indices.thiv import thiv
-from strapdown.crash.severity import find_severity_model
-from strapdown.crash.severity_model import injury_risk
+from strapdown.crash.indices import asi, flail_space, from_start, hic, integrals, olc, thiv
+from strapdown.crash.severity import find_severity_model, injury_risk
 from strapdown.dsp.channel_class import cfc_filter
 from strapdown.formats.crash_nhtsa import accelerations, imu_of
 from strapdown.formats.nhtsa import read_nhtsa
@@ -384,7 +378,7 @@ class TestHeads:
 
 def test_a_case_that_names_the_header_is_the_same_from_its_sealed_copy(recordings, tmp_path):
     from strapdown.config.crash_case_file import read_case_spec
-    from strapdown.systems.crash_case import whole_records
+    from strapdown.crash.case import whole_records
 
     folder = recordings("crash_nhtsa_10146")
     text = (Path(__file__).parent / "cases" / "nhtsa_10146.toml").read_text(encoding="utf-8")

@@ -17,13 +17,12 @@ import pytest
 from strapdown.crash.combine_units import combine_units
 from strapdown.crash.delta_v import delta_v
 from strapdown.crash.entry import Entry
-from strapdown.crash.unit_reconstruction import reconstruct_unit
+from strapdown.crash.reconstruction import reconstruct_crash, reconstruct_unit
 from strapdown.errors import DataError
 from strapdown.formats.nhtsa import read_nhtsa
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.crash_unit import Assumed, CrashUnit, Mounting, RecordedTriad
 from strapdown.sensors.uncertainty import uncertainty_of
-from strapdown.systems.crash_reconstruction import reconstruct_crash
 
 ENTRY = Entry.from_speed(57.09 / 3.6, 0.05)
 # Name, forward, down, place (to the decimetre), change of velocity at 115 ms.

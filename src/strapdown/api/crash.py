@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from html import escape
 from pathlib import Path
 from types import MappingProxyType
@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from strapdown.bundle.seal import Seal
+from strapdown.bundle.seal import Seal, check_destination
 from strapdown.config.crash_case import CaseSpec
 from strapdown.config.crash_case_file import read_case_spec
-from strapdown.crash.unit_reconstruction import UnitReconstruction
+from strapdown.crash.case import CaseResult, run_case
+from strapdown.crash.reconstruction import UnitReconstruction
 from strapdown.errors import ConfigError
 from strapdown.progress import Progress, silent
 from strapdown.report.crash_case import write_crash
-from strapdown.systems.crash_case import CaseResult, run_case
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -30,22 +30,35 @@ __all__ = ["CrashRun", "reconstruct"]
 class CrashRun(CaseResult):
     """Result of a crash reconstruction.
 
-    It adds the properties below to the attributes of `CaseResult`. `save` writes the result; until
-    then it is in memory only.
+    It adds the properties below to the attributes of `CaseResult`, which are those of the first
+    vehicle. `save` writes the result; until then it is in memory only.
+
+    Attributes
+    ----------
+    others : tuple of CrashRun
+        Runs of the other vehicles of the crash, in the order of their cases.
     """
+
+    others: tuple[CrashRun, ...] = ()
+
+    @property
+    def runs(self) -> Mapping[str, CrashRun]:
+        """Run of each vehicle by its number, from ``"1"``."""
+        runs = (self, *self.others)
+        return MappingProxyType({str(k): run for k, run in enumerate(runs, start=1)})
 
     @property
     def vehicles(self) -> Mapping[str, UnitReconstruction]:
-        """Results of each vehicle by its number; currently a case has one, ``"1"``.
+        """Results of each vehicle by its number, from ``"1"``, in the order of the cases.
 
         With several recorders, these are the results of their mean if they agree, else of the
         first. ``vehicles["1"].delta_v`` is the change of velocity of its severest event.
         """
-        return MappingProxyType({"1": self.reconstruction.main})
+        return MappingProxyType({k: run.reconstruction.main for k, run in self.runs.items()})
 
     @property
     def recorders(self) -> Mapping[str, UnitReconstruction]:
-        """Results of each recorder by itself, by name."""
+        """Results of each recorder of the first vehicle by itself, by name."""
         return MappingProxyType({unit.name: unit for unit in self.reconstruction.units})
 
     def to_pandas(self) -> pd.DataFrame:
@@ -55,9 +68,12 @@ class CrashRun(CaseResult):
         -------
         DataFrame
             By recorder, event and quantity (with its unit): ``value``, and the 95 % bounds ``low``
-            and ``high``.
+            and ``high``. Of several vehicles also by ``vehicle``, before these.
         """
-        return self.reconstruction.summary()
+        if not self.others:
+            return self.reconstruction.summary()
+        tables = {k: run.reconstruction.summary() for k, run in self.runs.items()}
+        return pd.concat(tables, names=["vehicle"])
 
     def plot(self, kind: str = "delta-v") -> Figure:
         """Draw one chart of the report.
@@ -101,6 +117,8 @@ class CrashRun(CaseResult):
     ) -> Seal:
         """Write the case as a sealed bundle, which `verify` runs again.
 
+        Of several vehicles each is a bundle of its own, in the folders ``1``, ``2``, … of `out`.
+
         Parameters
         ----------
         out : str or Path
@@ -115,6 +133,7 @@ class CrashRun(CaseResult):
         Returns
         -------
         Seal
+            Of the first vehicle.
 
         Raises
         ------
@@ -123,10 +142,19 @@ class CrashRun(CaseResult):
         DataError
             An input file has changed since it was read.
         """
-        return write_crash(self, out, report=report, force=force, progress=progress)
+        if not self.others:
+            return write_crash(self, out, report=report, force=force, progress=progress)
+        for number in self.runs:
+            check_destination(Path(out) / number, force)
+        seals = [
+            write_crash(run, Path(out) / number, report=report, force=force, progress=progress)
+            for number, run in self.runs.items()
+        ]
+        return seals[0]
 
     def __repr__(self) -> str:
-        return f"<CrashRun {self.spec.name}\n{self.reconstruction!r}>"
+        shown = [f"<CrashRun {r.spec.name}\n{r.reconstruction!r}>" for r in self.runs.values()]
+        return "\n".join(shown)
 
     def _repr_html_(self) -> str:
         table = self.to_pandas().to_html(float_format="{:.4g}".format)
@@ -134,16 +162,17 @@ class CrashRun(CaseResult):
 
 
 def reconstruct(
-    case: str | Path | CaseSpec,
-    *,
-    progress: Progress = silent,
+    case: str | Path | CaseSpec, *others: str | Path | CaseSpec, progress: Progress = silent
 ) -> CrashRun:
     """Reconstruct a crash: delta-V, direction of force, severity and path, with 95 % bounds.
 
     Parameters
     ----------
     case : str, Path or CaseSpec
-        Case file in TOML (``strapdown init crash`` writes one), or its specification.
+        Case file in TOML of a vehicle (``strapdown init crash`` writes one), or its specification.
+    *others : str, Path or CaseSpec
+        Cases of the other vehicles of the crash. Each vehicle is reconstructed from its own
+        recorders; their changes of velocity are not tied to each other.
     progress : callable, optional
         Called with a stage and the completed fraction.
 
@@ -154,13 +183,24 @@ def reconstruct(
     Raises
     ------
     ConfigError
-        The case is inconsistent; the message names the line.
+        A case is inconsistent; the message names the line.
     DataError
         A record cannot be used.
     DivergenceError
         A path left the range possible for a vehicle.
     """
-    file = None if isinstance(case, CaseSpec) else Path(case)
-    spec = case if isinstance(case, CaseSpec) else read_case_spec(Path(case))
-    result = run_case(spec, file, progress)
-    return CrashRun(**{f.name: getattr(result, f.name) for f in fields(result)})
+    cases = (case, *others)
+
+    def run(number: int) -> CaseResult:
+        def part(stage: str, share: float) -> None:
+            progress(stage, (number + share) / len(cases))
+
+        given = cases[number]
+        if isinstance(given, CaseSpec):
+            return run_case(given, None, part)
+        return run_case(read_case_spec(Path(given)), Path(given), part)
+
+    own = {f.name for f in fields(CaseResult)}
+    results = [run(number) for number in range(len(cases))]
+    first, *rest = (CrashRun(**{name: getattr(r, name) for name in own}) for r in results)
+    return replace(first, others=tuple(rest))

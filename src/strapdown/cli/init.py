@@ -83,7 +83,7 @@ def crash(
     from strapdown.cli.console import progress
     from strapdown.cli.draft_file import check_free, write_file
     from strapdown.cli.result_folder import refuse_result
-    from strapdown.systems.crash_draft import draft_case, read_records
+    from strapdown.crash.template import draft_case, read_records
 
     check_free(out, "case.toml", force=force)
     for record in records:

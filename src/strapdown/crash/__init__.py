@@ -8,7 +8,6 @@ from strapdown.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
     from strapdown.crash.acceleration import Acceleration
-    from strapdown.crash.at_point import at_point
     from strapdown.crash.delta_v import delta_v, trailing_delta_v
     from strapdown.crash.delta_v_bound import (
         EventChanges,
@@ -18,14 +17,14 @@ if TYPE_CHECKING:
         velocity_change,
     )
     from strapdown.crash.entry import Entry
-    from strapdown.crash.entry_sensitivity import FixCorrelation
+    from strapdown.crash.entry_estimate import FixCorrelation
     from strapdown.crash.events import detect_events
     from strapdown.crash.gnss_entry import GnssEntry
-    from strapdown.crash.monte_carlo import sample_paths
+    from strapdown.crash.measuring_point import at_point
+    from strapdown.crash.path import PathComparison, compare_with_reference, sample_paths
     from strapdown.crash.pdof import NedPdof, Pdof, ned_pdof, pdof
-    from strapdown.crash.prepare import prepare_unit
-    from strapdown.crash.reference_path import PathComparison, compare_with_reference
-    from strapdown.crash.unit_reconstruction import UnitReconstruction, reconstruct_unit
+    from strapdown.crash.preparation import prepare_unit
+    from strapdown.crash.reconstruction import UnitReconstruction, reconstruct_unit
 
 __all__ = [
     "Acceleration",
@@ -57,18 +56,17 @@ load_on_first_use(
     __name__,
     {
         "acceleration": "Acceleration",
-        "at_point": "at_point",
         "delta_v": "delta_v trailing_delta_v",
-        "delta_v_bound": "EventChanges VelocityChange velocity_change "
-        "body_delta_v_bound resolved_delta_v_bound",
+        "delta_v_bound": "EventChanges VelocityChange body_delta_v_bound "
+        "resolved_delta_v_bound velocity_change",
         "entry": "Entry",
-        "entry_sensitivity": "FixCorrelation",
+        "entry_estimate": "FixCorrelation",
         "events": "detect_events",
         "gnss_entry": "GnssEntry",
-        "monte_carlo": "sample_paths",
+        "measuring_point": "at_point",
+        "path": "PathComparison compare_with_reference sample_paths",
         "pdof": "NedPdof Pdof ned_pdof pdof",
-        "prepare": "prepare_unit",
-        "reference_path": "PathComparison compare_with_reference",
-        "unit_reconstruction": "UnitReconstruction reconstruct_unit",
+        "preparation": "prepare_unit",
+        "reconstruction": "UnitReconstruction reconstruct_unit",
     },
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,6 +25,9 @@ from strapdown.tables.checks import (
     values_of,
 )
 from strapdown.tables.imu import SAMPLINGS
+
+__all__ = ["resolved_weights", "window_weights"]
+
 
 Array = NDArray[np.float64]
 
@@ -106,23 +109,7 @@ class Acceleration:
         return [g for g in find_gaps(self.time) if g.start < end and g.end > start]
 
     def along(self, heading_deg: float) -> Acceleration:
-        """Return a north-east-down record resolved along and across one heading.
-
-        Parameters
-        ----------
-        heading_deg : float, deg
-            Of the vehicle at the impact.
-
-        Returns
-        -------
-        Acceleration
-            In the frame ``impact``: forward and right in the horizontal plane, down.
-
-        Raises
-        ------
-        ConfigError
-            The record is not resolved in north-east-down.
-        """
+        """Resolve a north-east-down record forward and right at one heading, deg: ``impact``."""
         if self.frame != "ned":
             raise ConfigError(
                 "crash.record-frame-heading-turns-north",
@@ -177,17 +164,9 @@ def body_acceleration(imu: pd.DataFrame, at_rest: Sequence[float]) -> Accelerati
 
 
 def force_at_rest(roll_deg: float, pitch_deg: float, gravity: float) -> Array:
-    """Specific force of an unbiased stationary sensor, from the leveling.
+    """Specific force of an unbiased stationary sensor at a roll and pitch, deg: (3,), m/s².
 
-    Parameters
-    ----------
-    roll_deg, pitch_deg : float, deg
-    gravity : float, m/s²
-
-    Returns
-    -------
-    ndarray, (3,), m/s²
-        For `body_acceleration`, where a record has no stationary interval.
+    For `body_acceleration`, where a record has no stationary interval.
     """
     q = rotation.conjugate(rotation.quaternion_from_euler([roll_deg, pitch_deg, 0.0]))
     return rotation.rotate(q, np.array([0.0, 0.0, -gravity]))
@@ -226,26 +205,9 @@ def resolved_acceleration(imu: pd.DataFrame, q_nb: ArrayLike, gravity: float) ->
 def attitude_of_samples(
     q_nb: ArrayLike, sampling: str, samples: int, source: str | None = None
 ) -> Array:
-    """Attitude for rotating each sample: at its stamp, or in the middle of its interval.
+    """Attitude for rotating each sample, (n, 4): at its stamp, or in the middle of its interval.
 
-    Parameters
-    ----------
-    q_nb : array_like, (n, 4)
-        At the stamps.
-    sampling : {'instantaneous', 'mean'}
-    samples : int
-        Number of samples.
-    source : str, optional
-        Name for messages.
-
-    Returns
-    -------
-    ndarray, (n, 4)
-
-    Raises
-    ------
-    DataError
-        There is not one rotation per sample.
+    `q_nb`, (n, 4), is at the stamps. `DataError`: there is not one rotation per sample.
     """
     q = rotation.normalise(q_nb)
     if q.shape != (samples, 4):
@@ -264,3 +226,129 @@ def attitude_of_samples(
         middle = rotation.compose(q[:-1], rotation.quaternion_from_rotation_vector(0.5 * turn))
         q = np.vstack([q[:1], middle])
     return q
+
+
+# Sample weights of an integral over a window: the gradient of a delta-V.
+
+
+def window_weights(
+    time: ArrayLike, start: float, end: float, sampling: str = "instantaneous"
+) -> Array:
+    """Weights of the samples in the integral from one instant to another.
+
+    Parameters
+    ----------
+    time : array_like, (n,), s
+        Increasing stamps.
+    start, end : float, s
+        Within the record; where `end` is before `start`, the integral is negative.
+    sampling : {'instantaneous', 'mean'}
+        Values at the stamps: interpolated linearly (trapezoids, and parts of trapezoids at the
+        ends; second-order error in the step). Means over the interval that ends at the stamp:
+        exact from stamp to stamp; within an interval its mean is used throughout (for an end
+        inside one: error at most h²/8 of the slope there). The first row of means belongs to
+        the time before the record and has zero weight.
+
+    Returns
+    -------
+    ndarray, (n,), s
+        ``w``, such that the integral is ``w @ values``.
+
+    Raises
+    ------
+    ConfigError
+        `sampling` is unknown.
+    DataError
+        The window extends beyond the record, or time does not increase.
+    """
+    stamps = as_array(time, None, "time")
+    check_time(stamps, None)
+    if sampling not in SAMPLINGS:
+        raise ConfigError(
+            "crash.no-kind-sampling", quantity="sampling", sampling=sampling, samplings=SAMPLINGS
+        )
+    check_within(stamps, start, end, None)
+    return _upto(stamps, end, sampling) - _upto(stamps, start, sampling)
+
+
+def check_within(time: Array, start: float, end: float, source: str | None) -> None:
+    """Refuse a window that is not within a record.
+
+    Raises
+    ------
+    DataError
+        The window is not within it, or the record has fewer than two samples.
+    """
+    if len(time) < 2:
+        raise DataError(
+            "crash.sample-change-velocity-needs-least",
+            file=source,
+            quantity="time",
+            count=len(time),
+        )
+    # Instants computed from stamps may exceed the last by rounding.
+    slack = 8.0 * float(np.spacing(np.abs(time[[0, -1]]).max()))
+    for instant in (start, end):
+        if not time[0] - slack <= instant <= time[-1] + slack:
+            raise DataError(
+                "crash.window-not-within-record",
+                file=source,
+                quantity="time",
+                start=start,
+                end=end,
+                time=time[0],
+                time_2=time[-1],
+            )
+
+
+def _upto(time: Array, instant: float, sampling: str) -> Array:
+    """Weights of the integral from the first stamp."""
+    weights = np.zeros(len(time))
+    k = int(np.clip(np.searchsorted(time, instant, side="right"), 1, len(time) - 1))
+    steps = np.diff(time[:k])
+    step = time[k] - time[k - 1]
+    u = (instant - time[k - 1]) / step
+    if sampling == "mean":
+        weights[1:k] = steps
+        weights[k] = step * u
+    else:
+        weights[: k - 1] += 0.5 * steps
+        weights[1:k] += 0.5 * steps
+        weights[k - 1] += step * (u - 0.5 * u * u)
+        weights[k] += step * 0.5 * u * u
+    return weights
+
+
+def resolved_weights(weights: ArrayLike, q_nb: ArrayLike, sampling: str) -> Array:
+    """Gradient of a delta-V in north-east-down with respect to the samples in body axes.
+
+    `weights`, (n,), s, as `window_weights`; `q_nb`, (n, 4), at the stamps. Returns ``G``, (n, 3,
+    3), s: an error ``e[k]`` of the samples changes the delta-V by ``sum G[k] @ e[k]``.
+    """
+    w = as_array(weights, None, "weights")
+    q = attitude_of_samples(q_nb, sampling, len(w))
+    turned: Array = w[:, None, None] * rotation.dcm_from_quaternion(q)
+    return turned
+
+
+# Sums over the unknowns of each line of an error budget.
+
+
+#: Line of the errors that are independent from sample to sample.
+NOISE = "sensor noise"
+
+
+def by_contributor(
+    values: Array, columns: Sequence[str], contributors: Sequence[str], more: Mapping[str, Array]
+) -> pd.DataFrame:
+    """Sum values, (p, k), of unknowns by contributor, in order of occurrence.
+
+    `more`: additional values, (k,), without an unknown, by contributor.
+    """
+    lines = pd.DataFrame(values, columns=list(columns))
+    table = lines.groupby(list(contributors), sort=False).sum()
+    for name, values_of_line in more.items():
+        already = table.loc[name].to_numpy() if name in table.index else np.zeros(len(columns))
+        table.loc[name] = already + values_of_line
+    table.index.name = "contributor"
+    return table

@@ -10,10 +10,8 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.alignment.levelling import level
-from strapdown.crash.at_point import PointKinematics
-from strapdown.crash.compare_units import clipped_axes
-from strapdown.crash.unit_differences import TINY, floored
-from strapdown.crash.unit_effects import SampleEffects, level_turned_by
+from strapdown.crash.consistency import TINY, clipped_axes, floored
+from strapdown.crash.measuring_point import PointKinematics, SampleEffects, level_turned_by
 from strapdown.errors import ConfigError, DataError
 from strapdown.results.rests import RestStretch
 from strapdown.sensors.pre_crash import Levelling
@@ -257,15 +255,9 @@ def _rate_weights(units: Sequence[PointKinematics], counted: NDArray[np.bool_]) 
 class SampleWeights:
     """Weights of one unit in a mean.
 
-    Attributes
-    ----------
-    force : ndarray, (n, 3, 3) or (3, 3)
-        For each sample of the specific force, vehicle axes.
-    rest : ndarray, (3, 3)
-        For the mean stationary specific force.
-    tilt : float
-        For the stationary attitude, as far as it does not follow from that force.
-    rate : float
+    `force`, (n, 3, 3) or (3, 3), for each sample of the specific force in vehicle axes; `rest`, (3,
+    3), for its stationary mean; `tilt` for the stationary attitude, as far as it does not follow
+    from that; `rate`.
     """
 
     force: Array
@@ -283,20 +275,11 @@ class SampleWeights:
 def combine_effects(
     parts: Sequence[SampleEffects], weights: Sequence[float | SampleWeights]
 ) -> SampleEffects:
-    """Effects on a weighted mean of units at one point.
+    """Effects on a weighted mean of units at the same stamps and point; weights sum to one.
 
-    Parameters
-    ----------
-    parts : sequence of SampleEffects
-        Of units at the same stamps and the same point. Unknowns of the same name are one unknown,
-        such as those of a gyro that two units share; the others are independent.
-    weights : sequence of float or SampleWeights
-        Sum of one.
-
-    Returns
-    -------
-    SampleEffects
-        The stationary attitude is the mean of theirs. Noise is that of independent units.
+    Unknowns of the same name are one unknown, such as those of a gyro that two units share; the
+    others are independent. The stationary attitude is the mean of theirs. Noise is that of
+    independent units.
     """
     rows: dict[str, int] = {}
     contributors: list[str] = []
@@ -388,35 +371,17 @@ def force_weights(units: Sequence[PointKinematics]) -> Array:
 
 
 def crash_steps(time: Array) -> Array:
-    """Steps of the crash window, zero outside; all steps where no stamp lies in the window.
-
-    Parameters
-    ----------
-    time : ndarray, (n,), s
-        From the trigger.
-
-    Returns
-    -------
-    ndarray, (n,), s
-    """
+    """Steps, (n,), s, zero outside the crash window; all steps where no stamp is in it."""
     steps = np.gradient(time)
     within = (time >= CRASH_WINDOW[0]) & (time <= CRASH_WINDOW[1])
     return np.where(within, steps, 0.0) if within.any() else steps
 
 
 def velocity_covariance(units: Sequence[PointKinematics]) -> Array:
-    """Joint covariance of the changes of velocity of units over the crash, axis by axis.
+    """Joint covariance, (3, k, k), (m/s)², of the changes of velocity of k units, axis by axis.
 
-    Parameters
-    ----------
-    units : sequence of PointKinematics
-        k units, at the same stamps.
-
-    Returns
-    -------
-    ndarray, (3, k, k), (m/s)²
-        Of the integral of the specific force along each vehicle axis. Unknowns of the same name are
-        one unknown; noise is independent from sample to sample.
+    Of the integral of the specific force over the crash. Unknowns of the same name are one unknown;
+    noise is independent from sample to sample.
     """
     steps = crash_steps(units[0].time)
     columns: dict[str, int] = {}
@@ -434,21 +399,11 @@ def velocity_covariance(units: Sequence[PointKinematics]) -> Array:
 
 
 def least_variance(covariance: Array) -> Array:
-    """Nonnegative weights of sum one that minimize the variance of a mean.
+    """Nonnegative weights, (k,), of sum one that minimize the variance of a mean.
 
-    Parameters
-    ----------
-    covariance : ndarray, (k, k)
-
-    Returns
-    -------
-    ndarray, (k,)
-
-    Notes
-    -----
     ``min |Lᵀ w|² + (1 - 1ᵀ w)²`` over ``w >= 0``, with ``C = L Lᵀ``: for every direction of w the
-    best length gives ``q / (1 + q)``, where q is the variance of the weights of that direction
-    with sum one; the minimum is therefore in the wanted direction.
+    best length gives ``q / (1 + q)``, where q is the variance of the weights of that direction with
+    sum one; the minimum is therefore in the wanted direction.
     """
     from scipy.optimize import nnls
 

@@ -39,21 +39,10 @@ Array = NDArray[np.float64]
 class RollMotion:
     """Roll of a vehicle relative to tipping over.
 
-    Attributes
-    ----------
-    share : float
-        Largest roll energy divided by the energy for tipping over; it tips from 1 on.
-    low, high : float
-        95 % bound of `share`, from the stated errors of the rate and of the initial roll.
-    time : float, s
-        Instant at which `share` was reached.
-    peak_rate_deg_s : float, deg/s
-        Signed, positive to the right.
-    peak_roll_deg : float, deg
-        Largest roll, signed.
-    quarter_turns : int
-        Complete quarter turns of `peak_roll_deg`; one or more is a rollover by NHTSA's definition
-        (rotation of 90 deg or more about the longitudinal or lateral axis).
+    `share`: largest roll energy divided by the energy for tipping over (it tips from 1 on), reached
+    at `time`, s, with the 95 % bound `low` to `high`; signed peaks of rate, deg/s, and roll, deg;
+    `quarter_turns` of the latter: one or more is a rollover by NHTSA's definition (90 deg or more
+    about the longitudinal or lateral axis).
     """
 
     share: float
@@ -107,17 +96,7 @@ class TippingBody:
                 raise ConfigError("crash.no-dimension-vehicle", quantity=f.name, value=value)
 
     def energy_share(self, roll: ArrayLike, rate: ArrayLike) -> Array:
-        """Energy of a roll divided by the energy for tipping over.
-
-        Parameters
-        ----------
-        roll, rate : array_like, (n,), rad and rad/s
-            From level; positive to the right.
-
-        Returns
-        -------
-        ndarray, (n,)
-        """
+        """Energy of a roll, rad, at a rate, rad/s, (n,) each, divided by that for tipping over."""
         angle, turn = np.asarray(roll, dtype=np.float64), np.asarray(rate, dtype=np.float64)
         arm = math.hypot(self.half_track, self.half_track / self.stability_factor)
         tip = math.atan(self.stability_factor)
@@ -140,27 +119,10 @@ class TippingBody:
     ) -> RollMotion:
         """Compute the roll of a record and its ratio to tipping over.
 
-        Parameters
-        ----------
-        time, roll_rate : array_like, (n,), s and rad/s
-            Rate about the forward axis, bias removed. Its integral is the roll while the pitch is
-            small: at 10 deg of pitch and 100 deg/s of yaw, 17 deg/s of roll are missed.
-        start_roll_deg : float, deg
-            Roll at the first sample.
-        rate_sd : float, rad/s
-            Of a constant error of the rate.
-        start_sd_deg : float, deg
-        since : float, s, optional
-            Earlier samples are integrated but not counted.
-
-        Returns
-        -------
-        RollMotion
-
-        Raises
-        ------
-        DataError
-            Stamps and rates differ in length, or no sample is left after `since`.
+        The roll is the integral of the rate about the forward axis, (n,), rad/s, bias removed,
+        valid while the pitch is small: at 10 deg of pitch and 100 deg/s of yaw, 17 deg/s of roll
+        are missed. `rate_sd`, rad/s, of a constant error; samples before `since`, s, are integrated
+        but not counted. `DataError`: lengths differ, or no sample is left.
         """
         stamps, rate = as_array(time, None, "time"), as_array(roll_rate, None, "roll_rate")
         check_same_length(None, time=stamps, roll_rate=rate)
@@ -214,24 +176,11 @@ ROLLOVER = "rollover"
 class CrashType:
     """Type of one event, and its margin to the next type.
 
-    Attributes
-    ----------
-    name : {'front', 'right', 'rear', 'left', 'rollover', 'undetermined'}
-        'undetermined' where a 95 % bound, of the direction of force or of tipping over, spans
-        a border.
-    side : {'front', 'right', 'rear', 'left'}
-        From the estimated direction alone.
-    direction : Pdof
-    interval : AngleInterval or None
-        Of the horizontal direction, 95 %; None without a covariance.
-    margin_deg : float, deg
-        From the direction to the border of the next type.
-    next_type : str
-        Type beyond that border.
-    roll : RollMotion or None
-        None without rates: rollover is then not examined.
-    reason : str
-        Explanation in one sentence.
+    `name` is ``front``, ``right``, ``rear``, ``left``, ``rollover``, or ``undetermined`` where a 95
+    % bound, of the direction of force or of tipping over, spans a border; `side` is from the
+    estimated direction alone. `interval`: 95 % of the horizontal direction, None without a
+    covariance. `margin_deg` to the border of `next_type`. `roll` is None without rates. `reason` is
+    one sentence.
     """
 
     name: str
@@ -245,19 +194,9 @@ class CrashType:
 
 
 def side_of(horizontal_deg: float) -> tuple[str, float, str]:
-    """Type by direction, the distance to the nearest border, and the type beyond it.
+    """Type by direction, deg clockwise from the front, margin to the border, type beyond it.
 
-    Parameters
-    ----------
-    horizontal_deg : float, deg
-        The direction the force came from, clockwise from the front.
-
-    Returns
-    -------
-    name : str
-        A direction on a border belongs to the type clockwise from the border.
-    margin_deg : float, deg
-    next_type : str
+    A direction on a border belongs to the type clockwise from the border.
     """
     names = list(BORDERS)
     quarter, within = divmod(horizontal_deg + 45.0, 90.0)
@@ -372,31 +311,11 @@ def classify_crashes(
     start_roll_sd_deg: float = 0.0,
     body: TippingBody = PASSENGER_CAR,
 ) -> tuple[CrashType, ...]:
-    """Classify each event of a record.
+    """Classify each event of a record: changes and covariances, one per event in order of time.
 
-    Parameters
-    ----------
-    changes : sequence of DeltaV
-        One per event.
-    covariances : sequence of array_like, (3, 3), m²/s², optional
-        One per event.
-    events : sequence of CrashEvent
-        In order of time.
-    time, roll_rate, start_roll_deg, roll_rate_sd, start_roll_sd_deg, body
-        As `classify_crash`, over the whole record. The roll before an event is carried over to
-        it; each event uses the roll from its own time zero to that of the next.
-
-    Returns
-    -------
-    tuple of CrashType
-        One per event.
-
-    Raises
-    ------
-    ConfigError
-        The number of changes or covariances differs from that of events; or as `classify_crash`.
-    DataError
-        As `classify_crash`.
+    Other arguments as `classify_crash`, over the whole record: the roll before an event is carried
+    over to it, and each event uses the roll from its own time zero to that of the next.
+    `ConfigError`: the number of changes or covariances differs from that of events.
     """
     if len(changes) != len(events) or (covariances is not None and len(covariances) != len(events)):
         raise ConfigError(

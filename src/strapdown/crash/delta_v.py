@@ -10,9 +10,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.crash.acceleration import Acceleration
+from strapdown.crash.acceleration import Acceleration, check_within, window_weights
 from strapdown.crash.events import CrashEvent
-from strapdown.crash.window_weights import check_within, window_weights
 from strapdown.dsp.running_integral import running_integral
 from strapdown.errors import ConfigError, DataError
 from strapdown.tables.checks import VELOCITY, index_of, source_of, values_of
@@ -75,19 +74,7 @@ class DeltaV:
         return math.hypot(float(self.vector[0]), float(self.vector[1]))
 
     def noise_covariance(self, noise: ArrayLike) -> Array:
-        """Covariance from white noise of the samples alone.
-
-        Parameters
-        ----------
-        noise : array_like, m/s²
-            Standard deviation of a sample: one number, (3,), or (n, 3).
-
-        Returns
-        -------
-        ndarray, (3, 3), m²/s²
-            Diagonal: ``sum(weights² noise²)``. The error budget holds all other errors of a
-            sensor.
-        """
+        """Covariance, (3, 3), m²/s², from white noise alone: sd, m/s², one, (3,) or (n, 3)."""
         sds = np.broadcast_to(np.asarray(noise, dtype=np.float64), (len(self.weights), 3))
         return np.diag(self.weights**2 @ sds**2)
 
@@ -128,10 +115,6 @@ def delta_v(
         Anywhere within the record; interpolated between samples as in `window_weights`.
     across_gaps : bool
         Bridge gaps of the record by linear interpolation.
-
-    Returns
-    -------
-    DeltaV
 
     Raises
     ------
@@ -175,18 +158,7 @@ def event_delta_v(
 
     Parameters
     ----------
-    acceleration : Acceleration
-    event : CrashEvent
     across_gaps : bool
-        As `delta_v`.
-
-    Returns
-    -------
-    DeltaV
-
-    Raises
-    ------
-    DataError
         As `delta_v`.
     """
     return delta_v(acceleration, event.time_zero, event.end, across_gaps=across_gaps)
@@ -199,7 +171,6 @@ def cumulative_delta_v(
 
     Parameters
     ----------
-    acceleration : Acceleration
     start, end : float, s
         Within the record.
     every : float, s, optional
@@ -255,10 +226,6 @@ def trailing_delta_v(
         number of samples, its start is interpolated.
     start, end : float, s, optional
         Range of the window ends; by default wherever the record reaches back far enough.
-
-    Returns
-    -------
-    TrailingDeltaV
 
     Raises
     ------
@@ -379,15 +346,7 @@ class VelocityCourse:
 def _largest(
     course: Callable[[Array], Polynomials], breaks: Array, low: float, high: float
 ) -> float:
-    """Instant in an interval at which the length of a vector of quadratics is largest.
-
-    Parameters
-    ----------
-    course : callable
-        Value, slope and half the curvature at instants between breaks.
-    breaks : ndarray
-    low, high : float
-    """
+    """Instant in an interval at which the length of a vector of quadratics is largest."""
     nodes = np.unique(np.r_[low, breaks[(breaks > low) & (breaks < high)], high])
     sizes = np.sqrt((course(nodes)[0] ** 2).sum(axis=1))
     best = int(np.argmax(sizes))
@@ -430,18 +389,10 @@ RECORDED, SEARCHED, BEYOND_END, EVERY = 0.250, 0.300, 0.030, 0.010
 
 @dataclass(frozen=True)
 class MaximumDeltaV:
-    """Largest cumulative changes of velocity of an event (49 CFR 563.5(b)).
+    """Largest cumulative changes of velocity of an event (49 CFR 563.5(b)), m/s.
 
-    Attributes
-    ----------
-    longitudinal, lateral : float, m/s
-        Signed.
-    resultant : float, m/s
-        Largest of the vector sum of the two at one instant.
-    longitudinal_time, lateral_time, resultant_time : float, s
-        From time zero.
-    searched : float, s
-        Searched time from time zero.
+    Longitudinal and lateral signed, resultant of both at one instant; times, s, and the searched
+    time from time zero.
     """
 
     longitudinal: float
@@ -482,22 +433,9 @@ def recorder_delta_v(acceleration: Acceleration, event: CrashEvent) -> pd.DataFr
 def maximum_delta_v(acceleration: Acceleration, event: CrashEvent) -> MaximumDeltaV:
     """Largest cumulative change of velocity since time zero, and the time to it.
 
-    Parameters
-    ----------
-    acceleration : Acceleration
-        In the frame ``body`` or ``impact``.
-    event : CrashEvent
-
-    Returns
-    -------
-    MaximumDeltaV
-        Searched over 300 ms, to 30 ms after the end of the event, or to the end of the
-        record, whichever is least (49 CFR 563.5(b), 563.8 Table III).
-
-    Raises
-    ------
-    DataError
-        Time zero is not within the record.
+    In the frame ``body`` or ``impact``, over 300 ms, to 30 ms after the end of the event, or to the
+    end of the record, whichever is least (49 CFR 563.5(b), 563.8 Table III). `DataError`: time zero
+    is not in the record.
     """
     zero = event.time_zero
     check_within(acceleration.time, zero, zero, acceleration.source)
@@ -520,24 +458,10 @@ def maximum_delta_v(acceleration: Acceleration, event: CrashEvent) -> MaximumDel
 
 
 def trajectory_delta_v(trajectory: pd.DataFrame, start: float, end: float) -> DeltaV:
-    """Change of velocity between two instants of a navigated trajectory.
+    """Change of velocity between two instants of a navigated trajectory, in the frame ``ned``.
 
-    Parameters
-    ----------
-    trajectory : DataFrame
-        Trajectory table at the reference point; its velocities do not contain gravity.
-    start, end : float, s
-        Within the trajectory; the velocity is interpolated linearly.
-
-    Returns
-    -------
-    DeltaV
-        In the frame ``ned``; the weights are those of the velocities.
-
-    Raises
-    ------
-    DataError
-        The window is empty or extends beyond the trajectory.
+    The velocity is interpolated linearly; the weights are those of the velocities. `DataError`: the
+    window is empty or extends beyond the trajectory.
     """
     check_trajectory(trajectory)
     time, source = index_of(trajectory), source_of(trajectory)

@@ -11,13 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown.constants import STANDARD_GRAVITY as GRAVITY
 from strapdown.constants import TWO_SIDED_95
+from strapdown.crash.acceleration import NOISE, by_contributor
 from strapdown.crash.delta_v import DeltaV
-from strapdown.crash.leg import ATTITUDE, VELOCITY
-from strapdown.crash.path import CrashPath
+from strapdown.crash.measuring_point import SampleEffects
+from strapdown.crash.path import ATTITUDE, VELOCITY, CrashPath
 from strapdown.crash.pdof import NedPdof, Pdof, PdofInterval, ned_pdof, pdof, pdof_interval
-from strapdown.crash.reconstruction_summary import change_line
-from strapdown.crash.unit_effects import SampleEffects
-from strapdown.crash.window_weights import NOISE, by_contributor
 from strapdown.errors import DataError
 from strapdown.rotation import cross_matrix
 
@@ -153,12 +151,7 @@ def _at(time: Array, values: Array, instant: float) -> Array:
 
 
 def _noise_between(path: CrashPath, start: float, end: float) -> Array:
-    """Covariance of the change of velocity between two instants from noise.
-
-    Noise on the force is independent from step to step, so that its variances subtract; the
-    attitude error from gyro noise before the window still acts within it. A window before the
-    entry is treated alike, in reverse order.
-    """
+    """Covariance of the change of velocity between two instants from noise."""
     noise, entry = path.noise_covariance[None], path.time[path.anchor]
     if end <= entry + 1e-9:
         start, end = end, start
@@ -275,3 +268,31 @@ def velocity_change(
     """
     direction = ned_pdof(change, heading_deg) if change.frame == "ned" else pdof(change)
     return VelocityChange(window, change, bound, direction, pdof_interval(change, bound.covariance))
+
+
+def change_line(change: VelocityChange) -> str:
+    """One change of velocity as a line of text."""
+    axes = "north, east, down" if change.delta_v.frame == "ned" else "forward, right, down"
+    parts = ", ".join(
+        f"{v:.2f} ± {b:.2f}"
+        for v, b in zip(change.delta_v.vector, change.bound.half_width, strict=True)
+    )
+    at, low, high = direction_bounds(change)
+    name = "azimuth" if change.delta_v.frame == "ned" else "PDOF"
+    direction = (
+        "not determined"
+        if change.interval.horizontal.undetermined
+        else f"{at:.1f} deg ({low:.1f} to {high:.1f})"
+    )
+    return (
+        f"{change.window} {change.delta_v.start:.4f} to {change.delta_v.end:.4f} s: {axes} "
+        f"{parts} m/s; {name} {direction}"
+    )
+
+
+def direction_bounds(change: VelocityChange) -> tuple[float, float, float]:
+    """Horizontal direction and its bounds, deg; bounds within half a turn of the direction."""
+    across = change.interval.horizontal
+    at = change.pdof.azimuth_deg if isinstance(change.pdof, NedPdof) else change.pdof.horizontal_deg
+    turn = 360.0 * round((at - 0.5 * (across.low_deg + across.high_deg)) / 360.0)
+    return at, across.low_deg + turn, across.high_deg + turn

@@ -234,27 +234,19 @@ class EntryState:
     ----------
     state : NavState
         Of the vehicle's reference point, at a sample of the Imu table.
-    gyro_bias : triple, rad/s
-    accel_bias : triple, m/s²
-        Excess of the Imu table at its mean rate and mean specific force over the window,
-        including the effect of scale, misalignment and g-sensitivity at these (mostly on
-        gravity). To be subtracted from the table.
+    gyro_bias, accel_bias : triple, rad/s, m/s²
+        Excess of the Imu table at `mean_rate` and `mean_specific_force` of the window, with the
+        effect of scale, misalignment and g-sensitivity there. To be subtracted from the table.
     covariance : ndarray, (15, 15)
-        Of `POSITION`, `VELOCITY`, `ATTITUDE`, `GYRO_BIAS`, `ACCEL_BIAS`. The attitude's error is
-        the rotation vector phi about north, east, down of ``C_true = exp([phi x]) C_estimate``.
-    mean_rate, mean_specific_force : triple, rad/s, m/s²
-        Values at which the biases hold.
+        Of `POSITION`, `VELOCITY`, `ATTITUDE`, `GYRO_BIAS`, `ACCEL_BIAS`; attitude as the rotation
+        vector phi about north, east, down of ``C_true = exp([phi x]) C_estimate``.
     fixes : DataFrame
-        Every fix from the beginning of the window on, by its stamp: ``used``; ``why`` it was
-        rejected or down-weighted; ``position_weight``, ``velocity_weight`` from 0 to 1; and
-        ``position_misfit``, ``velocity_misfit``: difference from the prediction by all others,
-        in standard deviations of that difference (root of the squared Mahalanobis distance; NaN
-        where not measured or not used).
-    chi_square : float
+        Every fix from the beginning of the window on, by its stamp: ``used``, ``why`` it was
+        rejected or down-weighted, weights from 0 to 1 and misfits of position and velocity:
+        difference from the prediction by all others in standard deviations (NaN where not measured
+        or not used).
+    chi_square, degrees_of_freedom : float, int
         Of the residuals of all used fixes, with their weights, and the priors.
-    degrees_of_freedom : int
-    iterations : int
-    findings : tuple of Finding
     """
 
     state: NavState
@@ -334,17 +326,10 @@ def rotated(q_nb: Array, phi: Array) -> Array:
 
 
 def angle_rates(roll_pitch_heading: ArrayLike) -> Array:
-    """Matrices from a small rotation vector in local level to changes of the angles.
+    """Matrices, (n, 3, 3), from a small rotation vector in local level to changes of the angles.
 
-    Parameters
-    ----------
-    roll_pitch_heading : array_like, (n, 3), deg
-
-    Returns
-    -------
-    ndarray, (n, 3, 3), rad per rad
-        Of roll, pitch, heading for a rotation about north, east, down with
-        ``C' = (I + [phi x]) C``. Not valid near a pitch of 90 deg, where it is infinite.
+    Of roll, pitch, heading, (n, 3), deg, for ``C' = (I + [phi x]) C``. Infinite at a pitch of 90
+    deg.
     """
     angles = np.radians(np.asarray(roll_pitch_heading, dtype=np.float64))
     pitch, heading = angles[:, 1], angles[:, 2]
@@ -358,17 +343,9 @@ def angle_rates(roll_pitch_heading: ArrayLike) -> Array:
 
 
 def angles_sd(roll_pitch_heading: ArrayLike, covariance: Array) -> Array:
-    """Standard deviations of the angles, to first order.
+    """Standard deviations of the angles, (n, 3), deg, to first order.
 
-    Parameters
-    ----------
-    roll_pitch_heading : array_like, (n, 3), deg
-    covariance : ndarray, (n, 3, 3), rad²
-        Of the rotation vector in local level, as `angle_rates` takes it.
-
-    Returns
-    -------
-    ndarray, (n, 3), deg
+    From the covariance, (n, 3, 3), rad², of the rotation vector in local level.
     """
     rates = angle_rates(roll_pitch_heading)
     turned = np.einsum("nij,njk,nlk->nil", rates, covariance, rates)

@@ -201,7 +201,6 @@ class CrashEvents:
     ----------
     events : tuple of CrashEvent
         In order of time; the last one may last beyond the record.
-    rule : EventRule
     woken : int
         Number of times the wake threshold was exceeded without an event: potholes, curbs, doors.
     largest_change : float, m/s
@@ -210,8 +209,6 @@ class CrashEvents:
     largest_axis : {'longitudinal', 'lateral'}
     largest_time : float, s
         End of that window; NaN without any change.
-    source : str or None
-    findings : tuple of Finding
     """
 
     events: tuple[CrashEvent, ...]
@@ -407,7 +404,6 @@ class EventDetector:
 
     Parameters
     ----------
-    rule : EventRule
     sampling : {'instantaneous', 'mean'}
         Whether a sample is the value at its stamp or the mean over the interval ending there.
     noise : float or (3,), m/s²
@@ -505,23 +501,10 @@ class EventDetector:
         return float(state[kernel.MOST]), axis, float(state[kernel.MOST_TIME])
 
     def update(self, time: float, accel: Array | Sequence[float]) -> tuple[CrashEvent, ...]:
-        """Process one sample.
+        """Process one sample: time, s, later than the preceding; acceleration, (3,), m/s².
 
-        Parameters
-        ----------
-        time : float, s
-            Later than that of the preceding sample.
-        accel : array_like, (3,), m/s²
-
-        Returns
-        -------
-        tuple of CrashEvent
-            Events ended by this sample, usually none.
-
-        Raises
-        ------
-        DataError
-            Time does not increase, or a number is not finite. The sample is then not processed.
+        Returns the events ended by it. `DataError`: time does not increase, or a number is not
+        finite; the sample is then not processed.
         """
         held = self._held
         if 0 < held < len(self._rows) and np.shape(accel) == (3,):
@@ -535,23 +518,7 @@ class EventDetector:
         return self.extend([time], [accel])  # type: ignore[arg-type]
 
     def extend(self, time: ArrayLike, accel: ArrayLike) -> tuple[CrashEvent, ...]:
-        """Process a chunk of a record.
-
-        Parameters
-        ----------
-        time : array_like, (n,), s
-        accel : array_like, (n, 3), m/s²
-
-        Returns
-        -------
-        tuple of CrashEvent
-            Events that ended in it.
-
-        Raises
-        ------
-        DataError
-            As `update`; then no sample of the chunk is processed.
-        """
+        """Process a chunk of a record, (n,), s, and (n, 3), m/s², as `update`: all or none."""
         try:
             stamps = np.asarray(time, dtype=np.float64)
             values = np.asarray(accel, dtype=np.float64)

@@ -13,26 +13,20 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.crash.at_point import PointKinematics
-from strapdown.crash.entry import (
-    ACCEL_BIAS,
-    ATTITUDE,
-    GYRO_BIAS,
-    Entry,
-    EntryState,
-)
-from strapdown.crash.entry import (
-    VELOCITY as VELOCITY_COLUMNS,
-)
-from strapdown.crash.entry_estimate import Estimate, Fixes, estimate
-from strapdown.crash.entry_sensitivity import (
+from strapdown.crash.entry import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, Entry, EntryState
+from strapdown.crash.entry import VELOCITY as VELOCITY_COLUMNS
+from strapdown.crash.entry_estimate import (
     AVERAGED,
     RECOVERY,
     EntryPriors,
+    Estimate,
+    Fixes,
     between,
+    estimate,
     judge_fixes,
     record_of_fixes,
 )
+from strapdown.crash.measuring_point import PointKinematics
 from strapdown.ellipsoids import WGS84
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.evaluation.control_points import rigid_fit
@@ -88,10 +82,6 @@ def entry_state_from_gnss(
         From the reference point, in vehicle axes.
     ellipsoid : str
         Reference ellipsoid of the positions, one of `ellipsoids.ELLIPSOIDS`.
-
-    Returns
-    -------
-    EntryState
 
     Raises
     ------
@@ -291,8 +281,6 @@ def start_from_gnss(
 
     Parameters
     ----------
-    at : PointKinematics
-    given : GnssEntry
     point : sequence of float, (3,), m
         New point of the unit, vehicle axes from the vehicle's origin.
 
@@ -307,11 +295,6 @@ def start_from_gnss(
         With joint covariance of attitude, velocity and biases.
     state : EntryState
         The estimate, with every fix and the reason why it was used or not.
-
-    Raises
-    ------
-    DataError, ConfigError, DivergenceError
-        As `entry_state_from_gnss`; or an axis or the turning of the unit is assumed.
     """
     unit = None if at.prepared is None else at.prepared.unit
     if unit is None or unit.gyro is None:
@@ -354,11 +337,7 @@ def _entry(state: EntryState) -> Entry:
         heading_deg=heading % 360.0,
         unknowns=tuple(
             # A larger bias than estimated leaves less for the motion.
-            (
-                f"{CONTRIBUTOR} {k + 1}",
-                CONTRIBUTOR,
-                (*np.r_[c[:6], nothing, -c[6:]].tolist(),),
-            )
+            (f"{CONTRIBUTOR} {k + 1}", CONTRIBUTOR, (*np.r_[c[:6], nothing, -c[6:]].tolist(),))
             for k, c in enumerate(columns)
         ),
         attitude_deg=(roll, pitch),
@@ -409,20 +388,9 @@ def first_guesses(
 ) -> tuple[list[NavState], list[Finding]]:
     """Guess position and velocity from the last fixes, and one or two headings.
 
-    Parameters
-    ----------
-    turned : NavigationRun
-        From a level, stationary start heading north, up to the anchor.
-    fixes : Fixes
-        The accepted fixes.
-    priors : EntryPriors
-
-    Returns
-    -------
-    guesses : list of NavState
-        Heading from the priors, or the direction of travel; and, where it differs, the heading
-        for which the velocity changes of the sensors agree best with those of the fixes.
-    findings : list of Finding
+    `turned` runs from a level, stationary start heading north up to the anchor. Headings: of the
+    priors, or the direction of travel; and, where it differs, the one for which the velocity
+    changes of the sensors agree best with those of the fixes.
     """
     velocity = _velocities(fixes)
     late = np.median(velocity[-_LAST:], axis=0)

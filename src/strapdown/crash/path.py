@@ -1,9 +1,11 @@
-"""Path and attitude of the reference point near a crash, with linear covariance."""
+"""Integration segment of a record, forward or backward from the entry of a path."""
 
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -12,25 +14,194 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import frames, rotation
-from strapdown._kernels.ned import ALT, LAT, LON, Q, V
+from strapdown._kernels.crash_errors import grow_errors, grow_noise, perturbed_runs
+from strapdown._kernels.earth import RATE
+from strapdown._kernels.ned import ALT, LAT, LON, ROW, Q, V, reverse_increments
 from strapdown.constants import STANDARD_GRAVITY as GRAVITY
+from strapdown.constants import TWO_SIDED_95
+from strapdown.crash.acceleration import NOISE, by_contributor, window_weights
 from strapdown.crash.entry import Entry, angles_sd
-from strapdown.crash.leg import ATTITUDE, PLACE, VELOCITY, IntegrationSegment, make_leg
-from strapdown.crash.reconstruction_summary import path_line
-from strapdown.crash.unit_effects import SampleEffects
-from strapdown.crash.window_weights import NOISE, by_contributor, window_weights
+from strapdown.crash.measuring_point import SampleEffects
 from strapdown.earth import earth_rate
 from strapdown.ellipsoids import find_ellipsoid
-from strapdown.errors import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError, DivergenceError
+from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown
 from strapdown.nav_state import NavState
 from strapdown.rotation import cross_matrix
 from strapdown.sensors.pre_crash import Levelling
 from strapdown.sensors.triad_errors import triad_of
-from strapdown.tables import ACCEL, EULER, GYRO, NED
+from strapdown.tables import ACCEL, EULER, GYRO, MOTION, NED, POSITION_SD
 from strapdown.tables import VELOCITY as VELOCITIES
 
 Array = NDArray[np.float64]
+
+# Columns of an error: rotation vector in level, velocity, position.
+ATTITUDE, VELOCITY, PLACE = slice(0, 3), slice(3, 6), slice(6, 9)
+
+
+@dataclass(frozen=True, eq=False)
+class IntegrationSegment:
+    """Increments of a segment, the effects of the unknowns on them, and the resulting states.
+
+    A backward segment is a motion of its own, with opposite velocity on an Earth that rotates the
+    other way; `errors`, `noise_covariance` and values read from `nominal` are reversed by the code
+    that joins them.
+
+    Attributes
+    ----------
+    time : ndarray, (k + 1,), s
+        In the order of integration.
+    state, rows, nominal : ndarray
+        Kernel state at the start, motion increments (k, 10), states (k + 1, 10).
+    effects : ndarray, (p, 6, k)
+        Effect of one standard deviation of each unknown on angle and velocity of each step.
+    noise_sd : ndarray, (6, k)
+    earth, options : ndarray
+        Kernel arguments.
+    """
+
+    backward: bool
+    time: Array
+    state: Array
+    rows: Array
+    nominal: Array
+    effects: Array
+    noise_sd: Array
+    earth: Array
+    options: Array
+
+    def errors(self, start: Array) -> Array:
+        """Propagate the errors of the unknowns from (p, 9) at the start to (p, k + 1, 9)."""
+        out = np.empty((len(start), len(self.time), 9))
+        theta = self.effects[:, :3].transpose(0, 2, 1)
+        # An error of the rotation vector rotates the end of the step by this.
+        theta = theta + 0.5 * np.cross(self.rows[:, 1:4], theta)
+        grow_errors(
+            self._attitude(),
+            self.rows,
+            self._met(start),
+            np.ascontiguousarray(theta.transpose(0, 2, 1)),
+            np.ascontiguousarray(self.effects[:, 3:]),
+            out,
+        )
+        return self._met(out)
+
+    def noise_covariance(self) -> Array:
+        """Covariance from the noise of the steps, (k + 1, 9, 9)."""
+        out = np.empty((len(self.time), 9, 9))
+        grow_noise(
+            self._attitude(),
+            self.rows,
+            self.noise_sd[:3].copy(),
+            self.noise_sd[3:].copy(),
+            np.zeros((9, 9)),
+            out,
+        )
+        if self.backward:
+            out[:, VELOCITY] *= -1.0
+            out[:, :, VELOCITY] *= -1.0
+        return out
+
+    def _attitude(self) -> Array:
+        return np.ascontiguousarray(rotation.dcm_from_quaternion(self.nominal[:-1, Q : Q + 4]))
+
+    def _met(self, errors: Array) -> Array:
+        """Errors in the order of integration from those of the motion, or the reverse."""
+        if not self.backward:
+            return np.ascontiguousarray(errors)
+        met = errors.copy()
+        met[..., VELOCITY] *= -1.0
+        return met
+
+
+def make_leg(
+    mechanization: NorthEastDown,
+    start: NavState,
+    imu: pd.DataFrame,
+    effects: SampleEffects,
+    rows: slice,
+    *,
+    backward: bool,
+) -> IntegrationSegment:
+    """Cut a segment out of a record and navigate it.
+
+    `start` is at the first sample of `rows`, or at the last where the segment runs backward; one
+    sample is a segment without a step. `DivergenceError`: the path left the range of the
+    mechanization.
+    """
+    part = imu.iloc[rows]
+    part.attrs = dict(imu.attrs)
+    mean = imu.attrs.get("sampling") == "mean"
+    time = part.index.to_numpy(dtype=np.float64)
+    state = mechanization.begin(start)
+    earth = find_ellipsoid(mechanization.ellipsoid).parameters()
+    steps = len(time) - 1
+    increments = np.empty((steps, len(MOTION)))
+    if steps:
+        increments[:] = motion_increments(part)[MOTION].to_numpy(dtype=np.float64)
+    theta = _over_steps(effects.rate[:, rows], time, mean)
+    force = _over_steps(effects.force[:, rows], time, mean)
+    dv = increments[:, 4:7]
+    # Half of the rotation precedes the middle of the velocity increment.
+    force = force + 0.5 * np.cross(theta, dv)
+    # A sample has the same noise in the step before it: over steps it adds up as if each step
+    # had the noise of one sample alone.
+    noise = np.concatenate([effects.rate_noise[rows], effects.force_noise[rows]], axis=1)
+    noise = noise[1:] * np.diff(time)[:, None]
+    if backward:
+        increments, theta, force, noise = _reversed(increments, theta, force, noise)
+        earth[RATE] *= -1.0
+        state[V : V + 3] *= -1.0
+        time = time[::-1].copy()
+    nominal = np.empty((steps + 1, ROW))
+    nominal[0] = state[:ROW]
+    own = state.copy()
+    made, _ = mechanization.advance_rows(own, increments, np.empty(0), earth, nominal[1:])
+    if made < steps:
+        raise DivergenceError(
+            "crash.path-leaves-vehicle-can-do",
+            file=imu.attrs.get("source"),
+            quantity="path",
+            time=time[made],
+        )
+    return IntegrationSegment(
+        backward,
+        time,
+        state,
+        increments,
+        nominal,
+        np.ascontiguousarray(np.concatenate([theta, force], axis=2).transpose(0, 2, 1)),
+        np.ascontiguousarray(noise.T),
+        earth,
+        mechanization.kernel_options(),
+    )
+
+
+def _over_steps(values: Array, time: Array, mean: bool) -> Array:
+    """Integrate (p, n, 3) samples over the n - 1 steps between them."""
+    dt = np.diff(time)[:, None]
+    if mean:
+        return np.asarray(values[:, 1:] * dt)
+    return np.asarray(0.5 * (values[:, 1:] + values[:, :-1]) * dt)
+
+
+def _reversed(
+    increments: Array, theta: Array, force: Array, noise: Array
+) -> tuple[Array, Array, Array, Array]:
+    """As `reverse_increments`, including the effects on the steps."""
+    out = np.empty_like(increments)
+    reverse_increments(increments, out)
+    if not len(increments):
+        return out, theta, force, noise
+    back = rotation.dcm_from_rotation_vector(-increments[:, 1:4])
+    felt = np.einsum("kij,pkj->pki", back, force)
+    felt -= np.cross(theta, np.einsum("kij,kj->ki", back, increments[:, 4:7]))
+    return out, -theta[:, ::-1], felt[:, ::-1], noise[::-1]
+
+
+# Path and attitude of the reference point near a crash, with linear covariance.
+
 
 #: Columns of an error, in order.
 ERROR = ["phi_n", "phi_e", "phi_d", *VELOCITIES, *NED]
@@ -97,27 +268,26 @@ class CrashPath:
         return pd.DataFrame(values, index=self.table.index, columns=[*NED, *VELOCITIES, *EULER])
 
     def variances(self, row: int = -1) -> pd.DataFrame:
-        """Variance contributed by each contributor at a sample.
+        """Variance by contributor at a sample, columns as `ERROR`: rad², (m/s)², m².
 
-        Parameters
-        ----------
-        row : int
-
-        Returns
-        -------
-        DataFrame
-            Indexed by contributor, columns as `ERROR`: rad², (m/s)², m². The column sums are
-            the diagonal of `covariance`.
-
-        Raises
-        ------
-        ConfigError
-            The sample does not exist.
+        The column sums are the diagonal of `covariance`. `ConfigError`: the sample does not exist.
         """
         if not -len(self.time) <= row < len(self.time):
             raise ConfigError("crash.no-sample", quantity="row", at_row=row, count=len(self.time))
         noise = {NOISE: np.diagonal(self.noise_covariance[row])}
         return by_contributor(self.errors[:, row] ** 2, ERROR, self.contributors, noise)
+
+
+def path_line(path: CrashPath) -> str:
+    """End point of a path as a line of text."""
+    sd = TWO_SIDED_95 * path.sd[NED].iloc[-1].to_numpy()
+    ends = ", ".join(
+        f"{v:.2f} ± {s:.2f}" for v, s in zip(path.table[NED].iloc[-1], sd, strict=True)
+    )
+    return (
+        f"path {path.time[0]:.4g} to {path.time[-1]:.4g} s, ends north, east, down {ends} m from "
+        f"its entry at {path.entry.time:.4g} s"
+    )
 
 
 def reconstruct_path(
@@ -154,10 +324,6 @@ def reconstruct_path(
     zeroed_at_rest : bool
         The mean rate up to `level_time` was subtracted as bias, and with it the Earth rate
         in the attitude at that time.
-
-    Returns
-    -------
-    CrashPath
 
     Raises
     ------
@@ -199,11 +365,7 @@ def reconstruct_path(
         )
         imu = _turning(imu, begin.missing)
     names = (*effects.names, *begin.names, *(u[0] for u in origin.unknowns))
-    contributors = (
-        *effects.contributors,
-        *begin.contributors,
-        *(u[1] for u in origin.unknowns),
-    )
+    contributors = (*effects.contributors, *begin.contributors, *(u[1] for u in origin.unknowns))
     start = np.zeros((len(names), 9))
     start[: len(begin.errors)] = begin.errors
     if origin.unknowns:
@@ -220,10 +382,7 @@ def reconstruct_path(
 
 @dataclass(frozen=True, eq=False)
 class _Begin:
-    """State at the entry, its errors from sensors and leveling, and their names.
-
-    Includes the rate missing from all samples, vehicle axes.
-    """
+    """State at the entry, its errors from sensors and leveling, and their names."""
 
     state: NavState
     names: tuple[str, ...]
@@ -274,9 +433,7 @@ def _carried(
         )
     if entry is None and level_time is None:
         raise DataError(
-            "crash.entry-speed-unknown",
-            file=imu.attrs.get("source"),
-            quantity="entry speed",
+            "crash.entry-speed-unknown", file=imu.attrs.get("source"), quantity="entry speed"
         )
     still = replace(origin, velocity=(0.0, 0.0, 0.0), heading_deg=0.0)
     begin = _state(still, levelling.roll_deg, levelling.pitch_deg, float(time[at]))
@@ -396,25 +553,10 @@ WINDOW = (-0.1, 0.75)
 
 
 def path_rows(imu: pd.DataFrame, at: float, window: Sequence[float] | None) -> tuple[int, int, int]:
-    """Find the first sample, the entry sample and the last sample of a path.
+    """Find the first sample, the sample nearest to the entry, and the last sample of a path.
 
-    Parameters
-    ----------
-    imu : DataFrame
-    at : float, s
-        Instant of the entry.
-    window : (float, float), s, optional
-        By default `WINDOW`, as far as recorded.
-
-    Returns
-    -------
-    first, anchor, last : int
-        The entry sample is the one nearest to the entry, and always within the path.
-
-    Raises
-    ------
-    DataError
-        The record does not contain the entry or the window.
+    `at`, s, is the instant of the entry; the window is by default `WINDOW`, as far as recorded.
+    `DataError`: the record does not contain the entry or the window.
     """
     time = imu.index.to_numpy(dtype=np.float64)
     slack = 1e-9 + 0.5 * float(np.median(np.diff(time))) if len(time) > 1 else 0.0
@@ -462,18 +604,11 @@ def _usual(time: Array, at: float) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False)
 class ToStamp:
-    """Motion from the instant of an entry to a sample.
+    """Motion from the instant of an entry to a sample, `length` s later (negative: earlier).
 
-    Attributes
-    ----------
-    length : float, s
-        Negative where the sample is earlier.
-    turn : ndarray, (3,), rad
-        Rotation vector of the body, body axes.
-    push : ndarray, (3,), m/s
-        Integral of the specific force, in body axes at mid-interval.
-    turn_errors, push_errors : ndarray, (p, 3)
-        Effect of one standard deviation of each unknown on them.
+    `turn`, (3,), rad, rotation vector in body axes; `push`, (3,), m/s, integral of the specific
+    force in body axes at mid-interval; with the effect of one standard deviation of each unknown on
+    them, (p, 3).
     """
 
     length: float
@@ -500,21 +635,10 @@ class ToStamp:
         return np.asarray(self.felt(q_nb) + np.array([0.0, 0.0, GRAVITY * self.length]))
 
     def carried(self, errors: Array, q_nb: Array, *, turned: bool) -> Array:
-        """Propagate errors from the entry to the sample.
+        """Propagate errors, (p, 9), from the entry to the sample, unknowns of the samples first.
 
-        Parameters
-        ----------
-        errors : ndarray, (p, 9)
-            Rotation vector in local level, velocity, position; unknowns of the samples first.
-        q_nb : ndarray, (4,)
-            Attitude at the sample.
-        turned : bool
-            Whether the attitude error is that at the entry; otherwise it is that at the sample.
-
-        Returns
-        -------
-        ndarray, (p, 9)
-            First order. Position growth within half a step is neglected.
+        `turned`: the attitude error is that at the entry, otherwise that at the sample. First
+        order; position growth within half a step is neglected.
         """
         out, own = errors.copy(), slice(0, len(self.turn_errors))
         C = rotation.dcm_from_quaternion(q_nb)
@@ -527,18 +651,9 @@ class ToStamp:
 
 
 def to_stamp(imu: pd.DataFrame, effects: SampleEffects, instant: float, row: int) -> ToStamp:
-    """Integrate from an instant between two samples to one of these samples.
+    """Integrate from an instant between two samples to one of these, `row`.
 
-    Parameters
-    ----------
-    imu : DataFrame
-        Imu table; interpolated as in `window_weights`.
-    effects : SampleEffects
-        On the same samples.
-    instant : float, s
-        Before the first or after the last sample, its values are held.
-    row : int
-        Of the sample.
+    Interpolated as in `window_weights`; beyond the record its first or last value is held.
     """
     time = imu.index.to_numpy(dtype=np.float64)
     length = float(time[row] - instant)
@@ -555,3 +670,301 @@ def to_stamp(imu: pd.DataFrame, effects: SampleEffects, instant: float, row: int
         np.einsum("n,pni->pi", few, effects.rate[:, near]),
         np.einsum("n,pni->pi", few, effects.force[:, near]),
     )
+
+
+# Monte Carlo paths of one crash, with errors drawn from the error budget.
+
+
+# Number of runs that share one stream of random numbers: part of the meaning of a seed,
+# unlike the number of cores.
+TOGETHER = 64
+# One gigabyte of paths.
+MOST_RUNS = 100_000
+
+
+@dataclass(frozen=True, eq=False)
+class PathSamples:
+    """Simulated paths, as differences from the reconstructed one.
+
+    Attributes
+    ----------
+    time : ndarray, (n,), s
+    errors : ndarray, (runs, n, 9)
+        Rotation vector in local level, rad; velocity, m/s; position, m: true minus computed,
+        for the drawn errors.
+    draws : ndarray, (runs, p)
+        Standard normal numbers, one for each unknown of the path.
+    """
+
+    time: Array
+    errors: Array = field(repr=False)
+    draws: Array = field(repr=False)
+
+    @property
+    def covariance(self) -> Array:
+        """About their mean, (n, 9, 9)."""
+        centred = self.errors - self.errors.mean(axis=0)
+        return np.asarray(np.einsum("rni,rnj->nij", centred, centred) / (len(centred) - 1))
+
+    def interval(self, share: float = 0.95) -> tuple[Array, Array]:
+        """Bounds of the central fraction `share` of the runs, each (n, 9)."""
+        edge = 0.5 * (1.0 - share)
+        low, high = np.quantile(self.errors, [edge, 1.0 - edge], axis=0)
+        return low, high
+
+
+def sample_paths(
+    path: CrashPath, *, runs: int = 10_000, seed: int = 0, workers: int | None = None
+) -> PathSamples:
+    """Draw Monte Carlo paths.
+
+    The same unknowns with the same standard deviations as in the linear covariance are drawn and
+    applied to start and increments, and each path is navigated in full.
+
+    Parameters
+    ----------
+    path : CrashPath
+    runs : int
+    seed : int
+        The same seed gives bitwise the same runs on any number of cores; a larger number of
+        runs extends a smaller one with the same seed.
+    workers : int, optional
+        Threads; by default all cores.
+
+    Raises
+    ------
+    ConfigError
+        `runs` is less than 2 or too large, or a seed or a number of workers is not valid.
+    """
+    _check(path, runs, seed, workers)
+    unknowns = len(path.names)
+    draws = np.empty((runs, unknowns))
+    errors = np.empty((runs, len(path.time), 9))
+    back, ahead = path.legs
+    views = (errors[:, : path.anchor + 1][:, ::-1], errors[:, path.anchor :])
+    prepared = []
+    for leg, view in zip((back, ahead), views, strict=True):
+        start = path.start.copy()
+        if leg.backward:
+            start[:, VELOCITY] *= -1.0
+        used = np.abs(leg.effects).max(axis=2, initial=0.0) > 0.0
+        active = (np.abs(start).max(axis=1) > 0.0) | (used.sum(axis=1) > 0)
+        prepared.append(
+            (
+                leg,
+                view,
+                active,
+                start[active],
+                np.ascontiguousarray(leg.effects[active]),
+                np.ascontiguousarray(used[active]),
+            )
+        )
+
+    def chunk(number: int) -> None:
+        rows = slice(number * TOGETHER, min((number + 1) * TOGETHER, runs))
+        generator = np.random.Generator(
+            np.random.SFC64(np.random.SeedSequence(seed, spawn_key=(number,)))
+        )
+        mine = generator.standard_normal((TOGETHER, unknowns))[: rows.stop - rows.start]
+        draws[rows] = mine
+        for leg, view, active, start, effects, used in prepared:
+            steps = len(leg.rows)
+            # Single precision suffices for noise and halves the memory.
+            noise = generator.standard_normal((TOGETHER, 6, steps), dtype=np.float32)
+            perturbed_runs(
+                leg.state,
+                leg.rows,
+                leg.nominal,
+                start,
+                effects,
+                used,
+                leg.noise_sd,
+                np.ascontiguousarray(mine[:, active]),
+                noise,
+                leg.earth,
+                leg.options,
+                view[rows],
+            )
+            if leg.backward:
+                view[rows, :, VELOCITY] *= -1.0
+
+    chunks = range((runs + TOGETHER - 1) // TOGETHER)
+    with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
+        list(pool.map(chunk, chunks))
+    return PathSamples(path.time, errors, draws)
+
+
+def _check(path: object, runs: object, seed: object, workers: object) -> None:
+    if not isinstance(path, CrashPath):
+        raise ConfigError("crash.path-of-wrong-type", quantity="path", name=type(path).__name__)
+    if not _is_whole(runs, 2, MOST_RUNS):
+        raise ConfigError(
+            "crash.runs-out-of-range", quantity="runs", runs=runs, most_runs=MOST_RUNS
+        )
+    for name, given, least in (("seed", seed, 0), ("workers", workers, 1)):
+        if not (_is_whole(given, least) or (name == "workers" and given is None)):
+            raise ConfigError("crash.count-not-whole", quantity=name, given=given, least=least)
+
+
+def _is_whole(given: object, least: int, most: float = math.inf) -> bool:
+    return isinstance(given, int | np.integer) and least <= int(given) <= most
+
+
+# A reconstructed path against a reference: cameras, or the truth of a simulation.
+
+
+@dataclass(frozen=True, eq=False)
+class PathComparison:
+    """Reconstructed minus reference path.
+
+    Attributes
+    ----------
+    errors : DataFrame
+        ``north east down``, m, indexed by the reference's instants, s.
+    bound : DataFrame
+        Half width of the 95 % interval of such errors, m: path and reference together.
+    rms, largest : tuple of float, m
+        Over the instants, per axis; the largest by size.
+    within : tuple of float
+        Fraction of the instants at which the error is within the bound. Errors of neighboring
+        instants are highly correlated, so the instants are not independent trials.
+    chi_square : float
+        For the three components at the last instant, to compare with `chi_square_95`.
+    chi_square_95 : float
+        95 % limit for three degrees of freedom.
+    consistent : bool
+        Whether the chi-square of the last instant is below the limit.
+    """
+
+    errors: pd.DataFrame = field(repr=False)
+    bound: pd.DataFrame = field(repr=False)
+    rms: tuple[float, float, float]
+    largest: tuple[float, float, float]
+    within: tuple[float, float, float]
+    chi_square: float
+    chi_square_95: float
+
+    @property
+    def consistent(self) -> bool:
+        """Whether the covariances are consistent with the last error."""
+        return self.chi_square <= self.chi_square_95
+
+
+def compare_with_reference(path: CrashPath, reference: pd.DataFrame) -> PathComparison:
+    """Compare a path with a reference.
+
+    Parameters
+    ----------
+    path : CrashPath
+    reference : DataFrame
+        Indexed by time from the common trigger, s; ``north east down`` of the same point, m, in
+        the axes of the path, from any origin: it is shifted so that both agree at the entry. With
+        ``north_sd east_sd down_sd``, m, where it is not exact.
+
+    Returns
+    -------
+    PathComparison
+        At the reference's instants within the path. The path is interpolated by the cubic that
+        matches its velocities, so that a reference of 1000 frames a second is not compared with
+        chords.
+
+    Raises
+    ------
+    DataError
+        A column is missing, a value is not finite, or the two do not share the entry and at
+        least one instant after it.
+    """
+    if not isinstance(reference, pd.DataFrame):
+        raise DataError(
+            "crash.reference-of-wrong-type",
+            quantity="reference path",
+            name=type(reference).__name__,
+        )
+    time, values, sd = _columns(reference)
+    from scipy.interpolate import CubicHermiteSpline
+
+    own = CubicHermiteSpline(path.time, path.table[NED].to_numpy(), path.table[["VN", "VE", "VD"]])
+    inside = (time >= path.time[0] - 1e-9) & (time <= path.time[-1] + 1e-9)
+    entry = path.entry.time
+    if not (inside.any() and time[0] <= entry + 1e-9 and time[inside][-1] > entry):
+        raise DataError(
+            "crash.path-entry",
+            file=reference.attrs.get("source"),
+            quantity="reference path",
+            time=time[0],
+            time_2=time[-1],
+            time_3=path.time[0],
+            time_4=path.time[-1],
+            entry=entry,
+        )
+    origin = np.array([np.interp(entry, time, values[:, k]) for k in range(3)])
+    at_origin = np.array([np.interp(entry, time, sd[:, k]) for k in range(3)])
+    origin = origin - own(entry)
+    difference = own(time[inside]) - (values[inside] - origin)
+    covariance = _covariance(path, time[inside])
+    # The reading at the origin is a further independent one.
+    own_noise = sd[inside] ** 2 + at_origin**2
+    covariance = covariance + np.einsum("ni,ij->nij", own_noise, np.eye(3))
+    bound = TWO_SIDED_95 * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+    largest = difference[np.abs(difference).argmax(axis=0), range(3)]
+    from scipy.stats import chi2
+
+    index = pd.Index(time[inside], name="time")
+    return PathComparison(
+        pd.DataFrame(difference, index=index, columns=NED),
+        pd.DataFrame(bound, index=index, columns=NED),
+        triad_of(np.sqrt((difference**2).mean(axis=0))),
+        triad_of(largest),
+        triad_of((np.abs(difference) <= bound).mean(axis=0)),
+        float(difference[-1] @ np.linalg.pinv(covariance[-1]) @ difference[-1]),
+        float(chi2.ppf(0.95, 3)),
+    )
+
+
+def _covariance(path: CrashPath, time: Array) -> Array:
+    place = path.covariance[:, PLACE, PLACE].reshape(len(path.time), 9)
+    rows = np.column_stack([np.interp(time, path.time, place[:, k]) for k in range(9)])
+    return np.asarray(rows.reshape(-1, 3, 3))
+
+
+def _columns(reference: pd.DataFrame) -> tuple[Array, Array, Array]:
+    some = any(c in reference.columns for c in POSITION_SD)
+    wanted = [*NED, *(POSITION_SD if some else ())]
+    missing = [c for c in wanted if c not in reference.columns]
+    if missing:
+        raise DataError(
+            "crash.no-column",
+            file=reference.attrs.get("source"),
+            quantity="reference path",
+            missing=missing,
+        )
+    try:
+        time = reference.index.to_numpy(dtype=np.float64)
+        both = reference[wanted].to_numpy(dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise DataError(
+            "crash.not-all-numbers",
+            file=reference.attrs.get("source"),
+            quantity="reference path",
+            error=error,
+        ) from None
+    values, sd = both[:, :3], both[:, 3:] if some else np.zeros((len(both), 3))
+    bad = ~(np.isfinite(values).all(axis=1) & np.isfinite(sd).all(axis=1) & np.isfinite(time))
+    stuck = np.r_[False, np.diff(time) <= 0.0]
+    for code, rows in (
+        ("crash.reference-not-finite", bad),
+        ("crash.reference-sd-negative", (sd < 0.0).any(axis=1)),
+        ("crash.reference-time-does-not-advance", stuck),
+    ):
+        if rows.any():
+            raise DataError(
+                code,
+                file=reference.attrs.get("source"),
+                row=int(np.argmax(rows)) + 1,
+                quantity="reference path",
+            )
+    if not len(time):
+        raise DataError(
+            "crash.no-rows", file=reference.attrs.get("source"), quantity="reference path"
+        )
+    return time, values, sd

@@ -8,9 +8,11 @@ from dataclasses import dataclass
 from statistics import NormalDist
 
 import numpy as np
+import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.crash.delta_v import DeltaV
+from strapdown.crash.acceleration import Acceleration
+from strapdown.crash.delta_v import DeltaV, delta_v
 from strapdown.errors import ConfigError, DataError
 from strapdown.rotation import within_half_turn
 
@@ -26,6 +28,8 @@ __all__ = [
     "from_convention",
     "ned_pdof",
     "pdof",
+    "pdof_by_shift",
+    "pdof_by_window",
     "pdof_gradient",
     "pdof_interval",
     "pdof_sd",
@@ -144,10 +148,6 @@ def ned_pdof(change: DeltaV | ArrayLike, heading_deg: float) -> NedPdof:
     heading_deg : float, deg
         Of the vehicle at the impact.
 
-    Returns
-    -------
-    NedPdof
-
     Raises
     ------
     ConfigError
@@ -165,22 +165,9 @@ def ned_pdof(change: DeltaV | ArrayLike, heading_deg: float) -> NedPdof:
 
 
 def pdof_gradient(change: DeltaV | ArrayLike) -> Array:
-    """Gradient of the two angles with respect to the change of velocity.
+    """Gradient of horizontal and vertical angle, (2, 3), deg per m/s, by the change of velocity.
 
-    Parameters
-    ----------
-    change : DeltaV or array_like, (3,), m/s
-        In any frame.
-
-    Returns
-    -------
-    ndarray, (2, 3), deg per m/s
-        Of the horizontal and the vertical angle.
-
-    Raises
-    ------
-    DataError
-        The change is vertical: its horizontal direction has no gradient.
+    `DataError`: the change is vertical, so that its horizontal direction has no gradient.
     """
     x, y, z = vector_of(change, ("body", "impact", "ned")).tolist()
     h2 = x * x + y * y
@@ -191,24 +178,10 @@ def pdof_gradient(change: DeltaV | ArrayLike) -> Array:
 
 
 def pdof_sd(change: DeltaV | ArrayLike, covariance: ArrayLike) -> tuple[float, float]:
-    """Standard deviations of the two angles, to first order.
+    """Standard deviations of horizontal and vertical angle, deg, to first order: ``sqrt(G P G^T)``.
 
-    Parameters
-    ----------
-    change : DeltaV or array_like, (3,), m/s
-    covariance : array_like, (3, 3), m²/s²
-        Of the change.
-
-    Returns
-    -------
-    horizontal_sd, vertical_sd : float, deg
-        ``sqrt(G P G^T)``. Valid while the change is large compared with its uncertainty;
-        `pdof_interval` has no such condition.
-
-    Raises
-    ------
-    DataError
-        As `pdof_gradient`; or `covariance` is not a covariance.
+    Valid while the change is large compared with its uncertainty; `pdof_interval` has no such
+    condition.
     """
     gradient = pdof_gradient(change)
     spread = gradient @ covariance_of(covariance) @ gradient.T
@@ -243,16 +216,8 @@ def covariance_of(given: ArrayLike) -> Array:
 class PdofConvention:
     """Convention for a horizontal direction.
 
-    Attributes
-    ----------
-    meaning : str
-        Description for users, with the source.
-    to : bool
-        Direction in which the force pushes, instead of the one from which it comes.
-    clockwise : bool
-        Seen from above.
-    full_turn : bool
-        In [0, 360) instead of (-180, 180].
+    In which the force pushes (`to`) or from which it comes; clockwise seen from above or not; in
+    [0, 360) (`full_turn`) or (-180, 180].
     """
 
     meaning: str
@@ -356,46 +321,17 @@ def from_convention(angle_deg: float, name: str) -> float:
 
 
 def clock_of(horizontal_deg: float) -> int:
-    """Hour that a force came from, 1 to 12.
+    """Hour that a force came from, 1 to 12, by its direction, deg clockwise from the front.
 
-    Parameters
-    ----------
-    horizontal_deg : float, deg
-        Clockwise from the front.
-
-    Returns
-    -------
-    int
-        The nearest hour, each 30 deg wide: 12 is the front, 3 the right (the clock of the
-        Collision Deformation Classification, SAE J224, columns 1 and 2). A direction on the
-        border belongs to the next hour clockwise: 15 deg is 1 o'clock, 345 deg is 12.
-
-    Raises
-    ------
-    ConfigError
-        The angle is not finite.
+    The nearest hour, each 30 deg wide: 12 is the front, 3 the right (Collision Deformation
+    Classification, SAE J224, columns 1 and 2). A border belongs to the next hour clockwise: 15 deg
+    is 1 o'clock, 345 deg is 12.
     """
     return (math.floor(_finite(horizontal_deg) / 30.0 + 0.5) - 1) % 12 + 1
 
 
 def direction_of_clock(hour: int) -> float:
-    """Middle of an hour, deg, in (-180, 180].
-
-    Parameters
-    ----------
-    hour : int
-        1 to 12.
-
-    Returns
-    -------
-    float, deg
-        Within 15 deg of the coded direction.
-
-    Raises
-    ------
-    ConfigError
-        The number is not an hour from 1 to 12.
-    """
+    """Middle of an hour, 1 to 12, deg in (-180, 180]: within 15 deg of the coded direction."""
     if hour not in range(1, 13):
         raise ConfigError("crash.no-hour", quantity="clock", hour=hour)
     return _wrapped(30.0 * hour, False)
@@ -456,7 +392,6 @@ class PdofInterval:
 
     Attributes
     ----------
-    horizontal, vertical : AngleInterval
     level : float
         Coverage probability of each.
     """
@@ -555,3 +490,127 @@ def _fieller(mean: Array, spread: Array, z: float) -> tuple[float, float] | None
     if abs(away) > 90.0:
         away -= math.copysign(180.0, away)
     return estimate + min(away - reach, 0.0), estimate + max(away + reach, 0.0)
+
+
+# Sensitivity of a direction of force to the length of the window and to time zero.
+
+
+#: Lengths of the windows of a sensitivity table, s.
+WINDOWS = (0.010, 0.020, 0.030, 0.040, 0.050, 0.075, 0.100, 0.125, 0.150)
+#: Shifts of time zero of a sensitivity table, s.
+SHIFTS = (-0.010, -0.005, -0.002, -0.001, 0.0, 0.001, 0.002, 0.005, 0.010)
+
+
+def _row(acceleration: Acceleration, start: float, end: float, heading_deg: float) -> list[float]:
+    change = delta_v(acceleration, start, end, across_gaps=True)
+    if not change.vector.any():
+        return [*change.vector.tolist(), math.nan, math.nan]
+    if acceleration.frame == "ned":
+        over_ground = ned_pdof(change, heading_deg)
+        return [*change.vector.tolist(), over_ground.relative_deg, over_ground.vertical_deg]
+    angles = pdof(change)
+    return [*change.vector.tolist(), angles.horizontal_deg, angles.vertical_deg]
+
+
+def _table(rows: list[list[float]], name: str, at: Sequence[float]) -> pd.DataFrame:
+    columns = ["dv_x", "dv_y", "dv_z", "horizontal_deg", "vertical_deg"]
+    return pd.DataFrame(
+        np.array(rows, dtype=np.float64).reshape(-1, 5),
+        index=pd.Index(list(at), name=name, dtype=np.float64),
+        columns=columns,
+    )
+
+
+def pdof_by_window(
+    acceleration: Acceleration,
+    time_zero: float,
+    windows: Sequence[float] = WINDOWS,
+    *,
+    heading_deg: float = 0.0,
+) -> pd.DataFrame:
+    """Direction of force versus the length of the window from time zero.
+
+    Parameters
+    ----------
+    acceleration : Acceleration
+    time_zero : float, s
+    windows : sequence of float, s
+    heading_deg : float, deg
+        At the impact; for a record in north-east-down, the direction is relative to this
+        heading.
+
+    Returns
+    -------
+    DataFrame
+        Index ``window``, s; ``dv_x dv_y dv_z``, m/s, ``horizontal_deg``, ``vertical_deg``; NaN
+        for a zero change of velocity. Windows that extend beyond the record are left out.
+
+    Raises
+    ------
+    DataError
+        None of the windows is within the record.
+    """
+    fit = [w for w in windows if w > 0.0 and _fits(acceleration, time_zero, time_zero + w)]
+    if not fit:
+        raise _no_window(acceleration, time_zero, windows)
+    rows = [_row(acceleration, time_zero, time_zero + w, heading_deg) for w in fit]
+    return _table(rows, "window", fit)
+
+
+def pdof_by_shift(
+    acceleration: Acceleration,
+    time_zero: float,
+    end: float,
+    shifts: Sequence[float] = SHIFTS,
+    *,
+    keep_length: bool = False,
+    heading_deg: float = 0.0,
+) -> pd.DataFrame:
+    """Direction of force versus an error of time zero.
+
+    Parameters
+    ----------
+    acceleration : Acceleration
+    time_zero, end : float, s
+        The detected window.
+    shifts : sequence of float, s
+        Added to `time_zero`.
+    keep_length : bool
+        Whether the end is shifted as well.
+    heading_deg : float, deg
+        As `pdof_by_window`.
+
+    Returns
+    -------
+    DataFrame
+        Index ``shift``, s; columns as `pdof_by_window`.
+
+    Raises
+    ------
+    DataError
+        None of the windows is within the record.
+    """
+    ends = [end + (s if keep_length else 0.0) for s in shifts]
+    pairs = [(s, time_zero + s, e) for s, e in zip(shifts, ends, strict=True)]
+    fit = [(s, a, b) for s, a, b in pairs if b > a and _fits(acceleration, a, b)]
+    if not fit:
+        raise _no_window(acceleration, time_zero, [end - time_zero])
+    rows = [_row(acceleration, a, b, heading_deg) for _, a, b in fit]
+    return _table(rows, "shift", [s for s, _, _ in fit])
+
+
+def _fits(acceleration: Acceleration, start: float, end: float) -> bool:
+    return acceleration.begin <= start and end <= acceleration.end
+
+
+def _no_window(acceleration: Acceleration, zero: float, windows: Sequence[float]) -> DataError:
+    shortest = min(windows, default=0.0)
+    return DataError(
+        "crash.no-window-shortest-ms-within",
+        file=acceleration.source,
+        quantity="window",
+        zero=zero,
+        shortest=shortest * 1000.0,
+        begin=acceleration.begin,
+        end=acceleration.end,
+    )

@@ -1,17 +1,302 @@
-"""Published models of injury risk.
-
-Only models with an identified published table are included. URGENCY and its successors
-(Malliaris 1997, Bahouth 2004, Kononen 2011) and the MAIS3+ model of the planner by Geisslinger
-and others (2023) are not: their coefficients were found in programs that name no table of a
-publication. `severity_file.load_severity_model` reads them from a user who has the source.
-"""
+"""Injury-risk models, and the probability of injury with a bound from the inputs."""
 
 from __future__ import annotations
 
-from strapdown.crash.severity_model import SeverityModel, Term
-from strapdown.errors import ConfigError
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
-__all__ = ["SEVERITY_MODELS", "find_severity_model"]
+from strapdown.errors import ConfigError, DataError, Finding
+
+__all__ = [
+    "SEVERITY_MODELS",
+    "SPEEDS",
+    "InjuryRisk",
+    "SeverityModel",
+    "Term",
+    "find_severity_model",
+    "injury_risk",
+    "load_severity_model",
+]
+
+
+#: Units of speed, in m/s. Inputs with these units are given in m/s; others in their stated unit.
+SPEEDS: dict[str, float] = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
+TRANSFORMS = ("identity", "log", "square")
+OUTSIDE = ("refuse", "tell")
+
+
+@dataclass(frozen=True)
+class Term:
+    """One term of the logit.
+
+    `coefficient` is per unit of the transformed input (log is natural), `unit` that of the source's
+    table; for a category (`equals`) it is added where the input matches.
+    """
+
+    input: str
+    coefficient: float
+    unit: str = ""
+    transform: str = "identity"
+    equals: str | None = None
+
+
+@dataclass(frozen=True)
+class SeverityModel:
+    """A published model of the probability of an injury: ``1/(1 + exp(-w))``.
+
+    Attributes
+    ----------
+    name, title : str
+    author, year, table : str
+        Publication, and the table with the coefficients.
+    outcome : str
+        Predicted outcome: ``MAIS3+``.
+    intercept : float
+    terms : tuple of Term
+    validity : dict
+        By input, the least and greatest value for which the model is valid, in the unit of
+        its term.
+    applies : dict
+        By input, the categories for which the model is valid: ``{"crash_type": ("front",)}``.
+    note : str
+        Origin of the coefficients and of the validity range.
+    """
+
+    name: str
+    title: str
+    author: str
+    year: int
+    table: str
+    outcome: str
+    intercept: float
+    terms: tuple[Term, ...]
+    validity: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    applies: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    note: str = ""
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the inputs."""
+        return tuple(dict.fromkeys(term.input for term in self.terms))
+
+    def unit(self, name: str) -> str:
+        """Unit of an input in the table; empty for a category."""
+        return next((t.unit for t in self.terms if t.input == name and t.equals is None), "")
+
+    @property
+    def source(self) -> str:
+        """Author, year, title and table in one line."""
+        return f"{self.author} ({self.year}): {self.title}, {self.table}"
+
+
+@dataclass(frozen=True)
+class InjuryRisk:
+    """Probability of an injury from one model.
+
+    Attributes
+    ----------
+    model : SeverityModel
+    probability : float
+    low, high : float
+        Bound from the uncertainty of the inputs alone, without that of the coefficients.
+    coverage : float
+        Of the bound.
+    logit, logit_sd : float
+    findings : tuple of Finding
+    """
+
+    model: SeverityModel
+    probability: float
+    low: float
+    high: float
+    coverage: float
+    logit: float
+    logit_sd: float
+    findings: tuple[Finding, ...] = ()
+
+
+def injury_risk(
+    model: SeverityModel,
+    inputs: Mapping[str, float | str],
+    sd: Mapping[str, float] | None = None,
+    *,
+    coverage: float = 0.95,
+    outside: str = "refuse",
+) -> InjuryRisk:
+    """Probability of an injury, with a bound from the uncertainty of the inputs.
+
+    Parameters
+    ----------
+    model : SeverityModel
+    inputs : dict
+        By name: speeds in m/s, others in the unit of the model's table, categories as words.
+    sd : dict, optional
+        Standard deviations in the same units, taken as independent.
+    coverage : float
+        Of the bound, between 0 and 1.
+    outside : {'refuse', 'tell'}
+        Action where the model is not valid: an error, or a finding with the number.
+
+    Raises
+    ------
+    DataError
+        An input is missing or not a number, or the model is not valid there.
+    ConfigError
+        An option or an sd is not valid.
+
+    Notes
+    -----
+    The logistic function is monotone, so the bound is that of the logit transformed by it; for
+    untransformed inputs (no log, no square) and normal errors it is exact.
+    """
+    from scipy.special import expit, ndtri
+
+    spread = dict(sd or {})
+    _check_options(model, spread, coverage, outside)
+    findings = list(_validity(model, inputs, spread, float(ndtri(0.5 + 0.5 * coverage)), outside))
+    logit, variance = model.intercept, 0.0
+    slopes: dict[str, float] = {}
+    for term in model.terms:
+        given = _given(model, inputs, term.input)
+        if term.equals is not None:
+            logit += term.coefficient if given == term.equals else 0.0
+            continue
+        value = _value(model, term.input, given)
+        made, slope = _transformed(model, term, value)
+        logit += term.coefficient * made
+        slopes[term.input] = slopes.get(term.input, 0.0) + term.coefficient * slope
+    for name, slope in slopes.items():
+        factor = SPEEDS.get(model.unit(name), 1.0)
+        variance += (slope * spread.get(name, 0.0) / factor) ** 2
+    reach = float(ndtri(0.5 + 0.5 * coverage)) * math.sqrt(variance)
+    return InjuryRisk(
+        model,
+        float(expit(logit)),
+        float(expit(logit - reach)),
+        float(expit(logit + reach)),
+        coverage,
+        logit,
+        math.sqrt(variance),
+        tuple(findings),
+    )
+
+
+def _check_options(
+    model: SeverityModel, sd: Mapping[str, float], coverage: float, outside: str
+) -> None:
+    if outside not in OUTSIDE:
+        raise ConfigError(
+            "crash.outside-option-unknown",
+            quantity="outside",
+            outside=outside,
+            word=outside,
+            known=OUTSIDE,
+        )
+    if not 0.0 < coverage < 1.0:
+        raise ConfigError("crash.coverage-none", quantity="coverage", coverage=coverage)
+    for name, value in sd.items():
+        if not (math.isfinite(value) and value >= 0.0):
+            raise ConfigError(
+                "crash.standard-deviation-negative", quantity=f"sd of {name}", value=value
+            )
+
+
+def _given(model: SeverityModel, inputs: Mapping[str, float | str], name: str) -> float | str:
+    if name not in inputs:
+        unit = model.unit(name)
+        raise DataError(
+            "crash.model-needs-number" if unit else "crash.model-needs-word",
+            quantity=name,
+            name=model.name,
+            input=name,
+            unit="m/s" if unit in SPEEDS else unit,
+        )
+    return inputs[name]
+
+
+def _value(model: SeverityModel, name: str, given: float | str) -> float:
+    """Return a number in the unit of the model's table."""
+    if isinstance(given, str) or not math.isfinite(given):
+        raise DataError(
+            "crash.no-finite-number",
+            quantity=name,
+            given=given,
+            name=name,
+            unit="m/s" if model.unit(name) in SPEEDS else model.unit(name),
+        )
+    return float(given) / SPEEDS.get(model.unit(name), 1.0)
+
+
+def _transformed(model: SeverityModel, term: Term, value: float) -> tuple[float, float]:
+    """Value of the term and its slope with respect to the input in its unit."""
+    if term.transform == "square":
+        return value * value, 2.0 * value
+    if term.transform == "log":
+        if value <= 0.0:
+            raise DataError(
+                "crash.takes-logarithm-value",
+                quantity=term.input,
+                name=model.name,
+                value=value,
+                unit=term.unit,
+            )
+        return math.log(value), 1.0 / value
+    return value, 1.0
+
+
+def _validity(
+    model: SeverityModel,
+    inputs: Mapping[str, float | str],
+    sd: Mapping[str, float],
+    reach: float,
+    outside: str,
+) -> list[Finding]:
+    findings = []
+    for name, categories in model.applies.items():
+        if name not in inputs:
+            findings.append(
+                Finding(
+                    "crash.not-stated",
+                    quantity=name,
+                    name=model.name,
+                    categories=categories,
+                    name_2=name,
+                )
+            )
+        elif inputs[name] not in categories:
+            said = {"name": model.name, "categories": categories, "category": inputs[name]}
+            findings.append(_outside("crash.model-for-others", name, outside, **said))
+    for name, (low, high) in model.validity.items():
+        value = _value(model, name, _given(model, inputs, name))
+        error = reach * sd.get(name, 0.0) / SPEEDS.get(model.unit(name), 1.0)
+        said = {"name": model.name, "value": value, "unit": model.unit(name)}
+        said |= {"low": low, "high": high}
+        if not low <= value <= high:
+            findings.append(_outside("crash.outside-model-range", name, outside, **said))
+        elif not low <= value - error <= value + error <= high:
+            findings.append(
+                Finding("crash.bound-leaves-range", quantity=name, error=error, data=said)
+            )
+    return findings
+
+
+def _outside(code: str, quantity: str, outside: str, **values: Any) -> Finding:
+    if outside == "refuse":
+        raise DataError(f"{code}-refused", quantity=quantity, data=values)
+    return Finding(code, quantity=quantity, data=values)
+
+
+# Published models of injury risk.
+#
+# Only models with an identified published table are included. URGENCY and its successors
+# (Malliaris 1997, Bahouth 2004, Kononen 2011) and the MAIS3+ model of the planner by Geisslinger
+# and others (2023) are not: their coefficients were found in programs that name no table of a
+# publication. `severity_file.load_severity_model` reads them from a user who has the source.
+
 
 WANG_NOTE = (
     "Logistic regression on NASS-CDS 2010-2015, all occupants together, belted or not. The report "
@@ -75,3 +360,164 @@ def find_severity_model(name: str) -> SeverityModel:
             known=SEVERITY_MODELS,
         )
     return SEVERITY_MODELS[name]
+
+
+# Injury-risk model from a TOML file transcribed from a publication.
+
+
+TEXTS = ("title", "author", "table", "outcome")
+TOP = (*TEXTS, "year", "intercept", "terms", "validity", "applies", "note")
+NUMBER_TERM = ("input", "unit", "coefficient", "transform")
+CATEGORY_TERM = ("input", "equals", "coefficient")
+
+
+def load_severity_model(path: str | Path) -> SeverityModel:
+    """Read an injury-risk model.
+
+    Parameters
+    ----------
+    path : str or Path
+        A TOML file; its name is that of the model. ``title``, ``author``, ``year``, ``table`` and
+        ``outcome`` give the outcome and the source; ``intercept`` and ``[[terms]]`` are the logit.
+        Each term has ``input``, ``unit`` and ``coefficient`` (and ``transform``: identity, log or
+        square), or, for a category, ``input``, ``equals`` and ``coefficient``. ``[validity]`` gives
+        ``input = [least, greatest]`` in the unit of its term, ``[applies]`` gives
+        ``input = ["category", ...]``.
+
+    Raises
+    ------
+    ConfigError
+        The file is missing or not in this form; the message names the key.
+    """
+    file = Path(path)
+    table = _table(file)
+    _known(file, table, TOP, "")
+    texts = {key: _text(file, table, key) for key in TEXTS}
+    year = table.get("year")
+    if isinstance(year, bool) or not isinstance(year, int):
+        raise _bad(file, "year", "crash.year-not-whole", year=year)
+    note = table.get("note", "")
+    if not isinstance(note, str):
+        raise _bad(file, "note", "crash.no-text")
+    terms = _terms(file, table)
+    return SeverityModel(
+        name=file.stem,
+        year=year,
+        intercept=_number(file, table.get("intercept"), "intercept"),
+        terms=terms,
+        validity=_validity_severity_file(file, table.get("validity", {}), terms),
+        applies=_applies(file, table.get("applies", {})),
+        note=note,
+        **texts,
+    )
+
+
+def _table(file: Path) -> dict[str, Any]:
+    if not file.is_file():
+        raise ConfigError("crash.no-such-file", file=str(file))
+    try:
+        return tomllib.loads(file.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError("crash.no-toml", file=file.name, error=error) from None
+
+
+def _terms(file: Path, table: Mapping[str, Any]) -> tuple[Term, ...]:
+    rows = table.get("terms")
+    if not isinstance(rows, list) or not rows or not all(isinstance(r, dict) for r in rows):
+        raise _bad(file, "terms", "crash.terms-missing")
+    terms: list[Term] = []
+    for k, row in enumerate(rows, start=1):
+        place = f"terms {k}"
+        category = "equals" in row
+        _known(file, row, CATEGORY_TERM if category else NUMBER_TERM, f"{place}.")
+        name = _text(file, row, "input", f"{place}.")
+        coefficient = _number(file, row.get("coefficient"), f"{place}.coefficient")
+        if category:
+            term = Term(name, coefficient, equals=_text(file, row, "equals", f"{place}."))
+        else:
+            transform = row.get("transform", "identity")
+            if transform not in TRANSFORMS:
+                raise _bad(
+                    file,
+                    f"{place}.transform",
+                    "crash.transform-unknown",
+                    transform=transform,
+                    word=str(transform),
+                    known=TRANSFORMS,
+                )
+            term = Term(name, coefficient, _text(file, row, "unit", f"{place}."), transform)
+        for other in terms:
+            _refuse_clash(file, place, term, other)
+        terms.append(term)
+    return tuple(terms)
+
+
+def _refuse_clash(file: Path, place: str, term: Term, other: Term) -> None:
+    if term.input != other.input:
+        return
+    if (term.equals is None) != (other.equals is None):
+        code = "crash.term-number-and-category"
+    elif term.unit != other.unit:
+        code = "crash.term-in-two-units"
+    elif (term.transform, term.equals) == (other.transform, other.equals):
+        code = "crash.term-twice"
+    else:
+        return
+    units = {"unit": term.unit, "before": other.unit, "speeds": SPEEDS.keys()}
+    raise _bad(file, place, code, input=term.input, **units)
+
+
+def _validity_severity_file(
+    file: Path, given: Any, terms: tuple[Term, ...]
+) -> dict[str, tuple[float, float]]:
+    if not isinstance(given, dict):
+        raise _bad(file, "validity", "crash.validity-not-a-table")
+    numbers = {t.input: t for t in terms if t.equals is None}
+    ranges: dict[str, tuple[float, float]] = {}
+    for name, pair in given.items():
+        place = f"validity.{name}"
+        if name not in numbers:
+            raise _bad(file, place, "crash.no-term-number-input", word=name, known=numbers)
+        if not isinstance(pair, list) or len(pair) != 2:
+            raise _bad(file, place, "crash.validity-not-a-pair", pair=pair, name=name)
+        low, high = (_number(file, value, place) for value in pair)
+        if not low < high:
+            raise _bad(file, place, "crash.no-range", low=low, high=high)
+        ranges[name] = (low, high)
+    return ranges
+
+
+def _applies(file: Path, given: Any) -> dict[str, tuple[str, ...]]:
+    if not isinstance(given, dict):
+        raise _bad(file, "applies", "crash.applies-not-a-table")
+    for name, words in given.items():
+        if not isinstance(words, list) or not words or not all(isinstance(w, str) for w in words):
+            raise _bad(
+                file, f"applies.{name}", "crash.categories-not-texts", words=words, name=name
+            )
+    return {name: tuple(words) for name, words in given.items()}
+
+
+def _number(file: Path, value: Any, key: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise _bad(file, key, "crash.coefficient-not-a-number", value=value)
+    return float(value)
+
+
+def _text(file: Path, table: Mapping[str, Any], key: str, prefix: str = "") -> str:
+    value = table.get(key)
+    if not isinstance(value, str) or not value.strip():
+        code = {"table": "crash.table-missing", "unit": "crash.unit-missing"}
+        said = {"name": key, "speeds": SPEEDS.keys()}
+        raise _bad(file, f"{prefix}{key}", code.get(key, "crash.text-missing"), **said)
+    return value
+
+
+def _known(file: Path, table: Mapping[str, Any], known: tuple[str, ...], prefix: str) -> None:
+    for key in table:
+        if key not in known:
+            raise _bad(file, f"{prefix}{key}", "crash.no-such-key", word=key, known=known)
+
+
+def _bad(file: Path, key: str, code: str, **values: Any) -> ConfigError:
+    return ConfigError(code, file=file.name, quantity=key, data=values)

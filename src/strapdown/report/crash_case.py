@@ -7,6 +7,7 @@ from typing import Any
 
 from strapdown.bundle.seal import Seal, to_json
 from strapdown.config.crash_case import CaseSpec
+from strapdown.crash.case import CaseResult, run_case
 from strapdown.formats.crash_writers import write_mme
 from strapdown.progress import Progress, silent
 from strapdown.report.crash_document import crash_document
@@ -24,7 +25,6 @@ from strapdown.report.document_files import write_drawings, write_text
 from strapdown.report.document_html import document_page
 from strapdown.report.document_pdf import write_pdf
 from strapdown.report.report_bundle import report_bundle
-from strapdown.systems.crash_case import CaseResult, run_case
 from strapdown.systems.one_thread import one_thread
 
 __all__ = ["file_name", "rerun_crash", "write_crash"]

@@ -11,16 +11,15 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
-from strapdown.crash.acceleration import Acceleration
-from strapdown.crash.compare_units import UnitComparison
+from strapdown.crash.acceleration import Acceleration, window_weights
+from strapdown.crash.consistency import UnitComparison
 from strapdown.crash.delta_v import VelocityCourse, cumulative_delta_v
 from strapdown.crash.delta_v_bound import DeltaVBound, VelocityChange, body_delta_v_bound
 from strapdown.crash.events import CrashEvent
 from strapdown.crash.path import CrashPath
-from strapdown.crash.pdof_sensitivity import SHIFTS, WINDOWS, pdof_by_shift, pdof_by_window
-from strapdown.crash.severity_model import SPEEDS, InjuryRisk, SeverityModel, injury_risk
-from strapdown.crash.unit_reconstruction import UnitReconstruction
-from strapdown.crash.window_weights import window_weights
+from strapdown.crash.pdof import SHIFTS, WINDOWS, pdof_by_shift, pdof_by_window
+from strapdown.crash.reconstruction import UnitReconstruction
+from strapdown.crash.severity import SPEEDS, InjuryRisk, SeverityModel, injury_risk
 from strapdown.dsp.channel_class import LEAST_RATE, cfc_filter
 from strapdown.errors import DataError, StrapdownError
 from strapdown.report.chart import (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from strapdown import __version__
+from strapdown.crash.case import CaseResult
 from strapdown.report import crash_tables
 from strapdown.report.chart import Chart
 from strapdown.report.crash_figures import CrashFigures
@@ -27,7 +28,6 @@ from strapdown.report.document import (
     TableBlock,
 )
 from strapdown.report.values import GAP, plain
-from strapdown.systems.crash_case import CaseResult
 
 __all__ = ["crash_document"]
 

@@ -9,8 +9,9 @@ import numpy as np
 import pandas as pd
 
 from strapdown.constants import TWO_SIDED_95
+from strapdown.crash.case import CaseResult, ReferenceAnswer, main_event
 from strapdown.crash.path import CrashPath
-from strapdown.crash.unit_reconstruction import UnitReconstruction
+from strapdown.crash.reconstruction import UnitReconstruction
 from strapdown.report.chart import Chart
 from strapdown.report.crash_animation import path_animation
 from strapdown.report.crash_charts import (
@@ -37,7 +38,6 @@ from strapdown.report.crash_plan import path_plan
 from strapdown.report.crash_signals import UnitSignals, unit_signals
 from strapdown.report.document import Animation, Picture
 from strapdown.report.values import axis_names
-from strapdown.systems.crash_case import CaseResult, ReferenceAnswer, main_event
 from strapdown.tables import NED
 
 __all__ = ["CrashFigures", "crash_figures", "reference_in_path_axes"]

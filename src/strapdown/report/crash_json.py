@@ -14,19 +14,19 @@ from numpy.typing import NDArray
 from strapdown import __version__
 from strapdown.bundle.configuration_paths import names_file
 from strapdown.constants import TWO_SIDED_95
-from strapdown.crash.compare_units import UnitComparison
+from strapdown.crash.case import CaseResult, ReferenceAnswer, SeverityAnswer, main_event
+from strapdown.crash.consistency import UnitComparison
 from strapdown.crash.crash_type import CrashType
 from strapdown.crash.delta_v_bound import EventChanges, VelocityChange
 from strapdown.crash.events import CrashEvent
 from strapdown.crash.path import CrashPath
 from strapdown.crash.pdof import NedPdof
-from strapdown.crash.unit_reconstruction import UnitReconstruction
+from strapdown.crash.reconstruction import UnitReconstruction
 from strapdown.errors import Finding
 from strapdown.formats import csv
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.report import crash_limits, crash_words
 from strapdown.report.values import spaced
-from strapdown.systems.crash_case import CaseResult, ReferenceAnswer, SeverityAnswer, main_event
 from strapdown.tables import ACCEL, EULER, GYRO, NED, VELOCITY
 
 __all__ = ["crash_json", "signal_record", "signals_table", "trajectory_table", "write_table"]

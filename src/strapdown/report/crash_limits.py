@@ -7,10 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from strapdown.constants import TWO_SIDED_95
-from strapdown.crash.unit_reconstruction import UnitReconstruction
+from strapdown.crash.case import CaseResult, main_event
+from strapdown.crash.reconstruction import UnitReconstruction
 from strapdown.report.values import about, instant, plain, speed
 from strapdown.sensors.pre_crash import PreparedUnit
-from strapdown.systems.crash_case import CaseResult, main_event
 
 __all__ = [
     "CONVENTIONS",

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from strapdown.crash.events import CrashEvent
 from strapdown.crash.path import CrashPath
 from strapdown.crash.pdof import AngleInterval
-from strapdown.crash.unit_reconstruction import UnitReconstruction
+from strapdown.crash.reconstruction import UnitReconstruction
 from strapdown.report.chart import BLACK, Mark, look
 from strapdown.report.values import plain
 

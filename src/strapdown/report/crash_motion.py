@@ -12,9 +12,7 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.events import CrashEvent
-from strapdown.crash.monte_carlo import PathSamples
-from strapdown.crash.path import CrashPath
-from strapdown.crash.reference_path import PathComparison
+from strapdown.crash.path import CrashPath, PathComparison, PathSamples
 from strapdown.report.chart import (
     BLACK,
     BLUE,

@@ -11,8 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.crash.events import CrashEvent
-from strapdown.crash.leg import PLACE
-from strapdown.crash.path import CrashPath
+from strapdown.crash.path import PLACE, CrashPath
 from strapdown.report.chart import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
 from strapdown.report.crash_moments import path_moments
 from strapdown.report.crash_outline import Outline, draw_outline

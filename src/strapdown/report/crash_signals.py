@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.events import CrashEvent
-from strapdown.crash.unit_reconstruction import UnitReconstruction
+from strapdown.crash.reconstruction import UnitReconstruction
 from strapdown.report.chart import (
     AXIS_COLOURS,
     GREY,

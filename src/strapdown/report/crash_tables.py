@@ -8,6 +8,7 @@ import numpy as np
 
 from strapdown.config.crash_case import TriadSpec
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
+from strapdown.crash.case import CaseResult, ReferenceAnswer, main_event
 from strapdown.crash.delta_v_bound import VelocityChange
 from strapdown.crash.pdof import AngleInterval, Pdof
 from strapdown.report.document import TableBlock
@@ -25,7 +26,6 @@ from strapdown.report.values import (
 )
 from strapdown.rotation import within_half_turn
 from strapdown.sensors.crash_unit import RecordedTriad
-from strapdown.systems.crash_case import CaseResult, ReferenceAnswer, main_event
 from strapdown.tables import NED
 
 __all__ = [

@@ -9,8 +9,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from strapdown.constants import TWO_SIDED_95
+from strapdown.crash.case import CaseResult, main_event
 from strapdown.crash.pdof import Pdof
-from strapdown.crash.unit_reconstruction import UnitReconstruction
+from strapdown.crash.reconstruction import UnitReconstruction
 from strapdown.errors import Finding
 from strapdown.formats.crash_record import CrashRecord
 from strapdown.report.document import KeyFigure
@@ -29,7 +30,6 @@ from strapdown.report.values import (
     speed,
     speed_range,
 )
-from strapdown.systems.crash_case import CaseResult, main_event
 from strapdown.tables import NED
 
 __all__ = [

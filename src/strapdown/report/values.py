@@ -17,9 +17,9 @@ from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.report.chart import break_jumps
 
 if TYPE_CHECKING:
+    from strapdown.crash.case import CaseResult
     from strapdown.crash.pdof import AngleInterval
-    from strapdown.crash.unit_reconstruction import UnitReconstruction
-    from strapdown.systems.crash_case import CaseResult
+    from strapdown.crash.reconstruction import UnitReconstruction
 
 __all__ = [
     "ANY",

@@ -10,11 +10,11 @@ import pytest
 
 import strapdown as sd
 from strapdown.config.crash_case_file import read_case_spec
+from strapdown.crash.case import run_case
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats.log_writers import LOG_WRITERS
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.simulation import Origin, StationaryMotion, simulate_imu
-from strapdown.systems.crash_case import run_case
 
 SITE = (55.75, 37.62, 150.0)
 SENSOR = "fog-1000"
@@ -98,6 +98,29 @@ def test_a_case_is_reconstructed_as_by_the_engine(tmp_path, run_cli):
     case.save(tmp_path / "out", report=False)
     assert not list((tmp_path / "out").glob("report.*"))
     assert sd.verify(tmp_path / "out").verdict == "identical"
+
+
+def test_several_vehicles_are_numbered_in_the_order_of_their_cases(tmp_path, run_cli):
+    assert run_cli("simulate", "pole", "-q", "--out", tmp_path / "pole").code == 0
+    path = tmp_path / "pole" / "case.toml"
+    spec = read_case_spec(path)
+    # The other vehicle has one recorder, and no drawn paths.
+    options = spec.options.model_copy(update={"monte_carlo_runs": 0})
+    single = spec.model_copy(update={"units": spec.units[:1], "options": options})
+    both, alone = sd.reconstruct(path, single), sd.reconstruct(single)
+    assert list(both.vehicles) == ["1", "2"]
+    assert list(alone.vehicles) == ["1"]
+    # Each is what its case gives by itself, to the bit.
+    assert both.vehicles["1"].delta_v.resultant == both.reconstruction.main.delta_v.resultant
+    assert both.vehicles["2"].delta_v.resultant == alone.vehicles["1"].delta_v.resultant
+    assert both.vehicles["2"].name == spec.units[0].name != both.vehicles["1"].name
+    table = both.to_pandas()
+    assert table.loc["1"].equals(both.reconstruction.summary())
+    assert table.loc["2"].equals(alone.to_pandas())
+    assert repr(both).count("<CrashRun") == 2
+    both.save(tmp_path / "out", report=False)
+    assert sd.verify(tmp_path / "out" / "1").verdict == "identical"
+    assert sd.verify(tmp_path / "out" / "2").verdict == "identical"
 
 
 def test_streams_of_a_file_by_name(tmp_path, rest):

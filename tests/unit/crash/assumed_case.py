@@ -13,10 +13,10 @@ import numpy as np
 import pandas as pd
 
 from strapdown import rotation
-from strapdown.crash.at_point import at_point
 from strapdown.crash.entry import Entry
+from strapdown.crash.measuring_point import at_point
 from strapdown.crash.path import reconstruct_path
-from strapdown.crash.prepare import prepare_unit
+from strapdown.crash.preparation import prepare_unit
 from strapdown.sensors.crash_unit import Assumed, CrashUnit, RecordedTriad, assumed_shapes
 from strapdown.sensors.uncertainty import TriadUncertainty
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from strapdown import rotation
-from strapdown.crash.entry_sensitivity import EntryPriors
+from strapdown.crash.entry_estimate import EntryPriors
 from strapdown.frames import place_difference
 from strapdown.nav_state import NavState
 from strapdown.sensors.error_chain import apply

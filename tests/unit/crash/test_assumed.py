@@ -18,20 +18,20 @@ from tests.unit.crash.assumed_case import (
 )
 
 from strapdown.crash.combine_units import combine_units
-from strapdown.crash.compare_units import compare_units
+from strapdown.crash.consistency import compare_units
 from strapdown.crash.delta_v import delta_v
 from strapdown.crash.entry import Entry
 from strapdown.crash.gnss_entry import GnssEntry, start_from_gnss
-from strapdown.crash.monte_carlo import sample_paths
-from strapdown.crash.prepare import prepare_unit
-from strapdown.crash.unit_effects import MISSING_AXIS, NO_TURNING
+from strapdown.crash.measuring_point import MISSING_AXIS, NO_TURNING
+from strapdown.crash.path import sample_paths
+from strapdown.crash.preparation import prepare_unit
+from strapdown.crash.reconstruction import reconstruct_crash
 from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.crash_unit import Assumed, CrashUnit, Mounting, RecordedTriad, assumed_shapes
 from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.sensors.unmeasured import TURNS
 from strapdown.simulation.crash_motion import CRASHES
 from strapdown.simulation.crash_recording import paper_units, record_crash
-from strapdown.systems.crash_reconstruction import reconstruct_crash
 from strapdown.tables import NED, VELOCITY
 
 ENTRY = Entry.from_speed(SPEED, 0.05)

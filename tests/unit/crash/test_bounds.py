@@ -11,14 +11,12 @@ from tests.unit.crash.crash_case import RATE, prepared
 
 from strapdown import rotation
 from strapdown.crash.acceleration import body_acceleration
-from strapdown.crash.at_point import PointKinematics, at_point
 from strapdown.crash.delta_v import delta_v
 from strapdown.crash.delta_v_bound import body_delta_v_bound, resolved_delta_v_bound
 from strapdown.crash.entry import Entry, angle_rates
-from strapdown.crash.leg import VELOCITY
-from strapdown.crash.monte_carlo import sample_paths
-from strapdown.crash.reference_path import compare_with_reference
-from strapdown.crash.unit_reconstruction import reconstruct_unit
+from strapdown.crash.measuring_point import PointKinematics, at_point
+from strapdown.crash.path import VELOCITY, compare_with_reference, sample_paths
+from strapdown.crash.reconstruction import reconstruct_unit
 from strapdown.errors import DataError
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.simulation import ImuErrors, simulate_imu

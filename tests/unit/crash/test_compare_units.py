@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 from strapdown import Entry, reconstruct_crash, rotation
-from strapdown.crash.at_point import at_point
+from strapdown.crash.acceleration import window_weights
 from strapdown.crash.combine_units import combine_units, least_variance
-from strapdown.crash.compare_units import compare_units
-from strapdown.crash.mounting_checks import signed_permutations
-from strapdown.crash.unit_differences import (
+from strapdown.crash.consistency import (
+    compare_units,
     difference_covariance,
     joint_covariance,
+    signed_permutations,
     velocity_increments,
 )
-from strapdown.crash.window_weights import window_weights
+from strapdown.crash.measuring_point import at_point
 from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
 from strapdown.sensors.pre_crash import Levelling, PreparedUnit

@@ -11,7 +11,13 @@ sys.path.insert(0, str(Path(__file__).parent))
 from pulses import Pulse, means, stamps
 
 from strapdown import rotation
-from strapdown.crash.acceleration import Acceleration, body_acceleration, resolved_acceleration
+from strapdown.crash.acceleration import (
+    Acceleration,
+    body_acceleration,
+    resolved_acceleration,
+    resolved_weights,
+    window_weights,
+)
 from strapdown.crash.delta_v import (
     cumulative_delta_v,
     delta_v,
@@ -22,7 +28,6 @@ from strapdown.crash.delta_v import (
     trajectory_delta_v,
 )
 from strapdown.crash.events import detect_events
-from strapdown.crash.window_weights import resolved_weights, window_weights
 from strapdown.errors import ConfigError, DataError
 from strapdown.tables import imu_table
 from strapdown.tables.trajectory import trajectory_table

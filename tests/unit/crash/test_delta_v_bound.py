@@ -9,8 +9,8 @@ from scipy.stats import norm
 
 from strapdown.crash.delta_v_bound import DeltaVBound, body_delta_v_bound, resolved_delta_v_bound
 from strapdown.crash.entry import Entry
+from strapdown.crash.measuring_point import SampleEffects
 from strapdown.crash.path import CrashPath
-from strapdown.crash.unit_effects import SampleEffects
 from strapdown.errors import DataError
 
 STEP = 0.01

@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from strapdown.crash.at_point import at_point
-from strapdown.crash.entry_sensitivity import FixCorrelation
+from strapdown.crash.entry_estimate import FixCorrelation
 from strapdown.crash.gnss_entry import CONTRIBUTOR, GnssEntry, start_from_gnss
+from strapdown.crash.measuring_point import at_point
 from strapdown.crash.path import reconstruct_path
-from strapdown.crash.prepare import prepare_unit
+from strapdown.crash.preparation import prepare_unit
+from strapdown.crash.reconstruction import reconstruct_crash
 from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.sensors.synchronise import synchronise
@@ -19,7 +20,6 @@ from strapdown.simulation.crash_motion import Setting, crash_scenario
 from strapdown.simulation.crash_recording import paper_units, record_crash
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
 from strapdown.simulation.mounted_motion import MountedMotion
-from strapdown.systems.crash_reconstruction import reconstruct_crash
 from strapdown.tables import GEODETIC, NED, VELOCITY
 
 CRASH = crash_scenario("pole", setting=Setting(stand=1.0, coast=2.0))

@@ -9,12 +9,16 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, minimize
 
-from strapdown.crash.indices.asi import asi
-from strapdown.crash.indices.flail_space import flail_space
-from strapdown.crash.indices.hic import hic
-from strapdown.crash.indices.olc import olc
-from strapdown.crash.indices.pulse import four_pole, largest_mean, moving_means
-from strapdown.crash.indices.thiv import thiv
+from strapdown.crash.indices import (
+    asi,
+    flail_space,
+    four_pole,
+    hic,
+    largest_mean,
+    moving_means,
+    olc,
+    thiv,
+)
 from strapdown.errors import ConfigError, DataError
 
 G = 9.80665

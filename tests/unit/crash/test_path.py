@@ -13,10 +13,8 @@ from strapdown._kernels.crash_errors import perturbed_runs
 from strapdown.crash.combine_units import combine_effects
 from strapdown.crash.delta_v_bound import resolved_delta_v_bound
 from strapdown.crash.entry import Entry
-from strapdown.crash.leg import PLACE, VELOCITY
-from strapdown.crash.monte_carlo import sample_paths
-from strapdown.crash.path import reconstruct_path
-from strapdown.crash.unit_effects import unit_effects
+from strapdown.crash.measuring_point import unit_effects
+from strapdown.crash.path import PLACE, VELOCITY, reconstruct_path, sample_paths
 from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.sensors.lever_arm import move_unit

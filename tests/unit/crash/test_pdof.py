@@ -21,12 +21,13 @@ from strapdown.crash.pdof import (
     from_convention,
     ned_pdof,
     pdof,
+    pdof_by_shift,
+    pdof_by_window,
     pdof_gradient,
     pdof_interval,
     pdof_sd,
     to_convention,
 )
-from strapdown.crash.pdof_sensitivity import pdof_by_shift, pdof_by_window
 from strapdown.errors import ConfigError, DataError
 
 

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from strapdown.crash.at_point import at_point
-from strapdown.crash.compare_units import compare_units
-from strapdown.crash.prepare import prepare_unit
+from strapdown.crash.consistency import compare_units
+from strapdown.crash.measuring_point import at_point
+from strapdown.crash.preparation import prepare_unit
 from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.sensors.pre_crash import FROM_GRAVITY

@@ -7,20 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from strapdown.crash.at_point import at_point
 from strapdown.crash.combine_units import combine_units
 from strapdown.crash.entry import Entry
+from strapdown.crash.measuring_point import at_point, unit_effects
 from strapdown.crash.path import reconstruct_path
-from strapdown.crash.prepare import prepare_unit
-from strapdown.crash.unit_effects import unit_effects
-from strapdown.crash.unit_reconstruction import reconstruct_unit
+from strapdown.crash.preparation import prepare_unit
+from strapdown.crash.reconstruction import reconstruct_crash, reconstruct_unit
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.sensors.lever_arm import move_unit
 from strapdown.sensors.synchronise import synchronise
 from strapdown.simulation.crash_motion import CRASHES
 from strapdown.simulation.crash_recording import paper_units, record_crash
 from strapdown.simulation.mounted_motion import MountedMotion
-from strapdown.systems.crash_reconstruction import reconstruct_crash
 from strapdown.tables import ACCEL, NED
 
 POLE = CRASHES["pole"]

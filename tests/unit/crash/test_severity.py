@@ -7,9 +7,14 @@ import math
 import numpy as np
 import pytest
 
-from strapdown.crash.severity import SEVERITY_MODELS, find_severity_model
-from strapdown.crash.severity_file import load_severity_model
-from strapdown.crash.severity_model import SeverityModel, Term, injury_risk
+from strapdown.crash.severity import (
+    SEVERITY_MODELS,
+    SeverityModel,
+    Term,
+    find_severity_model,
+    injury_risk,
+    load_severity_model,
+)
 from strapdown.errors import ConfigError, DataError
 
 MPH = 0.44704

@@ -16,18 +16,16 @@ from strapdown.config.crash_case import (
     TriadSpec,
     UnitSpec,
 )
+from strapdown.crash.case import CaseResult, ReferenceAnswer, SeverityAnswer
 from strapdown.crash.entry import Entry
-from strapdown.crash.monte_carlo import sample_paths
-from strapdown.crash.reference_path import compare_with_reference
-from strapdown.crash.severity import find_severity_model
-from strapdown.crash.severity_model import injury_risk
+from strapdown.crash.path import compare_with_reference, sample_paths
+from strapdown.crash.reconstruction import reconstruct_crash
+from strapdown.crash.severity import find_severity_model, injury_risk
 from strapdown.report.crash_figures import crash_figures
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.simulation.crash_motion import find_crash
 from strapdown.simulation.crash_recording import paper_units, record_crash
 from strapdown.simulation.mounted_motion import MountedMotion
-from strapdown.systems.crash_case import CaseResult, ReferenceAnswer, SeverityAnswer
-from strapdown.systems.crash_reconstruction import reconstruct_crash
 from strapdown.tables import NED
 
 HOSTILE = '<script>alert("&")</script>\x00'

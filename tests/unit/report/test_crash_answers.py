@@ -13,6 +13,7 @@ import pytest
 from strapdown.bundle.seal import to_json
 from strapdown.config.crash_case import AssumedSpec, ReferenceSpec
 from strapdown.config.crash_case_file import read_case_spec
+from strapdown.crash.case import case_severity, compare_reference, main_event, run_case
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import read_raw
 from strapdown.report.crash_case import file_name
@@ -21,7 +22,6 @@ from strapdown.report.crash_limits import limitations
 from strapdown.report.simulation import simulate
 from strapdown.report.values import spaced
 from strapdown.report.verify import changed_case
-from strapdown.systems.crash_case import case_severity, compare_reference, main_event, run_case
 
 USUAL = {
     "Ringing of the structure is not seen at this rate",

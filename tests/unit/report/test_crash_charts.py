@@ -10,8 +10,9 @@ import pytest
 from tests.unit.report.crash_results import crash_case, figures_of
 
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
+from strapdown.crash.case import main_event
 from strapdown.crash.delta_v_bound import body_delta_v_bound
-from strapdown.crash.pdof_sensitivity import pdof_by_shift
+from strapdown.crash.pdof import pdof_by_shift
 from strapdown.report.chart import SERIES_COLOURS
 from strapdown.report.crash_charts import (
     delta_v_budget,
@@ -24,7 +25,6 @@ from strapdown.report.crash_signals import flags_in_vehicle_axes, in_vehicle_axe
 from strapdown.report.plotly_chart import figure
 from strapdown.report.svg_chart import draw
 from strapdown.sensors.crash_unit import Mounting
-from strapdown.systems.crash_case import main_event
 from strapdown.tables import EULER, NED
 
 ALONE = ("IMU1",)

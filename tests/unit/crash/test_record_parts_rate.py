@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from strapdown.systems.crash_draft.table_parts import stated_rate
+from strapdown.crash.record_parts import stated_rate
 
 
 @pytest.mark.parametrize(

@@ -12,16 +12,9 @@ from numpy.typing import NDArray
 
 from strapdown.alignment.levelling import level
 from strapdown.crash.acceleration import force_at_rest
-from strapdown.crash.at_point import PointKinematics, at_point
 from strapdown.crash.entry import Entry
+from strapdown.crash.measuring_point import PointKinematics, at_point
 from strapdown.crash.path import reconstruct_path
-from strapdown.crash.prepare_findings import (
-    bias_findings,
-    length_findings,
-    rest_findings,
-    saturation_findings,
-    step_findings,
-)
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.results.rests import RestStretch
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad, UnitArrays, check_unit
@@ -34,7 +27,12 @@ from strapdown.sensors.pre_crash import (
     gyro_bias_from,
     in_axes,
 )
-from strapdown.sensors.range_merge import agreement_findings, bias_from_lower_range, merge_ranges
+from strapdown.sensors.range_merge import (
+    MergedRanges,
+    agreement_findings,
+    bias_from_lower_range,
+    merge_ranges,
+)
 from strapdown.sensors.rest import rest_between
 from strapdown.sensors.saturation import RangeLimits, find_limits
 from strapdown.sensors.synchronise import SynchronisedUnit, SynchronisedUnits
@@ -103,10 +101,6 @@ def prepare_unit(
         Whether the specific force while stationary is scaled to the length of gravity.
     margin, hysteresis, fade
         As `merge_ranges`.
-
-    Returns
-    -------
-    PreparedUnit
 
     Raises
     ------
@@ -241,10 +235,7 @@ def _find_rest(
 
 
 def _range_biases(
-    unit: CrashUnit,
-    data: UnitArrays,
-    limits: Sequence[RangeLimits],
-    rest: RestStretch | None,
+    unit: CrashUnit, data: UnitArrays, limits: Sequence[RangeLimits], rest: RestStretch | None
 ) -> tuple[list[Array], tuple[int | None, ...], tuple[Triad, ...]]:
     """Bias of every range relative to the lowest: each is tied to the next lower one."""
     bias: list[Array] = [np.zeros(3)]
@@ -395,35 +386,14 @@ READ = 2
 
 
 def prepare_together(
-    together: SynchronisedUnits,
-    point: Sequence[float],
-    gravity: float,
-    options: Mapping[str, Any],
+    together: SynchronisedUnits, point: Sequence[float], gravity: float, options: Mapping[str, Any]
 ) -> list[PointKinematics]:
-    """Prepare units and move them to a point.
+    """Prepare units, each over its own record, and move them to a point, (3,), m, vehicle axes.
 
-    Parameters
-    ----------
-    together : SynchronisedUnits
-        Each over its own record.
-    point : sequence of float, (3,), m
-        Vehicle axes, from the vehicle's origin.
-    gravity : float, m/s²
-    options : mapping
-        Options of `prepare_unit` for all units; under the name of a unit, a mapping of its own.
-
-    Returns
-    -------
-    list of PointKinematics
-        In the order of the units. A unit that borrows its gyro, is not leveled by an option, and
-        whose record begins after the lender's stationary interval is leveled by the lender: roll
-        and pitch are propagated with the gyro to the start of the borrower's record, with their
-        standard deviation.
-
-    Raises
-    ------
-    DataError, ConfigError
-        As `prepare_unit`.
+    `options`: of `prepare_unit` for all units; under the name of a unit, a mapping of its own. A
+    unit that borrows its gyro, is not leveled by an option, and whose record begins after the
+    lender's stationary interval is leveled by the lender: roll and pitch are propagated with the
+    gyro to the start of the borrower's record, with their standard deviation.
     """
     names = {u.unit.name for u in together.units}
     common = {k: v for k, v in options.items() if k not in names}
@@ -507,26 +477,10 @@ def _attitude_at_start(
 def level_at_rest(rest: RestStretch, unknown: float, gravity: float, source: str) -> Levelling:
     """Roll and pitch from the mean specific force, with the sd from its noise.
 
-    Parameters
-    ----------
-    rest : RestStretch
-        In vehicle axes.
-    unknown : float, m/s²
-        Standard deviation of the vehicle's own acceleration over the interval, each axis.
-    gravity : float, m/s²
-    source : str
-        For messages.
-
-    Returns
-    -------
-    Levelling
-        The sd is that of the worse of the two angles: an acceleration error e perpendicular to
-        the specific force tilts the level by ``e / g`` (roll: divided by ``cos(pitch)``).
-
-    Raises
-    ------
-    DataError
-        The length differs from gravity by more than 20 %.
+    `unknown`, m/s²: standard deviation of the vehicle's own acceleration over the interval, each
+    axis. The sd is that of the worse of the two angles: an acceleration error e perpendicular to
+    the specific force tilts the level by ``e / g`` (roll: divided by ``cos(pitch)``). `DataError`:
+    the length differs from gravity by more than 20 %.
     """
     assert rest.accel_mean is not None and rest.accel_mean_sd is not None
     try:
@@ -552,26 +506,12 @@ def from_stated_attitude(
     unknown: float,
     gravity: float,
 ) -> tuple[Levelling, Array | None]:
-    """Bias of the lowest range from gravity in a stated attitude.
+    """Bias of the lowest range from gravity in a stated attitude: (roll, pitch, sd), deg.
 
-    Parameters
-    ----------
-    stated : (roll, pitch, sd), deg
-    rest : RestStretch, optional
-        In vehicle axes.
-    bias_sd : ndarray, (3,), m/s²
-        Stated sd of the bias of the lowest range, vehicle axes.
-    unknown : float, m/s²
-        As `level_at_rest`.
-    gravity : float, m/s²
-
-    Returns
-    -------
-    levelling : Levelling
-    shift : ndarray, (3,), m/s², or None
-        Stationary reading of the lowest range minus gravity in that attitude; None where there is
-        no stationary interval, or where the stated bias is more accurate than ``g`` times the sd
-        of the attitude.
+    `bias_sd`, (3,), m/s²: stated sd of that bias, vehicle axes; `unknown` as `level_at_rest`.
+    Returns the leveling and the stationary reading minus gravity in that attitude, (3,), m/s²; None
+    where there is no stationary interval, or where the stated bias is more accurate than ``g``
+    times the sd of the attitude.
     """
     roll, pitch, sd = stated
     levelling = Levelling(float(roll), float(pitch), float(sd), from_rest=False)
@@ -584,28 +524,12 @@ def from_stated_attitude(
 
 
 def with_gravity(
-    unit: CrashUnit,
-    data: UnitArrays,
-    levelling: tuple[float, float, float] | None,
-    gravity: float,
+    unit: CrashUnit, data: UnitArrays, levelling: tuple[float, float, float] | None, gravity: float
 ) -> UnitArrays:
-    """Add the gravity component along assumed axes.
+    """Add the gravity component along assumed axes, in sensor axes.
 
-    Parameters
-    ----------
-    unit : CrashUnit
-        Its triads give the assumed axes.
-    data : UnitArrays
-        Arrays of the unit, sensor axes.
-    levelling : (roll, pitch, sd), deg, optional
-        Of the stationary vehicle.
-    gravity : float, m/s²
-
-    Raises
-    ------
-    DataError
-        There is such an axis and no leveling is stated: two accelerometer axes do not determine
-        the attitude.
+    `levelling`: (roll, pitch, sd), deg, of the stationary vehicle. `DataError`: there is such an
+    axis and no leveling is stated, as two accelerometer axes do not determine the attitude.
     """
     absent = list(unit.accelerometers[0].absent)
     if not absent:
@@ -628,30 +552,12 @@ def with_gravity(
 def gravity_correction(
     rest: RestStretch, uncertainty: TriadUncertainty, unknown: float, gravity: float
 ) -> tuple[float, Array] | None:
-    """Correction that makes the stationary specific force as long as gravity.
+    """Correction that makes the stationary specific force as long as gravity, and its direction.
 
-    Parameters
-    ----------
-    rest : RestStretch
-        In vehicle axes.
-    uncertainty : TriadUncertainty
-        Of the lowest range.
-    unknown : float, m/s²
-        As `level_at_rest`.
-    gravity : float, m/s²
-
-    Returns
-    -------
-    correction : float, m/s²
-        To be added along the direction.
-    direction : ndarray, (3,)
-        Of the mean specific force, vehicle axes.
-
-    Notes
-    -----
-    It removes the bias along the vertical and the scale-factor error on gravity, as long as the
-    body does not turn. None over a steady interval whose own acceleration is less certain than
-    that bias and scale factor.
+    m/s², and (3,) in vehicle axes. It removes the bias along the vertical and the scale-factor
+    error on gravity, as long as the body does not turn. None over a steady interval whose own
+    acceleration (`unknown`, as `level_at_rest`) is less certain than bias and scale factor of the
+    lowest range.
     """
     assert rest.accel_mean is not None
     mean = np.asarray(rest.accel_mean)
@@ -660,3 +566,247 @@ def gravity_correction(
     if unknown > 0.0 and unknown >= own:
         return None
     return gravity - length, mean / length
+
+
+# Findings on the preparation of a unit.
+
+
+# A number contradicts its stated value beyond this many standard deviations.
+SIGMAS = 4.0
+# Fraction of the range: differences from interpolation and decimation of two clipped ranges.
+LEAST_STEP = 1e-3
+# A record that begins less than this before the impact has no interval before it.
+SHORTEST = 0.05  # s
+# Limits of a stationary specific force that is in g instead of m/s².
+NEAR_ONE = (0.8, 1.2)
+
+
+def rest_findings(
+    unit: CrashUnit,
+    time: Array,
+    impact: float,
+    rest: RestStretch | None,
+    levelled: bool,
+    steady_acceleration: float,
+) -> list[Finding]:
+    """Report a missing stationary interval, or only a steady one.
+
+    Raises
+    ------
+    DataError
+        There is neither, and no leveling is stated.
+    """
+    if rest is None:
+        late = time[0] > impact - SHORTEST
+        said = {"begin": time[0], "impact": impact}
+        if not levelled:
+            code = "crash.record-starts-in-crash" if late else "crash.no-rest"
+            raise DataError(code, file=unit.name, quantity="rest", data=said)
+        code = "crash.record-starts-in-crash-levelled" if late else "crash.no-rest-levelled"
+        return [Finding(code, file=unit.name, quantity="rest", data=said)]
+    if rest.grade == "steady":
+        return [
+            Finding(
+                "crash.no-stationary-stretch-quiet-without",
+                file=unit.name,
+                quantity="rest",
+                end=rest.end - rest.start,
+                start=rest.start,
+                steady_acceleration=steady_acceleration,
+            )
+        ]
+    return []
+
+
+def length_findings(unit: CrashUnit, rest: RestStretch, gravity: float) -> list[Finding]:
+    """Report a stationary force that is in g, points down, or contradicts its stated errors.
+
+    Raises
+    ------
+    DataError
+        Its length is near one.
+    """
+    assert rest.accel_mean is not None
+    mean = np.asarray(rest.accel_mean)
+    length = float(np.linalg.norm(mean))
+    lowest = unit.accelerometers[0]
+    if NEAR_ONE[0] <= length <= NEAR_ONE[1]:
+        raise DataError(
+            "crash.specific-force-rest-long-gravity",
+            file=f"{unit.name}, {lowest.name}",
+            quantity="accel",
+            length=length,
+        )
+    found = []
+    if mean[2] > 0.5 * gravity:
+        found.append(
+            Finding(
+                "crash.specific-force-rest-along-vehicle",
+                file=f"{unit.name}, {lowest.name}",
+                quantity="accel_z",
+                mean=mean[2],
+            )
+        )
+    u = lowest.uncertainty
+    stated = float(np.hypot(max(u.axis("bias")), gravity * max(u.axis("scale"))))
+    if stated > 0.0 and abs(length - gravity) > SIGMAS * stated and 8.0 < length < 11.6:
+        found.append(
+            Finding(
+                "crash.specific-force-rest-long-off",
+                file=f"{unit.name}, {lowest.name}",
+                quantity="accel",
+                length=length,
+                length_2=length - gravity,
+                length_3=abs(length - gravity) / stated,
+                stated=stated,
+            )
+        )
+    return found
+
+
+def saturation_findings(
+    unit: CrashUnit, data: UnitArrays, limits: Sequence[RangeLimits], gyro_limits: RangeLimits
+) -> list[Finding]:
+    """Report clipping of the last range or the gyro, and ranges unlike the stated ones."""
+    found = []
+    last = len(limits) - 1
+    for j, (triad, limit) in enumerate(zip(unit.accelerometers, limits, strict=True)):
+        found += _ends(unit, triad, limit, "m/s²", "accel")
+        if j == last:
+            found += _clipped(unit, triad, data.time, limit, "accel")
+    assert unit.gyro is not None
+    found += _ends(unit, unit.gyro, gyro_limits, "rad/s", "gyro")
+    found += _clipped(unit, unit.gyro, data.time, gyro_limits, "gyro")
+    return found
+
+
+def _ends(
+    unit: CrashUnit, triad: RecordedTriad, limits: RangeLimits, u: str, quantity: str
+) -> list[Finding]:
+    found = []
+    stated = triad.uncertainty.axis("full_scale")
+    for k, axis in enumerate("xyz"):
+        source = f"{unit.name}, {triad.name}"
+        if limits.found[k]:
+            found.append(
+                Finding(
+                    "crash.held-between-stated-full-scale",
+                    file=source,
+                    quantity=f"{quantity}_{axis}",
+                    lower=limits.lower[k],
+                    upper=limits.upper[k],
+                    u=u,
+                    stated=stated[k],
+                )
+            )
+        if limits.beyond[k]:
+            found.append(
+                Finding(
+                    "crash.reads-more-than-stated-full",
+                    file=source,
+                    quantity=f"{quantity}_{axis}",
+                    stated=stated[k],
+                    u=u,
+                )
+            )
+    return found
+
+
+def _clipped(
+    unit: CrashUnit, triad: RecordedTriad, time: Array, limits: RangeLimits, quantity: str
+) -> list[Finding]:
+    found = []
+    for k, axis in enumerate("xyz"):
+        rows = np.flatnonzero(limits.clipped[:, k])
+        if rows.size:
+            found.append(
+                Finding(
+                    f"crash.{quantity}-clipped",
+                    file=f"{unit.name}, {triad.name}",
+                    quantity=f"{quantity}_{axis}",
+                    count=rows.size,
+                    first=time[rows[0]],
+                    last=time[rows[-1]],
+                )
+            )
+    return found
+
+
+def bias_findings(
+    unit: CrashUnit,
+    bias: Sequence[Array],
+    bias_from: Sequence[int | None],
+    rest: RestStretch | None,
+) -> list[Finding]:
+    """Report a bias that could not be estimated, or exceeds the stated one."""
+    found = []
+    for j in range(1, len(bias)):
+        triad = unit.accelerometers[j]
+        source = f"{unit.name}, {triad.name}"
+        if bias_from[j] is None:
+            found.append(
+                Finding(
+                    "crash.bias-unknown-without-rest"
+                    if rest is None
+                    else "crash.bias-unknown-range-at-end",
+                    file=source,
+                    quantity="bias",
+                    name=unit.accelerometers[j - 1].name,
+                    sd=max(triad.uncertainty.axis("bias")),
+                )
+            )
+            continue
+        own = bias[j] - bias[j - 1]
+        stated = np.hypot(
+            triad.uncertainty.axis("bias"), unit.accelerometers[j - 1].uncertainty.axis("bias")
+        )
+        for k, axis in enumerate("xyz"):
+            if stated[k] > 0.0 and abs(own[k]) > SIGMAS * stated[k]:
+                found.append(
+                    Finding(
+                        "crash.bias-against-times-stated",
+                        file=source,
+                        quantity=f"accel_{axis}",
+                        own=own[k],
+                        name=unit.accelerometers[j - 1].name,
+                        own_2=abs(own[k]) / stated[k],
+                        stated=stated[k],
+                    )
+                )
+    return found
+
+
+def step_findings(unit: CrashUnit, merged: MergedRanges) -> list[Finding]:
+    """Report ranges that differ where one takes over from the other."""
+    found = []
+    largest = np.abs(merged.values).max(axis=0)
+    for j in range(len(merged.step)):
+        low, high = unit.accelerometers[j], unit.accelerometers[j + 1]
+        for k, axis in enumerate("xyz"):
+            if not merged.switches[j, k]:
+                continue
+            level = min(low.uncertainty.axis("full_scale")[k], 1e6)
+            scale = level * np.hypot(
+                low.uncertainty.axis("scale")[k], high.uncertainty.axis("scale")[k]
+            )
+            # Each axis senses the other axes through its own two angles.
+            angles = np.hypot(
+                low.uncertainty.axis("misalignment")[k], high.uncertainty.axis("misalignment")[k]
+            )
+            aside = angles * np.hypot(*np.delete(largest, k))
+            own = max(float(np.hypot(scale, aside)), LEAST_STEP * level)
+            sd = float(np.hypot(merged.step_sd[j, k], own))
+            if abs(merged.step[j, k]) > SIGMAS * sd:
+                found.append(
+                    Finding(
+                        "crash.take-over-another-they-differ",
+                        file=unit.name,
+                        quantity=f"accel_{axis}",
+                        name=low.name,
+                        name_2=high.name,
+                        step=merged.step[j, k],
+                        switches=merged.switches[j, k],
+                        step_2=abs(merged.step[j, k]) / sd,
+                    )
+                )
+    return found

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
-from strapdown.systems.crash_draft.draft import TURNS
-from strapdown.systems.crash_draft.impact import sitting_at_rest
+from strapdown.crash.template import TURNS, sitting_at_rest
 
 G = 9.80665
 UP = np.array([0.0, 0.0, -G])

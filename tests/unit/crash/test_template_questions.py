@@ -7,7 +7,7 @@ import tomllib
 import numpy as np
 import pytest
 
-from strapdown.systems.crash_draft import draft_case, read_records
+from strapdown.crash.template import draft_case, read_records
 
 RATE = 500.0
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from strapdown import CrashUnit, Entry, Mounting, TriadUncertainty, reconstruct_crash, sample_paths
-from strapdown.crash.reference_path import compare_with_reference
+from strapdown.crash.path import compare_with_reference
 from strapdown.errors import ConfigError, DataError
 from strapdown.simulation.crash_motion import CRASHES, CrashMotion, HaversinePulse
 from strapdown.simulation.crash_recording import paper_units, record_crash

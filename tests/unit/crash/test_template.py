@@ -15,13 +15,13 @@ from hypothesis import strategies as st
 
 from strapdown import rotation
 from strapdown.config.crash_case_file import read_case_spec
+from strapdown.crash.template import draft_case, read_records
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.formats.crash_records import read_crash_record
 from strapdown.formats.crash_triad import triad_of_channels
 from strapdown.simulation.crash_motion import find_crash
 from strapdown.simulation.crash_recording import paper_units, record_crash
-from strapdown.systems.crash_draft import draft_case, read_records
 
 G = 9.80665
 UP = (180.0, 0.0, 0.0)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from strapdown.bundle.seal import sha256
 from strapdown.config.crash_case import AssumedSpec, CaseSpec, ReferenceSpec, TriadSpec, UnitSpec
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.delta_v import delta_v
@@ -16,12 +17,25 @@ from strapdown.crash.delta_v_bound import body_delta_v_bound
 from strapdown.crash.entry import Entry
 from strapdown.crash.events import EventRule
 from strapdown.crash.gnss_entry import GnssEntry
-from strapdown.crash.monte_carlo import PathSamples, sample_paths
-from strapdown.crash.path import CrashPath
-from strapdown.crash.reference_path import PathComparison, compare_with_reference
-from strapdown.crash.severity import SEVERITY_MODELS, find_severity_model
-from strapdown.crash.severity_model import InjuryRisk, SeverityModel, injury_risk
-from strapdown.crash.unit_reconstruction import UnitReconstruction
+from strapdown.crash.path import (
+    CrashPath,
+    PathComparison,
+    PathSamples,
+    compare_with_reference,
+    sample_paths,
+)
+from strapdown.crash.reconstruction import (
+    CrashReconstruction,
+    UnitReconstruction,
+    reconstruct_crash,
+)
+from strapdown.crash.severity import (
+    SEVERITY_MODELS,
+    InjuryRisk,
+    SeverityModel,
+    find_severity_model,
+    injury_risk,
+)
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.crash_record import CrashRecord
 from strapdown.formats.crash_records import read_crash_record
@@ -30,11 +44,9 @@ from strapdown.formats.gnss_files import files_of_fixes, read_gnss
 from strapdown.formats.named_columns import read_reference_path
 from strapdown.progress import Progress, silent
 from strapdown.results.inputs import InputFiles
-from strapdown.sensors.catalogue import load_sensor
+from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.crash_unit import Assumed, CrashUnit, Mounting, RecordedTriad
 from strapdown.sensors.uncertainty import stated_uncertainty
-from strapdown.systems.crash_reconstruction import CrashReconstruction, reconstruct_crash
-from strapdown.systems.inputs import input_files, sensor_file
 from strapdown.systems.one_thread import one_thread
 
 __all__ = [
@@ -104,10 +116,6 @@ def run_case(
     progress : callable, optional
         Called with a stage and the share that is done.
 
-    Returns
-    -------
-    CaseResult
-
     Raises
     ------
     ConfigError
@@ -163,13 +171,7 @@ def run_case(
 
 
 def whole_records(spec: CaseSpec) -> tuple[dict[str, CrashRecord], CaseSpec]:
-    """Read the records of a case, and name each of several files by its folder.
-
-    Raises
-    ------
-    ConfigError, DataError
-        As `read_crash_record`.
-    """
+    """Read the records of a case, and name each of several files by its folder."""
     read = {t.path: read_crash_record(t.path) for t in _triads(spec)}
     moved = {path: str(_whole(path, record)) for path, record in read.items()}
     units = tuple(
@@ -208,14 +210,20 @@ def _triads(spec: CaseSpec) -> Iterator[TriadSpec]:
 def _inputs(
     spec: CaseSpec, case_file: Path | None, records: dict[str, CrashRecord]
 ) -> tuple[InputFiles, ...]:
-    found = [] if case_file is None else [input_files("case", str(case_file), (case_file,))]
-    found += [input_files("record", path, record.files) for path, record in records.items()]
-    for sensor in dict.fromkeys(t.sensor for t in _triads(spec)):
-        found += sensor_file(sensor)
+    sensors = (t.sensor for t in _triads(spec) if t.sensor is not None)
+    given: list[tuple[str, str, tuple[Path, ...]]] = []
+    if case_file is not None:
+        given.append(("case", str(case_file), (case_file,)))
+    given += [("record", path, record.files) for path, record in records.items()]
+    # Only the files of sensors that are not of the catalogue.
+    given += [("sensor", s, (Path(s),)) for s in dict.fromkeys(sensors) if s.lower() not in SENSORS]
     others = [("reference", r.path) for r in spec.references if r.path is not None]
     others += [("fixes", spec.entry.path)] if spec.entry.path is not None else []
-    found += [input_files(role, path, files_of_fixes(path)) for role, path in dict.fromkeys(others)]
-    return tuple(found)
+    given += [(role, path, files_of_fixes(path)) for role, path in dict.fromkeys(others)]
+    return tuple(
+        InputFiles(role, Path(path), files, tuple(sha256(file) for file in files))
+        for role, path, files in given
+    )
 
 
 def _entry(spec: CaseSpec) -> Entry | GnssEntry | None:
@@ -285,24 +293,10 @@ TRIADS = {"acceleration": "accel", "rate": "gyro"}
 
 
 def case_unit(spec: UnitSpec, records: Mapping[str, CrashRecord]) -> CrashUnit:
-    """Build a unit from its specification in the case.
+    """Build a unit from its specification in the case, and the records by path.
 
-    Parameters
-    ----------
-    spec : UnitSpec
-    records : dict of str to CrashRecord
-        By path.
-
-    Returns
-    -------
-    CrashUnit
-
-    Raises
-    ------
-    DataError
-        A channel is missing, or cannot be used.
-    ConfigError
-        A sensor, a key or a number is invalid.
+    Raises `DataError` for a channel that is missing or unusable, `ConfigError` for an invalid
+    sensor, key or number.
     """
     count = len(spec.accelerometers)
     accelerometers = tuple(
@@ -333,11 +327,7 @@ def _assumed(spec: AssumedSpec) -> Assumed:
 
 
 def _triad(
-    unit: UnitSpec,
-    spec: TriadSpec,
-    records: Mapping[str, CrashRecord],
-    quantity: str,
-    name: str,
+    unit: UnitSpec, spec: TriadSpec, records: Mapping[str, CrashRecord], quantity: str, name: str
 ) -> RecordedTriad:
     table = triad_of_channels(
         records[spec.path],
@@ -365,22 +355,10 @@ AXES = {"forward": (1.0, 0.0, 0.0), "right": (0.0, 1.0, 0.0)}
 
 @dataclass(frozen=True, eq=False)
 class ReferenceAnswer:
-    """Comparison of one unit's answer with a reference.
+    """Comparison of one unit's answer with a reference: a path, or a delta-V over a span in s.
 
-    Attributes
-    ----------
-    spec : ReferenceSpec
-    unit : str
-        Unit of the answer.
-    table : DataFrame or None
-        Reference path as read.
-    path : PathComparison or None
-    span : tuple of float, s
-        Span of a delta-v.
-    delta_v, sd : float, m/s
-        Computed over the span; NaN for a path.
-    consistent : bool
-        Whether the difference is within the 95 % bound of both together.
+    `delta_v` and `sd`, m/s, are NaN for a path. `consistent`: the difference is within the 95 %
+    bound of both together.
     """
 
     spec: ReferenceSpec
@@ -399,26 +377,9 @@ def compare_reference(
     gravity: float,
     tables: Mapping[str, pd.DataFrame],
 ) -> ReferenceAnswer:
-    """Compare one unit with one reference.
+    """Compare one unit with one reference; `tables` are reference paths as read, by path.
 
-    Parameters
-    ----------
-    spec : ReferenceSpec
-    unit : UnitReconstruction
-    gravity : float, m/s²
-    tables : dict of str to DataFrame
-        Reference paths, by path of their file.
-
-    Returns
-    -------
-    ReferenceAnswer
-
-    Raises
-    ------
-    DataError
-        The reference and the record have no time in common.
-    ConfigError
-        The span of a delta-v is not stated, and there is no event.
+    `DataError`: path and reference do not overlap.
     """
     if spec.path is not None:
         table = tables[spec.path]
@@ -478,8 +439,6 @@ class SeverityAnswer:
 
     Attributes
     ----------
-    model : SeverityModel
-    risk : InjuryRisk or None
     because : Finding or None
         Why there is no risk.
     """
@@ -503,23 +462,10 @@ def main_event(unit: UnitReconstruction) -> int | None:
 
 
 def case_severity(spec: CaseSpec, unit: UnitReconstruction) -> tuple[SeverityAnswer, ...]:
-    """Evaluate the models that the case names, or all that fit the type of the crash.
+    """Evaluate the models that the case names, or all that fit the type of the severest event.
 
-    Parameters
-    ----------
-    spec : CaseSpec
-    unit : UnitReconstruction
-        Its event with the largest delta-v is used.
-
-    Returns
-    -------
-    tuple of SeverityAnswer
-        Empty without an event. A model that is not valid here, or lacks an input, states why.
-
-    Raises
-    ------
-    ConfigError
-        A model is unknown.
+    Empty without an event. A model that is not valid here, or lacks an input, states why.
+    `ConfigError`: a model is unknown.
     """
     number = main_event(unit)
     if number is None:

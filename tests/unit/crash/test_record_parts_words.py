@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from strapdown.config.toml_text import ASK, Page, array, inline, number, plain, string
-from strapdown.systems.crash_draft.header_words import read_heading
+from strapdown.crash.record_parts import read_heading
 
 
 @pytest.mark.parametrize(

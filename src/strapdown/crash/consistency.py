@@ -1,0 +1,1195 @@
+"""Velocity increments of units at a common point, and the covariance of their differences."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown import rotation
+from strapdown.crash.acceleration import window_weights
+from strapdown.crash.measuring_point import LEVER_ARM, MOUNTING, PointKinematics
+from strapdown.errors import ConfigError, DataError, Finding
+
+__all__ = [
+    "TINY",
+    "AxisMatch",
+    "LeverArmCheck",
+    "MountingRotation",
+    "NoiseOfSums",
+    "UnitAgainstAll",
+    "UnitComparison",
+    "UnitPair",
+    "VelocityIncrements",
+    "axis_findings",
+    "check_lever_arm",
+    "chi_square_along",
+    "chi_square_tail",
+    "clipped_axes",
+    "clipped_pieces",
+    "common_edges",
+    "compare_units",
+    "difference_covariance",
+    "floored",
+    "joint_covariance",
+    "lever_arm_findings",
+    "match_axes",
+    "measured_axes",
+    "measured_by_all",
+    "measured_by_any",
+    "mounting_rotation",
+    "noise_of_sums",
+    "rotation_findings",
+    "signed_permutations",
+    "velocity_increments",
+]
+
+
+Array = NDArray[np.float64]
+
+# Relative to the largest variance: smaller covariances are rounding.
+FLOOR, TINY = 1e-12, 1e-30
+
+
+@dataclass(frozen=True, eq=False)
+class VelocityIncrements:
+    """Integrals of a unit's specific force and rates over m intervals; rows by interval, then axis.
+
+    `values`, (m, 3), m/s, and `turned`, (m, 3), rad, between `edges`, (m + 1,), s; the effect of
+    one standard deviation of each of p unknowns on them, (3 m, p); `lever`, (3 m, 3), 1/s: effect
+    of a position error (true minus stated) on the values.
+    """
+
+    edges: Array
+    values: Array
+    turned: Array
+    names: tuple[str, ...]
+    contributors: tuple[str, ...]
+    effects: Array
+    turned_effects: Array
+    noise: NoiseOfSums
+    lever: Array
+
+    def of_pieces(self, kept: NDArray[np.bool_]) -> VelocityIncrements:
+        """Select some of the intervals; the edges remain those of all.
+
+        Parameters
+        ----------
+        kept : ndarray of bool, (m,)
+        """
+        if kept.all():
+            return self
+        rows = np.repeat(kept, 3)
+        return replace(
+            self,
+            values=self.values[kept],
+            turned=self.turned[kept],
+            effects=self.effects[rows],
+            turned_effects=self.turned_effects[rows],
+            noise=self.noise.of_rows(rows),
+            lever=self.lever[rows],
+        )
+
+    def borrows(self, other: VelocityIncrements) -> bool:
+        """Whether both share one gyro, so that their rates agree by construction."""
+        return self.noise.gyro == other.noise.gyro
+
+
+def joint_covariance(
+    increments: Sequence[VelocityIncrements], *, of: str = "force", without: Collection[str] = ()
+) -> Array:
+    """Covariance, (3 m k, 3 m k), of the increments of k units together, between the same edges.
+
+    Unknowns of the same name are one unknown, and the noise of a gyro that several units borrow is
+    common, as far as they use the same samples. `of` is ``force`` or ``rate``; `without`:
+    contributors to leave out.
+    """
+    columns: dict[str, int] = {}
+    gyros: dict[tuple[str, int], list[int]] = {}
+    for k, unit in enumerate(increments):
+        for name, contributor in zip(unit.names, unit.contributors, strict=True):
+            if contributor not in without:
+                columns.setdefault(name, len(columns))
+        gyros.setdefault((unit.noise.gyro, unit.noise.turned.shape[1]), []).append(k)
+    size = increments[0].values.size
+    spread = np.zeros((len(increments), size, len(columns)))
+    out = np.zeros((len(increments), size, len(increments), size))
+    for k, unit in enumerate(increments):
+        kept = [i for i, c in enumerate(unit.contributors) if c not in without]
+        given = unit.effects if of == "force" else unit.turned_effects
+        spread[k][:, [columns[unit.names[i]] for i in kept]] = given[:, kept]
+        if of == "force":
+            out[k, :, k] += unit.noise.of_force
+    for of_one in gyros.values():
+        for i in of_one:
+            for j in of_one:
+                one, other = increments[i].noise, increments[j].noise
+                if of == "force":
+                    out[i, :, j] += one.through_arm @ other.through_arm.T
+                else:
+                    out[i, :, j] += one.turned @ other.turned.T
+    whole = len(increments) * size
+    flat = spread.reshape(whole, -1)
+    return np.asarray(out.reshape(whole, whole) + flat @ flat.T)
+
+
+def difference_covariance(
+    first: VelocityIncrements,
+    second: VelocityIncrements,
+    *,
+    of: str = "force",
+    without: Collection[str] = (),
+    turn: Array | None = None,
+) -> Array:
+    """Covariance, (..., 3 m, 3 m), of the increments of one unit minus those of another.
+
+    Common errors cancel. `of`, `without` as `joint_covariance`; `turn`, (..., 3, 3): rotation
+    applied to the increments of the second unit.
+    """
+    size, pieces = first.values.size, len(first.values)
+    turned = np.eye(3) if turn is None else turn
+    blocks = np.einsum("ab,...ij->...aibj", np.eye(pieces), turned)
+    blocks = blocks.reshape(*turned.shape[:-2], size, size)
+    back = np.swapaxes(blocks, -1, -2)
+    both = joint_covariance((first, second), of=of, without=without)
+    mixed = both[:size, size:] @ back
+    out = both[:size, :size] + blocks @ both[size:, size:] @ back
+    out = out - mixed - np.swapaxes(mixed, -1, -2)
+    return np.asarray(0.5 * (out + np.swapaxes(out, -1, -2)))
+
+
+def floored(covariance: Array) -> Array:
+    """Make a covariance invertible: raise it by the rounding of its largest variance.
+
+    Parameters
+    ----------
+    covariance : ndarray, (..., k, k)
+        One, or several with one floor.
+    """
+    largest = float(np.diagonal(covariance, axis1=-2, axis2=-1).max())
+    return np.asarray(covariance + max(FLOOR * largest, TINY) * np.eye(covariance.shape[-1]))
+
+
+def common_edges(
+    units: Sequence[PointKinematics], window: tuple[float, float] | None, pieces: int
+) -> Array:
+    """Edges of equal intervals over a window that all units cover.
+
+    Raises
+    ------
+    DataError
+        The units have no common time, or do not cover the window.
+    ConfigError
+        An interval is shorter than two samples of a unit.
+    """
+    if len(units) < 2:
+        raise DataError("crash.unit-comparison-needs-two", quantity="units", count=len(units))
+    first = max(float(u.time[0]) for u in units)
+    last = min(float(u.time[-1]) for u in units)
+    start, end = (max(first, -0.1), min(last, 0.75)) if window is None else window
+    if not first <= start < end <= last:
+        begins = next(u.name for u in units if u.time[0] == first)
+        ends = next(u.name for u in units if u.time[-1] == last)
+        wanted = (-0.1, 0.75) if window is None else window
+        raise DataError(
+            "crash.share-does-not-cover-begins",
+            quantity="window",
+            units=[u.name for u in units],
+            first=first,
+            last=last,
+            wanted=wanted[0],
+            wanted_2=wanted[1],
+            begins=begins,
+            ends=ends,
+        )
+    coarsest = max(float(np.median(np.diff(u.time))) for u in units)
+    most = int((end - start) / (2.0 * coarsest))
+    if most < 3:
+        raise ConfigError(
+            "crash.steps-cannot-cut-into-three",
+            quantity="window",
+            end=end - start,
+            coarsest=coarsest,
+        )
+    return np.linspace(start, end, min(pieces, most) + 1)
+
+
+def velocity_increments(unit: PointKinematics, edges: Array) -> VelocityIncrements:
+    """Integrate a unit's specific force and rates between edges, (m + 1,), s, in body axes."""
+    sampling = str(unit.imu.attrs["sampling"])
+    weights = np.array(
+        [window_weights(unit.time, *piece, sampling) for piece in itertools.pairwise(edges)]
+    )
+    effects, size = unit.effects, 3 * len(weights)
+    within = weights.any(axis=0)
+    few = weights[:, within]
+    if unit.moved is None:
+        lever = np.zeros((size, 3))
+    else:
+        lever = np.einsum("an,nik->aik", few, unit.moved.lever[within]).reshape(size, 3)
+    return VelocityIncrements(
+        edges,
+        weights @ unit.force,
+        weights @ unit.rate,
+        effects.names,
+        effects.contributors,
+        np.einsum("an,pni->aip", few, effects.force[:, within], optimize=True).reshape(size, -1),
+        np.einsum("an,pni->aip", few, effects.rate[:, within], optimize=True).reshape(size, -1),
+        noise_of_sums(unit, weights),
+        lever,
+    )
+
+
+def chi_square_tail(chi_square: float, freedom: int) -> float:
+    """Probability of a chi-square at least this large; `freedom` may be zero."""
+    from scipy.stats import chi2
+
+    return float(chi2.sf(chi_square, freedom)) if freedom else 1.0
+
+
+# Effect of the sample noise of a unit on weighted sums of samples.
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseOfSums:
+    """Noise of m weighted sums of specific force and rates; rows by sum, then axis.
+
+    `of_force`, (3 m, 3 m), (m/s)²: covariance from accelerometer noise. `through_arm`, m/s, and
+    `turned`, rad, (3 m, q): effect of one standard deviation of each of q independent numbers, the
+    gyro noise, on the sums of force through the lever arm and on those of the rates. Units that
+    borrow a `gyro` have the same numbers.
+    """
+
+    of_force: Array
+    through_arm: Array
+    turned: Array
+    gyro: str
+
+    def of_rows(self, rows: NDArray[np.bool_]) -> NoiseOfSums:
+        """Some of the rows, (3 m,)."""
+        return NoiseOfSums(
+            self.of_force[np.ix_(rows, rows)], self.through_arm[rows], self.turned[rows], self.gyro
+        )
+
+
+def noise_of_sums(at_point: PointKinematics, weights: Array) -> NoiseOfSums:
+    """Compute the effect of the sample noise on sums of samples with weights, (m, n), s.
+
+    Gyro noise through the lever arm keeps its correlation from sample to sample: it nearly cancels
+    in a change of velocity.
+    """
+    m = len(weights)
+    prepared, moved, effects = at_point.prepared, at_point.moved, at_point.effects
+    within = _touched(at_point, weights)
+    few = weights[:, within]
+    if prepared is None or moved is None:
+        own = _diagonal(effects.force_noise[within])
+        turning = _root(_diagonal(effects.rate_noise[within]))
+    else:
+        own = prepared.noise_covariance[within]
+        turning = _root(prepared.gyro_noise_covariance[within])
+    blocks = np.einsum("an,nij,bn->aibj", few, own, few, optimize=True)
+    turned = np.einsum("an,nik->aink", few, turning).reshape(3 * m, -1)
+    if moved is None or not moved.lever_arm.any():
+        arm = np.zeros_like(turned)
+    else:
+        by_rate = moved.of_rates_in_sums(weights)[:, within]
+        arm = np.einsum("anij,njk->aink", by_rate, turning).reshape(3 * m, -1)
+    return NoiseOfSums(blocks.reshape(3 * m, 3 * m), arm, turned, at_point.gyro)
+
+
+def _touched(at_point: PointKinematics, weights: Array) -> slice:
+    """Samples with weight in a sum, and those used for their angular acceleration."""
+    used = np.flatnonzero(weights.any(axis=0))
+    if not used.size:
+        return slice(0, 0)
+    wide = 0 if at_point.moved is None else at_point.moved.slope.slope.shape[1]
+    return slice(max(int(used[0]) - wide, 0), int(used[-1]) + wide + 1)
+
+
+def _diagonal(sd: Array) -> Array:
+    return np.asarray(sd[:, :, None] ** 2 * np.eye(3))
+
+
+def _root(covariances: Array) -> Array:
+    """Matrices whose product with their transpose is the covariance of each sample."""
+    values, vectors = np.linalg.eigh(covariances)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :])
+
+
+# Relative mounting of two units on one vehicle: rotation, lever arm, swapped axes.
+
+
+SIGMAS = 4.0
+ROUNDS = 3
+MOUNTING_CHECKS_TINY = 1e-30
+# The mounting rotation is the estimated quantity, so its prior uncertainty is excluded.
+_TURN = (MOUNTING,)
+# Directions with a larger standard deviation count as unknown.
+MOST_SD = 0.2  # rad
+
+
+@dataclass(frozen=True, eq=False)
+class MountingRotation:
+    """Rotation from the axes of the second unit to those of the first.
+
+    `matrix`, (3, 3); `vector_deg`, (3,), the same as a rotation vector; `covariance`, (3, 3), rad²,
+    of a small rotation about the axes of the first unit, with a variance of pi² for unobserved
+    directions. `misfit`: root of the residuals' chi-square over its degrees of freedom; where it
+    exceeds one, the covariance has been multiplied by its square.
+    """
+
+    matrix: Array
+    vector_deg: Array
+    covariance: Array
+    misfit: float
+
+    @classmethod
+    def untold(cls) -> MountingRotation:
+        """Return the result where the rotation is not observable."""
+        return cls(np.eye(3), np.zeros(3), np.pi**2 * np.eye(3), 0.0)
+
+    @property
+    def sd_deg(self) -> Array:
+        """Standard deviation about each axis of the first unit, (3,), deg."""
+        return np.asarray(np.degrees(np.sqrt(np.diag(self.covariance))), dtype=np.float64)
+
+
+def mounting_rotation(first: VelocityIncrements, second: VelocityIncrements) -> MountingRotation:
+    """Estimate the rotation between two units from forces and rates.
+
+    Parameters
+    ----------
+    first, second : VelocityIncrements
+        Between the same edges.
+
+    Notes
+    -----
+    The least-squares rotation (Wahba 1965, doi:10.1137/1007077) by singular values (Markley
+    1988, J. Astronaut. Sci. 36, 245), forces and rates weighted by their stated variances; then
+    Gauss-Newton steps with the full covariances, since a bias is common to all intervals. The
+    covariance of the estimate is the inverse of the normal matrix. Rates of a shared gyro are
+    left out.
+    """
+    C = _wahba(first, second)
+    normal, step, square = np.eye(3), np.zeros(3), 0.0
+    for _ in range(ROUNDS):
+        normal, step, square = _refine(first, second, C)
+        C = rotation.dcm_from_rotation_vector(step) @ C
+    size = first.values.size + (0 if first.borrows(second) else first.turned.size)
+    misfit = float(np.sqrt(max(square, 0.0) / (size - 3)))
+    values, vectors = np.linalg.eigh(normal)
+    variances = np.minimum(max(1.0, misfit) ** 2 / np.maximum(values, 1e-12), np.pi**2)
+    return MountingRotation(
+        C,
+        np.degrees(rotation.rotation_vector_from_dcm(C)),
+        np.asarray((vectors * variances) @ vectors.T),
+        misfit,
+    )
+
+
+def _observed(
+    first: VelocityIncrements, second: VelocityIncrements
+) -> list[tuple[Array, Array, str]]:
+    """Return forces, and rates unless both units share one gyro."""
+    rates = [] if first.borrows(second) else [(first.turned, second.turned, "rate")]
+    return [(first.values, second.values, "force"), *rates]
+
+
+def _wahba(first: VelocityIncrements, second: VelocityIncrements) -> Array:
+    """Least-squares rotation with one variance for each kind of vector."""
+    product = np.zeros((3, 3))
+    for a, b, of in _observed(first, second):
+        variance = float(np.trace(difference_covariance(first, second, of=of, without=_TURN)))
+        product += a.T @ b / max(variance / a.size, MOUNTING_CHECKS_TINY)
+    u, _, vt = np.linalg.svd(product)
+    return np.asarray(u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt)
+
+
+def _refine(
+    first: VelocityIncrements, second: VelocityIncrements, C: Array
+) -> tuple[Array, Array, float]:
+    """Normal matrix, small rotation and chi-square of the residuals, with full covariances."""
+    normal, right, square = np.zeros((3, 3)), np.zeros(3), 0.0
+    for a, b, of in _observed(first, second):
+        turned = b @ C.T
+        covariance = floored(difference_covariance(first, second, of=of, without=_TURN, turn=C))
+        # (1 + [φ×]) v = v - [v×] φ.
+        effect, left = -rotation.cross_matrix(turned).reshape(-1, 3), (a - turned).ravel()
+        weighed = np.linalg.solve(covariance, np.column_stack([effect, left]))
+        normal += effect.T @ weighed[:, :3]
+        right += effect.T @ weighed[:, 3]
+        square += float(left @ weighed[:, 3])
+    step = np.linalg.lstsq(normal, right, rcond=1e-9)[0]
+    return normal, np.asarray(step, dtype=np.float64), square - float(right @ step)
+
+
+def rotation_findings(
+    found: MountingRotation, stated_sd: float, first: str, second: str
+) -> list[Finding]:
+    """Report a rotation between the units beyond four standard deviations.
+
+    `stated_sd`, rad: stated standard deviation of each angle between the two.
+    """
+    vector = np.radians(found.vector_deg)
+    values, vectors = np.linalg.eigh(found.covariance)
+    along = vectors.T @ vector
+    told = np.sqrt(values) < MOST_SD
+    ratio = np.abs(along) / np.sqrt(values + stated_sd**2)
+    if not (told & (ratio > SIGMAS)).any():
+        return []
+    x, y, z = found.vector_deg
+    sd = found.sd_deg
+    return [
+        Finding(
+            "crash.turned-against-about-forward-right",
+            file=second,
+            quantity="mounting angles",
+            first=first,
+            x=x,
+            y=y,
+            z=z,
+            sd=sd[0],
+            sd_2=sd[1],
+            sd_3=sd[2],
+            stated_sd_deg=np.degrees(stated_sd),
+        )
+    ]
+
+
+# Lever arm between two units, from the difference of their forces while the vehicle turns.
+
+# Directions with a larger standard deviation count as unobserved.
+LEVER_ARM_CHECK_MOST_SD = 0.1  # m
+
+
+@dataclass(frozen=True, eq=False)
+class LeverArmCheck:
+    """Correction of the stated lever arm between two units.
+
+    `correction`, (3,), m, vehicle axes, to be added to the position of the first minus that of the
+    second; meaningful along the columns of `directions`, (3, 3), that are `told`: with an `sd`
+    below 0.1 m. `misfit` as `MountingRotation`, applied to the sds.
+    """
+
+    correction: Array
+    directions: Array
+    sd: Array
+    told: NDArray[np.bool_]
+    misfit: float
+
+    @classmethod
+    def untold(cls) -> LeverArmCheck:
+        """Return the result where the lever arm is not observable."""
+        return cls(np.zeros(3), np.eye(3), np.full(3, np.inf), np.zeros(3, dtype=bool), 0.0)
+
+
+def check_lever_arm(first: VelocityIncrements, second: VelocityIncrements) -> LeverArmCheck:
+    """Estimate the error of the stated relative position of two units.
+
+    Parameters
+    ----------
+    first, second : VelocityIncrements
+        Moved to one point with the stated positions, between the same edges.
+
+    Notes
+    -----
+    Units moved with position errors e₁ and e₂ (true minus stated) differ by
+    ``([α×] + [ω×]²) (e₁ - e₂)``: generalized least squares, with noise and all unknowns of
+    both except the positions as covariance. The component along a fixed axis of rotation is not
+    observable; the normal matrix shows which directions are. Noise of the angular acceleration
+    biases the estimate toward zero by its share of the signal power.
+    """
+    shares = [v.lever for v in (first, second) if v.lever.any()]
+    if not shares:
+        return LeverArmCheck.untold()
+    lever = np.mean(shares, axis=0)
+    difference = (first.values - second.values).ravel()
+    covariance = floored(difference_covariance(first, second, without=(LEVER_ARM,)))
+    weighed = np.linalg.solve(covariance, np.column_stack([lever, difference]))
+    normal = lever.T @ weighed[:, :3]
+    values, vectors = np.linalg.eigh(0.5 * (normal + normal.T))
+    values, vectors = values[::-1], vectors[:, ::-1]
+    seen = values > 1e-9 * max(float(values[0]), 1e-30)
+    along = np.where(seen, vectors.T @ (lever.T @ weighed[:, 3]) / np.where(seen, values, 1.0), 0.0)
+    correction = vectors @ along
+    left = difference - lever @ correction
+    freedom = max(left.size - int(seen.sum()), 1)
+    misfit = float(np.sqrt(max(left @ np.linalg.solve(covariance, left), 0.0) / freedom))
+    sd = np.where(seen, max(1.0, misfit) / np.sqrt(np.where(seen, values, 1.0)), np.inf)
+    return LeverArmCheck(correction, vectors, sd, sd < LEVER_ARM_CHECK_MOST_SD, misfit)
+
+
+def lever_arm_findings(
+    check: LeverArmCheck, stated_sd: float, stated: Array, first: str, second: str
+) -> list[Finding]:
+    """Report positions that the motion contradicts; empty where they are not observable.
+
+    `stated`, (3,), m: position of the first minus that of the second; `stated_sd`, m, of each
+    coordinate.
+    """
+    found = []
+    along = check.directions.T @ check.correction
+    for k in np.flatnonzero(check.told):
+        ratio = abs(float(along[k])) / float(np.hypot(check.sd[k], stated_sd))
+        if ratio <= SIGMAS:
+            continue
+        d = check.directions[:, k] * np.sign(along[k])
+        found.append(
+            Finding(
+                "crash.direction-their-forces-stated",
+                file=first,
+                quantity="position",
+                d=d[0],
+                d_2=d[1],
+                d_3=d[2],
+                d_4=float(d @ stated) + abs(float(along[k])),
+                sd=check.sd[k],
+                second=second,
+                d_5=float(d @ stated),
+                stated_sd=stated_sd,
+            )
+        )
+    return found
+
+
+# Swapped and inverted axes, detected with a second unit on the same vehicle.
+
+
+# Differences of chi-square to the best candidate: below the first another is still possible,
+# above the second it is excluded (3 and 5 standard deviations).
+POSSIBLE, EXCLUDED = 9.0, 25.0
+# Where the stated axes fit with this probability, others are not searched: without rotation, one
+# of 48 candidates fits noise better by chance.
+FITS = 1e-3
+AXES = ("forward", "right", "down")
+
+
+@dataclass(frozen=True, eq=False)
+class AxisMatch:
+    """Signed permutation of a unit's axes that agrees best with another unit.
+
+    `accelerometers`, `gyro`, (3, 3), map the readings of the second unit to the axes of the first
+    (identity where they agree or the motion cannot decide); `..._lead`: excess chi-square of the
+    identity over it; `..._sure`: posterior probability among all 48 with equal priors. `ambiguous`:
+    axes of the first unit for which other permutations fit the accelerometers within three standard
+    deviations.
+    """
+
+    accelerometers: Array
+    gyro: Array
+    accelerometers_lead: float
+    gyro_lead: float
+    accelerometers_sure: float
+    gyro_sure: float
+    ambiguous: tuple[str, ...]
+
+    @classmethod
+    def untold(cls) -> AxisMatch:
+        """Return the result where the axes are not observable."""
+        return cls(np.eye(3), np.eye(3), 0.0, 0.0, 0.0, 0.0, AXES)
+
+    @property
+    def kind(self) -> str:
+        """``agree``, ``unit`` (turned as a whole), ``accelerometers``, ``gyro``, or ``both``."""
+        accel = self.accelerometers_lead > EXCLUDED
+        gyro = self.gyro_lead > EXCLUDED
+        proper = float(np.linalg.det(self.accelerometers)) > 0.0
+        if accel and gyro:
+            return "unit" if proper and np.array_equal(self.accelerometers, self.gyro) else "both"
+        if accel:
+            return "accelerometers"
+        return "gyro" if gyro else "agree"
+
+
+def signed_permutations() -> Array:
+    """All 48 matrices with one ±1 in each row and column; 24 are rotations."""
+    found = []
+    for order in itertools.permutations(range(3)):
+        for signs in itertools.product((1.0, -1.0), repeat=3):
+            matrix = np.zeros((3, 3))
+            matrix[range(3), order] = signs
+            found.append(matrix)
+    return np.array(found)
+
+
+def match_axes(first: VelocityIncrements, second: VelocityIncrements) -> AxisMatch:
+    """Find the signed permutation of the second unit's axes that agrees with the first.
+
+    Parameters
+    ----------
+    first, second : VelocityIncrements
+        Between the same edges; gravity is included, so that a stationary interval separates up
+        from down.
+
+    Notes
+    -----
+    Least squares over the intervals with the full covariance of the difference, since a bias is
+    common to all intervals. The excess of the smallest residuals is added to every interval alike:
+    after moving with wrong rates, or forces that were wrong before moving, no permutation fits.
+    Among indistinguishable permutations the one nearest to the identity is taken, and the identity
+    where it fits with a probability of 1e-3 or more. Accelerometers and gyros are judged
+    separately, since either may be wired wrong: the angular rate of a rigid body is the same
+    everywhere, while forces agree only after both are moved to one point, which a wrong gyro axis
+    also disturbs. A shared gyro is not judged.
+    """
+    accel, lead, sure, other = _best(first, second, "force")
+    if first.borrows(second):
+        return AxisMatch(accel, np.eye(3), lead, 0.0, sure, 0.0, other)
+    gyro, gyro_lead, gyro_sure, _ = _best(first, second, "rate")
+    return AxisMatch(accel, gyro, lead, gyro_lead, sure, gyro_sure, other)
+
+
+def _best(
+    first: VelocityIncrements, second: VelocityIncrements, of: str
+) -> tuple[Array, float, float, tuple[str, ...]]:
+    candidates = signed_permutations()
+    a, b = (v.values if of == "force" else v.turned for v in (first, second))
+    left = (a[None] - b @ candidates.transpose(0, 2, 1)).reshape(len(candidates), -1, 1)
+    covariance = floored(difference_covariance(first, second, of=of, turn=candidates))
+    stated = np.trace(covariance, axis1=1, axis2=2) / a.size
+    identity = int(np.flatnonzero((candidates == np.eye(3)).all(axis=(1, 2)))[0])
+    as_stated = left[identity, :, 0]
+    fit = float(as_stated @ np.linalg.solve(covariance[identity], as_stated))
+    unstated = max(float(((left**2).mean(axis=(1, 2)) - stated).min()), 0.0)
+    covariance = covariance + unstated * np.eye(a.size)
+    cost = (left * np.linalg.solve(covariance, left)).sum(axis=(1, 2))
+    behind = (cost - cost.min()) / max(1.0, float(cost.min()) / a.size)
+    possible = np.flatnonzero(behind <= POSSIBLE)
+    # Nearest to the identity: most ones on the diagonal.
+    near = np.trace(candidates[possible], axis1=1, axis2=2)
+    best = int(possible[np.lexsort((behind[possible], -near))[0]])
+    if chi_square_tail(fit, a.size) >= FITS:
+        best = identity
+    weights = np.exp(-0.5 * behind)
+    differs = (candidates[possible] != candidates[best]).any(axis=2).any(axis=0)
+    return (
+        candidates[best],
+        float(max(behind[identity] - behind[best], 0.0)) if best != identity else 0.0,
+        float(weights[best] / weights.sum()),
+        tuple(name for name, d in zip(AXES, differs, strict=True) if d),
+    )
+
+
+def axis_findings(match: AxisMatch, first: str, second: str) -> list[Finding]:
+    """Report swapped or inverted axes; empty where they agree.
+
+    Parameters
+    ----------
+    first, second : str
+        Names of the units.
+    """
+    kind = match.kind
+    if kind == "agree":
+        return []
+    parts = {
+        "unit": [("unit", match.accelerometers, match.accelerometers_lead)],
+        "accelerometers": [("accelerometers", match.accelerometers, match.accelerometers_lead)],
+        "gyro": [("gyro", match.gyro, match.gyro_lead)],
+        "both": [
+            ("accelerometers", match.accelerometers, match.accelerometers_lead),
+            ("gyro", match.gyro, match.gyro_lead),
+        ],
+    }[kind]
+    found = []
+    for part, matrix, lead in parts:
+        moved = [
+            Finding(
+                "crash.axis-opposite" if matrix[i, j] < 0 else "crash.axis-along",
+                severity="note",
+                name=first,
+                axis=AXES[i],
+                other=AXES[j],
+            )
+            for i in range(3)
+            for j in [int(np.argmax(np.abs(matrix[i])))]
+            if matrix[i, j] != 1.0 or i != j
+        ]
+        doubt = []
+        if match.ambiguous and part != "gyro":
+            doubt = [Finding("crash.axes-ambiguous", severity="note", axes=match.ambiguous)]
+        found.append(
+            Finding(
+                f"crash.{part}-axes-differ",
+                file=second,
+                quantity="axes",
+                moved=moved,
+                lead=math.sqrt(lead),
+                doubt=doubt,
+            )
+        )
+    return found
+
+
+# Comparison of several units on one vehicle: whether they agree within stated uncertainty.
+
+Flags = NDArray[np.bool_]
+# Variance of assumed axes, relative to the largest: no weight beside measured ones.
+NO_WEIGHT = 1e8
+
+
+def compare_units(
+    units: Sequence[PointKinematics],
+    *,
+    window: tuple[float, float] | None = None,
+    pieces: int = 20,
+    level: float = 1e-3,
+) -> UnitComparison:
+    """Compare units pairwise and against their weighted combination.
+
+    Parameters
+    ----------
+    units : sequence of PointKinematics
+        Two or more, of one rigid vehicle, at one point.
+    window : (start, end), s, optional
+        Window to compare; by default -0.1 to 0.75 s, as far as all units have samples.
+    pieces : int
+        Number of equal intervals over which mean forces are compared, reduced so that each has
+        two samples. The test is equivalent to one of the delta-V curve at the interval edges.
+    level : float
+        Probability below which a difference counts as a disagreement.
+
+    Notes
+    -----
+    Only directions that both units measure are compared; assumed axes are excluded. With the
+    difference d of the velocity increments and its covariance C from all stated uncertainties,
+    ``dᵀ C⁻¹ d`` is chi-square distributed. Common errors (a shared gyro, the common leveling
+    attitude) cancel in d and in C. Structural ringing at one position only, and any other unstated
+    error, shows as a disagreement; the message gives the interval where it is largest. Intervals
+    in which either unit was clipped without a wider range are left out, and a finding reports it.
+    Each pair is checked for swapped axes, a rotated mounting and wrong positions.
+
+    Raises
+    ------
+    There are fewer than two units, or they do not cover the window.
+        There are fewer than two units, or they do not cover the window.
+    ConfigError
+        The window is too short, or an option is out of range.
+    """
+    if not (pieces >= 3 and 0.0 < level < 1.0):
+        raise ConfigError(
+            "crash.pieces-level", quantity="pieces, level", pieces=pieces, level=level
+        )
+    edges = common_edges(units, window, pieces)
+    increments = [velocity_increments(u, edges) for u in units]
+    cut = [clipped_pieces(u, edges) for u in units]
+    pairs = tuple(
+        _pair(units[i], units[j], increments[i], increments[j], ~(cut[i] | cut[j]), level)
+        for i, j in itertools.combinations(range(len(units)), 2)
+    )
+    kept = ~np.any(cut, axis=0)
+    together = _against_all(units, [v.of_pieces(kept) for v in increments], kept)
+    chi, freedom = together.chi_square, together.freedom
+    probability = chi_square_tail(chi, freedom)
+    findings = [_left_out(u, edges, c) for u, c in zip(units, cut, strict=True) if c.any()]
+    findings += [f for p in pairs for f in p.findings]
+    findings += _odd_one(units, pairs)
+    return UnitComparison(
+        edges,
+        pairs,
+        _curve(together.combined, kept) + together.told,
+        _curve_sd(together.covariance, kept) + together.told,
+        together.against,
+        chi,
+        freedom,
+        probability,
+        probability >= level and all(p.agree for p in pairs),
+        tuple(findings),
+    )
+
+
+def _pair(
+    first: PointKinematics,
+    second: PointKinematics,
+    a: VelocityIncrements,
+    b: VelocityIncrements,
+    kept: Flags,
+    level: float,
+) -> UnitPair:
+    edges = a.edges
+    a, b = a.of_pieces(kept), b.of_pieces(kept)
+    difference, covariance = (a.values - b.values).ravel(), difference_covariance(a, b)
+    basis = measured_by_all((first, second))
+    told = np.where(measured_axes(basis), 0.0, np.nan)
+    chi, freedom = chi_square_along(basis, difference, covariance)
+    probability = chi_square_tail(chi, freedom)
+    curve, sd = _curve(difference, kept) + told, _curve_sd(covariance, kept) + told
+    lengths = np.diff(edges)[kept, None]
+    force = np.full((2, kept.size, 3), np.nan)
+    force[0, kept] = difference.reshape(-1, 3) / lengths + told
+    force[1, kept] = np.sqrt(np.diag(covariance)).reshape(-1, 3) / lengths + told
+    findings: list[Finding] = []
+    whole = not (first.assumed_axes or second.assumed_axes) and bool(kept.any())
+    if whole:
+        axes, turned, lever = match_axes(a, b), mounting_rotation(a, b), check_lever_arm(a, b)
+    else:
+        # The checks of relative mounting need three measured axes and a gyro on both units.
+        axes, turned, lever = AxisMatch.untold(), MountingRotation.untold(), LeverArmCheck.untold()
+    agree = probability >= level
+    if not kept.any():
+        findings.append(_nothing_whole(first, second))
+    elif freedom == 0:
+        findings.append(_nothing_in_common(first, second))
+    elif not agree:
+        findings.append(_disagreement(first, second, edges, curve, sd, chi, freedom, probability))
+    found = axis_findings(axes, first.name, second.name)
+    if whole and not found and first.prepared is not None and second.prepared is not None:
+        # A small rotation or a wrong position is not meaningful while axes are swapped.
+        mounted = first.prepared.unit.mounting, second.prepared.unit.mounting
+        angles = math.radians(math.hypot(*(m.angles_sd_deg for m in mounted)))
+        found = rotation_findings(turned, angles, first.name, second.name)
+        found += lever_arm_findings(
+            lever,
+            math.hypot(*(m.position_sd for m in mounted)),
+            np.subtract(mounted[0].position, mounted[1].position),
+            first.name,
+            second.name,
+        )
+    return UnitPair(
+        first.name,
+        second.name,
+        edges,
+        curve,
+        sd,
+        force[0],
+        force[1],
+        chi,
+        freedom,
+        probability,
+        agree,
+        axes,
+        turned,
+        lever,
+        tuple(findings + found),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Together:
+    """Weighted mean of the increments, its covariance, chi-square, and each unit against it."""
+
+    combined: Array
+    covariance: Array
+    told: Array
+    chi_square: float
+    freedom: int
+    against: tuple[UnitAgainstAll, ...]
+
+
+def _against_all(
+    units: Sequence[PointKinematics], increments: Sequence[VelocityIncrements], kept: Flags
+) -> _Together:
+    """Combine `increments` of the kept intervals and compare each unit with the combination."""
+    size = increments[0].values.size
+    if size == 0:
+        return _nothing_together(units, kept)
+    joint = floored(joint_covariance(increments))
+    pieces, largest = size // 3, float(np.diagonal(joint).max())
+    bases = [measured_by_all((u,)) for u in units]
+    for k, basis in enumerate(bases):
+        if basis.shape[1] < 3:
+            # Assumed axes get no weight beside measured ones.
+            rows = slice(k * size, (k + 1) * size)
+            unmeasured = np.eye(3) - basis @ basis.T
+            joint[rows, rows] += NO_WEIGHT * largest * np.kron(np.eye(pieces), unmeasured)
+    whole = np.tile(np.eye(size), (len(units), 1))
+    given = np.concatenate([v.values.ravel() for v in increments])
+    weighed = np.linalg.solve(joint, np.column_stack([whole, given]))
+    covariance = np.linalg.inv(whole.T @ weighed[:, :size])
+    combined = covariance @ (whole.T @ weighed[:, size])
+    left = given - whole @ combined
+    against = []
+    for k, (u, basis) in enumerate(zip(units, bases, strict=True)):
+        rows = slice(k * size, (k + 1) * size)
+        # The unit is part of the combination: their covariance is that of the combination.
+        own = joint[rows, rows] - covariance
+        chi, freedom = chi_square_along(basis, left[rows], own)
+        told = np.where(measured_axes(basis), 0.0, np.nan)
+        against.append(
+            UnitAgainstAll(
+                u.name,
+                _curve(left[rows], kept) + told,
+                _curve_sd(own, kept) + told,
+                chi,
+                freedom,
+                chi_square_tail(chi, freedom),
+            )
+        )
+    several = measured_by_any(units)
+    freedom = pieces * (sum(b.shape[1] for b in bases) - several.shape[1])
+    return _Together(
+        combined,
+        np.asarray(covariance),
+        np.where(measured_axes(several), 0.0, np.nan),
+        _square(left, joint),
+        freedom,
+        tuple(against),
+    )
+
+
+def _square(difference: Array, covariance: Array) -> float:
+    return float(difference @ np.linalg.solve(floored(covariance), difference))
+
+
+def _nothing_together(units: Sequence[PointKinematics], kept: Flags) -> _Together:
+    """Return the result where all intervals were left out."""
+    none = np.full((kept.size + 1, 3), np.nan)
+    return _Together(
+        np.zeros(0),
+        np.zeros((0, 0)),
+        np.full(3, np.nan),
+        0.0,
+        0,
+        tuple(UnitAgainstAll(u.name, none, none, 0.0, 0, 1.0) for u in units),
+    )
+
+
+def _curve(increments: Array, kept: Flags) -> Array:
+    """Cumulative sums at all edges; left-out intervals contribute zero."""
+    whole = np.zeros((kept.size, 3))
+    whole[kept] = increments.reshape(-1, 3)
+    return np.vstack([np.zeros(3), np.cumsum(whole, axis=0)])
+
+
+def _curve_sd(covariance: Array, kept: Flags) -> Array:
+    m = kept.size
+    total = np.kron(np.tril(np.ones((m, m)))[:, kept], np.eye(3))
+    variance = np.maximum(np.einsum("ij,jk,ik->i", total, covariance, total), 0.0)
+    return np.vstack([np.zeros(3), np.sqrt(variance).reshape(-1, 3)])
+
+
+def _disagreement(
+    first: PointKinematics,
+    second: PointKinematics,
+    edges: Array,
+    curve: Array,
+    sd: Array,
+    chi: float,
+    freedom: int,
+    probability: float,
+) -> Finding:
+    ratio = np.abs(curve[1:]) / np.where(sd[1:] > 0.0, sd[1:], np.inf) + 0.0 * sd[1:]
+    row, axis = np.unravel_index(int(np.nanargmax(ratio)), ratio.shape)
+    share = f"{probability:.1g}" if probability > 1e-12 else "less than 1e-12"
+    return Finding(
+        "crash.disagree-their-common-point-chi",
+        file=first.name,
+        quantity="delta-V",
+        name=second.name,
+        chi=chi,
+        freedom=freedom,
+        share=share,
+        axes=AXES[axis],
+        edges=edges[row + 1],
+        curve=curve[row + 1, axis],
+        sd=sd[row + 1, axis],
+    )
+
+
+def _left_out(unit: PointKinematics, edges: Array, cut: Flags) -> Finding:
+    pieces = np.flatnonzero(cut)
+    return Finding(
+        "crash.end-range-between-pieces-record",
+        file=unit.name,
+        quantity="comparison",
+        edges=edges[pieces[0]],
+        edges_2=edges[pieces[-1] + 1],
+        size=pieces.size,
+        size_2=cut.size,
+    )
+
+
+def _nothing_whole(first: PointKinematics, second: PointKinematics) -> Finding:
+    return Finding(
+        "crash.no-piece-record-neither-end",
+        file=first.name,
+        quantity="comparison",
+        name=second.name,
+    )
+
+
+def _nothing_in_common(first: PointKinematics, second: PointKinematics) -> Finding:
+    return Finding(
+        "crash.measure-no-axis-common-not", file=first.name, quantity="delta-V", name=second.name
+    )
+
+
+def _odd_one(units: Sequence[PointKinematics], pairs: Sequence[UnitPair]) -> list[Finding]:
+    """Of three or more units, find the one without which the others agree."""
+    if len(units) < 3 or all(p.agree for p in pairs):
+        return []
+    odd = [
+        u.name for u in units if all(p.agree for p in pairs if u.name not in (p.first, p.second))
+    ]
+    if len(odd) != 1:
+        return []
+    return [Finding("crash.others-agree-another-not", file=odd[0], quantity="delta-V")]
+
+
+# Results of a comparison of units.
+
+
+@dataclass(frozen=True, eq=False)
+class UnitPair:
+    """Comparison of two units at their common point; NaN along axes that either assumes.
+
+    `difference`, `sd`, (m + 1, 3), m/s: integral of the first unit's specific force minus the
+    second's, vehicle axes, from the first edge; intervals in which either was clipped contribute
+    zero. `force_difference`, `force_sd`, (m, 3), m/s²: means over each interval; NaN where either
+    was clipped. `chi_square`, `freedom` over the remaining intervals and common axes; `probability`
+    of one at least this large if the stated uncertainty is right. `axes`, `turned`, `lever_arm` are
+    not meaningful where either assumes an axis.
+    """
+
+    first: str
+    second: str
+    edges: Array = field(repr=False)
+    difference: Array = field(repr=False)
+    sd: Array = field(repr=False)
+    force_difference: Array = field(repr=False)
+    force_sd: Array = field(repr=False)
+    chi_square: float
+    freedom: int
+    probability: float
+    agree: bool
+    axes: AxisMatch = field(repr=False)
+    turned: MountingRotation = field(repr=False)
+    lever_arm: LeverArmCheck = field(repr=False)
+    findings: tuple[Finding, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class UnitAgainstAll:
+    """One unit against the combination of all: delta-V differences and sd, (m + 1, 3), m/s.
+
+    NaN along axes that it, or all, assume. Chi-square as `UnitPair`.
+    """
+
+    name: str
+    difference: Array = field(repr=False)
+    sd: Array = field(repr=False)
+    chi_square: float
+    freedom: int
+    probability: float
+
+
+@dataclass(frozen=True, eq=False)
+class UnitComparison:
+    """Comparison of all units of a vehicle at one point.
+
+    `combined`, `combined_sd`, (m + 1, 3), m/s: delta-V of the optimally weighted combination at
+    `edges`, gravity included, body axes; NaN along axes that all units assume. Chi-square of all
+    units against it.
+    """
+
+    edges: Array = field(repr=False)
+    pairs: tuple[UnitPair, ...]
+    combined: Array = field(repr=False)
+    combined_sd: Array = field(repr=False)
+    against: tuple[UnitAgainstAll, ...]
+    chi_square: float
+    freedom: int
+    probability: float
+    agree: bool
+    findings: tuple[Finding, ...]
+
+
+# Directions measured by units of which some assume axes.
+
+
+# Squared cosines closer to 0 or 1 than this are rounding.
+ROUNDING = 1e-9
+# A vehicle axis counts as measured from this squared cosine on: 18 deg.
+MOST = 0.9
+
+
+def measured_by_all(units: Sequence[PointKinematics]) -> Array:
+    """Orthonormal columns spanning the directions that every unit measures, (3, r)."""
+    total = sum((_unmeasured(u) for u in units), np.zeros((3, 3)))
+    if not total.any():
+        return np.eye(3)
+    values, vectors = np.linalg.eigh(total)
+    return np.asarray(vectors[:, values < ROUNDING])
+
+
+def measured_by_any(units: Sequence[PointKinematics]) -> Array:
+    """Orthonormal columns spanning the directions that at least one unit measures, (3, r)."""
+    measured = np.mean([np.eye(3) - _unmeasured(u) for u in units], axis=0)
+    values, vectors = np.linalg.eigh(measured)
+    return np.asarray(vectors[:, values > ROUNDING])
+
+
+def measured_axes(basis: Array) -> NDArray[np.bool_]:
+    """Which of the vehicle's axes lie within these directions, (3,)."""
+    return np.asarray((basis**2).sum(axis=1) > MOST)
+
+
+def chi_square_along(basis: Array, difference: Array, covariance: Array) -> tuple[float, int]:
+    """Chi-square of a difference, (3 m,), along a basis, (3, r), and its degrees of freedom."""
+    if basis.shape[1] < 3:
+        along = np.kron(np.eye(difference.size // 3), basis)
+        difference, covariance = along.T @ difference, along.T @ covariance @ along
+    if not difference.size:
+        return 0.0, 0
+    return float(difference @ np.linalg.solve(floored(covariance), difference)), difference.size
+
+
+def _unmeasured(unit: PointKinematics) -> Array:
+    return np.zeros((3, 3)) if unit.unmeasured is None else unit.unmeasured
+
+
+# Intervals in which a unit was clipped without a wider range.
+
+
+# Squared cosine below which a sensor axis does not count: within 6 deg of perpendicular.
+LEAST_SHARE = 0.01
+
+
+def clipped_axes(unit: PointKinematics, window: tuple[float, float]) -> Flags:
+    """Along which of the vehicle's axes, (3,), a unit was clipped in a window, s.
+
+    All False for a mean of several units. A clipped gyro affects all axes and is not included.
+    """
+    prepared = unit.prepared
+    if prepared is None:
+        return np.zeros(3, dtype=bool)
+    time = prepared.imu.index.to_numpy(dtype=np.float64)
+    within = (time >= window[0]) & (time <= window[1])
+    cut = prepared.clipped[within].any(axis=0)
+    share = prepared.unit.mounting.C_vs**2 > LEAST_SHARE
+    return np.asarray((share & cut).any(axis=1))
+
+
+def clipped_pieces(unit: PointKinematics, edges: Array) -> Flags:
+    """In which intervals between edges, (m,), the readings of a unit are affected by clipping.
+
+    By a clipped sample of accelerometers or gyro, or a neighbor of one: the gyro samples that form
+    one angular acceleration, and the accelerometer sample up to which the line between samples
+    extends.
+    """
+    prepared = unit.prepared
+    if prepared is None:
+        return np.zeros(len(edges) - 1, dtype=bool)
+    time = prepared.imu.index.to_numpy(dtype=np.float64)
+    arm = unit.moved is not None and bool(unit.moved.lever_arm.any())
+    wide = unit.moved.slope.slope.shape[1] // 2 if arm and unit.moved is not None else 0
+    cut = _spread(_any(prepared.clipped), 1)
+    # A clipped gyro affects the accelerometer readings only through a lever arm.
+    cut |= _spread(_any(prepared.gyro_clipped), wide + 1) if arm else False
+    at = time[cut]
+    return np.asarray(
+        np.searchsorted(at, edges[1:], side="right") > np.searchsorted(at, edges[:-1], side="left")
+    )
+
+
+def _any(flags: Flags) -> Flags:
+    return np.asarray(flags.any(axis=1))
+
+
+def _spread(flags: Flags, by: int) -> Flags:
+    """Flags extended by so many neighbors on either side."""
+    return np.asarray(np.convolve(flags, np.ones(2 * by + 1), mode="same") > 0.5)

@@ -1,1 +1,0 @@
-"""Indices of crash severity from the vehicle's motion: ASI, THIV and PHD, OLC, OIV and ORA, HIC."""

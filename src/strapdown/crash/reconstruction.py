@@ -1,0 +1,735 @@
+"""Results of a reconstruction as a small table and as text lines."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
+from strapdown.crash.acceleration import Acceleration, body_acceleration, resolved_acceleration
+from strapdown.crash.combine_units import combine_units
+from strapdown.crash.consistency import UnitComparison, compare_units
+from strapdown.crash.crash_type import CrashType, classify_crashes
+from strapdown.crash.delta_v import DeltaV, delta_v, trailing_delta_v
+from strapdown.crash.delta_v_bound import (
+    EventChanges,
+    VelocityChange,
+    body_delta_v_bound,
+    change_line,
+    direction_bounds,
+    resolved_delta_v_bound,
+    velocity_change,
+)
+from strapdown.crash.entry import Entry
+from strapdown.crash.events import PART_563, CrashEvents, EventRule, detect_events
+from strapdown.crash.gnss_entry import GnssEntry, start_from_gnss
+from strapdown.crash.measuring_point import PointKinematics, SampleEffects
+from strapdown.crash.path import VELOCITY, CrashPath, path_line, reconstruct_path
+from strapdown.crash.preparation import prepare_together
+from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.mechanization import NorthEastDown
+from strapdown.sensors.crash_unit import CrashUnit
+from strapdown.sensors.synchronise import SynchronisedUnits, synchronise
+from strapdown.sensors.triad_errors import FARTHEST, finite, triple
+from strapdown.tables import NED
+
+__all__ = ["check_crash_options", "check_standing", "entry_findings", "summary_table", "unit_line"]
+
+
+Row = tuple[str, str, float, float, float]
+
+
+def summary_table(units: Sequence[UnitReconstruction]) -> pd.DataFrame:
+    """Changes of velocity, directions of force and ends of the path, with 95 % bounds.
+
+    Returns
+    -------
+    DataFrame
+        Indexed by ``unit``, ``part`` (number and type of the event, or ``path``) and
+        ``quantity``; ``value``, ``low`` and ``high`` in the unit that the quantity names, with
+        95 % bounds.
+    """
+    index, rows = [], []
+    for unit in units:
+        for part, quantity, value, low, high in _unit_rows(unit):
+            index.append((unit.name, part, quantity))
+            rows.append((value, low, high))
+    return pd.DataFrame(
+        rows,
+        index=pd.MultiIndex.from_tuples(index, names=["unit", "part", "quantity"]),
+        columns=["value", "low", "high"],
+        dtype=np.float64,
+    )
+
+
+def _unit_rows(unit: UnitReconstruction) -> list[Row]:
+    rows: list[Row] = []
+    for k, (changes, kind) in enumerate(zip(unit.body, unit.types, strict=True), start=1):
+        part = f"{k} {kind.name}"
+        whole, peak = changes.event, changes.peak
+        event = unit.events.events[k - 1]
+        sd = TWO_SIDED_95 * event.time_zero_sd
+        rows.append((part, "time zero s", *_about(event.time_zero, sd)))
+        for name, value, half in zip(
+            ("delta-V forward m/s", "delta-V right m/s", "delta-V down m/s"),
+            whole.delta_v.vector.tolist(),
+            whole.bound.half_width,
+            strict=True,
+        ):
+            rows.append((part, name, *_about(value, half)))
+        length = 1e3 * (peak.delta_v.end - peak.delta_v.start)
+        for name, change in (
+            ("delta-V resultant m/s", whole),
+            (f"largest in {length:.3g} ms m/s", peak),
+        ):
+            rows.append((part, name, *_about(change.resultant, change.resultant_bound)))
+        rows.append((part, "PDOF deg", *direction_bounds(whole)))
+    path = unit.path
+    ends = TWO_SIDED_95 * path.sd.iloc[-1]
+    for axis in NED:
+        value = float(path.table[axis].iloc[-1])
+        rows.append(("path", f"end {axis} m", *_about(value, float(ends[axis]))))
+    return rows
+
+
+def _about(value: float, half: float) -> tuple[float, float, float]:
+    return value, value - half, value + half
+
+
+def unit_line(unit: UnitReconstruction) -> str:
+    """Results of one unit: a line for each event, and one for the path."""
+    lines = [
+        f"{unit.name}, event {k}, {kind.name}: delta-V {c.event.resultant:.2f} ± "
+        f"{c.event.resultant_bound:.2f} m/s; {change_line(c.event)}"
+        for k, (c, kind) in enumerate(zip(unit.body, unit.types, strict=True), start=1)
+    ]
+    if not lines:
+        size, axis = unit.events.largest_change, unit.events.largest_axis
+        lines = [f"{unit.name}: no event, at most {size:.2f} m/s ({axis})"]
+    return "\n".join([*lines, f"{unit.name}, {path_line(unit.path)}"])
+
+
+# Crash reconstruction from one unit, or from the mean of several.
+
+
+Array = NDArray[np.float64]
+
+#: Length of the trailing window: Tadic and Vukajlovic (2016), section 4.
+PEAK_WINDOW = 0.030
+NO_ROLL = "whether it rolled over cannot be told without a gyro about the forward axis"
+
+
+@dataclass(frozen=True, eq=False)
+class UnitReconstruction:
+    """Reconstruction from one unit, or from the mean of several.
+
+    Attributes
+    ----------
+    name : str
+    at_point : PointKinematics
+    acceleration : Acceleration
+        Along the rotating axes of the vehicle, stationary mean subtracted.
+    resolved : Acceleration
+        In the axes of the path, gravity subtracted; over the path's window.
+    events : CrashEvents
+    path : CrashPath
+    body, ned : tuple of EventChanges
+        For every event, along the rotating axes and resolved. An event that extends beyond the
+        path's window has no resolved change.
+    types : tuple of CrashType
+        For every event, from its change along the rotating axes and the roll.
+    findings : tuple of Finding
+    """
+
+    name: str
+    at_point: PointKinematics = field(repr=False)
+    acceleration: Acceleration = field(repr=False)
+    resolved: Acceleration = field(repr=False)
+    events: CrashEvents
+    path: CrashPath = field(repr=False)
+    body: tuple[EventChanges, ...]
+    ned: tuple[EventChanges | None, ...]
+    types: tuple[CrashType, ...]
+    findings: tuple[Finding, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"<UnitReconstruction\n{unit_line(self)}>"
+
+    def summary(self) -> pd.DataFrame:
+        """Results with 95 % bounds: `summary_table` of this unit."""
+        return summary_table([self])
+
+    @property
+    def delta_v(self) -> VelocityChange | None:
+        """Change of velocity of the severest event, along the rotating axes; None without any."""
+        changes = [one.event for one in self.body]
+        return max(changes, key=lambda change: change.resultant) if changes else None
+
+
+def reconstruct_unit(
+    at_point: PointKinematics,
+    entry: Entry | None,
+    *,
+    window: Sequence[float] | None = None,
+    peak_window: float = PEAK_WINDOW,
+    rule: EventRule = PART_563,
+    gravity: float = STANDARD_GRAVITY,
+    mechanization: NorthEastDown | None = None,
+) -> UnitReconstruction:
+    """Find the events of a unit, its changes of velocity and its path.
+
+    Parameters
+    ----------
+    at_point : PointKinematics
+    entry : Entry or None
+        As `reconstruct_path`.
+    window : (float, float), s, optional
+        Of the path.
+    peak_window : float, s
+    rule : EventRule
+    gravity : float, m/s²
+        At the site.
+    mechanization : NorthEastDown, optional
+
+    Returns
+    -------
+    UnitReconstruction
+        Without events where the record has no crash: `events` gives the largest change.
+
+    Raises
+    ------
+    DataError, DivergenceError
+        As `reconstruct_path`.
+    """
+    check_standing(at_point, entry)
+    at_rest, rest_sd = at_point.resting_force(gravity)
+    acceleration = body_acceleration(at_point.imu, at_rest.tolist())
+    effects = at_point.effects
+    events = detect_events(
+        acceleration,
+        rule,
+        noise=tuple(float(x) for x in np.median(effects.force_noise, axis=0)),
+        bias_sd=tuple(float(x) for x in rest_sd),
+    )
+    path = reconstruct_path(
+        at_point.imu,
+        effects,
+        at_point.levelling,
+        None if at_point.rest is None else at_point.rest.end,
+        entry,
+        window=window,
+        mechanization=mechanization,
+        zeroed_at_rest=at_point.rest is not None,
+    )
+    first = int(np.searchsorted(at_point.imu.index, path.time[0] - 1e-9))
+    part = at_point.imu.iloc[first : first + len(path.time)]
+    part.attrs = dict(at_point.imu.attrs)
+    resolved = resolved_acceleration(part, path.q_nb, gravity)
+    body: list[EventChanges] = []
+    ned: list[EventChanges | None] = []
+    findings = [
+        *events.findings,
+        *entry_findings(at_point, entry, path, events, mechanization),
+        *_unseen(at_point, events),
+    ]
+    for event in events.events:
+        ends = event.time_zero_sd, 0.0 if math.isnan(event.end_sd) else event.end_sd
+        start, end = event.time_zero, min(event.end, acceleration.end)
+        peak = trailing_delta_v(acceleration, peak_window, min(start + peak_window, end), end).peak
+        whole = delta_v(acceleration, start, end, across_gaps=True)
+        body.append(
+            EventChanges(
+                _along(effects, peak, "peak", rest_sd, None),
+                _along(effects, whole, "event", rest_sd, _moved(whole, ends)),
+            )
+        )
+        if path.time[0] <= min(start, peak.start) and max(end, peak.end) <= path.time[-1]:
+            course = np.unwrap(path.table["heading"], period=360.0)
+            heading = float(np.interp(start, path.time, course)) % 360.0
+            spans = (peak.start, peak.end), (start, end)
+            peak, whole = (delta_v(resolved, *span, across_gaps=True) for span in spans)
+            ned.append(
+                EventChanges(
+                    _resolved(path, peak, "peak", heading, None),
+                    _resolved(path, whole, "event", heading, _moved(whole, ends)),
+                )
+            )
+        else:
+            ned.append(None)
+            findings.append(
+                Finding(
+                    "crash.event-not-within-path-change",
+                    file=at_point.name,
+                    quantity="window",
+                    start=start,
+                    end=end,
+                    time=path.time[0],
+                    time_2=path.time[-1],
+                )
+            )
+    # An assumed roll gives no information on a rollover.
+    rolled = "roll" not in at_point.assumed_axes
+    types = classify_crashes(
+        [changes.event.delta_v for changes in body],
+        [changes.event.bound.covariance for changes in body],
+        events=events.events,
+        time=acceleration.time if rolled else None,
+        roll_rate=at_point.imu["gyro_x"].to_numpy(dtype=np.float64) if rolled else None,
+        start_roll_deg=at_point.levelling.roll_deg,
+        roll_rate_sd=effects.roll_bias_sd,
+        start_roll_sd_deg=at_point.levelling.sd_deg,
+    )
+    if not rolled:
+        types = tuple(replace(t, reason=f"{t.reason}; {NO_ROLL}") for t in types)
+    return UnitReconstruction(
+        at_point.name,
+        at_point,
+        acceleration,
+        resolved,
+        events,
+        path,
+        tuple(body),
+        tuple(ned),
+        types,
+        tuple(findings),
+    )
+
+
+def _unseen(at_point: PointKinematics, events: CrashEvents) -> list[Finding]:
+    """Report that an impact along an assumed axis is not among the events."""
+    blind = [axis for axis in at_point.assumed_axes if axis in ("forward", "right")]
+    if events.events or not blind:
+        return []
+    return [
+        Finding(
+            "crash.impact-along-would-not-show", file=at_point.name, quantity="delta-V", blind=blind
+        )
+    ]
+
+
+def _moved(change: DeltaV, ends: tuple[float, float]) -> Array:
+    """Effect on the change of one standard deviation of either end of an event."""
+    return np.array([-change.start_rate * ends[0], change.end_rate * ends[1]])
+
+
+def _along(
+    effects: SampleEffects, change: DeltaV, window: str, rest_sd: Array, at_ends: Array | None
+) -> VelocityChange:
+    bound = body_delta_v_bound(effects, change.weights, rest_sd=rest_sd, at_ends=at_ends)
+    return velocity_change(window, change, bound)
+
+
+def _resolved(
+    path: CrashPath, change: DeltaV, window: str, heading: float, at_ends: Array | None
+) -> VelocityChange:
+    bound = resolved_delta_v_bound(path, change.start, change.end, at_ends=at_ends)
+    return velocity_change(window, change, bound, heading)
+
+
+# Consistency of the stated entry with the record.
+
+
+# Two numbers are inconsistent beyond so many standard deviations.
+SIGMAS = 4.0
+# A vehicle steeper than this at the impact is on a slope: braking does not pitch it so far.
+SLOPE_DEG = 4.0
+
+
+def check_standing(at_point: PointKinematics, entry: Entry | None) -> None:
+    """Refuse a start at zero speed where the vehicle may have been driving.
+
+    Raises
+    ------
+    DataError
+        No entry is given, and the quiet interval may be one of driving at speed.
+    """
+    rest = at_point.rest
+    if entry is None and rest is not None and rest.grade == "steady":
+        raise DataError(
+            "crash.entry-speed-unknown-quiet",
+            file=at_point.name,
+            quantity="entry",
+            start=rest.start,
+            end=rest.end,
+        )
+
+
+def entry_findings(
+    at_point: PointKinematics,
+    entry: Entry | None,
+    path: CrashPath,
+    events: CrashEvents,
+    mechanization: NorthEastDown | None,
+) -> list[Finding]:
+    """Report an entry during the crash, or a speed that the record contradicts.
+
+    Parameters
+    ----------
+    path : CrashPath
+        The path from this entry.
+    mechanization : NorthEastDown, optional
+    """
+    if entry is None:
+        return []
+    found = _slope(at_point, entry, path)
+    # Time zero is the beginning of a window with a small change; for an impact on a wall the change
+    # is at the end of the window, and the first contact up to one window after time zero.
+    if events.events and events.events[0].time_zero + events.rule.wake_window < entry.time:
+        first = events.events[0].time_zero
+        found.append(
+            Finding(
+                "crash.stated-crash-began-ms-before",
+                file=at_point.name,
+                quantity="entry",
+                time=entry.time,
+                time_2=1000.0 * (entry.time - first),
+                first=first,
+            )
+        )
+        # Its speed may differ from that at the beginning.
+        return found
+    rest = at_point.rest
+    if rest is None or rest.grade != "still" or at_point.prepared is None:
+        return found
+    driven = reconstruct_path(
+        at_point.imu,
+        at_point.effects,
+        at_point.levelling,
+        rest.end,
+        None,
+        window=(float(path.time[0]), float(path.time[-1])),
+        mechanization=mechanization,
+    )
+    k, j = path.anchor, int(np.searchsorted(driven.time, path.time[path.anchor] - 1e-9))
+    speed, sd = _speed(path, k)
+    felt, felt_sd = _speed(driven, j)
+    if abs(speed - felt) > SIGMAS * float(np.hypot(sd, felt_sd)):
+        found.append(
+            Finding(
+                "crash.rest-until-record-itself-comes",
+                file=at_point.name,
+                quantity="entry speed",
+                speed=speed,
+                sd=1.96 * sd,
+                time=entry.time,
+                end=rest.end,
+                felt=felt,
+                felt_sd=1.96 * felt_sd,
+            )
+        )
+    return found
+
+
+def _slope(at_point: PointKinematics, entry: Entry, path: CrashPath) -> list[Finding]:
+    """Report a level velocity for a vehicle that is stationary on a slope."""
+    now, sd = path.table.iloc[path.anchor], path.sd.iloc[path.anchor]
+    pitch, along = float(now["pitch"]), entry.velocity
+    speed = float(np.hypot(along[0], along[1]))
+    heading = np.radians(float(now["heading"]))
+    ahead = along[0] * np.cos(heading) + along[1] * np.sin(heading)
+    climbs = float(np.tan(np.radians(pitch)) * ahead + along[2])
+    known = np.hypot(speed * np.radians(float(sd["pitch"])), float(sd["VD"]))
+    if abs(pitch) < SLOPE_DEG or abs(climbs) < SIGMAS * known:
+        return []
+    return [
+        Finding(
+            "crash.vertical-velocity-upward-vehicle-points",
+            file=at_point.name,
+            quantity="entry",
+            along=0.0 - along[2],
+            pitch=pitch,
+            time=entry.time,
+            climbs=climbs - along[2],
+        )
+    ]
+
+
+def _speed(path: CrashPath, row: int) -> tuple[float, float]:
+    """Horizontal speed at a sample, and its standard deviation."""
+    v = path.table[["VN", "VE"]].to_numpy()[row]
+    speed = float(np.hypot(*v))
+    spread = path.covariance[row, VELOCITY, VELOCITY][:2, :2]
+    if speed == 0.0:
+        return 0.0, float(np.sqrt(spread.trace()))
+    return speed, float(np.sqrt(v @ spread @ v)) / speed
+
+
+# Reconstruct a crash from its units' records: delta-v, direction of force and path.
+
+
+@dataclass(frozen=True, eq=False)
+class CrashReconstruction:
+    """Reconstruction of a crash by each unit and by all together.
+
+    Attributes
+    ----------
+    point : tuple of float, m
+        The reference point, vehicle axes from the vehicle's origin.
+    synchronised : SynchronisedUnits
+    units : tuple of UnitReconstruction
+        Each unit by itself, at the reference point.
+    comparison : UnitComparison or None
+        None for a single unit.
+    combined : UnitReconstruction or None
+        Of the weighted mean of the units, if requested and if several units agree.
+    findings : tuple of Finding
+        Findings of all steps.
+    """
+
+    point: tuple[float, float, float]
+    synchronised: SynchronisedUnits = field(repr=False)
+    units: tuple[UnitReconstruction, ...]
+    comparison: UnitComparison | None
+    combined: UnitReconstruction | None
+    findings: tuple[Finding, ...]
+
+    def __repr__(self) -> str:
+        lines = [unit_line(u) for u in self.answers]
+        said = f"{len(self.findings)} finding{'s' * (len(self.findings) != 1)}"
+        return "\n".join([f"<CrashReconstruction at {self.point} m", *lines, f"{said}>"])
+
+    @property
+    def answers(self) -> tuple[UnitReconstruction, ...]:
+        """Every unit, and their mean if there is one."""
+        return (*self.units, *(() if self.combined is None else (self.combined,)))
+
+    def summary(self) -> pd.DataFrame:
+        """Table of delta-v, directions of force and ends of the path, with their bounds.
+
+        Returns
+        -------
+        DataFrame
+            Indexed by ``unit``, ``part`` (number and type of the event, or ``path``) and
+            ``quantity``; ``value``, ``low`` and ``high`` in the unit that the quantity names: 95 %
+            bounds.
+        """
+        return summary_table(self.answers)
+
+    @property
+    def main(self) -> UnitReconstruction:
+        """The mean of the units, or the first unit."""
+        return self.units[0] if self.combined is None else self.combined
+
+    def unit(self, name: str) -> UnitReconstruction:
+        """Find a unit by its name.
+
+        Raises
+        ------
+        ConfigError
+            No unit has this name.
+        """
+        for unit in self.units:
+            if unit.name == name:
+                return unit
+        raise ConfigError(
+            "crash.unit-unknown", quantity="unit", name=name, units=[u.name for u in self.units]
+        )
+
+
+def reconstruct_crash(
+    units: Sequence[CrashUnit],
+    entry: Entry | GnssEntry | None,
+    *,
+    point: Sequence[float] = (0.0, 0.0, 0.0),
+    window: Sequence[float] | None = None,
+    rate: float = 200.0,
+    sampling: str = "instantaneous",
+    clock: str = "trigger",
+    combine: bool = True,
+    preparation: Mapping[str, Any] | None = None,
+    peak_window: float = PEAK_WINDOW,
+    rule: EventRule = PART_563,
+    gravity: float = STANDARD_GRAVITY,
+    mechanization: NorthEastDown | None = None,
+) -> CrashReconstruction:
+    """Reconstruct a crash.
+
+    Parameters
+    ----------
+    units : sequence of CrashUnit
+        Of one rigid vehicle, as recorded.
+    entry : Entry, GnssEntry or None
+        Velocity, heading and instant of the path; or fixes of a GNSS receiver before the crash,
+        from which each unit finds them together with its biases (the mean of the units then uses
+        the entry of the first). None: the vehicle was stationary at the beginning of the record,
+        and the path is given in its axes at the trigger.
+    point : sequence of float, (3,), m
+        Reference point in vehicle axes (forward, right, down) from the vehicle's origin.
+    window : (float, float), s, optional
+        Of the path, from the trigger; -0.1 to 0.75 s, as far as a unit's record has them, if not
+        given.
+    rate : float, Hz
+        Of the common stamps. Faster channels are decimated without aliasing.
+    sampling : {'instantaneous', 'mean'}
+        Meaning of the samples at the common stamps: values of a band-limited signal, or true means
+        over the step, which preserve the delta-v of a fast channel.
+    clock : {'trigger', 'correlation'}
+        As `synchronise`.
+    combine : bool
+        Also reconstruct the weighted mean of the units, if they agree; if they contradict, a
+        finding reports it. `combine_units` computes the mean in any case.
+    preparation : mapping, optional
+        Options of `prepare_unit`, for all units; under the name of a unit, a mapping of its own
+        options.
+    peak_window : float, s
+        Window of the delta-v that usually rates severity.
+    rule : EventRule
+        Definition of an event: 49 CFR 563 by default.
+    gravity : float, m/s²
+        Local gravity.
+    mechanization : NorthEastDown, optional
+
+    Returns
+    -------
+    CrashReconstruction
+        All bounds are 95 % bounds. Without an event in the record there are no changes of velocity,
+        and a finding states how near it came; the path is returned in any case.
+
+    Raises
+    ------
+    DataError
+        A record cannot be used: the message names unit, sensor, row, quantity and remedy.
+    ConfigError
+        An option is out of range.
+    DivergenceError
+        A path left the range of vehicle motion.
+    """
+    check_crash_options(
+        units, entry, point, window, preparation, peak_window, rule, gravity, mechanization
+    )
+    together = synchronise(units, method=clock, rate=rate, sampling=sampling, cut=False)
+    findings = list(together.findings)
+    there = prepare_together(together, point, gravity, preparation or {})
+    for of in there:
+        findings += () if of.prepared is None else of.prepared.findings
+    # Before each unit estimates its own biases, which absorbs part of the differences.
+    comparison = compare_units(there) if len(there) > 1 else None
+    tied: list[Entry | None] = [None if isinstance(entry, GnssEntry) else entry] * len(there)
+    if isinstance(entry, GnssEntry):
+        for k, of in enumerate(there):
+            there[k], tied[k], state = start_from_gnss(of, entry, point)
+            findings += state.findings
+
+    def answers(of: PointKinematics, start: Entry | None) -> UnitReconstruction:
+        return reconstruct_unit(
+            of,
+            start,
+            window=window,
+            peak_window=peak_window,
+            rule=rule,
+            gravity=gravity,
+            mechanization=mechanization,
+        )
+
+    found = tuple(answers(of, start) for of, start in zip(there, tied, strict=True))
+    combined = None
+    if combine and comparison is not None and comparison.agree:
+        combined = answers(combine_units(there), tied[0])
+    for reconstruction in (*found, *(() if combined is None else (combined,))):
+        findings += reconstruction.findings
+    if comparison is not None:
+        findings += comparison.findings
+        if combine and not comparison.agree:
+            findings.append(_no_mean(there))
+    x, y, z = (float(v) for v in point)
+    return CrashReconstruction(
+        (x, y, z), together, found, comparison, combined, tuple(dict.fromkeys(findings))
+    )
+
+
+def _no_mean(units: Sequence[PointKinematics]) -> Finding:
+    return Finding(
+        "crash.units-disagree-no-mean-told",
+        file=", ".join(u.name for u in units),
+        quantity="combine",
+    )
+
+
+# Checks of the arguments of `reconstruct_crash` before any work.
+
+
+def check_crash_options(
+    units: object,
+    entry: object,
+    point: object,
+    window: object,
+    preparation: object,
+    peak_window: object,
+    rule: object,
+    gravity: object,
+    mechanization: object,
+) -> None:
+    """Check the arguments that no later stage would report by kind or size.
+
+    Raises
+    ------
+    DataError
+        No unit is given.
+    ConfigError
+        An argument is of another kind, or out of range.
+    """
+    _check_units(units)
+    if not (entry is None or isinstance(entry, Entry | GnssEntry)):
+        raise _wrong_type("entry", entry)
+    place = triple(point, "point", "sensors.point-not-three-numbers")
+    if math.hypot(*place) > FARTHEST:
+        raise ConfigError(
+            "crash.vehicle-origin", quantity="point", place=place, hypot=math.hypot(*place)
+        )
+    if window is not None:
+        _check_window(window)
+    if not (preparation is None or isinstance(preparation, Mapping)):
+        raise _wrong_type("preparation", preparation)
+    names = {unit.name for unit in units}  # type: ignore[attr-defined]
+    for name, given in (preparation or {}).items():
+        if name in names and not isinstance(given, Mapping):
+            raise ConfigError(
+                "crash.preparation-of-unit-of-wrong-type",
+                quantity=f"preparation, {name}",
+                type=type(given).__name__,
+            )
+        if name not in names and isinstance(given, Mapping):
+            raise ConfigError(
+                "crash.preparation-of-unknown-unit", quantity="preparation", name=name
+            )
+    if not (finite(peak_window) and peak_window > 0.0):  # type: ignore[operator]
+        raise ConfigError("crash.no-length", quantity="peak_window", peak_window=peak_window)
+    if not isinstance(rule, EventRule):
+        raise _wrong_type("rule", rule)
+    if not isinstance(gravity, int | float):
+        raise _wrong_type("gravity", gravity)
+    if not (mechanization is None or isinstance(mechanization, NorthEastDown)):
+        raise _wrong_type("mechanization", mechanization)
+
+
+def _check_units(units: object) -> None:
+    if isinstance(units, CrashUnit):
+        raise ConfigError("crash.unit-list-needed", file=units.name, quantity="units")
+    if units is None or (isinstance(units, Sequence) and not units):
+        raise DataError("crash.no-units-given", quantity="units")
+    if not isinstance(units, Sequence) or isinstance(units, str):
+        raise _wrong_type("units", units)
+    for unit in units:
+        if not isinstance(unit, CrashUnit):
+            raise _wrong_type("units", unit)
+
+
+def _check_window(window: Any) -> None:
+    try:
+        begin, end = (float(x) for x in window)
+    except (TypeError, ValueError):
+        begin = end = math.nan
+    if not (math.isfinite(begin) and math.isfinite(end) and begin < end):
+        raise ConfigError("crash.window-not-a-pair", quantity="window", window=window)
+
+
+def _wrong_type(quantity: str, given: object) -> ConfigError:
+    return ConfigError(
+        f"crash.{quantity}-of-wrong-type", quantity=quantity, type=type(given).__name__
+    )
