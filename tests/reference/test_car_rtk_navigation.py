@@ -28,7 +28,6 @@ from strapdown.aiding.gnss import Gnss
 from strapdown.aiding.gnss_clock import time_offset, velocity_delay
 from strapdown.aiding.gnss_readiness import gnss_readiness
 from strapdown.aiding.vehicle import NoSlip
-from strapdown.alignment.levelling import level
 from strapdown.estimation.covariance import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.error_model import RotationVectorModel
@@ -38,6 +37,7 @@ from strapdown.increments import motion_increments
 from strapdown.mechanization import MECHANIZATIONS
 from strapdown.nav_state import NavState
 from strapdown.navigation.navigator import Navigator, with_states
+from strapdown.rotation import level
 from strapdown.tables import gnss_table, imu_table
 
 DEG = np.pi / 180.0

@@ -21,6 +21,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from strapdown.bundle.configuration_paths import with_paths
+from strapdown.bundle.seal import InputFiles
 from strapdown.config.alignment import AxesTable, LogTable
 from strapdown.config.spec import specify
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
@@ -29,7 +30,6 @@ from strapdown.formats.clocks import GPS, UNIX, clock_of
 from strapdown.formats.gnss_files import GNSS_READERS, GnssOptions
 from strapdown.formats.gnss_files import read_gnss as read_gnss_table
 from strapdown.formats.log_writers import LOG_WRITERS
-from strapdown.results.inputs import InputFiles
 from strapdown.systems.alignment_source import body_record
 from strapdown.tables import ACCEL, GYRO, QUATERNION, imu_table
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from strapdown.aiding.aid import Measurement
 from strapdown.aiding.standstill import STANDSTILL_DETECTORS, STANDSTILL_THRESHOLDS
-from strapdown.attitude import ALGORITHMS, AttitudeAlgorithm
+from strapdown.attitude_algorithms import ALGORITHMS, AttitudeAlgorithm
 from strapdown.config.choice import SLOTS, Slot, options_of
 from strapdown.config.motions import KINDS
 from strapdown.ellipsoids import ELLIPSOIDS

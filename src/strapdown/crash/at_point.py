@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from strapdown.crash.acceleration import force_at_rest
 from strapdown.crash.unit_effects import SampleEffects, unit_effects
-from strapdown.results.rests import RestStretch
 from strapdown.sensors.lever_arm import MovedImu, move_unit
 from strapdown.sensors.pre_crash import Levelling, PreparedUnit
+from strapdown.sensors.rest import RestStretch
 from strapdown.sensors.unmeasured import axis_names, unmeasured_axes, unmeasured_turns
 from strapdown.tables import ACCEL, GYRO
 

@@ -9,15 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.alignment.levelling import level
 from strapdown.crash.at_point import PointKinematics
 from strapdown.crash.compare_units import clipped_axes
 from strapdown.crash.unit_differences import TINY, floored
 from strapdown.crash.unit_effects import SampleEffects, level_turned_by
 from strapdown.errors import ConfigError, DataError
-from strapdown.results.rests import RestStretch
+from strapdown.rotation import level
 from strapdown.sensors.pre_crash import Levelling
-from strapdown.sensors.rest import LEAST_SAMPLES, rest_between
+from strapdown.sensors.rest import LEAST_SAMPLES, RestStretch, rest_between
 from strapdown.tables import imu_table
 
 __all__ = [

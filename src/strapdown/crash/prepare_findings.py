@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
-from strapdown.results.rests import RestStretch
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad, UnitArrays
 from strapdown.sensors.range_merge import MergedRanges
+from strapdown.sensors.rest import RestStretch
 from strapdown.sensors.saturation import RangeLimits
 
 Array = NDArray[np.float64]

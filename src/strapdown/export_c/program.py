@@ -12,8 +12,8 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from strapdown import rotation
-from strapdown.attitude import AttitudeAlgorithm
-from strapdown.attitude.cost import operation_count, step_kernel
+from strapdown.attitude_algorithms import AttitudeAlgorithm
+from strapdown.attitude_algorithms.cost import kernel_home, operation_count, step_kernel
 from strapdown.errors import ConfigError
 from strapdown.export_c.kernels import Function, Kernels
 from strapdown.export_c.test_vector import main_program, make_vector
@@ -66,7 +66,7 @@ def export_c(
     """
     kind = _kind(interpolation, sampling, imu)
     around, shape = SAMPLINGS[kind], shape_of(algorithm)
-    kernels = Kernels(shape.ranges(algorithm))
+    kernels = Kernels(kernel_home(algorithm), shape.ranges(algorithm))
     step = _require_step(kernels, algorithm)
     increments = _require_increments(kernels, kind, "dx" in step.parameters)
     for name in ("quat_normalise", "euler_from_quat", *shape.kernels):
@@ -364,7 +364,11 @@ def shape_of(algorithm: AttitudeAlgorithm) -> Shape:
     """Return the initialization and output of an algorithm's state."""
     if algorithm.name == "dcm" and algorithm.kernel_options()[0]:
         return _TRUNCATED
-    return SHAPES[algorithm.name]
+    if algorithm.name in SHAPES:
+        return SHAPES[algorithm.name]
+    if type(algorithm).begin is not AttitudeAlgorithm.begin:
+        raise ConfigError("attitude.state-not-exported", quantity="--export-c", name=algorithm.name)
+    return _BY_QUATERNION
 
 
 # --- one sample, by meaning of a sample and interpolation of rates ----------------------------

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,8 +10,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown._kernels import arithmetic
-from strapdown.attitude import AttitudeAlgorithm
-from strapdown.attitude.cost import step_kernel
+from strapdown.attitude_algorithms import AttitudeAlgorithm
+from strapdown.attitude_algorithms.cost import kernel_home
 from strapdown.export_c.translate import comment
 from strapdown.tables import GYRO
 
@@ -100,12 +99,12 @@ def _run(
     algorithm: AttitudeAlgorithm, rows: Array, q_nb: Array, kind: str, single: bool
 ) -> tuple[Array, Array]:
     number: Any = np.float32 if single else np.float64
-    home = step_kernel(algorithm)[0]
+    home = kernel_home(algorithm)
 
     def module(name: str) -> Any:
         if single:
             return arithmetic.single_precision(name)
-        return importlib.import_module(f"{arithmetic.PACKAGE}.{name}")
+        return arithmetic.kernel_module(name)
 
     dt, rate = rows[:, 0].astype(number), rows[:, 1:].astype(number)
     if kind == "mean":

@@ -17,12 +17,11 @@ from strapdown.formats.find_columns import AXES, Column, find_columns, require_g
 from strapdown.formats.inference import Inference
 from strapdown.formats.judge import UNITS
 from strapdown.formats.numbers import ticks_of
-from strapdown.formats.recording import Origin, RawLog, ReadOptions, Recording
+from strapdown.formats.recording import Origin, RawLog, Reading, ReadOptions, Recording
 from strapdown.formats.stamps import Stamps, read_stamps
 from strapdown.formats.summed import SUMS, intervals, sampling_of_sums
 from strapdown.formats.triad_units import told_by_numbers, units_of_triads, values_of_triads
 from strapdown.formats.unit_words import factor_of, parse_unit
-from strapdown.results.inputs import Reading
 from strapdown.tables import SAMPLINGS, find_gaps, imu_table
 
 __all__ = [

@@ -12,10 +12,9 @@ from strapdown.formats.body_axes import axes_matrix, mirrored
 from strapdown.formats.columns import EULERS, QUATERNIONS, parse_axes
 from strapdown.formats.find_columns import Column, find_columns
 from strapdown.formats.numbers import numbers, ticks_of
-from strapdown.formats.recording import Origin, RawLog, ReadOptions
+from strapdown.formats.recording import Origin, RawLog, Reading, ReadOptions
 from strapdown.formats.stamps import read_stamps
 from strapdown.formats.unit_words import parse_unit
-from strapdown.results.inputs import Reading
 from strapdown.tables import attitude_table
 
 Array = NDArray[np.float64]

@@ -14,7 +14,7 @@ from strapdown.errors import DataError
 from strapdown.formats.trajectory_csv import one_line
 from strapdown.formats.trajectory_options import TUM_FRAMES, TrajectoryFileOptions
 from strapdown.frames import ecef_from_geodetic, q_ne
-from strapdown.rotation.quaternions import Q_NED_ENU
+from strapdown.rotation import Q_NED_ENU
 from strapdown.tables import EULER, check_trajectory, places_of
 
 Array = NDArray[np.float64]

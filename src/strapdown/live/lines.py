@@ -30,7 +30,7 @@ from strapdown.formats import csv
 from strapdown.formats.sensorstream import blocks_of
 from strapdown.navigation.navigator import Navigator
 from strapdown.navigation.record import CovarianceSnapshot
-from strapdown.rotation.euler_angles import euler_sd
+from strapdown.rotation import euler_sd
 from strapdown.systems.sins.modes import PipelineChunk
 from strapdown.systems.sins.source import COLUMN_UNITS
 from strapdown.tables import EULER, GEODETIC, GNSS, TRAJECTORY, VELOCITY

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from strapdown.bundle.seal import InputFiles, input_files, sensor_file
 from strapdown.config.crash_case import AssumedSpec, CaseSpec, ReferenceSpec, TriadSpec, UnitSpec
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.delta_v import delta_v
@@ -28,11 +29,9 @@ from strapdown.formats.crash_records import read_crash_record
 from strapdown.formats.crash_triad import triad_of_channels
 from strapdown.formats.gnss_files import files_of_fixes, read_gnss
 from strapdown.formats.named_columns import read_reference_path
-from strapdown.results.inputs import InputFiles
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.crash_unit import Assumed, CrashUnit, Mounting, RecordedTriad
 from strapdown.sensors.uncertainty import stated_uncertainty
-from strapdown.systems.attitude_source import input_files, sensor_file
 from strapdown.systems.crash_reconstruction import CrashReconstruction, reconstruct_crash
 from strapdown.systems.one_thread import one_thread
 from strapdown.systems.progress import Progress, silent

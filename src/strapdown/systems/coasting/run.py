@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from strapdown.bundle.seal import InputFiles, input_files, sensor_file
 from strapdown.config.coast import CoastSpec
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.navigation_modules import sensors_of
 from strapdown.errors import ConfigError, Finding
-from strapdown.results.inputs import InputFiles
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty
-from strapdown.systems.attitude_source import input_files, sensor_file
 from strapdown.systems.coasting.forecast import Forecast
 from strapdown.systems.coasting.recorded import RecordedCoast, coast_of_run
 from strapdown.systems.coasting.stated import forecast_of_sensor, sensor_of

@@ -26,7 +26,7 @@ from strapdown.estimation.error_model import PHYSICAL
 from strapdown.evaluation.heading_light import SURE
 from strapdown.nav_state import NavState
 from strapdown.navigation.record import NavigationRecord
-from strapdown.rotation.euler_angles import euler_sd
+from strapdown.rotation import euler_sd
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.sins.chain import NavigationPipeline
 from strapdown.systems.sins.modes import Aligned

@@ -35,7 +35,7 @@ from strapdown.nav_state import NavState
 from strapdown.navigation.consistency import ObservationConsistency
 from strapdown.navigation.navigator import Navigator, NavigatorState
 from strapdown.navigation.record import CovarianceSnapshot, NavigationChunk, NavigationRecord
-from strapdown.rotation.euler_angles import euler_sd
+from strapdown.rotation import euler_sd
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.sins.chain import NavigationPipeline
 from strapdown.systems.sins.gyrocompass import Compass

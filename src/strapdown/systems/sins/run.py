@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from strapdown.alignment.alignment import Alignment, Site
 from strapdown.alignment.fine_result import FineResult
+from strapdown.bundle.seal import InputFiles, input_files
 from strapdown.config.choice import SLOTS, make_choice
 from strapdown.config.navigation import CoarseModeSpec, FineModeSpec, NavigationSpec, StartTable
 from strapdown.config.navigation_modules import given_of, make_aids, make_filter, sensors_of
@@ -29,9 +30,7 @@ from strapdown.nav_state import NavState
 from strapdown.navigation.navigator import Navigator, with_states
 from strapdown.navigation.record import NavigationRecord
 from strapdown.navigation.recorder import Recorder
-from strapdown.results.inputs import InputFiles
 from strapdown.sensors.uncertainty import ImuUncertainty
-from strapdown.systems.attitude_source import input_files
 from strapdown.systems.one_thread import one_thread
 from strapdown.systems.progress import Progress, silent
 from strapdown.systems.sins.chain import NavigationPipeline

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.aiding.aid import TabulatedMeasurement
 from strapdown.alignment.alignment import Site
+from strapdown.bundle.seal import InputFiles, input_files, sensor_file
 from strapdown.config.choice import SLOTS
 from strapdown.config.navigation import (
     AidSpec,
@@ -32,18 +33,16 @@ from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.control_points import read_control_points
 from strapdown.formats.gnss_files import files_of_fixes, read_gnss
 from strapdown.formats.gnss_fixes import GnssOptions
-from strapdown.formats.recording import StatedStart
+from strapdown.formats.recording import Reading, StatedStart
 from strapdown.formats.trajectory_readers import files_of_trajectory, read_trajectory
 from strapdown.frames import geodetic_from_ned, ned_from_geodetic
 from strapdown.nav_state import NavState
-from strapdown.results.inputs import InputFiles, Reading
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.error_chain import child, normal
 from strapdown.simulation import simulate_imu
 from strapdown.simulation.earth_motion import EarthMotion
 from strapdown.simulation.gnss import GnssReceiver, moved_places, simulate_gnss
 from strapdown.systems.alignment_source import body_record
-from strapdown.systems.attitude_source import input_files, sensor_file
 from strapdown.systems.trajectory_source import make_motion, with_key
 from strapdown.tables import (
     GEODETIC,

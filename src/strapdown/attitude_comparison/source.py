@@ -1,29 +1,28 @@
-"""Input of the attitude bench: a log or a scenario, its truth, its window."""
+"""Source of a comparison: a log or a scenario, its truth, and the part that is used."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.attitude import Quaternion, run_attitude
-from strapdown.bundle.seal import sha256
-from strapdown.config import AttitudeSpec, LogSpec, ScenarioSpec
+from strapdown.attitude_algorithms import Quaternion, run_attitude
+from strapdown.attitude_comparison.options import AttitudeSpec
+from strapdown.bundle.seal import InputFiles, input_files, sensor_file
+from strapdown.config import LogSpec, ScenarioSpec
 from strapdown.errors import DataError, Finding
 from strapdown.evaluation.differences import error_angles
 from strapdown.formats import read_log
-from strapdown.formats.recording import Origin, ReadOptions
-from strapdown.formats.references import read_truth
+from strapdown.formats.recording import Origin, Reading, ReadOptions
 from strapdown.increments import increments_from_imu
-from strapdown.results.inputs import InputFiles, Reading
-from strapdown.sensors.catalogue import SENSORS, load_sensor
-from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
 from strapdown.tables import QUATERNION
 
-Array = NDArray[np.float64]
+if TYPE_CHECKING:
+    from strapdown.simulation import ImuErrors
 
 
 @dataclass(frozen=True)
@@ -61,6 +60,8 @@ def simulate_scenario(spec: ScenarioSpec) -> tuple[pd.DataFrame, pd.DataFrame]:
     ConfigError
         The scenario, the rate, the sampling or the sensor is unknown.
     """
+    from strapdown.simulation import find_scenario, simulate_imu
+
     return simulate_imu(
         find_scenario(spec.name).motion,
         scenario_errors(spec),
@@ -79,6 +80,9 @@ def scenario_errors(spec: ScenarioSpec) -> ImuErrors:
     ConfigError
         The scenario or the sensor is unknown.
     """
+    from strapdown.sensors.catalogue import load_sensor
+    from strapdown.simulation import find_scenario
+
     if spec.sensor is None:
         return find_scenario(spec.name).errors
     return load_sensor(spec.sensor).draw(spec.seed)
@@ -124,19 +128,9 @@ def read_source(spec: AttitudeSpec) -> Source:
     )
 
 
-def input_files(role: str, path: str, files: tuple[Path, ...]) -> InputFiles:
-    """List files read in a role, with their present digests."""
-    return InputFiles(role, Path(path), files, tuple(sha256(file) for file in files))
-
-
-def sensor_file(sensor: str | None) -> tuple[InputFiles, ...]:
-    """Return the file of a sensor that is not from the catalogue."""
-    if sensor is None or sensor.lower() in SENSORS:
-        return ()
-    return (input_files("sensor", sensor, (Path(sensor),)),)
-
-
 def _scenario(spec: ScenarioSpec) -> Source:
+    from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
+
     scenario = find_scenario(spec.name)
     imu, truth = simulate_scenario(spec)
     clean, _ = simulate_imu(
@@ -201,6 +195,8 @@ def with_truth(source: Source, spec: AttitudeSpec) -> Source:
         if not inside.any():
             return replace(source, truth=None, scored=None)
         return replace(source, truth=source.truth[inside], scored=source.scored[inside])
+    from strapdown.formats.references import read_truth
+
     path = Path(spec.truth_path)
     options = read_options(spec.source) if isinstance(spec.source, LogSpec) else None
     truth = read_truth(path, options, source.origin)
