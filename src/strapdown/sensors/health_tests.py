@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from strapdown.constants import MAD_TO_SD
 from strapdown.ellipsoids import WGS84
-from strapdown.sensors.channel_health import ABRUPT
 from strapdown.sensors.health_log import (
     ChannelFault,
     HealthLog,
@@ -26,6 +25,9 @@ from strapdown.sensors.health_log import (
 from strapdown.sensors.saturation import find_limits
 from strapdown.tables import ACCEL, GYRO
 
+# Fraction of the step between the near sixths of both windows, 1.3 ms apart; a rotating head takes
+# longer.
+ABRUPT = 0.8
 __all__ = [
     "find_implausible",
     "find_jumps",
