@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -22,7 +22,6 @@ from numpy.typing import ArrayLike
 
 from strapdown.bundle.configuration_paths import with_paths
 from strapdown.bundle.seal import InputFiles
-from strapdown.config.alignment import AxesTable, LogTable
 from strapdown.config.spec import specify
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
 from strapdown.formats import csv
@@ -30,8 +29,10 @@ from strapdown.formats.clocks import GPS, UNIX, clock_of
 from strapdown.formats.gnss_files import GNSS_READERS, GnssOptions
 from strapdown.formats.gnss_files import read_gnss as read_gnss_table
 from strapdown.formats.log_writers import LOG_WRITERS
-from strapdown.systems.alignment_source import body_record
 from strapdown.tables import ACCEL, GYRO, QUATERNION, imu_table
+
+if TYPE_CHECKING:
+    from strapdown.config.alignment import LogTable
 
 __all__ = [
     "GnssFile",
@@ -66,6 +67,9 @@ class ImuFile:
 
     def read(self) -> Imu:
         """Read the used part of the log into body axes and SI."""
+        from strapdown.config.alignment import AxesTable
+        from strapdown.systems.alignment_source import body_record
+
         recording, table, findings = body_record(self.log, AxesTable(axes=self.axes))
         imu = Imu(table)
         imu.attrs = {**table.attrs, "findings": findings, "readings": recording.readings}
@@ -261,6 +265,8 @@ def read_imu(
     unknown = set(units or {}) - {"gyro", "accel", "time"}
     if unknown:
         raise ConfigError("api.quantity-without-unit", quantity="units", unknown=sorted(unknown)[0])
+    from strapdown.config.alignment import LogTable
+
     log = specify(
         LogTable,
         path=str(path),
@@ -386,6 +392,8 @@ def imu_input(source: Any) -> ImuFile | pd.DataFrame:
     if isinstance(source, ImuFile):
         return source
     if isinstance(source, str | Path):
+        from strapdown.config.alignment import LogTable
+
         return ImuFile(specify(LogTable, path=str(source)))
     if isinstance(source, pd.DataFrame):
         file = _unchanged(source)

@@ -17,7 +17,6 @@ from strapdown.bundle.seal import Seal, to_json
 from strapdown.bundle.writing import write_bundle
 from strapdown.errors import ConfigError
 from strapdown.evaluation.reference_points import Score
-from strapdown.export_c import export_c
 from strapdown.formats import csv
 from strapdown.report import attitude_words as words
 from strapdown.report.attitude_charts import charts, share_basis
@@ -344,6 +343,8 @@ def write_c(bench: AttitudeComparison, path: Path, *, force: bool = False) -> st
     ConfigError
         No algorithm is recommended among several, or the file may not be written.
     """
+    from strapdown.export_c import export_c
+
     check_c(path, force)
     chosen = chosen_for_c(bench)
     first = bench.runs[0].attitude[QUATERNION].to_numpy()
