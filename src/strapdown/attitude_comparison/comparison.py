@@ -466,7 +466,9 @@ def _gyro_bias(
     spec: AttitudeSpec, source: Source, rests: tuple[RestStretch, ...]
 ) -> tuple[pd.DataFrame, dict[str, Any], tuple[InputFiles, ...]]:
     """The samples without the gyro bias, the bias as `AttitudeComparison.gyro_bias`, its files."""
-    imu, files = source.imu, ()
+    imu = source.imu
+    files: tuple[InputFiles, ...] = ()
+    bias: Sequence[float]
     choice = spec.gyro_bias.lower()
     if spec.gyro_bias_path is not None:
         options = read_options(spec.source) if isinstance(spec.source, LogSpec) else None
@@ -502,7 +504,7 @@ def _gyro_bias(
     else:
         numbers, unit = _stated_bias(spec.gyro_bias)
         factor = factor_of(unit, GYRO_UNITS)
-        bias, where = tuple(v * factor for v in numbers), f"stated: {spec.gyro_bias}"
+        bias, where = [v * factor for v in numbers], f"stated: {spec.gyro_bias}"
     less = imu.copy()
     less[GYRO] = imu[GYRO].to_numpy() - np.asarray(bias)
     return less, {"rad_per_s": list(bias), "from": where}, files

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -72,7 +72,7 @@ class AttitudeOptions:
     reference_log : str or Path, optional
         Log of a second, better sensor on the same body: synchronized and aligned with this one,
         its attitude serves as the truth.
-    initial : str
+    initial : str or array_like, (3,), deg
         ``auto``, ``truth``, ``level``, ``zero``, or ``roll,pitch,heading`` in deg. ``auto`` is
         the truth where there is one, leveled where the log begins at rest, and zero otherwise.
     gyro_bias : str or array_like, (3,), rad/s
@@ -102,7 +102,7 @@ class AttitudeOptions:
     trials: int = 1
     reference: str | Sequence[str] = ()
     reference_log: str | Path | None = None
-    initial: str = "auto"
+    initial: str | ArrayLike = "auto"
     gyro_bias: str | ArrayLike = "none"
     peers: Sequence[str] = ()
     from_s: float | None = None
@@ -140,14 +140,8 @@ class AttitudeOptions:
         check_part(self.from_s, self.to_s, self.duration_s)
         first, *others = _one_of_each(one for text in sources for one in self._of_source(text))
         words, truth_path = _sort_references(_texts(self.reference))
-        bias = self.gyro_bias
-        if not isinstance(bias, str | Path):
-            bias = ",".join(str(v) for v in np.asarray(bias).ravel().tolist())
-        bias = str(bias).strip()
+        bias = _text(self.gyro_bias)
         bias_path = str(Path(bias)) if _exists(bias) else None
-        initial = self.initial
-        if not isinstance(initial, str):
-            initial = ",".join(str(v) for v in np.asarray(initial).ravel().tolist())
         algorithms = _texts(self.algorithms)
         return specify(
             AttitudeSpec,
@@ -157,7 +151,7 @@ class AttitudeOptions:
             interpolation=self.interpolation.strip(),
             rates_hz=tuple(float(r) for r in self.rates_hz),
             tolerance_deg=self.tolerance_deg,
-            initial=initial.strip(),
+            initial=_text(self.initial),
             gyro_bias="log" if bias_path else bias,
             references=words,
             truth_path=truth_path,
@@ -234,6 +228,13 @@ def refuse_no_rate(rate: float) -> None:
     """Raise ConfigError unless a rate in Hz is positive and finite."""
     if not (np.isfinite(rate) and rate > 0.0):
         raise ConfigError("attitude.hz-no-rate", quantity="--rates", rate=rate)
+
+
+def _text(value: Any) -> str:
+    """Return a text unchanged, three numbers as text."""
+    if isinstance(value, str | Path):
+        return str(value).strip()
+    return ",".join(str(v) for v in np.asarray(value).ravel().tolist())
 
 
 def _texts(values: object) -> list[str]:
