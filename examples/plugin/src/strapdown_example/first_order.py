@@ -12,17 +12,17 @@ from strapdown.attitude_algorithms.algorithm import Accuracy, AttitudeAlgorithm
 
 
 @njit
-def first_order_step(q, dt, tx, ty, tz, dx, dy, dz, a, b):
+def first_order_step(state, dt, tx, ty, tz, dx, dy, dz, a, b):
     """``q <- normalize(q + q (0, theta) / 2)``, of (4,) and rad; every step has these arguments."""
-    w = q[0] - 0.5 * (q[1] * tx + q[2] * ty + q[3] * tz)
-    x = q[1] + 0.5 * (q[0] * tx + q[2] * tz - q[3] * ty)
-    y = q[2] + 0.5 * (q[0] * ty + q[3] * tx - q[1] * tz)
-    z = q[3] + 0.5 * (q[0] * tz + q[1] * ty - q[2] * tx)
+    w = state[0] - 0.5 * (state[1] * tx + state[2] * ty + state[3] * tz)
+    x = state[1] + 0.5 * (state[0] * tx + state[2] * tz - state[3] * ty)
+    y = state[2] + 0.5 * (state[0] * ty + state[3] * tx - state[1] * tz)
+    z = state[3] + 0.5 * (state[0] * tz + state[1] * ty - state[2] * tx)
     norm = math.sqrt(w * w + x * x + y * y + z * z)
-    q[0] = w / norm
-    q[1] = x / norm
-    q[2] = y / norm
-    q[3] = z / norm
+    state[0] = w / norm
+    state[1] = x / norm
+    state[2] = y / norm
+    state[3] = z / norm
 
 
 @njit
