@@ -229,7 +229,7 @@ def attitude(
         return
     if write.quiet:
         return
-    _print_bench(bench)
+    print_comparison(bench)
     if files.timing:
         _print_speed(taken)
     print_findings(bench.findings)
@@ -283,7 +283,7 @@ def _split(text: str) -> list[str]:
 MOST_LINES = 8
 
 
-def _print_bench(bench: AttitudeComparison) -> None:
+def print_comparison(bench: AttitudeComparison) -> None:
     """Print the input of the run, its tables, and the answer last, where it is visible."""
     from strapdown.cli.console import console, print_table
     from strapdown.report import attitude_tables as tables
