@@ -12,9 +12,9 @@ RATE = 200.0
 
 
 def ratios() -> Iterator[Ratio]:
+    from strapdown.api.attitude import compare_attitude
     from strapdown.formats.log_writers import LOG_WRITERS
     from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
-    from strapdown.systems.attitude_bench import bench_attitude
     from strapdown.tables import GYRO
 
     # Ten minutes at 200 Hz, nine algorithms, six rates, both ways to come to them.
@@ -24,7 +24,7 @@ def ratios() -> Iterator[Ratio]:
         LOG_WRITERS["csv"](log, imu, truth)
 
         def answer() -> None:
-            bench_attitude(log, algorithms="all")
+            compare_attitude(log, algorithms="all")
 
         answer()
         try:

@@ -21,7 +21,7 @@ def rates() -> np.ndarray:
 
 def ratios() -> Iterator[Ratio]:
     from strapdown._kernels import attitude as kernel
-    from strapdown.attitude import AttitudeTracker, Quaternion, run_attitude
+    from strapdown.attitude_algorithms import AttitudeTracker, Quaternion, run_attitude
     from strapdown.increments import increments_from_imu
     from strapdown.tables import imu_table
 

@@ -11,17 +11,17 @@ from benchmarks.measure import Ratio
 
 
 def ratios() -> Iterator[Ratio]:
-    from strapdown import read_log, simulate
-    from strapdown.systems.attitude_bench import bench_attitude
+
+    from strapdown import compare_attitude, read_log, simulate
 
     with TemporaryDirectory() as folder:
         seal = simulate("alexiev-fig2c", Path(folder) / "log", rate=20_000, formats=["npz"])
         log = seal.path / "log.npz"
-        bench_attitude(log)  # everything is loaded and compiled before memory is counted
+        compare_attitude(log)  # everything is loaded and compiled before memory is counted
         table = read_log(log).imu
         size = table.to_numpy().nbytes + table.index.to_numpy().nbytes
         tracemalloc.start()
-        bench_attitude(log)
+        compare_attitude(log)
         _, peak = tracemalloc.get_traced_memory()
         tracemalloc.stop()
     yield Ratio(

@@ -21,7 +21,7 @@ from papers.reproduction import (
     amount,
 )
 from strapdown import rotation
-from strapdown.attitude import AttitudeAlgorithm, EulerKrylov
+from strapdown.attitude_algorithms import AttitudeAlgorithm, EulerKrylov
 from strapdown.increments import increments_from_imu
 from strapdown.rotation import within_half_turn
 from strapdown.simulation import simulate_imu

@@ -20,9 +20,9 @@ from papers.reproduction import (
     amount,
 )
 from strapdown import rotation
-from strapdown.attitude import AttitudeAlgorithm, attitude_history, count_cost, make_algorithm
+from strapdown.attitude_algorithms import AttitudeAlgorithm, attitude_history, make_algorithm
+from strapdown.attitude_algorithms.cost import Cost, count_cost
 from strapdown.increments import increments_from_imu
-from strapdown.results import Cost
 from strapdown.simulation import ImuErrors, Motion, find_scenario, simulate_imu
 from strapdown.tables import GYRO, QUATERNION
 

@@ -21,7 +21,7 @@ from papers.reproduction import (
     amount,
 )
 from papers.tests.statements_of_a_paper import check_manual
-from strapdown.attitude import ALGORITHMS
+from strapdown.attitude_algorithms import ALGORITHMS
 from strapdown.constants import STANDARD_GRAVITY
 
 PAGE = Path(__file__).parents[1] / "alexiev" / "README.md"
@@ -158,8 +158,8 @@ def test_a_wrong_sign_in_the_algorithm_turns_the_verdicts_that_rest_on_it(monkey
     right = ALGORITHMS["dcm"]
 
     class Backwards(right):  # type: ignore[misc, valid-type]
-        def advance_steps(self, state, steps):
-            return super().advance_steps(state, replace(steps, theta=-steps.theta))
+        def advance(self, state, steps):
+            return super().advance(state, replace(steps, theta=-steps.theta))
 
     keys = ("fig4-dcm-reference", "euler-unstable", "fig4-incorrect")
     assert [verdicts[k] for k in keys] == [HOLDS_WHEN, HOLDS, HOLDS]

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from strapdown.api.attitude import (
         Attitude,
         AttitudeComparison,
+        AttitudeOptions,
         OrientationFilter,
         attitude,
         compare_attitude,
@@ -81,6 +82,7 @@ __all__ = [
     "Assumed",
     "Attitude",
     "AttitudeComparison",
+    "AttitudeOptions",
     "Barometer",
     "BodyVelocity",
     "CrashReconstruction",
@@ -147,7 +149,9 @@ _HOMES = {
     "coast": "strapdown.api.alignment",
     "Attitude": "strapdown.api.attitude",
     "AttitudeComparison": "strapdown.api.attitude",
+    "AttitudeOptions": "strapdown.api.attitude",
     "OrientationFilter": "strapdown.api.attitude",
+    "attitude": "strapdown.api.attitude",
     "compare_attitude": "strapdown.api.attitude",
     "CrashRun": "strapdown.api.crash",
     "reconstruct": "strapdown.api.crash",
@@ -199,10 +203,6 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
-    if name == "attitude":
-        from importlib import import_module
-
-        return import_module("strapdown.attitude")
     if name in _HOMES:
         from importlib import import_module
 

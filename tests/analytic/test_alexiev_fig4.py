@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
-from strapdown.systems.attitude_bench import bench_attitude
+from strapdown.api.attitude import compare_attitude
 
 
 def final_errors(rate: float, algorithms: str, **options) -> dict[str, float]:
-    bench = bench_attitude("alexiev-fig4", rate=rate, algorithms=algorithms.split(), **options)
+    bench = compare_attitude("alexiev-fig4", rate_hz=rate, algorithms=algorithms.split(), **options)
     return {s.algorithm: s.error_deg for s in bench.scores}
 
 
 def test_exact_final_attitude():
-    bench = bench_attitude("alexiev-fig4")
+    bench = compare_attitude("alexiev-fig4")
     final = bench.truth.iloc[-1]
     # As printed in the notes, to their six decimals.
     assert final["heading"] == pytest.approx(170.323182, abs=5e-7)
@@ -53,7 +53,7 @@ def test_euler_with_trapezoidal_rates(rate, error, digits):
 @pytest.mark.parametrize(("rate", "error", "digits"), [(10, 25.2, 1), (50, 4.16, 2)])
 def test_plain_forward_euler(rate, error, digits):
     """With the rate at the start of each step instead of the mean of its two ends."""
-    from strapdown.attitude import EulerKrylov, run_attitude
+    from strapdown.attitude_algorithms import EulerKrylov, run_attitude
     from strapdown.simulation import find_scenario
     from strapdown.tables import QUATERNION, increments_table
 
@@ -69,7 +69,7 @@ def test_plain_forward_euler(rate, error, digits):
 
 
 def test_a_closed_pulse_costs_its_sampling_error_and_no_algorithm_is_to_blame():
-    bench = bench_attitude("alexiev-fig4-closed", rate=100)
+    bench = compare_attitude("alexiev-fig4-closed", rate_hz=100)
     # The trapezoid of the half-open pulse is exact; the closed one holds one sample more.
     assert bench.sampling_error_deg[0] == pytest.approx(
         np.degrees(np.hypot(0.1, 2.0) / 100), rel=1e-6
@@ -85,7 +85,7 @@ def test_naive_has_an_error_that_no_rate_removes():
 
 
 def test_euler_says_how_near_it_came_to_the_pole():
-    bench = bench_attitude("alexiev-fig4", rate=100, algorithms=["euler"])
+    bench = compare_attitude("alexiev-fig4", rate_hz=100, algorithms=["euler"])
     near = bench.runs[0].diagnostics
     assert near["closest_to_pole_deg"] == pytest.approx(1.48, abs=0.005)
     assert 2.7 < near["closest_to_pole_time_s"] < 2.9

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
-from strapdown.attitude import make_algorithm, run_attitude
+from strapdown.attitude_algorithms import make_algorithm, run_attitude
 from strapdown.increments import increments_from_imu
 from strapdown.simulation import Coning, ImuErrors, find_scenario, simulate_imu
 from strapdown.tables import QUATERNION, THETA, imu_table, increments_table

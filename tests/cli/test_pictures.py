@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from strapdown import simulate
+from strapdown.api.attitude import compare_attitude
 from strapdown.config import read_trajectory_spec
 from strapdown.config.alignment import LogTable
 from strapdown.config.navigation_file import read_navigation_spec
@@ -25,7 +26,6 @@ from strapdown.report.navigation_found import told_of
 from strapdown.report.svg_chart import draw
 from strapdown.report.trajectory_simulation import simulation_chart
 from strapdown.report.verdict_document import light_picture
-from strapdown.systems.attitude_bench import bench_attitude
 from strapdown.systems.navigation_draft import draft_navigation
 from strapdown.systems.navigation_run import run_navigation
 from strapdown.systems.trajectory_source import make_motion
@@ -113,7 +113,9 @@ def compare_picture(now, name):
 
 @pytest.mark.skipif(not PINNED, reason="another matplotlib than that of constraints.txt")
 def test_the_rates_of_the_readme_are_what_is_drawn_now(tmp_path):
-    (chart,) = [c for c in charts(bench_attitude("alexiev-fig6", rate=200)) if c.slug == "sweep"]
+    (chart,) = [
+        c for c in charts(compare_attitude("alexiev-fig6", rate_hz=200)) if c.slug == "sweep"
+    ]
     compare_chart(chart, "attitude_rates.svg", tmp_path)
 
 

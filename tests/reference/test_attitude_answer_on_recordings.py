@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
-from strapdown.attitude import attitude_history, make_algorithm
+from strapdown.api.attitude import compare_attitude
+from strapdown.attitude_algorithms import attitude_history, make_algorithm
 from strapdown.increments import increments_from_imu
-from strapdown.rotation.euler_angles import unit_rotation_angle
-from strapdown.systems.attitude_bench import bench_attitude
+from strapdown.rotation import unit_rotation_angle
 from strapdown.tables import QUATERNION, THETA
 
 TRIALS = [
@@ -32,7 +32,7 @@ def test_the_matrix_alone_loses_what_its_axis_turned_within_the_steps(recordings
     is turned fast for three minutes: measured here and found by the formula alike.
     """
     path = recordings("broad") / f"{name}.hdf5"
-    bench = bench_attitude(path, algorithms=["dcm", "quaternion"], rates=[285])
+    bench = compare_attitude(path, algorithms=["dcm", "quaternion"], rates_hz=[285])
     matrix, quaternion = bench.shares
     increments = increments_from_imu(bench.imu)
     theta = increments[THETA].to_numpy()
@@ -65,7 +65,7 @@ def test_the_matrix_alone_loses_what_its_axis_turned_within_the_steps(recordings
 def test_a_board_turned_by_hand(recordings, axis):
     """Put back by hand, tilted: what is far from the reference is neither algorithm nor rate."""
     folder = recordings("mpu6050_turns")
-    bench = bench_attitude(
+    bench = compare_attitude(
         folder / f"rotate-360ccw-around-{axis}",
         gyro_bias=folder / "unmoved-10min",
         reference="end same as start",
@@ -81,7 +81,7 @@ def test_a_board_turned_by_hand(recordings, axis):
     # Gravity says that it was put back tilted by 11 to 15 deg: no less can be left.
     full = bench.sweep[bench.sweep["factor"] == 1]
     assert full["error_deg"].min() > 5.0
-    strict = bench_attitude(
+    strict = compare_attitude(
         folder / f"rotate-360ccw-around-{axis}",
         gyro_bias=folder / "unmoved-10min",
         reference="end same as start",
@@ -94,7 +94,7 @@ def test_a_board_turned_by_hand(recordings, axis):
 
 def test_a_phone_in_a_car(recordings):
     """A minute on a motorway: the naive sum is all that is needed beside such a gyro."""
-    bench = bench_attitude(recordings("phone_comma2k19"), algorithms=["naive", "quaternion"])
+    bench = compare_attitude(recordings("phone_comma2k19"), algorithms=["naive", "quaternion"])
     assert bench.answer.verdict == "sensor"
     assert bench.answer.algorithm == "naive"
     naive, quaternion = bench.shares
@@ -104,9 +104,9 @@ def test_a_phone_in_a_car(recordings):
 
 def test_trials_of_the_recordings_together(recordings):
     paths = [recordings("broad") / f"{name}.hdf5" for name in TRIALS[::2]]
-    bench = bench_attitude(paths, algorithms=["naive", "quaternion"], rates=[285, 100])
+    bench = compare_attitude(paths, algorithms=["naive", "quaternion"], rates_hz=[285, 100])
     assert bench.trials.names == tuple(p.name for p in paths)
     assert bench.answer.verdict == "sensor"
-    alone = [bench_attitude(p, algorithms=["quaternion"], rates=[285]) for p in paths]
+    alone = [compare_attitude(p, algorithms=["quaternion"], rates_hz=[285]) for p in paths]
     worst = max(b.shares[0].sensor_deg[2] for b in alone)
     assert f"{worst:.3g}°" in bench.answer.sentence

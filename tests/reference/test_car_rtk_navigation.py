@@ -24,7 +24,6 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
-from strapdown.alignment.levelling import level
 from strapdown.estimation.covariance import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.error_model import RotationVectorModel
@@ -38,6 +37,7 @@ from strapdown.navigation.measurements.gnss_readiness import gnss_readiness
 from strapdown.navigation.measurements.vehicle import NoSlip
 from strapdown.navigation.navigator import Navigator, with_states
 from strapdown.navigation.outage_test import score_withheld, scores_table, spans_to_withhold
+from strapdown.rotation import level
 from strapdown.tables import gnss_table, imu_table
 
 DEG = np.pi / 180.0

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from strapdown import read_log, rotation
-from strapdown.attitude import make_algorithm, run_attitude
+from strapdown.attitude_algorithms import make_algorithm, run_attitude
 from strapdown.export_c import export_c
 from strapdown.increments import increments_from_imu
 from strapdown.tables import GYRO, QUATERNION

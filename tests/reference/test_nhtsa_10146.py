@@ -24,8 +24,6 @@ from strapdown.increments import motion_increments
 from strapdown.mechanization.ned import NorthEastDown
 from strapdown.mechanization.run import run_mechanization
 from strapdown.nav_state import NavState
-from strapdown.sensors.channel_health import check_channel, check_peers
-from strapdown.sensors.redundant_channels import compare_redundant
 
 STEP = 1e-4
 G = 9.80665
@@ -166,79 +164,6 @@ class TestVehicle:
         # 41.5 mph: -6.9774 + 0.1620 * 41.5 = -0.25.
         assert risk.probability == pytest.approx(0.44, abs=0.01)
         assert 0.39 < risk.low < risk.probability < risk.high < 0.48
-
-
-@pytest.fixture(scope="module")
-def healths(test):
-    found = {}
-    for unit in ("m/s2", "rad/s"):
-        channels = [c for c in test.channels if c.present and c.si_unit == unit]
-        tested = check_peers(
-            [
-                check_channel(
-                    c.table.index,
-                    c.table["value"],
-                    c.name,
-                    acceleration=unit == "m/s2",
-                    full_scale=c.rating_si,
-                    entry_speed=c.initial_velocity,
-                )
-                for c in channels
-            ]
-        )
-        found |= {c.number: h for c, h in zip(channels, tested, strict=True)}
-    return found
-
-
-class TestHealth:
-    def test_failed_engine_channel_is_found_without_its_status(self, healths):
-        # The laboratory cut it at 67 ms. It is also four times as noisy as its like before the
-        # impact, where nothing is wrong yet.
-        assert {"noise", "cut"} <= set(healths[96].kinds)
-        cut = next(f for f in healths[96].faults if f.kind == "cut")
-        assert cut.at == pytest.approx(0.0669)
-        assert [n for n, h in healths.items() if {"noise", "cut"} & set(h.kinds)] == [96]
-
-    def test_what_else_is_told(self, healths):
-        """True and false alarms, as they are.
-
-        98 has a true one: its zero moved by 0.9 g, where 97 on the other side stays. 97 is at the
-        limit: 1.01 m/s down at the end, of 1.0. Heads are neither at rest nor straight when the
-        record ends, so the tests of the end alarm falsely for them, as they say of themselves.
-        """
-        kinds = {n: set(h.kinds) for n, h in healths.items()}
-        for number in (93, 94, 95, 99, 100, 101, 102, 103, 104, 105, 106):
-            assert kinds[number] == set()
-        assert kinds[98] == {"offset"}
-        assert kinds[97] == {"velocity"}
-        heads = (1, 2, 3, 4, 5, 6, 47, 48, 49, 50, 51, 52)
-        assert all(kinds[n] and kinds[n] <= {"offset", "velocity"} for n in heads)
-
-    @pytest.mark.parametrize(
-        ("pair", "agree"),
-        [
-            # Redundant pairs. 48 and 51, across the passenger's head, see a tenth of what the
-            # others see, and their integrals of 1.6 m/s differ by 0.16.
-            ((1, 4), True),
-            ((2, 5), True),
-            ((3, 6), True),
-            ((47, 50), True),
-            ((48, 51), False),
-            ((49, 52), True),
-            ((93, 99), True),
-            ((94, 100), True),
-            # Not redundant, and told so: top and bottom of the engine, left and right.
-            ((95, 96), False),
-            ((97, 98), False),
-        ],
-    )
-    def test_pairs(self, test, pair, agree):
-        (time, a), (_, b) = (zeroed(test, n) for n in pair)
-        n = min(a.size, b.size)
-        result = compare_redundant(a[:n], b[:n], time[:n])
-        assert result.agree == agree
-        if agree:
-            assert result.gain == pytest.approx(1.0, abs=0.03)
 
 
 @dataclass(frozen=True)

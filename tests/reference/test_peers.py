@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from strapdown import read_log, rotation
-from strapdown.attitude import Quaternion, run_attitude
+from strapdown.attitude_algorithms import Quaternion, run_attitude
 from strapdown.increments import increments_from_imu
 from strapdown.peers import PEERS, run_peers
 from strapdown.tables import MAG, QUATERNION

@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from strapdown import frames, read_log, rotation
-from strapdown.systems.attitude_bench import bench_attitude
+from strapdown.api.attitude import compare_attitude
 from strapdown.tables import ACCEL, GYRO, QUATERNION
 
 
@@ -59,7 +59,7 @@ def test_attitude_is_that_of_the_pose(folder, recording):
     nearest = np.abs(times[:, None] - recording.truth.index.to_numpy()).argmin(axis=0)
     assert np.degrees((pose[nearest].inv() * ours).magnitude()).max() < 0.5
     lat_deg, lon_deg, _ = frames.geodetic_from_ecef(np.column_stack([x, y, z])).T
-    same = rotation.to_scipy(frames.q_ne(lat_deg, lon_deg))
+    same = Rotation.from_quat(frames.q_ne(lat_deg, lon_deg), scalar_first=True)
     assert np.degrees((same.inv() * ned).magnitude()).max() < 1e-9
 
 
@@ -79,7 +79,7 @@ def test_frames_and_axes_agree_with_velocity_and_gravity(folder, recording):
 
 
 def test_gyro_alone_keeps_the_attitude(folder):
-    plain = bench_attitude(folder)
+    plain = compare_attitude(folder)
     # A bias that Android estimates is good to a tenth of a deg/s or so; it adds up over 60 s.
     score = {s.algorithm: s for s in plain.scores}["quaternion"]
     assert 0.1 < score.error_deg < 6.0
@@ -93,7 +93,7 @@ def test_gyro_alone_keeps_the_attitude(folder):
     bias = np.degrees(off) / (truth.index[-1] - truth.index[0])
     assert np.linalg.norm(bias) < 0.1
     text = ",".join(f"{b:.9f}" for b in bias) + " deg/s"
-    left = {s.algorithm: s for s in bench_attitude(folder, gyro_bias=text).scores}["quaternion"]
+    left = {s.algorithm: s for s in compare_attitude(folder, gyro_bias=text).scores}["quaternion"]
     # The heading changes by 0.6 deg in all, so that body axes hardly turn and the bias is even.
     assert left.error_deg < 0.1
     assert left.max_deg < 1.5

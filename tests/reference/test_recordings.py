@@ -15,10 +15,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from strapdown import read_log, rotation
-from strapdown.attitude import Quaternion, run_attitude
+from strapdown.api.attitude import compare_attitude
+from strapdown.attitude_algorithms import Quaternion, run_attitude
 from strapdown.evaluation.differences import error_angles
 from strapdown.increments import increments_from_imu
-from strapdown.systems.attitude_bench import bench_attitude
 from strapdown.tables import ACCEL, GYRO, QUATERNION, imu_table
 
 TURNS = {
@@ -46,7 +46,7 @@ def test_two_turns_by_hand(recordings, name, bias):
         "stated": "-4.54,0.11,-1.07 deg/s",
         "recorded": str(folder / "unmoved-10min"),
     }[bias]
-    bench = bench_attitude(
+    bench = compare_attitude(
         folder / name, reference=[f"end 2 turns about {axis} since start"], gyro_bias=gyro_bias
     )
     scores = {s.algorithm: s for s in bench.scores}
@@ -69,7 +69,7 @@ def test_what_the_hand_left_is_what_the_accelerometer_sees(recordings, name):
     """
     axis, _ = TURNS[name]
     folder = recordings("mpu6050_turns")
-    bench = bench_attitude(
+    bench = compare_attitude(
         folder / name,
         reference=[f"end 2 turns about {axis} since start"],
         gyro_bias=str(folder / "unmoved-10min"),
@@ -117,7 +117,7 @@ def test_the_axes_of_the_board_are_right_handed(recordings, name):
     ],
 )
 def test_unmoved_logs_are_one_rest(recordings, name, up):
-    bench = bench_attitude(recordings("mpu6050_turns") / name)
+    bench = compare_attitude(recordings("mpu6050_turns") / name)
     assert len(bench.rests) == 1
     rest = bench.rests[0]
     assert rest.end - rest.start > 0.97 * (bench.imu.index[-1] - bench.imu.index[0])
@@ -140,7 +140,7 @@ BROAD = [
 @cache
 def broad(path):
     """All algorithms on a trial, less the bias of its rest."""
-    return bench_attitude(path, gyro_bias="rest")
+    return compare_attitude(path, gyro_bias="rest")
 
 
 @pytest.mark.parametrize("trial", BROAD)
@@ -166,7 +166,7 @@ def test_broad_starts_as_its_own_quaternion_says(recordings, trial):
     w, x, y, z = q[np.argmax(np.isfinite(q[:, 0]))]
     turn = Rotation.from_quat([x, y, z, w])
     ahead, left = turn.apply([1.0, 0.0, 0.0]), turn.apply([0.0, 1.0, 0.0])
-    initial = bench_attitude(path, algorithms=["quaternion"]).initial
+    initial = compare_attitude(path, algorithms=["quaternion"]).initial
     heading = np.degrees(np.arctan2(ahead[0], ahead[1])) % 360  # from north towards east
     pitch = np.degrees(np.arcsin(ahead[2]))  # nose up
     roll = np.degrees(np.arcsin(left[2] / np.cos(np.radians(pitch))))  # left side up

@@ -13,8 +13,8 @@ import pytest
 from scipy.io import loadmat
 
 from strapdown import read_log, rotation
-from strapdown.alignment.levelling import level
-from strapdown.attitude import Quaternion, run_attitude
+from strapdown.attitude_algorithms import Quaternion, run_attitude
+from strapdown.attitude_algorithms.algorithm import AttitudeRun
 from strapdown.evaluation.differences import attitude_at
 from strapdown.evaluation.position_references import dead_reckon
 from strapdown.evaluation.reference_points import (
@@ -24,7 +24,7 @@ from strapdown.evaluation.reference_points import (
 )
 from strapdown.evaluation.second_log import align_second_log, truth_from_second_log
 from strapdown.increments import increments_from_imu
-from strapdown.results import AttitudeRun
+from strapdown.rotation import level
 from strapdown.sensors.rest import (
     find_rests,
     find_rests_of_every_grade,

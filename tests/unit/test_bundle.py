@@ -8,12 +8,11 @@ import shutil
 import pytest
 
 from strapdown import simulate, verify
+from strapdown.api.attitude import compare_attitude
 from strapdown.bundle import sha256, write_bundle
-from strapdown.bundle.seal import MANIFEST
+from strapdown.bundle.seal import MANIFEST, InputFiles
 from strapdown.errors import ConfigError, DataError
 from strapdown.report.attitude import write_attitude
-from strapdown.results import InputFiles
-from strapdown.systems.attitude_bench import bench_attitude
 
 pytestmark = pytest.mark.usefixtures("sketched_module")
 
@@ -28,7 +27,7 @@ def log(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def sealed(log, tmp_path_factory, sketched_module):
-    bench = bench_attitude(
+    bench = compare_attitude(
         log, reference=["end same as 4.5", str(log.with_name("truth.csv"))], gyro_bias=str(log)
     )
     return write_attitude(bench, tmp_path_factory.mktemp("sealed") / "bundle")
@@ -75,7 +74,7 @@ def test_it_verifies_where_it_stands_and_elsewhere_without_its_inputs(sealed, co
 
 
 def test_the_same_run_gives_the_same_seal(log, tmp_path):
-    seals = [write_attitude(bench_attitude(log), tmp_path / name) for name in ("a", "b")]
+    seals = [write_attitude(compare_attitude(log), tmp_path / name) for name in ("a", "b")]
     assert seals[0].digest == seals[1].digest
 
 
@@ -147,7 +146,7 @@ def test_a_run_that_fails_leaves_nothing(tmp_path):
 
 
 def test_a_bundle_is_replaced_only_when_asked(log, tmp_path):
-    bench = bench_attitude(log)
+    bench = compare_attitude(log)
     first = write_attitude(bench, tmp_path / "out")
     with pytest.raises(ConfigError, match="force=True") as refused:
         write_attitude(bench, tmp_path / "out")
@@ -162,14 +161,14 @@ def test_a_folder_that_is_no_bundle_is_never_touched(log, tmp_path, force):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "thesis.tex").write_text("years of work")
     with pytest.raises(ConfigError):
-        write_attitude(bench_attitude(log), tmp_path / "out", force=force)
+        write_attitude(compare_attitude(log), tmp_path / "out", force=force)
     assert (tmp_path / "out" / "thesis.tex").read_text() == "years of work"
 
 
 def test_a_large_input_is_referred_to_and_still_watched(log, tmp_path, monkeypatch):
     monkeypatch.setattr("strapdown.bundle.writing.COPY_LIMIT", 10)
     source = shutil.copy(log, tmp_path / "mine.csv")
-    seal = write_attitude(bench_attitude(source), tmp_path / "out")
+    seal = write_attitude(compare_attitude(source), tmp_path / "out")
     assert not (seal.path / "inputs").exists()
     assert json.loads((seal.path / MANIFEST).read_text())["inputs"][0]["kept"] == "reference"
     assert verify(seal.path).verdict == "identical"
@@ -294,7 +293,7 @@ def test_every_way_of_naming_a_log_gives_one_seal(tmp_path, monkeypatch):
     names = ["logs/log.csv", "./logs/log.csv", "logs//log.csv", "logs/../logs/log.csv"]
     names.append(str(tmp_path / "logs" / "log.csv"))
     seals = [
-        write_attitude(bench_attitude(name, gyro_bias=name), f"out{k}")
+        write_attitude(compare_attitude(name, gyro_bias=name), f"out{k}")
         for k, name in enumerate(names)
     ]
     assert len({s.digest for s in seals}) == 1
@@ -304,14 +303,14 @@ def test_every_way_of_naming_a_log_gives_one_seal(tmp_path, monkeypatch):
 def test_a_link_keeps_its_own_name(tmp_path, log):
     (tmp_path / "blob1234").write_bytes(log.read_bytes())
     (tmp_path / "mine.csv").symlink_to(tmp_path / "blob1234")
-    seal = write_attitude(bench_attitude(tmp_path / "mine.csv"), tmp_path / "out")
+    seal = write_attitude(compare_attitude(tmp_path / "mine.csv"), tmp_path / "out")
     assert verify(seal.path).verdict == "identical"
 
 
 def test_a_log_that_changed_since_it_was_read_is_not_sealed(tmp_path, log):
     mine = tmp_path / "mine.csv"
     mine.write_bytes(log.read_bytes())
-    bench = bench_attitude(mine)
+    bench = compare_attitude(mine)
     mine.write_bytes(log.read_bytes() + b"\n")
     with pytest.raises(DataError, match="since it was read"):
         write_attitude(bench, tmp_path / "out")
@@ -322,7 +321,7 @@ def test_a_log_that_changed_since_it_was_read_is_not_sealed(tmp_path, log):
 
 
 def test_the_old_bundle_stays_where_the_new_one_cannot_be_put(tmp_path, log, monkeypatch):
-    bench = bench_attitude(log)
+    bench = compare_attitude(log)
     seal = write_attitude(bench, tmp_path / "out")
 
     def refuse(self, target):

@@ -20,8 +20,8 @@ from strapdown.bundle import (
 from strapdown.bundle import (
     writing as manifest,
 )
+from strapdown.bundle.seal import InputFiles
 from strapdown.errors import DataError
-from strapdown.results import InputFiles
 
 NAMES = {"write_bundle", "make_manifest", "_keep", "_place", "_move", "files_of", "with_paths"}
 FILES = {m.__file__ for m in (configuration_paths, manifest, seal, writing)}

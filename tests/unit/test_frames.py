@@ -116,7 +116,7 @@ def test_axes_are_those_of_scipy():
     turns = Rotation.from_euler("ZY", np.column_stack([lon, -lat - 90.0]), degrees=True).inv()
     # Two products of sines and cosines, each rounded, and their squares.
     assert frames.C_ne(lat, lon) == pytest.approx(turns.as_matrix(), abs=2e-15)
-    unit = rotation.rotation_angle(frames.q_ne(lat, lon), rotation.from_scipy(turns))
+    unit = rotation.rotation_angle(frames.q_ne(lat, lon), turns.as_quat(scalar_first=True))
     assert unit.max() < 1e-13
 
 

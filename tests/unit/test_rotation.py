@@ -397,34 +397,6 @@ def test_conjugate_reverses():
     assert (np.abs(back - v) <= bound * np.linalg.norm(v, axis=1)[:, None]).all()
 
 
-# --- scipy --------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("leading", [(), (1,), (7,), (2, 5), (0,)])
-def test_round_trip_through_scipy(leading):
-    q = random_quaternions(10)[: int(np.prod(leading))].reshape((*leading, 4))
-    back = rotation.from_scipy(rotation.to_scipy(q))
-    assert back.shape == q.shape
-    assert back.dtype == np.float64
-    # Normalised on either side: norm 4 U at most, each time.
-    assert np.abs(back - q).max(initial=0.0) <= 8 * U
-
-
-def test_to_scipy_turns_vectors_as_rotate_does():
-    q = random_quaternions(100)
-    v = np.random.default_rng(9).standard_normal((100, 3))
-    assert (
-        np.abs(rotation.to_scipy(q).apply(v) - rotation.rotate(q, v)).max()
-        <= TURN * np.abs(np.linalg.norm(v, axis=1)).max()
-    )
-
-
-def test_from_scipy_is_the_turn_that_scipy_holds():
-    turns = random_turns(100)
-    found = rotation.dcm_from_quaternion(rotation.from_scipy(turns))
-    assert np.abs(found - turns.as_matrix()).max() <= TURN
-
-
 # --- rotation_angle -----------------------------------------------------------------------
 
 
@@ -474,7 +446,6 @@ ONE = np.array([1.0, 0.0, 0.0, 0.0])
 TAKERS = {
     **{f"{b}_from_{a}": (getattr(rotation, f"{b}_from_{a}"), a) for a, b in PAIRS},
     "conjugate": (rotation.conjugate, "quaternion"),
-    "to_scipy": (rotation.to_scipy, "quaternion"),
     "compose, first": (lambda q: rotation.compose(q, ONE), "quaternion"),
     "compose, second": (lambda q: rotation.compose(ONE, q), "quaternion"),
     "rotate, quaternion": (lambda q: rotation.rotate(q, [1.0, 2.0, 3.0]), "quaternion"),
@@ -630,8 +601,6 @@ def test_outputs_share_no_memory_with_inputs():
         rotation.quaternion_from_dcm(rotation.dcm_from_quaternion(q)),
     ):
         assert not np.shares_memory(out, q)
-    turns = rotation.to_scipy(q)
-    assert not np.shares_memory(turns.as_quat(), q)
 
 
 def test_read_only_inputs_are_accepted():

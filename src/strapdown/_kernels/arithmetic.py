@@ -70,14 +70,15 @@ def _single(value: ast.expr) -> ast.expr:
     return ast.Call(_float32(), [value], [])
 
 
-def single_source(name: str) -> str:
+def single_source(module: str) -> str:
     """Source of a kernel module in single precision."""
-    tree = _InSingle().visit(ast.parse(_source(name)))
+    tree = _InSingle().visit(kernels_of(module))
     tree.body.insert(2, ast.parse("import numpy as _np").body[0])
     return ast.unparse(ast.fix_missing_locations(tree)) + "\n"
 
 
-def single_precision(name: str) -> ModuleType:
+@functools.cache
+def single_precision(module: str) -> ModuleType:
     """Import a kernel module compiled in single precision.
 
     The sources are written beside the compiled kernels, because numba keeps compiled code
@@ -85,8 +86,8 @@ def single_precision(name: str) -> ModuleType:
 
     Parameters
     ----------
-    name : str
-        One of `SOURCES`.
+    module : str
+        One of `SOURCES`, or the full name of a plug-in's module, which is loaded already.
 
     Returns
     -------
@@ -96,6 +97,9 @@ def single_precision(name: str) -> ModuleType:
         package = ModuleType(SINGLE)
         package.__path__ = [str(_written({n: single_source(n) for n in SOURCES}))]
         sys.modules[SINGLE] = package
+    name = module.replace(".", "_")
+    if module not in SOURCES:
+        sys.modules[SINGLE].__path__.append(str(_written({name: single_source(module)})))
     return importlib.import_module(f"{SINGLE}.{name}")
 
 
@@ -126,8 +130,35 @@ def _write(path: Path, text: str) -> None:
     Path(file.name).replace(path)
 
 
-def _source(name: str) -> str:
-    return Path(__file__).with_name(f"{name}.py").read_text(encoding="utf-8")
+def kernel_module(module: str) -> ModuleType:
+    """Import a kernel module in double precision, named as in `single_precision`."""
+    return importlib.import_module(f"{PACKAGE}.{module}" if module in SOURCES else module)
+
+
+def kernels_of(module: str) -> ast.Module:
+    """Syntax tree of a kernel module; of a plug-in's without its classes and what it imports.
+
+    Parameters
+    ----------
+    module : str
+        As in `single_precision`.
+    """
+    if module in SOURCES:
+        path = Path(__file__).with_name(f"{module}.py")
+        return ast.parse(path.read_text(encoding="utf-8"))
+    tree = ast.parse(Path(str(sys.modules[module].__file__)).read_text(encoding="utf-8"))
+    kept = [node for node in tree.body if _of_kernels(node)]
+    docstring = ast.Expr(ast.Constant("Kernels of a plug-in."))
+    future = ast.parse("from __future__ import annotations").body
+    return ast.fix_missing_locations(ast.Module([docstring, *future, *kept], []))
+
+
+def _of_kernels(node: ast.stmt) -> bool:
+    if isinstance(node, ast.ImportFrom):
+        return bool(node.module) and str(node.module).startswith((PACKAGE, "numba"))
+    if isinstance(node, ast.Import):
+        return all(item.name in ("math", "numpy", "numba") for item in node.names)
+    return isinstance(node, ast.FunctionDef | ast.Assign)
 
 
 class Counted:
@@ -195,25 +226,28 @@ class Counted:
 
 
 @functools.cache
-def counted_kernels() -> dict[str, SimpleNamespace]:
-    """Return every kernel module as plain Python, for numbers of `Counted`."""
-    loaded: dict[str, SimpleNamespace] = {}
-    for name in SOURCES:
-        tree = ast.parse(_source(name))
-        namespace: dict[str, object] = {}
-        for node in list(tree.body):
-            if isinstance(node, ast.ImportFrom):
-                tree.body.remove(node)
-                if node.module and node.module.startswith(f"{PACKAGE}."):
-                    other = vars(loaded[node.module.rpartition(".")[2]])
-                    namespace |= {item.name: other[item.name] for item in node.names}
-            elif isinstance(node, ast.FunctionDef):
-                node.decorator_list = []
-        exec(compile(tree, f"{name} (counted)", "exec"), namespace)
-        # Only now, so that the constants of the module are numbers.
-        namespace["math"] = namespace["np"] = _CountedMath
-        loaded[name] = SimpleNamespace(**namespace)
-    return loaded
+def counted_kernels(module: str) -> SimpleNamespace:
+    """Return a kernel module as plain Python, for numbers of `Counted`.
+
+    Parameters
+    ----------
+    module : str
+        As in `single_precision`.
+    """
+    tree = kernels_of(module)
+    namespace: dict[str, object] = {}
+    for node in list(tree.body):
+        if isinstance(node, ast.ImportFrom):
+            tree.body.remove(node)
+            if node.module and node.module.startswith(f"{PACKAGE}."):
+                other = vars(counted_kernels(node.module.rpartition(".")[2]))
+                namespace |= {item.name: other[item.name] for item in node.names}
+        elif isinstance(node, ast.FunctionDef):
+            node.decorator_list = []
+    exec(compile(ast.fix_missing_locations(tree), f"{module} (counted)", "exec"), namespace)
+    # Only now, so that the constants of the module are numbers.
+    namespace["math"] = namespace["np"] = _CountedMath
+    return SimpleNamespace(**namespace)
 
 
 class _CountedMath:

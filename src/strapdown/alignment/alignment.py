@@ -14,7 +14,7 @@ from strapdown import rotation
 from strapdown.earth import earth_rate, gravity, rows
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import Finding
-from strapdown.rotation.euler_angles import euler_sd
+from strapdown.rotation import euler_sd
 from strapdown.sensors.uncertainty import ImuUncertainty
 
 Array = NDArray[np.float64]

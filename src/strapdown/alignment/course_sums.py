@@ -14,8 +14,7 @@ from strapdown import rotation
 from strapdown.alignment.inertial_sums import InertialSums, sum_inertially
 from strapdown.errors import DataError
 from strapdown.increments import motion_increments
-from strapdown.results.rests import RestStretch
-from strapdown.sensors.rest import find_rests_of_every_grade, rest_between
+from strapdown.sensors.rest import RestStretch, find_rests_of_every_grade, rest_between
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, DV, GYRO, VELOCITY, VELOCITY_SD, check_gnss
 from strapdown.tables.checks import source_of

@@ -16,7 +16,7 @@ from strapdown.alignment.fine import FineResult, alignment_of, settled_epoch
 from strapdown.alignment.inertial_sums import sum_inertially
 from strapdown.alignment.mean_errors import sensor_covariance, sensor_noise
 from strapdown.alignment.stationary import home_of
-from strapdown.attitude import Quaternion, run_attitude
+from strapdown.attitude_algorithms import Quaternion, run_attitude
 from strapdown.errors import ConfigError, DataError
 from strapdown.estimation.error_filter import FilterState
 from strapdown.increments import increments_from_imu

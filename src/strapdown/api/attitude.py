@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import fields, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,20 +14,18 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
-from strapdown.alignment.levelling import level
 from strapdown.api.reading import ImuFile, imu_input, imu_of, imu_of_arrays
-from strapdown.attitude import attitude_history, make_algorithm
-from strapdown.attitude.tracker import AttitudeTracker
-from strapdown.bundle.seal import Seal, check_destination
+from strapdown.attitude_algorithms import AttitudeTracker, attitude_history, make_algorithm
+from strapdown.attitude_comparison.comparison import (
+    AttitudeComparison,
+    initial_attitude,
+    run_comparison,
+)
+from strapdown.attitude_comparison.options import AttitudeOptions
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.formats.recording import Origin
 from strapdown.increments import increments_from_imu
 from strapdown.progress import Progress, silent
-from strapdown.report.attitude import write_attitude
-from strapdown.results.attitude_bench import AttitudeBench
 from strapdown.sensors.rest import find_rests
-from strapdown.systems.attitude_bench import bench_attitude, initial_attitude
-from strapdown.systems.attitude_source import Source
 from strapdown.systems.inputs import NOWHERE, Memory, moved_inputs, moved_paths
 from strapdown.tables import GYRO, QUATERNION, attitude_table
 
@@ -37,15 +35,13 @@ if TYPE_CHECKING:
 __all__ = [
     "Attitude",
     "AttitudeComparison",
+    "AttitudeOptions",
     "OrientationFilter",
     "attitude",
     "compare_attitude",
 ]
 
 Array = NDArray[np.float64]
-
-#: Algorithms that are compared by default.
-COMPARED = ("naive", "euler", "dcm", "quaternion", "rk4", "rotvec")
 
 
 class Attitude(pd.DataFrame):
@@ -133,9 +129,8 @@ def attitude(
     rests = find_rests(imu)
     findings: list[Finding] = []
     name = str(imu.attrs.get("source") or "imu")
-    source = Source(name, "", Origin(0, "s"), imu, None, None, (), (), (), None)
     if isinstance(initial, str):
-        q_nb, start, _ = initial_attitude(initial, source, rests, findings)
+        q_nb, start, _ = initial_attitude(initial, imu, rests, findings)
         how = str(start["from"])
     else:
         q_nb, how = _given(initial), "given"
@@ -271,7 +266,7 @@ class OrientationFilter:
                     "api.no-specific-force-to-level", row=self._samples + 1, quantity="accel"
                 )
             force = self._force + _three(accel, "accel")
-            roll, pitch = level(force / (self._samples + 1))
+            roll, pitch = rotation.level(force / (self._samples + 1))
             tracker = AttitudeTracker(
                 self._algorithm,
                 rotation.quaternion_from_euler([roll, pitch, 0.0]),
@@ -309,81 +304,13 @@ class OrientationFilter:
         )
 
 
-@dataclass(frozen=True, repr=False)
-class AttitudeComparison(AttitudeBench):
-    """Result of a comparison of attitude algorithms on one record.
-
-    `answer` names the simplest algorithm and the lowest rate that are accurate enough; `summary`,
-    `sweep`, `shares` and `costs` are the basis. `plot` draws a chart, `to_pandas` gives one row
-    per algorithm. `save` writes the result; until then it is in memory only.
-    """
-
-    memory: Memory = field(default=Memory({}))
-
-    def save(
-        self, out: str | Path, *, report: bool = True, force: bool = False, png: bool = False
-    ) -> Seal:
-        """Write the comparison as a sealed bundle, which `verify` runs again.
-
-        Parameters
-        ----------
-        out : str or Path
-            New folder. Tables given in memory become input files in it.
-        report : bool
-            Whether to write the page and the figures as well.
-        force : bool
-            Overwrite an existing bundle.
-        png : bool
-            Write each figure as PNG as well.
-
-        Returns
-        -------
-        Seal
-
-        Raises
-        ------
-        ConfigError
-            `out` exists and may not be overwritten.
-        DataError
-            An input file has changed since it was read.
-        """
-        check_destination(Path(out), force)
-        with self._on_disk() as result:
-            return write_attitude(result, out, report=report, force=force, png=png)
-
-    @contextmanager
-    def _on_disk(self) -> Iterator[AttitudeComparison]:
-        with self.memory.as_files() if self.memory.tables else nullcontext(NOWHERE) as folder:
-            yield _moved(self, NOWHERE, folder)
-
-
-def _moved(result: AttitudeComparison, old: Path, new: Path) -> AttitudeComparison:
-    """The comparison with its input paths moved from one folder to another."""
-    if not result.memory.tables or old == new:
-        return result
-    return replace(
-        result,
-        specification=moved_paths(result.specification, old, new),
-        inputs=moved_inputs(result.inputs, old, new, copied=True),
-    )
-
-
-#: Further keywords of `systems.attitude_bench.bench_attitude`.
-_OPTIONS = set(inspect.signature(bench_attitude).parameters) - {
-    *("source", "algorithms", "rates", "tolerance_deg", "reference", "gyro_bias", "progress")
-}
-
-
 def compare_attitude(
     source: Any,
-    algorithms: Sequence[str] = COMPARED,
+    algorithms: str | Sequence[str] | None = None,
     *,
-    rates_hz: Sequence[float] = (),
-    tolerance_deg: float = 1.0,
-    reference: str | Sequence[str] = (),
-    gyro_bias: str | ArrayLike = "none",
-    options: Mapping[str, Any] | None = None,
+    options: AttitudeOptions | None = None,
     progress: Progress = silent,
+    **changes: Any,
 ) -> AttitudeComparison:
     """Compare attitude algorithms at several rates with a reference attitude.
 
@@ -394,24 +321,14 @@ def compare_attitude(
         (`strapdown modules`). Several paths or names are trials of one question: the first is
         shown, and the answer holds for all of them.
     algorithms : sequence of str
-        Names with their options, such as ``quaternion:order=3``, or ``all``.
-    rates_hz : sequence of float
-        Lower rates to try; by default the full rate and its halves.
-    tolerance_deg : float
-        Required accuracy: limit of the largest known error, in deg.
-    reference : str or sequence of str
-        The reference: ``end same as start``, ``12.5 roll 0 pitch 0 heading 90``, ``rests``, or the
-        path of a file with such lines or of an attitude truth.
-    gyro_bias : str or array_like, (3,), rad/s
-        ``none``, ``rest``, ``rests`` (its course through all of them), the path of a log of the
-        stationary sensor, or the bias.
-    options : mapping, optional
-        ``initial``, ``interpolation``, ``peers``, ``reference_log``; for a scenario ``rate`` (Hz),
-        ``sampling``, ``seed``, ``sensor``, ``trials``; for paths the reading options: ``axes``,
-        ``columns``, ``gyro_unit``, ``accel_unit``, ``time_unit``, ``repair``, ``from_s``,
-        ``to_s``, ``duration_s``.
+        Names with their options, such as ``quaternion:order=3``, plug-ins included; or ``all``.
+    options : AttitudeOptions, optional
+        How to compare and to read.
     progress : callable, optional
         Called with a stage and the completed fraction.
+    **changes
+        Fields of `AttitudeOptions` that replace those of `options`: ``rates_hz=[100, 50]``,
+        ``tolerance_deg=0.5``, ``reference="end same as start"``.
 
     Returns
     -------
@@ -428,44 +345,50 @@ def compare_attitude(
     -----
     Alexiev (2021). Earth rotation is neglected, as in the paper: 15 deg/h.
     """
-    asked = dict(options or {})
-    for name in asked:
-        if name not in _OPTIONS:
+    known = {f.name for f in fields(AttitudeOptions)}
+    for name in changes:
+        if name not in known:
             raise ConfigError(
-                "api.unknown-option", quantity="options", name=name, word=name, known=_OPTIONS
+                "api.unknown-option", quantity="options", name=name, word=name, known=known
             )
-    memory, sources = Memory({}), source
-    if not _names(source):
-        given = imu_input(source)
-        if isinstance(given, ImuFile):
-            sources, asked = given.log.path, {**_reading(given), **asked}
-        else:
-            memory = Memory({"imu.npz": given})
-    with memory.as_files() if memory.tables else nullcontext(NOWHERE) as folder:
-        bench = bench_attitude(
-            str(folder / "imu.npz") if memory.tables else sources,
-            algorithms=algorithms,
-            rates=rates_hz,
-            tolerance_deg=tolerance_deg,
-            reference=reference,
-            gyro_bias=gyro_bias,  # type: ignore[arg-type]  # it reads numbers, too
-            progress=progress,
-            **asked,
+    if algorithms is not None:
+        changes["algorithms"] = algorithms
+    if _is_named(source):
+        return run_comparison(
+            replace(options or AttitudeOptions(), **changes).specify(source), progress
         )
-        values = {f.name: getattr(bench, f.name) for f in fields(bench)}
-        return _moved(AttitudeComparison(**values, memory=memory), folder, NOWHERE)
+    given = imu_input(source)
+    if isinstance(given, ImuFile):
+        read = given.log.model_dump(exclude_none=True, exclude={"path"})
+        asked = replace(AttitudeOptions(**read, axes=given.axes), **changes)
+        if options is not None:
+            asked = replace(options, **{**read, "axes": given.axes, **changes})
+        return run_comparison(asked.specify(given.log.path), progress)
+    memory = Memory({"imu.npz": given})
+    with memory.as_files() as folder:
+        asked = replace(options or AttitudeOptions(), **changes)
+        made = run_comparison(asked.specify(folder / "imu.npz"), progress)
+        return replace(_moved(made, folder, NOWHERE), on_disk=partial(_on_disk, memory))
 
 
-def _names(source: Any) -> bool:
+@contextmanager
+def _on_disk(memory: Memory, result: AttitudeComparison) -> Iterator[AttitudeComparison]:
+    with memory.as_files() as folder:
+        yield _moved(result, NOWHERE, folder)
+
+
+def _moved(result: AttitudeComparison, old: Path, new: Path) -> AttitudeComparison:
+    """The comparison with its input paths moved from one folder to another."""
+    return replace(
+        result,
+        specification=moved_paths(result.specification, old, new),
+        inputs=moved_inputs(result.inputs, old, new, copied=True),
+    )
+
+
+def _is_named(source: Any) -> bool:
     """Whether a source is one path or name, or several."""
     if isinstance(source, str | Path):
         return True
     several = isinstance(source, list | tuple)
     return several and all(isinstance(one, str | Path) for one in source)
-
-
-def _reading(file: ImuFile) -> dict[str, Any]:
-    """Options with which a file was read, for the comparison to read it again."""
-    told = file.log.model_dump(exclude_none=True, exclude={"path"})
-    told["rate"] = told.pop("rate_hz", None)
-    return {**told, "axes": file.axes}

@@ -12,7 +12,7 @@ import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -25,6 +25,9 @@ from strapdown.formats.gnss_files import GNSS_READERS, GnssOptions
 from strapdown.formats.gnss_files import read_gnss as read_gnss_table
 from strapdown.systems.alignment_source import body_record
 from strapdown.tables import ACCEL, GYRO, QUATERNION, imu_table
+
+if TYPE_CHECKING:
+    from strapdown.config.alignment import LogTable
 
 __all__ = [
     "GnssFile",
@@ -253,6 +256,8 @@ def read_imu(
     unknown = set(units or {}) - {"gyro", "accel", "time"}
     if unknown:
         raise ConfigError("api.quantity-without-unit", quantity="units", unknown=sorted(unknown)[0])
+    from strapdown.config.alignment import LogTable
+
     log = specify(
         LogTable,
         path=str(path),
@@ -378,6 +383,8 @@ def imu_input(source: Any) -> ImuFile | pd.DataFrame:
     if isinstance(source, ImuFile):
         return source
     if isinstance(source, str | Path):
+        from strapdown.config.alignment import LogTable
+
         return ImuFile(specify(LogTable, path=str(source)))
     if isinstance(source, pd.DataFrame):
         file = _unchanged(source)

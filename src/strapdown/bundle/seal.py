@@ -18,9 +18,12 @@ __all__ = [
     "SCHEMA",
     "TIMING",
     "UNSEALED",
+    "InputFiles",
     "Seal",
     "check_destination",
     "files_of",
+    "input_files",
+    "sensor_file",
     "sha256",
     "to_json",
     "write_latency",
@@ -34,6 +37,32 @@ LATENCY = "latency.json"
 #: Files outside the seal: clocks differ.
 UNSEALED = (TIMING, LATENCY)
 SCHEMA = "strapdown bundle 2"
+
+
+@dataclass(frozen=True)
+class InputFiles:
+    """Files that a result depends on.
+
+    Attributes
+    ----------
+    role : str
+        ``log``, ``truth``, ``gyro-bias``, ``reference-log`` or ``sensor``.
+    path : Path
+        As given: a file, or a folder.
+    files : tuple of Path
+        Every file that was read.
+    digests : tuple of str
+        SHA-256 of each when it was read.
+    copied : bool
+        Whether a bundle copies them, whatever their size: they come from tables in memory and
+        exist only there.
+    """
+
+    role: str
+    path: Path
+    files: tuple[Path, ...]
+    digests: tuple[str, ...]
+    copied: bool = False
 
 
 @dataclass(frozen=True)
@@ -56,6 +85,20 @@ def sha256(path: Path) -> str:
     """SHA-256 of a file, in hexadecimal."""
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def input_files(role: str, path: str, files: tuple[Path, ...]) -> InputFiles:
+    """List files read in a role, with their present digests."""
+    return InputFiles(role, Path(path), files, tuple(sha256(file) for file in files))
+
+
+def sensor_file(sensor: str | None) -> tuple[InputFiles, ...]:
+    """Return the file of a sensor that is not from the catalogue."""
+    from strapdown.sensors.catalogue import SENSORS
+
+    if sensor is None or sensor.lower() in SENSORS:
+        return ()
+    return (input_files("sensor", sensor, (Path(sensor),)),)
 
 
 def files_of(root: Path) -> list[str]:

@@ -18,6 +18,7 @@ from strapdown.bundle.seal import (
     MANIFEST,
     SCHEMA,
     UNSEALED,
+    InputFiles,
     Seal,
     check_destination,
     files_of,
@@ -25,7 +26,6 @@ from strapdown.bundle.seal import (
     to_json,
 )
 from strapdown.errors import DataError
-from strapdown.results.inputs import InputFiles
 
 __all__ = ["machine", "make_manifest", "source_digest", "versions", "write_bundle"]
 

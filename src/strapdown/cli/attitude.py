@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json as json_module
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -17,10 +18,157 @@ from strapdown.cli.shared_options import (
     spread,
 )
 
+if TYPE_CHECKING:
+    import pandas as pd
+    from rich.console import Console
+
+    from strapdown.attitude_comparison.comparison import AttitudeComparison
+    from strapdown.attitude_comparison.options import AttitudeOptions
+    from strapdown.report.attitude_tables import TextTable
+
 EPILOG = (
     "Example: strapdown attitude alexiev-fig4 --rate 100\n\n"
     "Example: strapdown attitude log.csv --gyro-unit deg/s --reference 'end same as start'"
 )
+
+
+@dataclass(frozen=True)
+class ComparisonFlags:
+    """What to compare; the fields of `AttitudeOptions` as a person types them."""
+
+    algorithms: Annotated[
+        str,
+        typer.Option(
+            metavar="NAMES",
+            help="Names joined by blanks or commas, with options after a colon: 'naive "
+            "euler:step=rk4 dcm:order=3 rotvec:samples=3'; or all (naive euler dcm quaternion rk4 "
+            "rotvec).",
+            show_default=False,
+            rich_help_panel=RUN_PANEL,
+        ),
+    ] = "naive euler dcm quaternion rk4 rotvec"
+    rates: Annotated[
+        str | None,
+        typer.Option(
+            metavar="HZ,HZ,…",
+            help="Lower rates to try: '100 50 20 10'; the full rate and its halves if not given.",
+            rich_help_panel=RUN_PANEL,
+        ),
+    ] = None
+    tolerance_deg: Annotated[
+        float,
+        typer.Option(
+            metavar="DEG",
+            help="What is accurate enough: the largest error (1).",
+            show_default=False,
+            rich_help_panel=RUN_PANEL,
+        ),
+    ] = 1.0
+    interpolation: Annotated[
+        str,
+        typer.Option(
+            metavar="KIND",
+            help="How rates run between their stamps: linear (the trapezoid), or cubic (linear).",
+            show_default=False,
+            rich_help_panel=RUN_PANEL,
+        ),
+    ] = "linear"
+    trials: Annotated[
+        int,
+        typer.Option(
+            metavar="N",
+            help="Of a scenario: so many seeds (1).",
+            show_default=False,
+            rich_help_panel=RUN_PANEL,
+        ),
+    ] = 1
+    reference: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="WORDS|FILE",
+            help="What is known, as often as you like: 'end same as start', 'end 2 turns about z "
+            "since start', '12.5 roll 0 pitch 0 heading 90', '8 same place as 2', rests (gravity "
+            "at every rest), a file of such lines (.txt .toml .csv), or an attitude truth.",
+            rich_help_panel=RUN_PANEL,
+        ),
+    ] = None
+    reference_log: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="LOG",
+            help="Log of a second, better sensor on the same body, to be taken for the truth.",
+            rich_help_panel=RUN_PANEL,
+        ),
+    ] = None
+    initial: Annotated[
+        str,
+        typer.Option(
+            metavar="ATTITUDE",
+            help="auto, truth, level, zero, or roll,pitch,heading in deg (auto).",
+            show_default=False,
+            rich_help_panel=RUN_PANEL,
+        ),
+    ] = "auto"
+    gyro_bias: Annotated[
+        str,
+        typer.Option(
+            metavar="BIAS",
+            help="none; rest (mean of the first stationary stretch); rests (course through all of "
+            "them); 'x,y,z deg/s' about forward, right, down; or a log of the sensor lying still "
+            "(none).",
+            show_default=False,
+            rich_help_panel=RUN_PANEL,
+        ),
+    ] = "none"
+    peers: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAMES",
+            help="Other libraries to lay beside: vqf, imufusion, ahrs, or all (the extra 'peers').",
+            rich_help_panel=RUN_PANEL,
+        ),
+    ] = None
+    seed: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N", help="Of a scenario's simulated errors (0).", rich_help_panel=RUN_PANEL
+        ),
+    ] = None
+    sensor: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME|FILE",
+            help="Of a scenario: its errors are those of a unit of this sensor of the catalogue "
+            "(strapdown modules), or of a .toml file of your own.",
+            rich_help_panel=RUN_PANEL,
+        ),
+    ] = None
+
+
+@dataclass(frozen=True)
+class FileFlags:
+    """Files beside the result."""
+
+    export_c: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.c",
+            help="Write the algorithm that the answer chose (or the only one named) as C99, with "
+            "a test vector of this log.",
+            rich_help_panel=OUT_PANEL,
+        ),
+    ] = None
+    timing: Annotated[
+        bool,
+        typer.Option(
+            "--timing",
+            help="Print how long a sample takes on this machine (it is in timing.json, too).",
+            rich_help_panel=OUT_PANEL,
+        ),
+    ] = False
+    png: Annotated[
+        bool, typer.Option("--png", help="Draw the figures as PNG, too.", rich_help_panel=OUT_PANEL)
+    ] = False
 
 
 @spread
@@ -33,135 +181,10 @@ def attitude(
             "Several are trials of one question.",
         ),
     ],
-    algorithms: Annotated[
-        str,
-        typer.Option(
-            metavar="NAMES",
-            help="Names joined by blanks or commas, with options after a colon: 'naive "
-            "euler:step=rk4 dcm:order=3 rotvec:samples=3'; or all (naive euler dcm quaternion rk4 "
-            "rotvec).",
-            show_default=False,
-            rich_help_panel=RUN_PANEL,
-        ),
-    ] = "naive euler dcm quaternion rk4 rotvec",
-    rates: Annotated[
-        str | None,
-        typer.Option(
-            metavar="HZ,HZ,…",
-            help="Lower rates to try: '100 50 20 10'; the full rate and its halves if not given.",
-            rich_help_panel=RUN_PANEL,
-        ),
-    ] = None,
-    tolerance_deg: Annotated[
-        float,
-        typer.Option(
-            metavar="DEG",
-            help="What is accurate enough: the largest error (1).",
-            show_default=False,
-            rich_help_panel=RUN_PANEL,
-        ),
-    ] = 1.0,
-    interpolation: Annotated[
-        str,
-        typer.Option(
-            metavar="KIND",
-            help="How rates run between their stamps: linear (the trapezoid), or cubic (linear).",
-            show_default=False,
-            rich_help_panel=RUN_PANEL,
-        ),
-    ] = "linear",
-    trials: Annotated[
-        int,
-        typer.Option(
-            metavar="N",
-            help="Of a scenario: so many seeds (1).",
-            show_default=False,
-            rich_help_panel=RUN_PANEL,
-        ),
-    ] = 1,
-    reference: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="WORDS|FILE",
-            help="What is known, as often as you like: 'end same as start', 'end 2 turns about z "
-            "since start', '12.5 roll 0 pitch 0 heading 90', '8 same place as 2', rests (gravity "
-            "at every rest), a file of such lines (.txt .toml .csv), or an attitude truth.",
-            rich_help_panel=RUN_PANEL,
-        ),
-    ] = None,
-    reference_log: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="LOG",
-            help="Log of a second, better sensor on the same body, to be taken for the truth.",
-            rich_help_panel=RUN_PANEL,
-        ),
-    ] = None,
-    initial: Annotated[
-        str,
-        typer.Option(
-            metavar="ATTITUDE",
-            help="auto, truth, level, zero, or roll,pitch,heading in deg (auto).",
-            show_default=False,
-            rich_help_panel=RUN_PANEL,
-        ),
-    ] = "auto",
-    gyro_bias: Annotated[
-        str,
-        typer.Option(
-            metavar="BIAS",
-            help="none; rest (mean of the first stationary stretch); rests (course through all of "
-            "them); 'x,y,z deg/s' about forward, right, down; or a log of the sensor lying still "
-            "(none).",
-            show_default=False,
-            rich_help_panel=RUN_PANEL,
-        ),
-    ] = "none",
-    peers: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAMES",
-            help="Other libraries to lay beside: vqf, imufusion, ahrs, or all (the extra 'peers').",
-            rich_help_panel=RUN_PANEL,
-        ),
-    ] = None,
-    seed: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N", help="Of a scenario's simulated errors (0).", rich_help_panel=RUN_PANEL
-        ),
-    ] = None,
-    sensor: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME|FILE",
-            help="Of a scenario: its errors are those of a unit of this sensor of the catalogue "
-            "(strapdown modules), or of a .toml file of your own.",
-            rich_help_panel=RUN_PANEL,
-        ),
-    ] = None,
     *,
+    compare: ComparisonFlags,
     log: LogFlags,
-    export_c: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.c",
-            help="Write the algorithm that the answer chose (or the only one named) as C99, with "
-            "a test vector of this log.",
-            rich_help_panel=OUT_PANEL,
-        ),
-    ] = None,
-    timing: Annotated[
-        bool,
-        typer.Option(
-            "--timing",
-            help="Print how long a sample takes on this machine (it is in timing.json, too).",
-            rich_help_panel=OUT_PANEL,
-        ),
-    ] = False,
-    png: Annotated[
-        bool, typer.Option("--png", help="Draw the figures as PNG, too.", rich_help_panel=OUT_PANEL)
-    ] = False,
+    files: FileFlags,
     out: Annotated[Path | None, folder_to_make("LOG-attitude")] = None,
     write: OutFlags,
 ) -> None:
@@ -172,57 +195,27 @@ def attitude(
     cost, and writes the answer with tables, JSON, CSV, a report page and its figures.
     """
     from strapdown.api.attitude import compare_attitude
-    from strapdown.attitude import make_algorithm
-    from strapdown.attitude.cost import time_algorithms
+    from strapdown.attitude_algorithms import make_algorithm
+    from strapdown.attitude_algorithms.cost import time_algorithms
     from strapdown.bundle.seal import check_destination, write_timing
-    from strapdown.cli.attitude_tables import print_bench, print_speed
     from strapdown.cli.console import Stopwatch, console, print_findings, print_seal, progress
     from strapdown.cli.result_folder import default_folder, refuse_result
-    from strapdown.formats.columns import parse_column_option
     from strapdown.report.attitude import attitude_json, check_c, chosen_for_c, write_c
 
     for source in sources:
         refuse_result(source, "log")
     folder = out or default_folder(sources[0], "attitude")
     check_destination(folder, write.force)
-    check_c(export_c, write.force)
+    check_c(files.export_c, write.force)
     with progress(write.quiet or write.json) as show:
         report = Stopwatch(show)
-        bench = compare_attitude(
-            sources,
-            _split(algorithms),
-            rates_hz=_numbers(rates),
-            tolerance_deg=tolerance_deg,
-            reference=reference or [],
-            gyro_bias=gyro_bias,
-            options={
-                "interpolation": interpolation,
-                "trials": trials,
-                "reference_log": reference_log,
-                "peers": (peers or "").replace(",", " ").split(),
-                "initial": initial,
-                "rate": log.rate,
-                "sampling": log.sampling,
-                "seed": seed,
-                "sensor": sensor,
-                "columns": parse_column_option(log.columns or []),
-                "gyro_unit": log.gyro_unit,
-                "accel_unit": log.accel_unit,
-                "time_unit": log.time_unit,
-                "axes": log.axes,
-                "repair": log.repair,
-                "from_s": log.from_s,
-                "to_s": log.to_s,
-                "duration_s": log.duration,
-            },
-            progress=report,
-        )
-        if export_c is not None:
+        bench = compare_attitude(sources, options=_options(compare, log), progress=report)
+        if files.export_c is not None:
             chosen_for_c(bench)
         report("writing", 0.95)
-        seal = bench.save(folder, force=write.force, png=png)
-        if export_c is not None:
-            exported = write_c(bench, export_c, force=write.force)
+        seal = bench.save(folder, force=write.force, png=files.png)
+        if files.export_c is not None:
+            exported = write_c(bench, files.export_c, force=write.force)
         report("timing", 0.99)
         taken = time_algorithms([make_algorithm(run.algorithm) for run in bench.runs])
         report.stop()
@@ -236,13 +229,32 @@ def attitude(
         return
     if write.quiet:
         return
-    print_bench(bench)
-    if timing:
-        print_speed(taken)
+    print_comparison(bench)
+    if files.timing:
+        _print_speed(taken)
     print_findings(bench.findings)
     print_seal(seal, "report.html")
-    if export_c is not None:
-        console().print(f"C99   {export_c}: {exported}", soft_wrap=True)
+    if files.export_c is not None:
+        console().print(f"C99   {files.export_c}: {exported}", soft_wrap=True)
+
+
+def _options(compare: ComparisonFlags, log: LogFlags) -> AttitudeOptions:
+    from strapdown.attitude_comparison.options import AttitudeOptions
+    from strapdown.formats.columns import parse_column_option
+
+    flags = asdict(compare)
+    read = asdict(log)
+    return AttitudeOptions(
+        algorithms=_split(flags.pop("algorithms")),
+        rates_hz=_numbers(flags.pop("rates")),
+        reference=flags.pop("reference") or (),
+        peers=(flags.pop("peers") or "").replace(",", " ").split(),
+        rate_hz=read.pop("rate"),
+        duration_s=read.pop("duration"),
+        columns=parse_column_option(read.pop("columns") or []),
+        **flags,
+        **read,
+    )
 
 
 def _numbers(text: str | None) -> list[float]:
@@ -266,3 +278,76 @@ def _split(text: str) -> list[str]:
         else:
             names.append(word)
     return names
+
+
+MOST_LINES = 8
+
+
+def print_comparison(bench: AttitudeComparison) -> None:
+    """Print the input of the run, its tables, and the answer last, where it is visible."""
+    from strapdown.cli.console import console, print_table
+    from strapdown.report import attitude_tables as tables
+    from strapdown.report import attitude_words as words
+    from strapdown.report.attitude_tables import offer_lines, place_table
+
+    page = console()
+    if bench.trials is not None:
+        count = len(bench.trials.names)
+        page.print(f"First of {count} trials; the answer and the errors by rate hold for all:")
+    page.print(bench.source, style="bold")
+    if bench.readings:
+        page.print("Read as:")
+        print_table(
+            ["column", "taken as", "unit", "first value"],
+            [[r.source, r.quantity, r.unit, words.first_value(r)] for r in bench.readings],
+        )
+    for name, text in words.facts(bench):
+        page.print(f"{name}: {text}")
+    shown = [
+        *tables.result_tables(bench),
+        *tables.sweep_tables(bench),
+        tables.trial_table(bench),
+        place_table(bench),
+        tables.peer_table(bench),
+    ]
+    for table in shown:
+        if table is not None:
+            _print_table(table, page)
+    points = words.reference_lines(bench)
+    for point in points[:MOST_LINES]:
+        page.print(point)
+    if len(points) > MOST_LINES:
+        page.print(f"and {len(points) - MOST_LINES} more reference points, in the report")
+    page.print(bench.answer.sentence, style="bold")
+    page.print(words.standing(bench))
+    for title, lines in (("Why", bench.answer.why), ("What would help", bench.answer.helps)):
+        if lines:
+            page.print(f"{title}:")
+        for line in lines:
+            page.print(f"  - {line}")
+    if not bench.scores:
+        page.print(words.HOW_TO_REFERENCE)
+    if offers := offer_lines(bench):
+        page.print("These rests look alike, and could be reference points:")
+    for line in offers:
+        page.print(f"  {line}")
+
+
+def _print_speed(taken: pd.DataFrame) -> None:
+    """Print the time per sample of each algorithm on this machine."""
+    from strapdown.cli.console import console, print_table
+
+    console().print("\nTime of a sample on this machine")
+    print_table(
+        ["algorithm", "float64, ns", "float32, ns"],
+        [[str(a), f"{d:.3g}", f"{f:.3g}"] for a, d, f in taken.itertuples(index=False)],
+    )
+
+
+def _print_table(table: TextTable, page: Console) -> None:
+    from strapdown.cli.console import print_table
+
+    page.print(f"\n{table.title}", style="bold")
+    print_table(table.columns, table.rows, text=table.text, strong=table.strong)
+    if table.note:
+        page.print(table.note, style="dim")

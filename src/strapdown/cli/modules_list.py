@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from strapdown.attitude import ALGORITHMS, AttitudeAlgorithm
+from strapdown.attitude_algorithms import ALGORITHMS, AttitudeAlgorithm
 from strapdown.config.choice import SLOTS, Slot, options_of
 from strapdown.config.motions import KINDS
 from strapdown.ellipsoids import ELLIPSOIDS

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field, FiniteFloat
 
-from strapdown.config.crash_case import CaseSpec
-from strapdown.config.crash_case_file import read_case_spec
-from strapdown.config.crash_simulation import CrashSimulationSpec
 from strapdown.config.spec import Spec, specify
-from strapdown.config.trajectory import TrajectorySpec, read_trajectory_spec
+from strapdown.lazy_names import load_on_first_use
+
+if TYPE_CHECKING:
+    from strapdown.config.crash_case import CaseSpec
+    from strapdown.config.crash_case_file import read_case_spec
+    from strapdown.config.crash_simulation import CrashSimulationSpec
+    from strapdown.config.trajectory import TrajectorySpec, read_trajectory_spec
 
 __all__ = [
-    "AttitudeSpec",
     "CaseSpec",
     "CrashSimulationSpec",
     "LogSpec",
@@ -24,6 +26,16 @@ __all__ = [
     "read_trajectory_spec",
     "specify",
 ]
+
+load_on_first_use(
+    __name__,
+    {
+        "crash_case": "CaseSpec",
+        "crash_case_file": "read_case_spec",
+        "crash_simulation": "CrashSimulationSpec",
+        "trajectory": "TrajectorySpec read_trajectory_spec",
+    },
+)
 
 
 class ScenarioSpec(Spec):
@@ -50,27 +62,6 @@ class LogSpec(Spec):
     sampling: str | None = None
     rate_hz: FiniteFloat | None = None
     repair: bool = False
-
-
-class AttitudeSpec(Spec):
-    """One run of the attitude bench."""
-
-    source: Annotated[ScenarioSpec | LogSpec, Field(discriminator="kind")]
-    also: tuple[Annotated[ScenarioSpec | LogSpec, Field(discriminator="kind")], ...] = ()
-    algorithms: tuple[str, ...] = ("naive", "euler", "dcm", "quaternion", "rk4", "rotvec")
-    interpolation: Literal["linear", "cubic"] = "linear"
-    rates_hz: tuple[FiniteFloat, ...] = ()
-    tolerance_deg: FiniteFloat = Field(default=1.0, gt=0.0)
-    initial: str = "auto"
-    gyro_bias: str = "none"
-    references: tuple[str, ...] = ()
-    truth_path: str | None = None
-    gyro_bias_path: str | None = None
-    reference_log_path: str | None = None
-    peers: tuple[str, ...] = ()
-    from_s: FiniteFloat | None = None
-    to_s: FiniteFloat | None = None
-    duration_s: FiniteFloat | None = None
 
 
 class SimulateSpec(Spec):

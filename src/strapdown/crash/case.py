@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from strapdown.bundle.seal import sha256
+from strapdown.bundle.seal import InputFiles, sha256
 from strapdown.config.crash_case import AssumedSpec, CaseSpec, ReferenceSpec, TriadSpec, UnitSpec
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.delta_v import delta_v
@@ -43,7 +43,6 @@ from strapdown.formats.crash_triad import triad_of_channels
 from strapdown.formats.gnss_files import files_of_fixes, read_gnss
 from strapdown.formats.named_columns import read_reference_path
 from strapdown.progress import Progress, silent
-from strapdown.results.inputs import InputFiles
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.crash_unit import Assumed, CrashUnit, Mounting, RecordedTriad
 from strapdown.sensors.uncertainty import stated_uncertainty

@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.alignment.levelling import level
 from strapdown.crash.consistency import TINY, clipped_axes, floored
 from strapdown.crash.measuring_point import PointKinematics, SampleEffects, level_turned_by
 from strapdown.errors import ConfigError, DataError
-from strapdown.results.rests import RestStretch
+from strapdown.rotation import level
 from strapdown.sensors.pre_crash import Levelling
-from strapdown.sensors.rest import LEAST_SAMPLES, rest_between
+from strapdown.sensors.rest import LEAST_SAMPLES, RestStretch, rest_between
 from strapdown.tables import imu_table
 
 __all__ = [

@@ -14,10 +14,10 @@ from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY as GRAVITY
 from strapdown.crash.acceleration import force_at_rest
 from strapdown.errors import DataError
-from strapdown.results.rests import RestStretch
 from strapdown.sensors.crash_unit import SHAPES, Assumed, RecordedTriad, assumed_shapes
 from strapdown.sensors.lever_arm import MovedImu, move_unit
 from strapdown.sensors.pre_crash import FROM_GRAVITY, Levelling, PreparedUnit
+from strapdown.sensors.rest import RestStretch
 from strapdown.sensors.unmeasured import AXES, TURNS, axis_names, unmeasured_axes, unmeasured_turns
 from strapdown.sensors.unmeasured import TURNS as ANGLES
 from strapdown.tables import ACCEL, GYRO

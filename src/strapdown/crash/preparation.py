@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.alignment.levelling import level
 from strapdown.crash.acceleration import force_at_rest
 from strapdown.crash.entry import Entry
 from strapdown.crash.measuring_point import PointKinematics, at_point
 from strapdown.crash.path import reconstruct_path
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.results.rests import RestStretch
+from strapdown.rotation import level
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad, UnitArrays, check_unit
 from strapdown.sensors.pre_crash import (
     FROM_GRAVITY,
@@ -33,7 +32,7 @@ from strapdown.sensors.range_merge import (
     bias_from_lower_range,
     merge_ranges,
 )
-from strapdown.sensors.rest import rest_between
+from strapdown.sensors.rest import RestStretch, rest_between
 from strapdown.sensors.saturation import RangeLimits, find_limits
 from strapdown.sensors.synchronise import SynchronisedUnit, SynchronisedUnits
 from strapdown.sensors.triad_errors import ZERO, Triad, check_sd, finite, triad_of, triple

@@ -19,8 +19,6 @@ __all__ = [
     "CfcCoefficients",
     "cfc_coefficients",
     "cfc_filter",
-    "cfc_noise_factor",
-    "cfc_response",
 ]
 
 CHANNEL_CLASSES = (60, 180, 600, 1000)
@@ -108,44 +106,6 @@ def cfc_coefficients(cfc: float, step: float, standard: str = "iso") -> CfcCoeff
         -2.0 * (wa * wa - 1.0) / whole,
         (-1.0 + math.sqrt(2.0) * wa - wa * wa) / whole,
     )
-
-
-def cfc_response(
-    frequency: ArrayLike, cfc: float, step: float, standard: str = "iso"
-) -> Array | float:
-    """Compute the gain of both passes; their phase is zero.
-
-    Parameters
-    ----------
-    frequency : array_like, Hz
-        Up to the Nyquist frequency.
-    cfc, step, standard
-        As in `cfc_coefficients`.
-
-    Returns
-    -------
-    ndarray or float
-        ``1/(1 + (tan(π f step)/wa)⁴)``, a two-pole Butterworth filter applied twice after the
-        bilinear transformation. At 10 kHz the classes 60, 180 and 600 lie in the corridor of the
-        standards throughout; class 1000 does from 12.5 kHz on. At 10 kHz class 1000 is up to 3 dB
-        too low above 2.9 kHz, where the gain is below a twentieth.
-    """
-    cfc_coefficients(cfc, step, standard)
-    wa = math.tan(math.pi * cfc * DESIGN_FREQUENCY[standard] * step)
-    warped = np.tan(np.pi * np.asarray(frequency, dtype=np.float64) * step) / wa
-    gain = 1.0 / (1.0 + warped**4)
-    return float(gain) if gain.ndim == 0 else np.asarray(gain)
-
-
-def cfc_noise_factor(cfc: float, step: float, standard: str = "iso") -> float:
-    """Compute the ratio of the standard deviations of output and input for white noise.
-
-    Square root of the mean square gain over all frequencies (Parseval), far from the ends.
-    """
-    # The mean of a periodic analytic function over an even grid converges geometrically.
-    grid = (np.arange(1 << 16) + 0.5) / (1 << 17)
-    gain = np.asarray(cfc_response(grid / step, cfc, step, standard))
-    return float(np.sqrt(np.mean(gain**2)))
 
 
 def cfc_filter(values: ArrayLike, step: float, cfc: float, standard: str = "iso") -> Array:

@@ -29,7 +29,6 @@ __all__ = [
     "local_slope",
     "mirrored",
     "slope_response",
-    "widest_fit",
 ]
 
 
@@ -136,41 +135,6 @@ class SlidingFit:
         # About the peak the pulse is cos²(π t/T).
         turned = 0.5 * t + duration / (4.0 * np.pi) * np.sin(2.0 * np.pi * t / duration)
         return 1.0 - float(self.weights() @ turned)
-
-
-def widest_fit(step: float, duration: float, loss: float = 0.02, degree: int = 2) -> SlidingFit:
-    """Choose the widest window, thus the least noise, that preserves a pulse's peak.
-
-    Parameters
-    ----------
-    step : float, s
-    duration : float, s
-        Duration of the shortest haversine pulse of the derivative that matters.
-    loss : float
-        Largest relative loss of its peak.
-    degree : int
-
-    Raises
-    ------
-    ConfigError
-        Even the narrowest window loses more.
-    """
-    half = math.ceil(max(1, degree) / 2)
-    fit = SlidingFit(step, half, degree)
-    if abs(fit.pulse_loss(duration)) > loss:
-        raise ConfigError(
-            "dsp.pulse-loses-peak-even-over",
-            quantity="duration",
-            duration=duration,
-            pulse_loss=fit.pulse_loss(duration),
-            half=2 * half + 1,
-            step=step,
-        )
-    while True:
-        wider = SlidingFit(step, half + 1, degree)
-        if abs(wider.pulse_loss(duration)) > loss:
-            return fit
-        half, fit = half + 1, wider
 
 
 def derivative(values: ArrayLike, fit: SlidingFit, *, causal: bool = False) -> Derivative:

@@ -10,8 +10,8 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
-from strapdown.results.attitude_bench import AttitudeRun
-from strapdown.rotation.euler_angles import unit_rotation_angle
+from strapdown.attitude_algorithms.algorithm import AttitudeRun
+from strapdown.rotation import unit_rotation_angle
 from strapdown.tables import QUATERNION
 
 __all__ = ["attitude_at", "error_angles", "largest_differences"]

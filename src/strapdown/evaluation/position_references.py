@@ -22,12 +22,12 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
+from strapdown.attitude_algorithms.algorithm import AttitudeRun
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DataError
 from strapdown.evaluation.differences import attitude_at
 from strapdown.evaluation.reference_points import INSTANT, NUMBER, instant
-from strapdown.results.attitude_bench import AttitudeRun, PositionScore
-from strapdown.results.rests import RestStretch
+from strapdown.sensors.rest import RestStretch
 from strapdown.tables import ACCEL, QUATERNION
 
 __all__ = [
@@ -40,6 +40,58 @@ __all__ = [
     "parse_place",
     "score_places",
 ]
+
+
+@dataclass(frozen=True)
+class PositionScore:
+    """Comparison of a position dead-reckoned between stationary intervals with a reference.
+
+    Attributes
+    ----------
+    algorithm : str
+        Algorithm whose attitude rotated the specific force.
+    against : str
+        The reference as text.
+    time, since : float, s
+        The instants that are compared.
+    legs : int
+        Number of successive dead-reckoned legs between stationary intervals.
+    seconds : float
+        Total length of the legs, in s, with which the errors grow.
+    moved_m, moved_corrected_m : tuple of float, m
+        Displacement along the axes of the run's local level, without and with the velocity at
+        the end of each leg corrected to zero.
+    expected_m : tuple of float, m
+    error_m, corrected_error_m : float, m
+        Distance from the expected displacement.
+    end_velocity_m_s : float, m/s
+        Largest remaining velocity at the end of a leg, where it should be zero.
+    sd_m, corrected_sd_m, end_velocity_sd_m_s : float
+        From the stated errors of the sensors and of the start: root mean square of the length,
+        first order.
+    reference_sd_m : float or None
+        Standard deviation of the reference.
+    gravity_m_s2 : float
+        Gravity subtracted along the vertical.
+    """
+
+    algorithm: str
+    against: str
+    time: float
+    since: float
+    legs: int
+    seconds: float
+    moved_m: tuple[float, float, float]
+    moved_corrected_m: tuple[float, float, float]
+    expected_m: tuple[float, float, float]
+    error_m: float
+    corrected_error_m: float
+    end_velocity_m_s: float
+    sd_m: float
+    corrected_sd_m: float
+    end_velocity_sd_m_s: float
+    reference_sd_m: float | None
+    gravity_m_s2: float
 
 
 _UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}

@@ -17,19 +17,20 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
-from strapdown.alignment.levelling import level
+from strapdown.attitude_algorithms.algorithm import AttitudeRun
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DataError
 from strapdown.evaluation.differences import attitude_at
 from strapdown.increments import increments_from_imu
-from strapdown.results.attitude_bench import AttitudeRun, Score
-from strapdown.results.rests import RestStretch, SamePose
+from strapdown.rotation import level
+from strapdown.sensors.rest import RestStretch
 from strapdown.tables import EULER, THETA, references_table
 
 __all__ = [
@@ -44,6 +45,65 @@ __all__ = [
     "tilt_sd_deg",
     "with_tilt",
 ]
+
+
+@dataclass(frozen=True)
+class Score:
+    """Comparison of one algorithm with one reference.
+
+    Attributes
+    ----------
+    algorithm : str
+    against : str
+        ``truth``, or the reference point in words.
+    time : float, s
+        End of the comparison.
+    error_deg : float
+        Rotation angle between the computed and the reference attitude at that instant.
+    rms_deg, max_deg : float or None
+        Over every scored instant; None for a reference point.
+    turned_deg, expected_deg : float or None
+        For a number of turns: integrated angle about the axis, and expected angle.
+    sd_deg : float or None
+        Standard deviation of the reference.
+    reference : int or None
+        Number of the reference point, from 1.
+    """
+
+    algorithm: str
+    against: str
+    time: float
+    error_deg: float
+    rms_deg: float | None = None
+    max_deg: float | None = None
+    turned_deg: float | None = None
+    expected_deg: float | None = None
+    sd_deg: float | None = None
+    reference: int | None = None
+
+
+@dataclass(frozen=True)
+class SamePose:
+    """Two stationary intervals at which gravity had the same direction in the body.
+
+    Attributes
+    ----------
+    time, since : float, s
+        Instants within the two intervals, the later one first.
+    apart_deg, sd_deg : float
+        Angle between the two directions, and its standard deviation from noise.
+    words : str
+        The corresponding reference point, in command-line syntax.
+    caveat : str
+        Condition for using it as a reference point.
+    """
+
+    time: float
+    since: float
+    apart_deg: float
+    sd_deg: float
+    words: str
+    caveat: str
 
 
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?"

@@ -10,12 +10,11 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
-from strapdown.attitude import Quaternion, run_attitude
+from strapdown.attitude_algorithms import Quaternion, run_attitude
 from strapdown.dsp.delay import lag_correlation, repeats, top_peaks
 from strapdown.errors import DataError
 from strapdown.evaluation.differences import attitude_at
 from strapdown.increments import increments_from_imu
-from strapdown.results.attitude_bench import SecondLog
 from strapdown.tables import GYRO, THETA, attitude_table, check_imu, find_gaps, imu_table
 
 if TYPE_CHECKING:
@@ -35,6 +34,73 @@ __all__ = [
 
 
 Array = NDArray[np.float64]
+Triple = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class SecondLog:
+    """Alignment of a second sensor's log with the first, on the same body.
+
+    The model is ``omega_1(t) = scale R_12 omega_2(u) + bias`` with
+    ``u = t + offset + drift (t - middle)``; every ``sd`` is one standard deviation from the
+    residuals, with their correlation in time.
+
+    Attributes
+    ----------
+    start, end : float, s
+        Common interval of both logs, on the first clock.
+    middle : float, s
+        Instant of the first clock at which `offset` holds.
+    offset, offset_sd : float, s
+        Second clock minus first clock.
+    drift_ppm, drift_sd_ppm : float
+        Rate excess of the second clock, in parts per million.
+    mounting : tuple of four float
+        ``q_12``: rotates a vector from the second sensor's axes into the first one's.
+    mounting_deg : tuple of float, deg
+        The same as roll, pitch, heading.
+    mounting_sd_deg : tuple of float, deg
+        About the first sensor's axes; infinite where not observable.
+    bias, bias_sd : tuple of float, rad/s
+        Bias of the first minus (scaled, rotated) bias of the second, in the first one's axes.
+    scale, scale_sd : float
+        Scale of the first over that of the second.
+    axis : tuple of float or None
+        If the body rotated about one axis only: that axis, in the first sensor's axes. The
+        mounting about it is then the smallest rotation that fits, and not observable.
+    correlation : float
+        Correlation of the rates at the coarse offset, at best 1.
+    runner_up : float
+        The same for the next-best offset.
+    residual : float, rad/s
+        Root mean square of the residuals, all axes together, after smoothing.
+    smoothing : float, s
+        Standard deviation of the Gaussian that smoothed both before the fit.
+    cells : int
+        Number of fitted points.
+    """
+
+    start: float
+    end: float
+    middle: float
+    offset: float
+    offset_sd: float
+    drift_ppm: float
+    drift_sd_ppm: float
+    mounting: tuple[float, float, float, float]
+    mounting_deg: Triple
+    mounting_sd_deg: Triple
+    bias: Triple
+    bias_sd: Triple
+    scale: float
+    scale_sd: float
+    axis: Triple | None
+    correlation: float
+    runner_up: float
+    residual: float
+    smoothing: float
+    cells: int
+
 
 ITERATIONS = 30
 # Blocks over which residuals are summed to be independent.

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import ast
 import copy
-import importlib
 import inspect
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
-from strapdown._kernels.arithmetic import PACKAGE, SOURCES
+from strapdown._kernels.arithmetic import SOURCES, kernel_module, kernels_of
 
 
 @dataclass
@@ -52,12 +51,15 @@ class Kernels:
 
     Attributes
     ----------
+    home : str
+        Module of the algorithm's kernels (`attitude_algorithms.cost.kernel_home`).
     ranges : dict
         For a variable with an integer value at run time: the least and the greatest.
     functions : list of Function
         In the order of definition.
     """
 
+    home: str
     ranges: dict[str, tuple[int, int]] = field(default_factory=dict)
     functions: list[Function] = field(default_factory=list)
 
@@ -65,11 +67,10 @@ class Kernels:
         self._sources: dict[str, ast.FunctionDef] = {}
         self._constants: dict[str, Constant] = {}
         self._made: dict[tuple[object, ...], Function] = {}
-        for name in SOURCES:
-            module = importlib.import_module(f"{PACKAGE}.{name}")
-            text = inspect.getsource(module)
-            tree = ast.parse(text)
-            attach_comments(tree, text.splitlines())
+        for name in dict.fromkeys((*SOURCES, self.home)):
+            module = kernel_module(name)
+            tree = kernels_of(name)
+            attach_comments(tree, inspect.getsource(module).splitlines())
             for node in tree.body:
                 if isinstance(node, ast.FunctionDef):
                     self._sources[node.name] = node

@@ -18,7 +18,7 @@ from strapdown.formats.columns import EULERS, QUATERNIONS, factor_of, parse_axes
 from strapdown.formats.find_columns import AXES, Column, find_columns, require_gyro
 from strapdown.formats.inference import Inference
 from strapdown.formats.judge import SUMS, UNITS, intervals, sampling_of_sums
-from strapdown.formats.recording import Origin, RawLog, ReadOptions, Recording
+from strapdown.formats.recording import Origin, RawLog, Reading, ReadOptions, Recording
 from strapdown.formats.triad_units import (
     Axes,
     axes_matrix,
@@ -28,7 +28,6 @@ from strapdown.formats.triad_units import (
     units_of_triads,
     values_of_triads,
 )
-from strapdown.results.inputs import Reading
 from strapdown.tables import SAMPLINGS, attitude_table, find_gaps, imu_table
 
 __all__ = [

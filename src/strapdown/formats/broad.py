@@ -13,7 +13,7 @@ from strapdown.formats import hdf5
 from strapdown.formats.arrays import raw_log
 from strapdown.formats.assemble import LOST
 from strapdown.formats.recording import RawLog, TruthInSensorAxes
-from strapdown.rotation.quaternions import Q_NED_ENU
+from strapdown.rotation import Q_NED_ENU
 
 
 def detect(path: Path) -> bool:

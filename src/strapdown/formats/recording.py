@@ -12,11 +12,43 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import Finding
-from strapdown.results.inputs import Reading
 
 Array = NDArray[np.float64]
 
-__all__ = ["Origin", "RawLog", "ReadOptions", "Recording", "StatedStart", "TruthInSensorAxes"]
+__all__ = [
+    "Origin",
+    "RawLog",
+    "ReadOptions",
+    "Reading",
+    "Recording",
+    "StatedStart",
+    "TruthInSensorAxes",
+]
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Interpretation of one column of a log.
+
+    Attributes
+    ----------
+    source : str
+        Name of the column in the file.
+    quantity : str
+        Table column that it became, with a sign if it was reversed.
+    unit : str
+        Unit in the file.
+    why : str
+        Reason for this interpretation.
+    first : float or str
+        The first value, as written in the file.
+    """
+
+    source: str
+    quantity: str
+    unit: str
+    why: str
+    first: float | str
 
 
 @dataclass(frozen=True)

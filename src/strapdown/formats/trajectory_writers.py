@@ -17,7 +17,7 @@ from strapdown.formats.trajectory_csv import one_line, write_csv, write_parquet
 from strapdown.formats.trajectory_maps import write_geojson, write_kml
 from strapdown.formats.trajectory_options import TUM_FRAMES, TrajectoryFileOptions
 from strapdown.frames import ecef_from_geodetic, q_ne
-from strapdown.rotation.quaternions import Q_NED_ENU
+from strapdown.rotation import Q_NED_ENU
 from strapdown.tables import EULER, check_trajectory, places_of
 
 __all__ = [

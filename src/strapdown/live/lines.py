@@ -31,7 +31,7 @@ from strapdown.navigation.measurements.measurement import TabulatedMeasurement
 from strapdown.navigation.modes import PipelineChunk
 from strapdown.navigation.navigator import Navigator
 from strapdown.navigation.record import CovarianceSnapshot
-from strapdown.rotation.euler_angles import euler_sd
+from strapdown.rotation import euler_sd
 from strapdown.systems.navigation_source import COLUMN_UNITS
 from strapdown.tables import EULER, GEODETIC, GNSS, TRAJECTORY, VELOCITY
 from strapdown.tables.checks import POSITION_SD, VELOCITY_SD

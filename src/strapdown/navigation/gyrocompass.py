@@ -30,7 +30,7 @@ from strapdown.navigation.modes import Aligned
 from strapdown.navigation.pipeline import NavigationPipeline
 from strapdown.navigation.preprocessing import steps_of
 from strapdown.navigation.record import NavigationRecord
-from strapdown.rotation.euler_angles import euler_sd
+from strapdown.rotation import euler_sd
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import GEODETIC, GYRO, VELOCITY
 from strapdown.tables.checks import index_of, values_of

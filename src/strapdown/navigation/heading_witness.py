@@ -40,7 +40,7 @@ from strapdown.navigation.pipeline import NavigationPipeline
 from strapdown.navigation.preprocessing import NEAR as NEAR_FIXES
 from strapdown.navigation.preprocessing import JoinedSteps, joined_steps
 from strapdown.navigation.record import CovarianceSnapshot, NavigationChunk, NavigationRecord
-from strapdown.rotation.euler_angles import euler_sd
+from strapdown.rotation import euler_sd
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import EULER, GEODETIC, VELOCITY
 from strapdown.tables.checks import index_of, values_of

@@ -41,7 +41,6 @@ __all__ = [
     "scores_table",
     "spans_to_withhold",
     "withheld_runs",
-    "without_spans",
 ]
 
 
@@ -143,49 +142,6 @@ def spans_to_withhold(begin: float, end: float, length: float, places: int = 5) 
         )
     starts = begin + room * (np.linspace(0.0, 1.0, places) if places > 1 else np.array([0.5]))
     return tuple(Span(f"{length:g} s", float(at), float(at + length)) for at in starts)
-
-
-def without_spans(table: pd.DataFrame, spans: Sequence[Span]) -> pd.DataFrame:
-    """Return the rows of a table outside all spans.
-
-    Parameters
-    ----------
-    table : DataFrame
-        By time.
-    spans : sequence of Span
-        After the begin, up to the end.
-
-    Returns
-    -------
-    DataFrame
-
-    Raises
-    ------
-    ConfigError
-        All rows are in spans, or a span has no row.
-    """
-    time = index_of(table)
-    kept = np.ones(len(time), dtype=np.bool_)
-    for span in spans:
-        within = (time > span.begin) & (time <= span.end)
-        if not within.any():
-            raise ConfigError(
-                "evaluation.nothing-withhold-table-goes",
-                file=source_of(table),
-                quantity="withhold",
-                begin=span.begin,
-                end=span.end,
-                time=time[0],
-                time_2=time[-1],
-            )
-        kept &= ~within
-    if not kept.any():
-        raise ConfigError(
-            "evaluation.every-row-would-withheld", file=source_of(table), quantity="withhold"
-        )
-    out = table[kept]
-    out.attrs = dict(table.attrs)
-    return out
 
 
 def score_withheld(

@@ -24,7 +24,7 @@ from strapdown.navigation.record import (
     Span,
 )
 from strapdown.navigation.smoother import Smoothing
-from strapdown.rotation.euler_angles import euler_sd
+from strapdown.rotation import euler_sd
 from strapdown.tables import EULER, trajectory_error_table
 from strapdown.tables.checks import is_number
 

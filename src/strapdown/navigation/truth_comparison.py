@@ -22,7 +22,7 @@ from strapdown.evaluation.trajectory_differences import (
 )
 from strapdown.frames import q_ne
 from strapdown.navigation.record import NavigationRecord
-from strapdown.rotation.euler_angles import euler_sd
+from strapdown.rotation import euler_sd
 from strapdown.simulation.earth_motion import EarthMotion
 from strapdown.tables import (
     EULER,

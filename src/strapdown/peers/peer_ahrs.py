@@ -24,7 +24,7 @@ import numpy as np
 
 from strapdown import rotation
 from strapdown.peers.peer import Array, Peer, PeerFilter, Samples, load
-from strapdown.rotation.quaternions import Q_NED_ENU
+from strapdown.rotation import Q_NED_ENU
 
 
 def _step_by_step(

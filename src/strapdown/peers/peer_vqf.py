@@ -18,7 +18,7 @@ from strapdown.peers.peer import (
     align_heading,
     load,
 )
-from strapdown.rotation.quaternions import Q_NED_ENU
+from strapdown.rotation import Q_NED_ENU
 
 
 def _gyro(samples: Samples, q_nb: Array) -> Array:

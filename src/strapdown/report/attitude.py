@@ -9,25 +9,27 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.attitude import make_algorithm
+from strapdown.attitude_algorithms import make_algorithm
+from strapdown.attitude_algorithms.cost import Cost
+from strapdown.attitude_comparison.comparison import AttitudeComparison
+from strapdown.attitude_comparison.sweep import Share
 from strapdown.bundle.seal import Seal, to_json
 from strapdown.bundle.writing import write_bundle
 from strapdown.errors import ConfigError
-from strapdown.export_c import export_c
+from strapdown.evaluation.reference_points import Score
 from strapdown.formats import csv
 from strapdown.report import attitude_words as words
 from strapdown.report.attitude_charts import charts, share_basis
 from strapdown.report.attitude_page import attitude_page
 from strapdown.report.attitude_tables import places_json, source_of
 from strapdown.report.svg_chart import draw
-from strapdown.results.attitude_bench import AttitudeBench, Cost, Score, Share
 from strapdown.tables import EULER, GYRO, QUATERNION
 
 __all__ = ["attitude_json", "attitude_page", "write_attitude"]
 
 
 def write_attitude(
-    bench: AttitudeBench,
+    bench: AttitudeComparison,
     out: str | Path,
     *,
     report: bool = True,
@@ -38,7 +40,7 @@ def write_attitude(
 
     Parameters
     ----------
-    bench : AttitudeBench
+    bench : AttitudeComparison
     out : str or Path
         Folder to create.
     report : bool
@@ -86,7 +88,7 @@ def write_attitude(
     return seals[0]
 
 
-def _write_csv(bench: AttitudeBench, path: Path) -> None:
+def _write_csv(bench: AttitudeComparison, path: Path) -> None:
     """Write the attitude of every algorithm side by side, to 1e-9 and to 1e-6 deg."""
     columns: dict[str, NDArray[Any]] = {
         "time_s": bench.runs[0].attitude.index.to_numpy(dtype=np.float64)
@@ -101,7 +103,7 @@ def _write_csv(bench: AttitudeBench, path: Path) -> None:
     )
 
 
-def _write_sweep(bench: AttitudeBench, path: Path) -> None:
+def _write_sweep(bench: AttitudeComparison, path: Path) -> None:
     """Write the errors at every rate; unknown values are empty fields."""
     columns: dict[str, NDArray[Any]] = {}
     for name in bench.sweep.columns:
@@ -126,12 +128,12 @@ def _write_sweep(bench: AttitudeBench, path: Path) -> None:
 # Plain data of the attitude bench.
 
 
-def attitude_json(bench: AttitudeBench) -> dict[str, Any]:
+def attitude_json(bench: AttitudeComparison) -> dict[str, Any]:
     """Return a bench as plain data; every key carries its unit.
 
     Parameters
     ----------
-    bench : AttitudeBench
+    bench : AttitudeComparison
 
     Returns
     -------
@@ -194,7 +196,7 @@ def attitude_json(bench: AttitudeBench) -> dict[str, Any]:
     }
 
 
-def _sampling_error(bench: AttitudeBench) -> dict[str, float] | None:
+def _sampling_error(bench: AttitudeComparison) -> dict[str, float] | None:
     if bench.sampling_error_deg is None:
         return None
     return dict(zip(("final", "max"), bench.sampling_error_deg, strict=True))
@@ -208,7 +210,7 @@ def _final(row: Any, time: float) -> dict[str, float]:
     )
 
 
-def _answer(bench: AttitudeBench) -> dict[str, Any]:
+def _answer(bench: AttitudeComparison) -> dict[str, Any]:
     answer = bench.answer
     return {
         "verdict": answer.verdict,
@@ -259,7 +261,7 @@ def _share(share: Share) -> dict[str, Any]:
     }
 
 
-def _trials(bench: AttitudeBench) -> dict[str, Any] | None:
+def _trials(bench: AttitudeComparison) -> dict[str, Any] | None:
     if bench.trials is None:
         return None
     return {
@@ -305,7 +307,7 @@ def check_c(path: Path | None, force: bool) -> None:
         raise ConfigError("report.no-such-folder", file=str(path.parent), quantity="--export-c")
 
 
-def chosen_for_c(bench: AttitudeBench) -> str:
+def chosen_for_c(bench: AttitudeComparison) -> str:
     """Return the algorithm to export: the recommended one, or else the only one.
 
     Raises
@@ -320,12 +322,12 @@ def chosen_for_c(bench: AttitudeBench) -> str:
     return chosen
 
 
-def write_c(bench: AttitudeBench, path: Path, *, force: bool = False) -> str:
+def write_c(bench: AttitudeComparison, path: Path, *, force: bool = False) -> str:
     """Write one algorithm of a bench as C99, with a test vector from its log.
 
     Parameters
     ----------
-    bench : AttitudeBench
+    bench : AttitudeComparison
     path : Path
         File to write.
     force : bool
@@ -341,6 +343,8 @@ def write_c(bench: AttitudeBench, path: Path, *, force: bool = False) -> str:
     ConfigError
         No algorithm is recommended among several, or the file may not be written.
     """
+    from strapdown.export_c import export_c
+
     check_c(path, force)
     chosen = chosen_for_c(bench)
     first = bench.runs[0].attitude[QUATERNION].to_numpy()
@@ -357,7 +361,7 @@ def write_c(bench: AttitudeBench, path: Path, *, force: bool = False) -> str:
     return chosen
 
 
-def _liveliest(bench: AttitudeBench) -> int:
+def _liveliest(bench: AttitudeComparison) -> int:
     """Start of the test vector: the stretch with the most rotation, which exercises the code."""
     rate = bench.imu[GYRO].to_numpy()
     energy = (rate * rate).sum(axis=1).cumsum()

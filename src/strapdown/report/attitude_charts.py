@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from strapdown.attitude_comparison.comparison import AttitudeComparison
+from strapdown.attitude_comparison.references import PeerRun
 from strapdown.evaluation.differences import error_angles
 from strapdown.report.attitude_numbers import (
     MEANINGS,
@@ -31,18 +33,17 @@ from strapdown.report.chart import (
     look,
 )
 from strapdown.report.path_marks import place_labels
-from strapdown.results.attitude_bench import AttitudeBench, PeerRun
 from strapdown.tables import EULER, GYRO
 
 _TIME = "time, s"
 
 
-def charts(bench: AttitudeBench) -> list[Chart]:
+def charts(bench: AttitudeComparison) -> list[Chart]:
     """Return the charts for which this bench has data, in page order.
 
     Parameters
     ----------
-    bench : AttitudeBench
+    bench : AttitudeComparison
 
     Returns
     -------
@@ -56,12 +57,12 @@ def charts(bench: AttitudeBench) -> list[Chart]:
     ]
 
 
-def log_charts(bench: AttitudeBench) -> list[Chart]:
+def log_charts(bench: AttitudeComparison) -> list[Chart]:
     """Return the charts of signals and attitudes over time."""
     return [_gyro(bench), _attitude(bench)]
 
 
-def error_charts(bench: AttitudeBench) -> list[Chart]:
+def error_charts(bench: AttitudeComparison) -> list[Chart]:
     """Return the charts of errors and differences over time."""
     found = []
     if bench.truth is not None:
@@ -73,12 +74,12 @@ def error_charts(bench: AttitudeBench) -> list[Chart]:
     return found
 
 
-def _buckets(bench: AttitudeBench) -> int:
+def _buckets(bench: AttitudeComparison) -> int:
     """Points per curve, reduced for many curves to limit the page size."""
     return min(BUCKETS, 4500 // max(1, len(bench.runs)))
 
 
-def _marks(bench: AttitudeBench) -> tuple[Mark, ...]:
+def _marks(bench: AttitudeComparison) -> tuple[Mark, ...]:
     instants: dict[float, str] = {}
     for number, (_, row) in enumerate(bench.references.iterrows(), start=1):
         for key in ("since", "time"):
@@ -89,12 +90,12 @@ def _marks(bench: AttitudeBench) -> tuple[Mark, ...]:
     return tuple(Mark(at, label) for at, label in sorted(instants.items()))
 
 
-def _bands(bench: AttitudeBench) -> tuple[Band, ...]:
+def _bands(bench: AttitudeComparison) -> tuple[Band, ...]:
     first = float(bench.imu.index[0])
     return tuple(Band(max(r.start, first), r.end, "at rest") for r in bench.rests if r.end > first)
 
 
-def _gyro(bench: AttitudeBench) -> Chart:
+def _gyro(bench: AttitudeComparison) -> Chart:
     time = bench.imu.index.to_numpy(dtype=np.float64)
     names = ("x, forward", "y, right", "z, down")
     lines = tuple(
@@ -116,7 +117,7 @@ def _gyro(bench: AttitudeBench) -> Chart:
     )
 
 
-def _attitude(bench: AttitudeBench) -> Chart:
+def _attitude(bench: AttitudeComparison) -> Chart:
     panels = []
     for angle in EULER:
         lines = [
@@ -159,7 +160,7 @@ def _attitude(bench: AttitudeBench) -> Chart:
     )
 
 
-def _error(bench: AttitudeBench) -> Chart:
+def _error(bench: AttitudeComparison) -> Chart:
     assert bench.truth is not None
     scored = bench.truth[np.asarray(bench.scored)]
     lines = []
@@ -186,7 +187,7 @@ def _error(bench: AttitudeBench) -> Chart:
     )
 
 
-def _reference_error(bench: AttitudeBench) -> Chart:
+def _reference_error(bench: AttitudeComparison) -> Chart:
     lines = []
     for k, run in enumerate(bench.runs):
         scores = [
@@ -208,7 +209,7 @@ def _reference_error(bench: AttitudeBench) -> Chart:
     )
 
 
-def _difference(bench: AttitudeBench) -> Chart:
+def _difference(bench: AttitudeComparison) -> Chart:
     base = next((r for r in bench.runs if r.algorithm == "quaternion"), bench.runs[-1])
     lines = [
         curve(
@@ -240,12 +241,12 @@ LEAST_ERROR, LEAST_WORDS = 1e-6, "10⁻⁶°"
 _FAINT = "#c3c9d0"
 
 
-def answer_charts(bench: AttitudeBench) -> list[Chart]:
+def answer_charts(bench: AttitudeComparison) -> list[Chart]:
     """Return the charts for the top of the page: error against cost, and against rate.
 
     Parameters
     ----------
-    bench : AttitudeBench
+    bench : AttitudeComparison
 
     Returns
     -------
@@ -255,12 +256,12 @@ def answer_charts(bench: AttitudeBench) -> list[Chart]:
     return [*found, _sweep(bench)] if len(bench.sweep) else found
 
 
-def judgement_charts(bench: AttitudeBench) -> list[Chart]:
+def judgement_charts(bench: AttitudeComparison) -> list[Chart]:
     """Return the charts for the end of the page: error shares, trials and other libraries.
 
     Parameters
     ----------
-    bench : AttitudeBench
+    bench : AttitudeComparison
 
     Returns
     -------
@@ -280,11 +281,11 @@ def _shown(values: object) -> Array:
     return np.where(np.isnan(array), np.nan, np.maximum(array, LEAST_ERROR))
 
 
-def _tolerance(bench: AttitudeBench) -> str:
+def _tolerance(bench: AttitudeComparison) -> str:
     return f"tolerance {bench.answer.tolerance_deg:g}°"
 
 
-def _cost(bench: AttitudeBench) -> Chart:
+def _cost(bench: AttitudeComparison) -> Chart:
     cycles = np.array([max(cost.cycles, 1.0) for cost in bench.costs])
     errors = full_rate_errors(bench)
     names = [cost.algorithm for cost in bench.costs]
@@ -371,7 +372,7 @@ def _pareto(cost: Array, error: Array) -> list[int]:
     return front
 
 
-def _sweep(bench: AttitudeBench) -> Chart:
+def _sweep(bench: AttitudeComparison) -> Chart:
     answer = bench.answer
     meanings = [m for m in MEANINGS if (bench.sweep["meaning"] == m).any()]
     judged = bool(bench.scores)
@@ -449,7 +450,7 @@ def _sweep(bench: AttitudeBench) -> Chart:
     )
 
 
-def _share(bench: AttitudeBench) -> Chart:
+def _share(bench: AttitudeComparison) -> Chart:
     names = tuple(share.algorithm for share in bench.shares)
     rows = np.arange(len(names), dtype=np.float64)
     parts = [
@@ -475,7 +476,7 @@ def _share(bench: AttitudeBench) -> Chart:
     )
 
 
-def share_basis(bench: AttitudeBench) -> str:
+def share_basis(bench: AttitudeComparison) -> str:
     """Return whether the shares are exact or estimates."""
     if bench.specification["source"]["kind"] == "scenario":
         return (
@@ -491,7 +492,7 @@ def share_basis(bench: AttitudeBench) -> str:
     return own + "; the sensor's is not known without a truth."
 
 
-def _trials(bench: AttitudeBench) -> Chart:
+def _trials(bench: AttitudeComparison) -> Chart:
     trials = bench.trials
     assert trials is not None
     names = tuple(str(name) for name in trials.ranking["algorithm"])
@@ -535,7 +536,7 @@ def _trials(bench: AttitudeBench) -> Chart:
     )
 
 
-def _peers(bench: AttitudeBench) -> Chart:
+def _peers(bench: AttitudeComparison) -> Chart:
     alone, aided = like_with_like(bench)
     errors = full_rate_errors(bench)
     own = [(name, error, BLUE, "circle") for name, error in errors.items()]

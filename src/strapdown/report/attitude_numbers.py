@@ -7,7 +7,10 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from strapdown.results.attitude_bench import AttitudeBench, AttitudeRun, PeerRun, Score
+from strapdown.attitude_algorithms.algorithm import AttitudeRun
+from strapdown.attitude_comparison.comparison import AttitudeComparison
+from strapdown.attitude_comparison.references import PeerRun
+from strapdown.evaluation.reference_points import Score
 
 __all__ = [
     "MEANINGS",
@@ -31,12 +34,12 @@ def largest_known(scores: Sequence[Score]) -> float | None:
     return max((e for e in found if math.isfinite(e)), default=None)
 
 
-def full_rate_errors(bench: AttitudeBench) -> dict[str, float]:
+def full_rate_errors(bench: AttitudeComparison) -> dict[str, float]:
     """Return the error by which each algorithm is judged, at the log's own rate.
 
     Parameters
     ----------
-    bench : AttitudeBench
+    bench : AttitudeComparison
 
     Returns
     -------
@@ -57,7 +60,7 @@ def full_rate_errors(bench: AttitudeBench) -> dict[str, float]:
     return errors
 
 
-def chosen_run(bench: AttitudeBench) -> AttitudeRun:
+def chosen_run(bench: AttitudeComparison) -> AttitudeRun:
     """Return the run of the recommended algorithm, else that with the smallest error."""
     for run in bench.runs:
         if run.algorithm == bench.answer.algorithm:
@@ -69,12 +72,12 @@ def chosen_run(bench: AttitudeBench) -> AttitudeRun:
     )
 
 
-def sweep_grid(bench: AttitudeBench, meaning: str) -> pd.DataFrame:
+def sweep_grid(bench: AttitudeComparison, meaning: str) -> pd.DataFrame:
     """Return the errors of one method of lowering the rate.
 
     Parameters
     ----------
-    bench : AttitudeBench
+    bench : AttitudeComparison
     meaning : {'drop', 'sum'}
 
     Returns
@@ -93,7 +96,7 @@ def sweep_grid(bench: AttitudeBench, meaning: str) -> pd.DataFrame:
     return grid.reindex(index=names)[sorted(grid.columns, reverse=True)]
 
 
-def like_with_like(bench: AttitudeBench) -> tuple[list[PeerRun], list[PeerRun]]:
+def like_with_like(bench: AttitudeComparison) -> tuple[list[PeerRun], list[PeerRun]]:
     """Split the other libraries into gyro-only ones, as the bench's own are, and aided ones."""
     alone = [p for p in bench.peers if p.aiding == "gyro"]
     return alone, [p for p in bench.peers if p.aiding != "gyro"]

@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import __version__, rotation
+from strapdown.attitude_comparison.comparison import AttitudeComparison
 from strapdown.errors import Finding
 from strapdown.evaluation.differences import attitude_at
 from strapdown.report import attitude_tables as tables
@@ -20,7 +21,6 @@ from strapdown.report.attitude_tables import offer_lines, place_table
 from strapdown.report.chart import AXIS_COLOURS, BLACK, GREY, Chart
 from strapdown.report.document_html import embedded, render
 from strapdown.report.plotly_chart import FONT, figure
-from strapdown.results.attitude_bench import AttitudeBench
 
 __all__ = ["MOST_FRAMES", "attitude_page", "body_caption", "body_figure"]
 
@@ -36,12 +36,12 @@ _PLACES = {
 }
 
 
-def attitude_page(bench: AttitudeBench, drawn: Sequence[Chart] | None = None) -> str:
+def attitude_page(bench: AttitudeComparison, drawn: Sequence[Chart] | None = None) -> str:
     """Return a bench as one offline HTML page.
 
     Parameters
     ----------
-    bench : AttitudeBench
+    bench : AttitudeComparison
     drawn : sequence of Chart, optional
         Its charts, if already made.
 
@@ -143,12 +143,12 @@ _EDGES += [(5, 7), (6, 7)]
 _AXIS_NAMES = ("x forward", "y right", "z down")
 
 
-def body_figure(bench: AttitudeBench) -> dict[str, Any]:
+def body_figure(bench: AttitudeComparison) -> dict[str, Any]:
     """Return the animated body for ``Plotly.newPlot``, with its frames.
 
     Parameters
     ----------
-    bench : AttitudeBench
+    bench : AttitudeComparison
 
     Returns
     -------
@@ -175,7 +175,7 @@ def body_figure(bench: AttitudeBench) -> dict[str, Any]:
     return {"data": [*first, *_still()], "layout": _layout(time), "frames": frames}
 
 
-def body_caption(bench: AttitudeBench) -> str:
+def body_caption(bench: AttitudeComparison) -> str:
     """Caption of the animation, with its playback speed."""
     run = chosen_run(bench)
     time = _instants(run.attitude)
@@ -207,7 +207,7 @@ def _frame_length(time: Array) -> float:
     return max(real, _SHORTEST) if real * (len(time) - 1) <= _AS_IT_WAS else _SHORTEST
 
 
-def _ghost(bench: AttitudeBench, time: Array) -> Array | None:
+def _ghost(bench: AttitudeComparison, time: Array) -> Array | None:
     """True attitude at the frames; NaN where it is not known."""
     if bench.truth is None or not len(bench.truth):
         return None

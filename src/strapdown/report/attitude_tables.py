@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from strapdown.attitude import ALGORITHMS
+from strapdown.attitude_algorithms import ALGORITHMS
+from strapdown.attitude_algorithms.algorithm import AttitudeRun
+from strapdown.attitude_comparison.comparison import AttitudeComparison
+from strapdown.attitude_comparison.references import PeerRun
+from strapdown.evaluation.reference_points import Score
 from strapdown.report.attitude_charts import share_basis
 from strapdown.report.attitude_numbers import (
     MEANINGS,
@@ -16,7 +20,9 @@ from strapdown.report.attitude_numbers import (
     sweep_grid,
 )
 from strapdown.report.attitude_words import condition, degrees
-from strapdown.results.attitude_bench import AttitudeBench, AttitudeRun, PeerRun, Score, SecondLog
+
+if TYPE_CHECKING:
+    from strapdown.evaluation.second_log import SecondLog
 
 __all__ = [
     "TextTable",
@@ -66,7 +72,7 @@ class TextTable:
     strong: frozenset[int] = frozenset()
 
 
-def _named(bench: AttitudeBench) -> frozenset[int]:
+def _named(bench: AttitudeComparison) -> frozenset[int]:
     names = [run.algorithm for run in bench.runs]
     answer = bench.answer.algorithm
     return frozenset({names.index(answer)} if answer in names else ())
@@ -77,12 +83,12 @@ def number(value: float) -> str:
     return f"{value:.3g}" if value < 100 else f"{value:.0f}"
 
 
-def result_tables(bench: AttitudeBench) -> list[TextTable]:
+def result_tables(bench: AttitudeComparison) -> list[TextTable]:
     """Return the errors of each algorithm with their contributions; two tables if wide.
 
     Parameters
     ----------
-    bench : AttitudeBench
+    bench : AttitudeComparison
 
     Returns
     -------
@@ -133,7 +139,7 @@ def _compared(scores: list[Score], count: int) -> list[str]:
     return cells + [_NONE] * (count - len(cells))
 
 
-def _parts(bench: AttitudeBench) -> tuple[list[str], dict[str, dict[str, str]]]:
+def _parts(bench: AttitudeComparison) -> tuple[list[str], dict[str, dict[str, str]]]:
     """Columns of the error contributions and costs, and their cells by algorithm."""
     cells: dict[str, dict[str, str]] = {}
     if bench.shares:
@@ -154,7 +160,7 @@ def _parts(bench: AttitudeBench) -> tuple[list[str], dict[str, dict[str, str]]]:
     return list(cells), cells
 
 
-def _lowest_rate(bench: AttitudeBench, algorithm: str) -> str:
+def _lowest_rate(bench: AttitudeComparison, algorithm: str) -> str:
     """Lowest decimated rate down to which the algorithm error is within the tolerance."""
     cells = bench.sweep[
         (bench.sweep["algorithm"] == algorithm) & (bench.sweep["meaning"] == "drop")
@@ -163,7 +169,7 @@ def _lowest_rate(bench: AttitudeBench, algorithm: str) -> str:
     return f"{float(cells.loc[within, 'rate_hz'].min()):.3g} Hz" if within.any() else _NONE
 
 
-def _part_note(bench: AttitudeBench) -> str:
+def _part_note(bench: AttitudeComparison) -> str:
     if not bench.shares:
         return ""
     sensor = any(share.sensor_deg is not None for share in bench.shares)
@@ -184,14 +190,14 @@ def source_of(run: AttitudeRun) -> str:
     return f"{source} Eq. {run.equations}".strip() if run.equations else source
 
 
-def condition_table(bench: AttitudeBench) -> TextTable:
+def condition_table(bench: AttitudeComparison) -> TextTable:
     """Return the source and the diagnostics of each algorithm."""
     rows = tuple((r.algorithm, source_of(r), condition(r.diagnostics)) for r in bench.runs)
     columns = ("algorithm", "source", "own condition")
     return TextTable("The algorithms", columns, rows, text=(0, 1, 2), strong=_named(bench))
 
 
-def cost_table(bench: AttitudeBench) -> TextTable | None:
+def cost_table(bench: AttitudeComparison) -> TextTable | None:
     """Return the operations per sample of each algorithm; None if none were counted."""
     if not bench.costs:
         return None
@@ -214,7 +220,7 @@ def cost_table(bench: AttitudeBench) -> TextTable | None:
     )
 
 
-def sweep_tables(bench: AttitudeBench) -> list[TextTable]:
+def sweep_tables(bench: AttitudeComparison) -> list[TextTable]:
     """Return the errors at every rate, one table per method of lowering it."""
     tables = []
     answer = bench.answer
@@ -255,7 +261,7 @@ def sweep_tables(bench: AttitudeBench) -> list[TextTable]:
     return tables
 
 
-def difference_table(bench: AttitudeBench) -> TextTable | None:
+def difference_table(bench: AttitudeComparison) -> TextTable | None:
     """Return the largest difference of each pair of algorithms; None for a single one."""
     names = [run.algorithm for run in bench.runs]
     if len(names) < 2:
@@ -278,7 +284,7 @@ def luck_words(luck: float) -> str:
     return f"may be luck ({luck:.2g})"
 
 
-def trial_table(bench: AttitudeBench) -> TextTable | None:
+def trial_table(bench: AttitudeComparison) -> TextTable | None:
     """Return the ranking over several trials; None for a single trial."""
     if bench.trials is None:
         return None
@@ -309,12 +315,12 @@ def _interval(low: float, high: float) -> str:
     return f"{degrees(max(low, 0.0))} to {degrees(high)}"
 
 
-def peer_table(bench: AttitudeBench) -> TextTable | None:
+def peer_table(bench: AttitudeComparison) -> TextTable | None:
     """Return the errors of other libraries, gyro-only ones separate from aided ones.
 
     Parameters
     ----------
-    bench : AttitudeBench
+    bench : AttitudeComparison
 
     Returns
     -------
@@ -351,12 +357,12 @@ def _peer_error(peer: PeerRun) -> str:
 # Dead-reckoned positions and the second log.
 
 
-def place_table(bench: AttitudeBench) -> TextTable | None:
+def place_table(bench: AttitudeComparison) -> TextTable | None:
     """Return the errors of dead-reckoned positions against known positions.
 
     Parameters
     ----------
-    bench : AttitudeBench
+    bench : AttitudeComparison
 
     Returns
     -------
@@ -392,7 +398,7 @@ def place_table(bench: AttitudeBench) -> TextTable | None:
     )
 
 
-def offer_lines(bench: AttitudeBench) -> list[str]:
+def offer_lines(bench: AttitudeComparison) -> list[str]:
     """Stationary stretches of similar attitude, proposed as reference points."""
     return [
         f"--reference '{offer.words}' ({offer.apart_deg:.2g}° apart by gravity, 1σ "
@@ -401,7 +407,7 @@ def offer_lines(bench: AttitudeBench) -> list[str]:
     ]
 
 
-def places_json(bench: AttitudeBench) -> dict[str, Any]:
+def places_json(bench: AttitudeComparison) -> dict[str, Any]:
     """Positions, proposed reference points and the second log as plain data."""
     return {
         "places": [asdict(place) for place in bench.places],

@@ -5,12 +5,12 @@ from __future__ import annotations
 from html import escape
 from typing import TYPE_CHECKING
 
+from strapdown.attitude_comparison.comparison import AttitudeComparison
 from strapdown.errors import ConfigError
 from strapdown.report import attitude_words as words
 from strapdown.report.attitude_charts import charts
 from strapdown.report.attitude_tables import TextTable, result_tables
 from strapdown.report.svg_chart import notebook_figure
-from strapdown.results.attitude_bench import AttitudeBench
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,12 +32,12 @@ KINDS = {
 }
 
 
-def plot(bench: AttitudeBench, kind: str = "cost") -> Figure:
+def plot(bench: AttitudeComparison, kind: str = "cost") -> Figure:
     """Draw one chart of a bench, as the page shows it.
 
     Parameters
     ----------
-    bench : AttitudeBench
+    bench : AttitudeComparison
     kind : str
         One of `KINDS`.
 
@@ -63,12 +63,12 @@ def plot(bench: AttitudeBench, kind: str = "cost") -> Figure:
     return notebook_figure(drawn[kind])
 
 
-def short_html(bench: AttitudeBench) -> str:
+def short_html(bench: AttitudeComparison) -> str:
     """Return the answer and the table of results as HTML for a notebook.
 
     Parameters
     ----------
-    bench : AttitudeBench
+    bench : AttitudeComparison
 
     Returns
     -------

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from strapdown.evaluation.reference_points import in_words
-from strapdown.results.attitude_bench import AttitudeBench, Score, SecondLog
-from strapdown.results.inputs import Reading
-from strapdown.systems.attitude_known import passed_pole
+from strapdown.attitude_comparison.comparison import AttitudeComparison
+from strapdown.attitude_comparison.references import passed_pole
+from strapdown.evaluation.reference_points import Score, in_words
+from strapdown.formats.recording import Reading
+
+if TYPE_CHECKING:
+    from strapdown.evaluation.second_log import SecondLog
 
 CONVENTIONS = (
     ("Body axes", "x forward, y right, z down"),
@@ -49,12 +52,12 @@ def seconds(value: float) -> str:
     return f"{value:.3f}".rstrip("0").rstrip(".") + " s"
 
 
-def headline(bench: AttitudeBench) -> str:
+def headline(bench: AttitudeComparison) -> str:
     """Return the answer first, then the final errors of the algorithms."""
     return f"{bench.answer.sentence} {standing(bench)}"
 
 
-def standing(bench: AttitudeBench) -> str:
+def standing(bench: AttitudeComparison) -> str:
     """Return the final errors of the algorithms in one or two sentences."""
     scores = [s for s in bench.scores if s.against == "truth"]
     if scores:
@@ -75,7 +78,7 @@ def standing(bench: AttitudeBench) -> str:
     return answer + _whose_error(bench, scores)
 
 
-def _ranked(bench: AttitudeBench, scores: list[Score], off: str) -> str:
+def _ranked(bench: AttitudeComparison, scores: list[Score], off: str) -> str:
     ranked = sorted(scores, key=lambda s: s.error_deg)
     worst = ranked[-1]
     # A run through the pole may be near the truth by chance; it is not named as the best.
@@ -103,7 +106,7 @@ def _listed(names: list[str]) -> str:
 SMALL_SHARE = 0.1
 
 
-def _whose_error(bench: AttitudeBench, scores: list[Score]) -> str:
+def _whose_error(bench: AttitudeComparison, scores: list[Score]) -> str:
     """Exclude the algorithms as the error source when two exact ones agree."""
     names = [run.algorithm for run in bench.runs]
     exact = [s for s in scores if s.algorithm == "quaternion"]
@@ -141,7 +144,7 @@ def first_value(reading: Reading) -> str:
     return reading.first if isinstance(reading.first, str) else f"{reading.first:.6g}"
 
 
-def reference_lines(bench: AttitudeBench) -> list[str]:
+def reference_lines(bench: AttitudeComparison) -> list[str]:
     """Each reference point in words, with the turned angle where turns were counted."""
     lines = []
     for number, (_, row) in enumerate(bench.references.iterrows(), start=1):
@@ -159,7 +162,7 @@ def reference_lines(bench: AttitudeBench) -> list[str]:
     return lines
 
 
-def facts(bench: AttitudeBench) -> list[tuple[str, str]]:
+def facts(bench: AttitudeComparison) -> list[tuple[str, str]]:
     """Inputs and assumptions of the run."""
     i, b = bench.initial, bench.gyro_bias
     found = [
@@ -195,7 +198,7 @@ def facts(bench: AttitudeBench) -> list[tuple[str, str]]:
     return found
 
 
-def _truth_words(bench: AttitudeBench) -> str:
+def _truth_words(bench: AttitudeComparison) -> str:
     assert bench.truth is not None
     counted = bench.truth.index[bench.scored]
     if not len(counted):
@@ -215,7 +218,7 @@ def _bias_words(bias: dict[str, Any]) -> str:
     return f"({values}) deg/s about forward, right, down removed: {bias['from']}"
 
 
-def _rest_words(bench: AttitudeBench) -> list[str]:
+def _rest_words(bench: AttitudeComparison) -> list[str]:
     from math import degrees as to_degrees
 
     shown = [

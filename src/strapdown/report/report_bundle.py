@@ -7,10 +7,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Protocol
 
-from strapdown.bundle.seal import Seal
+from strapdown.bundle.seal import InputFiles, Seal
 from strapdown.bundle.writing import write_bundle
 from strapdown.config.spec import Spec
-from strapdown.results.inputs import InputFiles
 
 __all__ = ["report_bundle"]
 

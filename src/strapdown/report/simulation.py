@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
 
-from strapdown.bundle.seal import Seal, check_destination, to_json
+from strapdown.attitude_comparison.source import scenario_errors, simulate_scenario
+from strapdown.bundle.seal import Seal, check_destination, sensor_file, to_json
 from strapdown.bundle.writing import write_bundle
 from strapdown.config import (
     CrashSimulationSpec,
@@ -21,8 +22,6 @@ from strapdown.report.crash_simulation import stated_errors, write_crash_simulat
 from strapdown.report.trajectory_simulation import write_trajectory_simulation
 from strapdown.simulation import SCENARIOS, Motion, PulseMotion, TriadErrors, find_scenario
 from strapdown.simulation.crash_cases import CASES
-from strapdown.systems.attitude_source import scenario_errors, simulate_scenario
-from strapdown.systems.inputs import sensor_file
 
 __all__ = ["simulate", "write_simulation"]
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from strapdown.bundle.seal import Seal, check_destination, to_json
+from strapdown.bundle.seal import Seal, check_destination, sensor_file, to_json
 from strapdown.bundle.writing import write_bundle
 from strapdown.config import TrajectorySpec
 from strapdown.ellipsoids import WGS84, Ellipsoid, find_ellipsoid
@@ -24,7 +24,6 @@ from strapdown.report.crash_simulation import stated_errors
 from strapdown.report.path_marks import View, path_marks
 from strapdown.report.svg_chart import draw
 from strapdown.simulation import TriadErrors
-from strapdown.systems.inputs import sensor_file
 from strapdown.systems.trajectory_source import simulate_trajectory
 from strapdown.tables import EULER, places_of
 

@@ -15,11 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from strapdown.attitude_comparison.comparison import run_comparison
+from strapdown.attitude_comparison.options import AttitudeSpec
 from strapdown.bundle.configuration_paths import names_file, resolved
 from strapdown.bundle.reading import read_manifest, unsealed_changes
 from strapdown.bundle.seal import MANIFEST, Seal, sha256
 from strapdown.bundle.writing import machine, versions
-from strapdown.config import AttitudeSpec, CrashSimulationSpec, SimulateSpec, TrajectorySpec
+from strapdown.config import CrashSimulationSpec, SimulateSpec, TrajectorySpec
 from strapdown.config.changed_options import changed_options
 from strapdown.config.crash_case_file import read_case_spec
 from strapdown.errors import DataError, StrapdownError
@@ -32,7 +34,6 @@ from strapdown.report.crash_simulation import write_crash_simulation
 from strapdown.report.navigation import rerun_navigation
 from strapdown.report.simulation import write_simulation
 from strapdown.report.trajectory_simulation import write_trajectory_simulation
-from strapdown.systems.attitude_bench import run_bench
 
 __all__ = ["Verification", "changed_case", "verify"]
 
@@ -74,7 +75,7 @@ def _rerun_attitude(configuration: dict[str, Any], out: Path, sealed: set[str]) 
     # Additional PNG figures change no number and are not part of the configuration.
     png = any(name.endswith(".png") for name in sealed)
     asked = {key: value for key, value in configuration.items() if key != "report"}
-    bench = run_bench(AttitudeSpec.model_validate(asked))
+    bench = run_comparison(AttitudeSpec.model_validate(asked))
     return write_attitude(bench, out, png=png, report=_with_page(configuration))
 
 

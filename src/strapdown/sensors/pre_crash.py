@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from strapdown.ellipsoids import WGS84
 from strapdown.errors import Finding
-from strapdown.results.rests import RestStretch
 from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.sensors.rest import (
     LEAST_LENGTH,
     MAX_GYRO_SD,
     MAX_MEAN_RATE,
+    RestStretch,
     find_rests,
     rest_between,
 )

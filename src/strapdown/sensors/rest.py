@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.errors import DataError
-from strapdown.results.rests import GyroBiasCourse, RestStretch
 from strapdown.sensors.triad_errors import triad_of
 from strapdown.tables import ACCEL, GYRO
 
 __all__ = [
+    "GyroBiasCourse",
+    "RestStretch",
+    "find_rests",
     "find_rests_of_every_grade",
     "find_shaking_rests",
     "gyro_bias_at",
@@ -24,6 +26,7 @@ __all__ = [
 
 
 Array = NDArray[np.float64]
+Triple = tuple[float, float, float]
 Indices = NDArray[np.int64]
 
 # Window length: long enough for a meaningful standard deviation, short enough to detect a pause of
@@ -47,6 +50,70 @@ SAME_BIAS = 0.01  # rad/s: rests of one log share their bias to within this
 ROUNDING = 1e-9  # rad/s
 # Number of parts of a rest whose means give the standard deviation of the overall mean.
 LEAST_PARTS, MOST_PARTS = 4, 20
+
+
+@dataclass(frozen=True)
+class RestStretch:
+    """An interval in which the sensor did not rotate.
+
+    Attributes
+    ----------
+    start, end : float, s
+    gyro_mean : tuple of float, rad/s
+        Mean of each gyro: its bias, where the Earth's 15 deg/h is negligible.
+    gyro_sd : tuple of float, rad/s
+    accel_mean : tuple of float or None, m/s²
+    gyro_mean_sd : tuple of float or None, rad/s
+        Standard deviation of the mean, from the scatter of the means of its parts, so that
+        vibration and slow drift count; not from the samples as if they were independent.
+    accel_sd, accel_mean_sd : tuple of float or None, m/s²
+        As for the gyro.
+    grade : {'still', 'shaking', 'steady', 'stated'}
+        Quiet within the noise of the sensor; shaken about one attitude, so that only the
+        means are those of a stationary sensor; quiet and without rotation, but perhaps at
+        speed; or stated by the user.
+    """
+
+    start: float
+    end: float
+    gyro_mean: Triple
+    gyro_sd: Triple
+    accel_mean: Triple | None
+    gyro_mean_sd: Triple | None = None
+    accel_sd: Triple | None = None
+    accel_mean_sd: Triple | None = None
+    grade: str = "still"
+
+
+@dataclass(frozen=True)
+class GyroBiasCourse:
+    """Gyro bias over a log, from its stationary intervals.
+
+    Attributes
+    ----------
+    time : tuple of float, s
+        Middle of each interval.
+    mean, sd : tuple of three float per interval, rad/s
+        Bias in each interval, and its standard deviation.
+    average, average_sd : tuple of float, rad/s
+        Weighted mean over the intervals. The sd is inflated if the intervals scatter by more
+        than their own.
+    drift, drift_sd : tuple of float or None, rad/s²
+        Slope of a line through the intervals; None for a single one.
+    scatter : tuple of float or None
+        Root mean square distance of the intervals from the average, in units of their own
+        sd: near 1 for a constant bias, far above for a drifting one. None for a single
+        one.
+    """
+
+    time: tuple[float, ...]
+    mean: tuple[Triple, ...]
+    sd: tuple[Triple, ...]
+    average: Triple
+    average_sd: Triple
+    drift: Triple | None
+    drift_sd: Triple | None
+    scatter: Triple | None
 
 
 def find_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:

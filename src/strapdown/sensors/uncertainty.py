@@ -18,7 +18,6 @@ from strapdown.sensors.triad_errors import Matrix, Triad, TriadErrors, TriadLike
 from strapdown.tables.checks import is_number
 
 __all__ = [
-    "STATED_IMU_KEYS",
     "STATED_KEYS",
     "BiasDrift",
     "ImuUncertainty",
@@ -303,7 +302,6 @@ def _usable(keys: Mapping[str, Key]) -> dict[str, Key]:
     }
 
 
-#: Allowed keys by triad, each with its unit.
 STATED_KEYS: dict[str, dict[str, Key]] = {triad: _usable(keys) for triad, keys in KEYS.items()}
 
 
@@ -359,11 +357,6 @@ def stated_uncertainty(
 
 DRIFT = ("bias_instability", "correlation_time")
 
-#: Allowed keys by triad, each with its unit.
-STATED_IMU_KEYS: dict[str, tuple[str, ...]] = {
-    triad: (*STATED_KEYS[triad], *(k for k, key in KEYS[triad].items() if key.quantity in DRIFT))
-    for triad in ("gyro", "accel")
-}
 _NEEDED = {"bias": "bias_sd", "noise_density": "noise_density"}
 
 

@@ -10,9 +10,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.dsp.decimation import Resampled, decimate, low_pass_design, mean_samples
+from strapdown.dsp.decimation import (
+    Resampled,
+    decimate,
+    interpolate,
+    interpolated_means,
+    low_pass_design,
+    mean_samples,
+)
 from strapdown.dsp.delay import Delay, EvenSignal, find_delay
-from strapdown.dsp.interpolation import interpolate, interpolated_means
 from strapdown.dsp.samples import even_step
 from strapdown.errors import DataError, Finding
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad

@@ -20,6 +20,7 @@ from strapdown.alignment.readiness import (
     coarse_readiness,
     manoeuvres_after,
 )
+from strapdown.bundle.seal import InputFiles, input_files
 from strapdown.config.alignment import AlignmentSpec, ReferenceTable
 from strapdown.config.choice import SLOTS, make_choice
 from strapdown.config.navigation_modules import sensors_of
@@ -30,13 +31,11 @@ from strapdown.errors import DataError, Finding
 from strapdown.prefilter import Prefilter, PrefilterReport
 from strapdown.prefilter.prefilter import LOW_RATE
 from strapdown.progress import Progress, silent
-from strapdown.results.inputs import InputFiles
 from strapdown.rotation import within_half_turn
 from strapdown.sensors.health_log import LEAST_SAMPLES
 from strapdown.sensors.imu_health import ChannelFault, check_imu_channels
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.alignment_source import AlignmentSource, read_alignment_source
-from strapdown.systems.inputs import input_files
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, EULER, GYRO
 from strapdown.tables.checks import index_of, source_of, values_of

@@ -10,14 +10,14 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.bundle.seal import InputFiles, input_files, sensor_file
 from strapdown.config.alignment import AlignmentSpec, AxesTable, LogTable
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import Finding
 from strapdown.formats import read_log
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import files_of_fixes, read_gnss
-from strapdown.formats.recording import ReadOptions, Recording, StatedStart
-from strapdown.results.inputs import InputFiles, Reading
+from strapdown.formats.recording import Reading, ReadOptions, Recording, StatedStart
 from strapdown.rotation import euler_from_dcm
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.triad_errors import (
@@ -26,7 +26,8 @@ from strapdown.sensors.triad_errors import (
     check_axes_matrix,
     report_transposed,
 )
-from strapdown.systems.inputs import input_files, part_of_log, sensor_file
+from strapdown.simulation import Origin, StationaryMotion, Wave, rocking_stand, simulate_imu
+from strapdown.systems.inputs import part_of_log
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import values_of
 
@@ -228,7 +229,6 @@ def _sensor_file(spec: AlignmentSpec) -> tuple[InputFiles, ...]:
 
 
 def _simulated(spec: AlignmentSpec) -> AlignmentSource:
-    from strapdown.simulation import Origin, StationaryMotion, Wave, rocking_stand, simulate_imu
 
     asked = spec.simulation
     assert asked is not None  # one of the two is there

@@ -13,23 +13,19 @@ import numpy as np
 import pandas as pd
 
 from strapdown.bundle.configuration_paths import with_paths
-from strapdown.bundle.seal import sha256
+from strapdown.bundle.seal import InputFiles
 from strapdown.errors import ConfigError
 from strapdown.formats import csv
 from strapdown.formats.clocks import GPS, UNIX, clock_of
 from strapdown.formats.log_writers import LOG_WRITERS
-from strapdown.results.inputs import InputFiles
-from strapdown.sensors.catalogue import SENSORS
 
 __all__ = [
     "NOWHERE",
     "Memory",
     "check_part",
-    "input_files",
     "moved_inputs",
     "moved_paths",
     "part_of_log",
-    "sensor_file",
 ]
 
 
@@ -127,18 +123,6 @@ def part_of_log(
     if out.attrs.get("first_row") is not None:
         out.attrs["first_row"] += int(np.argmax(kept))
     return out
-
-
-def input_files(role: str, path: str, files: tuple[Path, ...]) -> InputFiles:
-    """List files read in a role, with their present digests."""
-    return InputFiles(role, Path(path), files, tuple(sha256(file) for file in files))
-
-
-def sensor_file(sensor: str | None) -> tuple[InputFiles, ...]:
-    """Return the file of a sensor that is not from the catalogue."""
-    if sensor is None or sensor.lower() in SENSORS:
-        return ()
-    return (input_files("sensor", sensor, (Path(sensor),)),)
 
 
 # Tables in memory as input files of a bundle.

@@ -16,7 +16,7 @@ import pandas as pd
 
 from strapdown.alignment.alignment import Alignment, Site
 from strapdown.alignment.fine import FineResult
-from strapdown.bundle.seal import Seal, check_destination
+from strapdown.bundle.seal import InputFiles, Seal, check_destination, input_files
 from strapdown.config.choice import SLOTS, make_choice
 from strapdown.config.navigation import (
     CoarseModeSpec,
@@ -55,9 +55,8 @@ from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.navigation.recorder import Recorder
 from strapdown.navigation.replay import PipelineRun, run_batch
 from strapdown.progress import Progress, silent
-from strapdown.results.inputs import InputFiles
 from strapdown.sensors.uncertainty import ImuUncertainty
-from strapdown.systems.inputs import NOWHERE, Memory, input_files, moved_inputs, moved_paths
+from strapdown.systems.inputs import NOWHERE, Memory, moved_inputs, moved_paths
 from strapdown.systems.navigation_checks import channel_findings, look_through, saturated_findings
 from strapdown.systems.navigation_source import (
     NavigationSource,

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.bundle.seal import InputFiles, input_files, sensor_file
 from strapdown.config.choice import SLOTS
 from strapdown.config.navigation import (
     AidSpec,
@@ -27,15 +28,20 @@ from strapdown.formats.aid_table import read_aid_table, read_control_points
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import files_of_fixes, read_gnss
 from strapdown.formats.gnss_fixes import GnssOptions
-from strapdown.formats.recording import StatedStart
+from strapdown.formats.recording import Reading, StatedStart
 from strapdown.formats.trajectory_readers import files_of_trajectory, read_trajectory
 from strapdown.navigation.measurements.measurement import TabulatedMeasurement
-from strapdown.results.inputs import InputFiles, Reading
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.error_chain import child, normal
 from strapdown.systems.alignment_source import body_record
-from strapdown.systems.inputs import input_files, sensor_file
-from strapdown.tables import GEODETIC, GNSS, POSITION_SD, VELOCITY_SD, gnss_table
+from strapdown.systems.trajectory_source import make_motion, with_key
+from strapdown.tables import (
+    GEODETIC,
+    GNSS,
+    POSITION_SD,
+    VELOCITY_SD,
+    gnss_table,
+)
 from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
 from strapdown.tables.checks import index_of, source_of, values_of
 
@@ -169,7 +175,6 @@ def _simulated(
     findings: list[Finding],
 ) -> NavigationSource:
     from strapdown.simulation import simulate_imu
-    from strapdown.systems.trajectory_source import make_motion, with_key
 
     asked = spec.simulation
     assert asked is not None  # one of the two is there

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.bundle.seal import InputFiles, input_files, sensor_file
 from strapdown.config.choice import SLOTS, make_choice
 from strapdown.config.coast import CoastSpec, CoastStartTable
 from strapdown.config.navigation import NavigationSpec, aids_of
@@ -49,7 +50,6 @@ from strapdown.navigation.pipeline import NavigationPipeline, PipelineState
 from strapdown.navigation.record import NavigationChunk, Span
 from strapdown.navigation.recorder import record_of
 from strapdown.progress import Progress, silent
-from strapdown.results.inputs import InputFiles
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.triad_errors import ImuErrors
 from strapdown.sensors.uncertainty import ImuUncertainty, stated_imu
@@ -58,7 +58,7 @@ from strapdown.simulation.earth_motion import EarthMotion, Origin
 from strapdown.simulation.gnss import GnssReceiver, instants, simulate_gnss, velocity_of_point
 from strapdown.simulation.path_motion import Limits, Manoeuvre
 from strapdown.simulation.vehicles import Accelerate, Straight, Turn, car
-from strapdown.systems.inputs import check_part, input_files, sensor_file
+from strapdown.systems.inputs import check_part
 from strapdown.systems.navigation_run import make_chain
 from strapdown.systems.navigation_source import NavigationSource, read_navigation_source
 from strapdown.systems.one_thread import one_thread

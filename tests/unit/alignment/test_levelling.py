@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
-from strapdown.alignment.levelling import level
+from strapdown.api.attitude import compare_attitude
 from strapdown.errors import DataError
 from strapdown.formats.log_writers import LOG_WRITERS
-from strapdown.systems.attitude_bench import bench_attitude
+from strapdown.rotation import level
 from strapdown.tables import imu_table
 
 ANGLES = [(0, 0), (10, -20), (-170, 5), (90, 0), (-90, 30), (3, 89), (0, -90), (180, 0)]
@@ -50,7 +50,7 @@ def tilted_log(path, roll, pitch):
 
 @pytest.mark.parametrize("initial", ["auto", "level"])
 def test_a_log_that_begins_at_rest_is_levelled(tmp_path, initial):
-    bench = bench_attitude(tilted_log(tmp_path / "log.csv", 10, -20), initial=initial)
+    bench = compare_attitude(tilted_log(tmp_path / "log.csv", 10, -20), initial=initial)
     assert bench.initial["roll_deg"] == pytest.approx(10, abs=1e-9)
     assert bench.initial["pitch_deg"] == pytest.approx(-20, abs=1e-9)
     assert bench.initial["heading_deg"] == pytest.approx(0, abs=1e-12)
@@ -58,7 +58,7 @@ def test_a_log_that_begins_at_rest_is_levelled(tmp_path, initial):
 
 
 def test_upside_down_is_questioned(tmp_path):
-    bench = bench_attitude(tilted_log(tmp_path / "log.csv", 178, 3))
+    bench = compare_attitude(tilted_log(tmp_path / "log.csv", 178, 3))
     assert any("upside down" in f.what for f in bench.findings)
-    mended = bench_attitude(tmp_path / "log.csv", accel_unit="-m/s2")
+    mended = compare_attitude(tmp_path / "log.csv", accel_unit="-m/s2")
     assert abs(mended.initial["roll_deg"]) < 5

@@ -72,8 +72,30 @@ def test_an_algorithm_from_outside_runs_in_batch_and_sample_by_sample(installed)
     one = sd.OrientationFilter(100.0, "first_order", initial=(0.0, 0.0, 0.0))
     streamed = [one.update(rate) for rate in gyro]
     assert np.array_equal(streamed, made[QUATERNION].to_numpy())
-    with pytest.raises(ConfigError, match="plug-in"):
-        sd.compare_attitude((t, gyro), ["first_order"])
+
+
+def test_an_algorithm_from_outside_is_compared_counted_and_verified(installed, tmp_path):
+    algorithms = ["first_order", "quaternion"]
+    made = sd.compare_attitude("alexiev-fig4", algorithms, rates_hz=[100.0])
+    cost = made.costs[0]
+    # Four sums of three products, their halves, four squares of the norm; and four divisions.
+    assert (cost.algorithm, cost.divide, cost.sqrt, cost.trig) == ("first_order", 4, 1, 0)
+    assert cost.multiply == 4 * 3 + 4 + 4
+    assert made.shares[0].own_deg[2] != made.shares[1].own_deg[2]
+    assert 0.0 < made.shares[0].single_deg[2] < 1e-2
+    made.save(tmp_path / "out", report=False)
+    assert sd.verify(tmp_path / "out").verdict == "identical"
+
+
+def test_an_algorithm_from_outside_is_a_word_of_the_command_line(installed, run_cli, tmp_path):
+    done = run_cli(
+        *("attitude", "alexiev-fig4", "--algorithms", "first_order", "--rates", "100"),
+        *("--json", "--out", str(tmp_path / "out"), "--export-c", str(tmp_path / "first.c")),
+    )
+    assert done.code == 0, done.err
+    assert "first_order_step(" in (tmp_path / "first.c").read_text()
+    (row,) = json.loads(done.out)["algorithms"]
+    assert row["algorithm"] == "first_order"
 
 
 def test_a_measurement_from_outside_aids_a_run_that_is_verified(installed, tmp_path):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from strapdown.attitude import make_algorithm
-from strapdown.attitude.cost import count_cost, memory, operation_count
+from strapdown.attitude_algorithms import make_algorithm
+from strapdown.attitude_algorithms.cost import count_cost, memory, operation_count
 
 NOTHING = {"add": 0, "multiply": 0, "divide": 0, "sqrt": 0, "trig": 0}
 BY_HAND = {

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from strapdown.dsp.derivative import SlidingFit, derivative, widest_fit
+from strapdown.dsp.derivative import SlidingFit, derivative
 from strapdown.errors import ConfigError, DataError
 
 STEP = 5e-3
@@ -70,13 +70,6 @@ def test_pulse_loss_is_what_a_pulse_loses(duration):
     # Taylor: the pulse's second derivative at its peak is -2 (π/T)²; the fit feels a/10 h² 7/6 ...
     first = 2.0 * (np.pi / duration) ** 2 * 7 * STEP**2 / 6
     assert fit.pulse_loss(duration) == pytest.approx(first, rel=2.0 * first + 0.01)
-
-
-def test_widest_fit_is_the_widest():
-    fit = widest_fit(STEP, 0.1, 0.05)
-    assert fit.pulse_loss(0.1) <= 0.05 < SlidingFit(STEP, fit.half + 1, 2).pulse_loss(0.1)
-    with pytest.raises(ConfigError, match="even over 3 samples"):
-        widest_fit(STEP, 0.012, 0.02)
 
 
 def test_causal_is_the_centred_late_by_half_a_window():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from strapdown.dsp.interpolation import interpolate, interpolated_means
+from strapdown.dsp.decimation import interpolate, interpolated_means
 from strapdown.dsp.samples import even_step
 from strapdown.errors import DataError
 

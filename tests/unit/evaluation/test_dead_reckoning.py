@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
+from strapdown.attitude_algorithms.algorithm import AttitudeRun
 from strapdown.constants import STANDARD_GRAVITY as G
 from strapdown.errors import ConfigError, DataError
 from strapdown.evaluation.position_references import (
@@ -17,7 +18,6 @@ from strapdown.evaluation.position_references import (
     score_places,
 )
 from strapdown.formats.references import read_reference_words
-from strapdown.results import AttitudeRun
 from strapdown.sensors.rest import rest_between
 from strapdown.tables import ACCEL, attitude_table, imu_table
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
-from strapdown.attitude import make_algorithm, run_attitude
+from strapdown.api.attitude import compare_attitude
+from strapdown.attitude_algorithms import make_algorithm, run_attitude
 from strapdown.errors import ConfigError, DataError
 from strapdown.evaluation.differences import attitude_at
 from strapdown.evaluation.reference_points import (
@@ -18,7 +19,6 @@ from strapdown.evaluation.reference_points import (
 from strapdown.formats.references import read_reference_words
 from strapdown.increments import increments_from_imu
 from strapdown.report.attitude_words import standing
-from strapdown.systems.attitude_bench import bench_attitude
 from strapdown.tables import imu_table
 
 
@@ -135,7 +135,7 @@ def test_files_of_points_say_the_same(tmp_path, name):
         "4 s: roll 0°, pitch 0°, heading 0°",
     ]
     assert table["sd"].iloc[1] == 2.0
-    bench = bench_attitude("alexiev-fig4", reference=[str(tmp_path / name)])
+    bench = compare_attitude("alexiev-fig4", reference=[str(tmp_path / name)])
     assert len(bench.references) == 2
 
 
@@ -156,7 +156,7 @@ def test_a_file_of_points_with_a_hole_is_refused(tmp_path, text, message):
 def test_a_truth_that_is_none_is_refused(tmp_path):
     (tmp_path / "truth.csv").write_text("time_s,a\n0,1\n1,2\n")
     with pytest.raises(DataError, match="no attitude in it"):
-        bench_attitude("alexiev-fig4", reference=[str(tmp_path / "truth.csv")])
+        compare_attitude("alexiev-fig4", reference=[str(tmp_path / "truth.csv")])
 
 
 def test_a_truth_of_another_time_is_refused(tmp_path):
@@ -164,7 +164,7 @@ def test_a_truth_of_another_time_is_refused(tmp_path):
         "time_s,roll_deg,pitch_deg,heading_deg\n70,0,0,0\n71,0,0,0\n"
     )
     with pytest.raises(DataError, match="one clock"):
-        bench_attitude("alexiev-fig4", reference=[str(tmp_path / "truth.csv")])
+        compare_attitude("alexiev-fig4", reference=[str(tmp_path / "truth.csv")])
 
 
 def test_a_truth_that_meets_the_log_in_one_instant_says_nothing(tmp_path):
@@ -172,13 +172,13 @@ def test_a_truth_that_meets_the_log_in_one_instant_says_nothing(tmp_path):
     text = "time_s,roll_deg,pitch_deg,heading_deg\n-1,0,0,0\n0,0,0,0\n"
     (tmp_path / "truth.csv").write_text(text)
     with pytest.raises(DataError, match="1 of its instants"):
-        bench_attitude("alexiev-fig4", reference=[str(tmp_path / "truth.csv")])
+        compare_attitude("alexiev-fig4", reference=[str(tmp_path / "truth.csv")])
 
 
 def test_a_truth_of_a_part_of_the_log_is_told_as_that(tmp_path):
     text = "time_s,roll_deg,pitch_deg,heading_deg\n0,0,0,0\n1,0,0,0\n"
     (tmp_path / "truth.csv").write_text(text)
-    bench = bench_attitude("alexiev-fig4", reference=[str(tmp_path / "truth.csv")])
+    bench = compare_attitude("alexiev-fig4", reference=[str(tmp_path / "truth.csv")])
     assert any("covers 1 of 5 s" in f.what for f in bench.findings)
 
 
@@ -192,7 +192,7 @@ def test_every_line_of_a_file_counts_and_a_bad_one_is_named(tmp_path):
     ("words", "said"), [("-2 turns about z", "-2 turns"), ("5 turns about z", "5 turns")]
 )
 def test_turns_that_the_gyro_did_not_see_are_questioned(words, said):
-    bench = bench_attitude(
+    bench = compare_attitude(
         "alexiev-fig2a", reference=[f"end {words} since start"], algorithms=["dcm", "quaternion"]
     )
     (finding,) = [f for f in bench.findings if f.quantity == "reference"]
@@ -200,7 +200,7 @@ def test_turns_that_the_gyro_did_not_see_are_questioned(words, said):
 
 
 def test_the_same_point_twice_is_two_points():
-    bench = bench_attitude("alexiev-fig2a", reference=["end same as start"] * 2)
+    bench = compare_attitude("alexiev-fig2a", reference=["end same as start"] * 2)
     assert [s.reference for s in bench.scores if s.algorithm == "dcm"] == [None, 1, 2]
     assert standing(bench).count("quaternion") == 1
 
@@ -208,7 +208,7 @@ def test_the_same_point_twice_is_two_points():
 def test_what_passed_the_pole_is_not_named_as_the_best():
     """At 10 Hz Runge-Kutta's Euler may end anywhere; it has said that it is not to be trusted."""
     names = ["naive", "euler:step=rk4"]
-    bench = bench_attitude("alexiev-fig4", rate=100, algorithms=names)
+    bench = compare_attitude("alexiev-fig4", rate_hz=100, algorithms=names)
     errors = {s.algorithm: s.error_deg for s in bench.scores}
     assert errors["euler:step=rk4"] < errors["naive"]
     assert standing(bench).startswith("At 5 s, naive is")

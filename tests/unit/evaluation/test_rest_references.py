@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
+from strapdown.attitude_algorithms.algorithm import AttitudeRun
 from strapdown.constants import STANDARD_GRAVITY as G
 from strapdown.errors import DataError
 from strapdown.evaluation.reference_points import (
@@ -19,7 +20,7 @@ from strapdown.evaluation.reference_points import (
     with_tilt,
 )
 from strapdown.formats.references import read_reference_words
-from strapdown.results import AttitudeRun, RestStretch
+from strapdown.sensors.rest import RestStretch
 from strapdown.tables import attitude_table, imu_table
 
 

@@ -8,11 +8,11 @@ import pytest
 from scipy.io import savemat
 
 from strapdown import rotation, simulate
+from strapdown.api.attitude import compare_attitude
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import read_log
 from strapdown.formats.recording import ReadOptions
 from strapdown.formats.references import read_truth
-from strapdown.systems.attitude_bench import bench_attitude
 from strapdown.tables import ACCEL, GYRO
 
 HEAD = "time_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s"
@@ -176,14 +176,14 @@ def test_an_accelerometer_that_cannot_be_used_is_left_out(tmp_path):
 
 def test_nan_in_the_first_row_does_not_reach_the_report(tmp_path):
     path = written(tmp_path / "log.csv", "\n".join([HEAD, "0,nan,0,0", *ROWS[1:]]))
-    bench = bench_attitude(path, repair=True)
+    bench = compare_attitude(path, repair=True)
     assert bench.readings[1].first == 0.1
 
 
 def test_a_clock_that_was_set_costs_no_memory(tmp_path):
     stamps = np.concatenate([np.arange(500) * 0.01, 1.7e9 + np.arange(500) * 0.01])
     np.savez(tmp_path / "log.npz", time_s=stamps, gyro_rad_s=np.zeros((1000, 3)))
-    bench = bench_attitude(tmp_path / "log.npz")
+    bench = compare_attitude(tmp_path / "log.npz")
     assert len(bench.rests) == 2
 
 
@@ -207,7 +207,7 @@ def turning(tmp_path, *, origin: float, begins: float, unit: str = "s"):
 @pytest.mark.parametrize("origin", [0.0, 999_995.0, 1.7e9])
 def test_a_truth_that_begins_later_is_on_the_log_s_clock(tmp_path, origin, unit):
     log, truth = turning(tmp_path, origin=origin, begins=2.0, unit=unit)
-    bench = bench_attitude(log, reference=[str(truth)], initial="zero", algorithms=["quaternion"])
+    bench = compare_attitude(log, reference=[str(truth)], initial="zero", algorithms=["quaternion"])
     # A double of 1.7e9 s is good to 2.4e-7 s, in which 0.5 rad/s turn by 7e-6 deg.
     assert bench.scores[0].max_deg < 2e-5
 
@@ -216,10 +216,10 @@ def test_the_start_is_taken_from_the_truth_only_where_there_is_some(tmp_path):
     log, truth = turning(tmp_path, origin=0.0, begins=0.0)
     lines = truth.read_text().splitlines()
     holed = written(tmp_path / "holed.csv", "\n".join([*lines[:3], *lines[95:]]))
-    bench = bench_attitude(log, reference=[str(holed)], from_s=4.5, initial="truth")
+    bench = compare_attitude(log, reference=[str(holed)], from_s=4.5, initial="truth")
     assert bench.initial["time_s"] == pytest.approx(9.3, abs=0.11)
     with pytest.raises(DataError, match="0 of its instants"):
-        bench_attitude(log, reference=[str(written(holed, "\n".join(lines[:20])))], from_s=5.0)
+        compare_attitude(log, reference=[str(written(holed, "\n".join(lines[:20])))], from_s=5.0)
 
 
 def test_a_truth_on_dates(tmp_path):
@@ -228,7 +228,7 @@ def test_a_truth_on_dates(tmp_path):
     log += [f"2026-05-01T12:00:{k // 10:02d}.{k % 10}Z,0,0,0.5" for k in range(50)]
     truth = ["timestamp,roll_deg,pitch_deg,heading_deg"]
     truth += [f"{s},0,0,{np.degrees(0.5 * k)}" for k, s in enumerate(stamps)]
-    bench = bench_attitude(
+    bench = compare_attitude(
         written(tmp_path / "log.csv", "\n".join(log)),
         algorithms="quaternion",
         reference=[str(written(tmp_path / "truth.csv", "\n".join(truth)))],
@@ -239,8 +239,8 @@ def test_a_truth_on_dates(tmp_path):
 @pytest.mark.parametrize("axes", ["y,z,x", "z,x,y", "x,-y,-z", "-y,x,z"])
 def test_axes_turn_a_log_s_own_truth_with_its_sensor(tmp_path, axes):
     simulate("alexiev-fig2c", tmp_path / "log", rate=100)
-    plain = bench_attitude(tmp_path / "log" / "log.csv", algorithms=["quaternion"])
-    turned = bench_attitude(tmp_path / "log" / "log.csv", algorithms=["quaternion"], axes=axes)
+    plain = compare_attitude(tmp_path / "log" / "log.csv", algorithms=["quaternion"])
+    turned = compare_attitude(tmp_path / "log" / "log.csv", algorithms=["quaternion"], axes=axes)
     # The error is a rotation angle: what is called forward cannot change it.
     assert turned.scores[0].max_deg == pytest.approx(plain.scores[0].max_deg, abs=1e-9)
 
@@ -258,9 +258,9 @@ def test_a_truth_whose_clock_has_no_unit_says_what_to_do(tmp_path):
     in_ms = ["time,roll_deg,pitch_deg,heading_deg"]
     in_ms += [f"{float(line.split(',')[0]) * 1e3},{line.partition(',')[2]}" for line in lines[1:]]
     with pytest.raises(DataError, match="as in time_ms"):
-        bench_attitude(log, reference=[str(written(truth, "\n".join(in_ms)))])
+        compare_attitude(log, reference=[str(written(truth, "\n".join(in_ms)))])
     in_ms[0] = "time_ms,roll_deg,pitch_deg,heading_deg"
-    bench = bench_attitude(log, reference=[str(written(truth, "\n".join(in_ms)))])
+    bench = compare_attitude(log, reference=[str(written(truth, "\n".join(in_ms)))])
     assert bench.scores[-1].max_deg < 1e-9
 
 

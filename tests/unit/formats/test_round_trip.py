@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from strapdown.attitude import make_algorithm, run_attitude
+from strapdown.attitude_algorithms import make_algorithm, run_attitude
 from strapdown.formats import read_log
 from strapdown.formats.log_writers import LOG_WRITERS, write_attitude_csv
 from strapdown.formats.references import read_truth

@@ -9,11 +9,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from strapdown.attitude import make_algorithm, run_attitude
+from strapdown.attitude_algorithms import make_algorithm, run_attitude
+from strapdown.attitude_algorithms.cost import Cost
+from strapdown.attitude_comparison.answer import Answer
+from strapdown.attitude_comparison.comparison import AttitudeComparison
+from strapdown.attitude_comparison.references import PeerRun
+from strapdown.attitude_comparison.sweep import Share, Trials
 from strapdown.evaluation.differences import error_angles, largest_differences
-from strapdown.evaluation.reference_points import references_from_words, score_references
+from strapdown.evaluation.reference_points import Score, references_from_words, score_references
 from strapdown.increments import increments_from_imu
-from strapdown.results import Answer, AttitudeBench, Cost, PeerRun, Score, Share, Trials
 from strapdown.simulation import ImuErrors, TriadErrors, find_scenario, simulate_imu
 from strapdown.tables import QUATERNION
 
@@ -144,7 +148,7 @@ def _bench(algorithms, name="alexiev-fig2c", rate=100.0, truth_known=True, refer
         ),
         helps=("A bias taken at rest first would take away two thirds of what is left.",),
     )
-    return AttitudeBench(
+    return AttitudeComparison(
         source=name,
         description=f"simulated: {scenario.title}; {len(noisy)} samples",
         specification={"source": {"kind": "scenario"}},

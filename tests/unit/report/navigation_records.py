@@ -10,7 +10,7 @@ import pandas as pd
 from strapdown.frames import geodetic_from_ned
 from strapdown.navigation.record import Event, NavigationRecord, Span
 from strapdown.report.navigation_found import NavigationTold
-from strapdown.rotation.euler_angles import euler_sd
+from strapdown.rotation import euler_sd
 from strapdown.tables import gnss_table, trajectory_error_table, trajectory_table
 
 #: Of an ellipse turned by 30 deg from north toward east, 3 m along and 1 m across.

@@ -8,10 +8,10 @@ from html.parser import HTMLParser
 
 import pytest
 
+from strapdown.api.attitude import compare_attitude
 from strapdown.report.attitude import attitude_page, write_attitude
 from strapdown.report.attitude_charts import charts
 from strapdown.report.chart import BUCKETS, break_jumps, thin
-from strapdown.systems.attitude_bench import bench_attitude
 
 EVIL = "</script><script>alert(1)</script><!--<img src=x onerror=alert(2)>"
 
@@ -43,7 +43,7 @@ def evil_page(tmp_path_factory):
     path = folder / "<b>log&amp;.csv"
     lines = [f"t,{EVIL},wy,wz"] + [f"{0.01 * k:.2f},0.1,0.2,{0.001 * k}" for k in range(50)]
     path.write_text("\n".join(lines) + "\n")
-    bench = bench_attitude(
+    bench = compare_attitude(
         path,
         columns={"gyro_x": EVIL},
         gyro_unit="rad/s",

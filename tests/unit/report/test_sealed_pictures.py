@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from strapdown import verify
+from strapdown.api.attitude import compare_attitude
 from strapdown.report.attitude import write_attitude
-from strapdown.systems.attitude_bench import bench_attitude
 
 FEW = ("euler", "quaternion")
 
 
 def test_pictures_of_the_second_form_verify_too(tmp_path):
     seal = write_attitude(
-        bench_attitude("alexiev-fig2a", algorithms=FEW), tmp_path / "out", png=True
+        compare_attitude("alexiev-fig2a", algorithms=FEW), tmp_path / "out", png=True
     )
     figures = seal.path / "figures"
     assert {p.stem for p in figures.glob("*.png")} == {p.stem for p in figures.glob("*.svg")}
@@ -29,7 +29,7 @@ def test_the_pictures_do_not_follow_the_style_of_whoever_runs_it(tmp_path, monke
         with mpl.rc_context({"font.size": size, "lines.linewidth": size}):
             seals.append(
                 write_attitude(
-                    bench_attitude("alexiev-fig2a", algorithms=FEW), tmp_path / str(size)
+                    compare_attitude("alexiev-fig2a", algorithms=FEW), tmp_path / str(size)
                 )
             )
     assert seals[0].digest == seals[1].digest

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from strapdown.cli.attitude_tables import print_bench
+from strapdown.cli.attitude import print_comparison
 from strapdown.errors import ConfigError
 from strapdown.formats import read_raw
 from strapdown.report import attitude_tables as tables
@@ -134,7 +134,7 @@ def test_each_algorithm_names_its_own_source(make_bench):
 
 
 def test_nine_algorithms_fit_a_terminal(full_bench, capsys):
-    print_bench(full_bench)
+    print_comparison(full_bench)
     lines = capsys.readouterr().out.splitlines()
     ruled = [k for k, line in enumerate(lines) if "───" in line]
     assert len(ruled) == 5
@@ -146,7 +146,7 @@ def test_nine_algorithms_fit_a_terminal(full_bench, capsys):
 
 
 def test_little_prints_as_well(make_bench, capsys):
-    print_bench(make_bench(("quaternion",), truth=False, sweep=False))
+    print_comparison(make_bench(("quaternion",), truth=False, sweep=False))
     out = capsys.readouterr().out
     assert "quaternion ran over the log." in out
     assert "--reference" in out

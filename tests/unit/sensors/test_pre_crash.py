@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from strapdown.results import RestStretch
 from strapdown.sensors.pre_crash import find_pre_crash_rest, gyro_bias_from, in_axes
+from strapdown.sensors.rest import RestStretch
 from strapdown.tables import imu_table
 
 BIAS = np.array([0.02, -0.05, 0.01])  # rad/s

@@ -18,16 +18,18 @@ from tests.sensor_faults import (
 
 from strapdown.errors import ConfigError, DataError
 from strapdown.rotation import dcm_from_euler
-from strapdown.sensors.axis_voting import (
+from strapdown.sensors.catalogue import SENSORS, load_sensor
+from strapdown.sensors.error_chain import apply, child
+from strapdown.sensors.redundant_units import (
     AxisErrors,
     AxisVoting,
+    MountedUnit,
+    UnitVoting,
     VotingRule,
     isolable_axes,
     parity_matrix,
+    vote_units,
 )
-from strapdown.sensors.catalogue import SENSORS, load_sensor
-from strapdown.sensors.error_chain import apply, child
-from strapdown.sensors.redundant_units import MountedUnit, UnitVoting, vote_units
 from strapdown.sensors.uncertainty import BiasDrift, ImuUncertainty, TriadUncertainty
 from strapdown.simulation import ImuErrors, SmoothRandom, simulate_imu
 from strapdown.tables import ACCEL, GYRO, imu_table

@@ -6,8 +6,12 @@ import numpy as np
 import pytest
 
 from strapdown.errors import DataError
-from strapdown.results import RestStretch
-from strapdown.sensors.rest import gyro_bias_at, gyro_bias_from_rests, without_gyro_bias
+from strapdown.sensors.rest import (
+    RestStretch,
+    gyro_bias_at,
+    gyro_bias_from_rests,
+    without_gyro_bias,
+)
 from strapdown.tables import GYRO, imu_table
 
 

@@ -8,12 +8,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from strapdown.attitude import make_algorithm
-from strapdown.attitude.cost import count_cost
+from strapdown.api.attitude import compare_attitude
+from strapdown.attitude_algorithms import make_algorithm
+from strapdown.attitude_algorithms.cost import count_cost
+from strapdown.attitude_comparison.answer import Evidence, choices, find_answer
 from strapdown.formats.log_writers import LOG_WRITERS
 from strapdown.simulation import SCENARIOS, ImuErrors, find_scenario, simulate_imu
-from strapdown.systems.attitude_answer import Evidence, choices, find_answer
-from strapdown.systems.attitude_bench import bench_attitude
 from strapdown.tables import imu_table
 
 NAMES = ("naive", "quaternion", "rk4")
@@ -226,7 +226,7 @@ def number_before(unit, text):
 
 
 def test_the_sentence_says_what_the_sweep_says():
-    bench = bench_attitude("alexiev-fig4")
+    bench = compare_attitude("alexiev-fig4")
     answer, table = bench.answer, bench.sweep
     assert (answer.verdict, answer.algorithm) == ("enough", "quaternion")
     chosen = table[(table["algorithm"] == answer.algorithm) & (table["meaning"] == answer.meaning)]
@@ -262,11 +262,11 @@ def test_the_sentence_says_what_the_sweep_says():
 
 
 def test_what_helps_a_biased_gyro_helps():
-    plain = bench_attitude("alexiev-fig2e")
+    plain = compare_attitude("alexiev-fig2e")
     assert plain.answer.verdict == "sensor"
     said = next(h for h in plain.answer.helps if "--gyro-bias rest" in h)
     left = float(re.search(r"([\d.]+)° would be left", said)[1])
-    better = bench_attitude("alexiev-fig2e", gyro_bias="rest")
+    better = compare_attitude("alexiev-fig2e", gyro_bias="rest")
     full = better.sweep[(better.sweep["factor"] == 1) & (better.sweep["meaning"] == "drop")]
     # By the most accurate of those that were run, which is not the most accurate that there is:
     # their own errors are apart by as much as the two differ by.
@@ -287,15 +287,15 @@ def test_what_helps_a_biased_gyro_helps():
 
 def test_what_helps_at_too_low_a_rate_helps():
     at = {"algorithms": ["quaternion", "rk4"]}
-    plain = bench_attitude("coning", rates=[100], **at)
+    plain = compare_attitude("coning", rates_hz=[100], **at)
     assert plain.answer.verdict == "rate"
     cubic, higher = plain.answer.helps[:2]
     left = float(re.search(r"([\d.]+)° would be left", cubic)[1])
-    better = bench_attitude("coning", rates=[100], interpolation="cubic", **at)
+    better = compare_attitude("coning", rates_hz=[100], interpolation="cubic", **at)
     assert better.sweep["error_deg"].min() <= left * 1.01
     assert better.answer.verdict == "enough"
     rate = float(re.search(r"about (\d+) Hz", higher)[1])
-    faster = bench_attitude("coning", rates=[rate], **at)
+    faster = compare_attitude("coning", rates_hz=[rate], **at)
     # By the leading power alone: the next one, of (2 pi 10/100)^2, may take a part.
     assert faster.sweep["error_deg"].min() < 1.2
     assert faster.sweep["error_deg"].min() > 0.5
@@ -311,11 +311,11 @@ def turned(tmp_path_factory):
 
 
 def test_a_log_of_which_nothing_is_known(turned):
-    bench = bench_attitude(turned, algorithms=["naive", "quaternion"])
+    bench = compare_attitude(turned, algorithms=["naive", "quaternion"])
     assert bench.answer.verdict == "own"
     assert bench.answer.algorithm == "quaternion"
     # A wrong reference point: the sensor, and not the rate, is what is far from it.
-    wrong = bench_attitude(
+    wrong = compare_attitude(
         turned, algorithms=["naive", "quaternion"], reference="end roll 0 pitch 0 heading 90"
     )
     assert wrong.answer.verdict == "sensor"
@@ -327,7 +327,7 @@ def test_a_log_that_turns_faster_than_it_is_sampled(tmp_path):
     time = np.arange(60) / 15.0
     gyro = 20.0 * np.column_stack([np.sin(9 * time), np.cos(7 * time), np.sin(5 * time + 1)])
     LOG_WRITERS["csv"](tmp_path / "fast.csv", imu_table(time, gyro), None)
-    bench = bench_attitude(tmp_path / "fast.csv", algorithms=["naive", "quaternion"])
+    bench = compare_attitude(tmp_path / "fast.csv", algorithms=["naive", "quaternion"])
     assert bench.answer.verdict == "rate"
     assert bench.answer.algorithm is None
 
@@ -335,7 +335,7 @@ def test_a_log_that_turns_faster_than_it_is_sampled(tmp_path):
 def test_the_tolerance_moves_the_answer(turned):
     rates = []
     for tolerance in (0.3, 1.0, 3.0, 10.0):
-        answer = bench_attitude(
+        answer = compare_attitude(
             "coning-slow", tolerance_deg=tolerance, algorithms=["quaternion"]
         ).answer
         rates.append(answer.rate_hz)
@@ -346,7 +346,7 @@ def test_the_tolerance_moves_the_answer(turned):
 
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_every_scenario_has_an_answer(name):
-    bench = bench_attitude(name, algorithms=["naive", "quaternion"], rates=[100])
+    bench = compare_attitude(name, algorithms=["naive", "quaternion"], rates_hz=[100])
     answer = bench.answer
     assert answer.verdict in ("enough", "sensor", "rate")
     error = bench.sweep.set_index("algorithm")["error_deg"]

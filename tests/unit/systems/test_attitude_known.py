@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
-from strapdown.attitude import Quaternion, run_attitude
+from strapdown.api.attitude import compare_attitude
+from strapdown.attitude_algorithms import Quaternion, run_attitude
 from strapdown.errors import ConfigError, DataError
 from strapdown.evaluation.differences import Known, attitude_at, known_at
 from strapdown.formats.log_writers import LOG_WRITERS
@@ -15,7 +16,6 @@ from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation import find_scenario, simulate_imu
 from strapdown.simulation.attitude_motions import Handling
-from strapdown.systems.attitude_bench import bench_attitude
 from strapdown.tables import ACCEL, GYRO, QUATERNION, attitude_table, imu_table
 
 MOTION = Handling(duration=60.0, seed=3)
@@ -61,13 +61,13 @@ def truths_own_error(bench, exact):
 
 
 def test_errors_against_a_second_log_are_those_against_the_exact_truth(logs, first):
-    bench = bench_attitude(
+    bench = compare_attitude(
         logs / "first.csv",
         reference_log=logs / "second.csv",
         gyro_bias="rest",
         initial="0,0,0",
         algorithms=ALGORITHMS,
-        rates=[100],
+        rates_hz=[100],
     )
     found = bench.second
     assert found.offset == pytest.approx(LATE, abs=5 * found.offset_sd + 1e-6)
@@ -106,12 +106,12 @@ def test_a_second_log_with_an_attitude_tells_where_the_run_starts(logs, first):
     """In the midst of a motion, where no levelling and no zero would do."""
     rate = np.linalg.norm(first[0][GYRO].to_numpy(), axis=1)
     middle = float(first[0].index[2000 + int(rate[2000:3000].argmax())])
-    bench = bench_attitude(
+    bench = compare_attitude(
         logs / "first.csv",
         from_s=middle,
         reference_log=logs / "optical.csv",
         algorithms=ALGORITHMS,
-        rates=[100],
+        rates_hz=[100],
     )
     assert bench.initial["from"] == "from the truth"
     found = bench.second
@@ -131,7 +131,7 @@ def test_a_second_log_with_an_attitude_tells_where_the_run_starts(logs, first):
 def test_two_truths_are_refused(logs, first):
     LOG_WRITERS["csv"](logs / "truth.csv", first[0], first[1])
     with pytest.raises(ConfigError, match="attitude truth was given, too"):
-        bench_attitude(
+        compare_attitude(
             logs / "first.csv",
             reference=logs / "truth.csv",
             reference_log=logs / "second.csv",
@@ -142,7 +142,7 @@ def test_a_second_log_of_another_motion_is_refused(logs):
     other, _ = simulate_imu(Handling(duration=60.0, seed=99), ImuErrors(), rate=100.0)
     LOG_WRITERS["csv"](logs / "other.csv", other, None)
     with pytest.raises(DataError):
-        bench_attitude(logs / "first.csv", reference_log=logs / "other.csv")
+        compare_attitude(logs / "first.csv", reference_log=logs / "other.csv")
 
 
 def test_a_second_log_is_no_exact_truth_of_a_scenario(logs, tmp_path):
@@ -150,11 +150,11 @@ def test_a_second_log_is_no_exact_truth_of_a_scenario(logs, tmp_path):
     second, _ = simulate_imu(find_scenario("gestures").motion, ImuErrors(), rate=200.0)
     turned = imu_table(second.index, 1.02 * second[GYRO].to_numpy(), second[ACCEL].to_numpy())
     LOG_WRITERS["csv"](tmp_path / "second.csv", turned, None)
-    bench = bench_attitude(
+    bench = compare_attitude(
         "gestures",
         reference_log=tmp_path / "second.csv",
         algorithms=["quaternion"],
-        rates=[100],
+        rates_hz=[100],
     )
     # Its scale is 2 % off, which no algorithm is to blame for.
     assert bench.scores[0].max_deg > 1.0
@@ -162,12 +162,12 @@ def test_a_second_log_is_no_exact_truth_of_a_scenario(logs, tmp_path):
 
 
 def test_gravity_at_rests_is_a_reference(logs, first):
-    bench = bench_attitude(
+    bench = compare_attitude(
         logs / "first.csv",
         reference="rests",
         gyro_bias="rest",
         algorithms=["quaternion"],
-        rates=[100],
+        rates_hz=[100],
     )
     assert bench.initial["from"].startswith("levelled")
     kinds = bench.references["kind"]
@@ -193,7 +193,7 @@ def test_rests_without_any_are_refused(tmp_path):
     gyro = np.column_stack([np.sin(9 * time), np.cos(7 * time), np.sin(5 * time)])
     LOG_WRITERS["csv"](tmp_path / "log.csv", imu_table(time, gyro), None)
     with pytest.raises(ConfigError, match="no rest with acceleration"):
-        bench_attitude(tmp_path / "log.csv", reference="rests")
+        compare_attitude(tmp_path / "log.csv", reference="rests")
 
 
 def test_the_course_of_a_trend_is_taken_off(tmp_path):
@@ -207,9 +207,9 @@ def test_the_course_of_a_trend_is_taken_off(tmp_path):
     errors = ImuErrors(TriadErrors(noise_density=1e-4, trend=trend))
     imu, truth = simulate_imu(MOTION, errors, rate=100.0, seed=1)
     LOG_WRITERS["csv"](tmp_path / "log.csv", imu, truth)
-    asked = {"algorithms": ["quaternion"], "rates": [100]}
-    plain = bench_attitude(tmp_path / "log.csv", **asked)
-    course = bench_attitude(tmp_path / "log.csv", gyro_bias="rests", **asked)
+    asked = {"algorithms": ["quaternion"], "rates_hz": [100]}
+    plain = compare_attitude(tmp_path / "log.csv", **asked)
+    course = compare_attitude(tmp_path / "log.csv", gyro_bias="rests", **asked)
     own = plain.shares[0].own_deg[2]
     bound = own + np.sqrt(3) * (5 * np.hypot(0.11, 0.05) + 2 * 0.009)
     assert course.scores[0].max_deg < bound
@@ -219,17 +219,17 @@ def test_the_course_of_a_trend_is_taken_off(tmp_path):
 
 
 def test_poses_that_are_alike_are_offered_and_can_be_taken(logs):
-    bench = bench_attitude(
-        logs / "first.csv", gyro_bias="rest", algorithms=["quaternion"], rates=[100]
+    bench = compare_attitude(
+        logs / "first.csv", gyro_bias="rest", algorithms=["quaternion"], rates_hz=[100]
     )
     assert len(bench.offers) >= 1
     offer = bench.offers[-1]
     # The phone is put back into the very same pose each time.
-    taken = bench_attitude(
+    taken = compare_attitude(
         logs / "first.csv",
         gyro_bias="rest",
         algorithms=["quaternion"],
-        rates=[100],
+        rates_hz=[100],
         reference=offer.words,
     )
     assert taken.offers == ()
@@ -238,10 +238,10 @@ def test_poses_that_are_alike_are_offered_and_can_be_taken(logs):
 
 
 def test_a_place_is_scored_for_every_algorithm():
-    bench = bench_attitude(
+    bench = compare_attitude(
         "gestures",
         algorithms=["quaternion", "rotvec"],
-        rates=[200],
+        rates_hz=[200],
         reference=["13 same place as 6", "end same as start"],
     )
     assert [p.algorithm for p in bench.places] == ["quaternion", "rotvec"]

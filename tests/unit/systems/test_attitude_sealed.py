@@ -8,13 +8,13 @@ import shutil
 import pytest
 
 from strapdown import simulate, verify
+from strapdown.api.attitude import compare_attitude
 from strapdown.peers import available_peers
 from strapdown.report.attitude import write_attitude
-from strapdown.systems.attitude_bench import bench_attitude
 
 pytestmark = pytest.mark.usefixtures("sketched")
 
-ASKED = {"algorithms": ["naive", "quaternion"], "rates": [50, 25]}
+ASKED = {"algorithms": ["naive", "quaternion"], "rates_hz": [50, 25]}
 SENSOR = (
     'title = "x"\nclass = "phone"\nsummary = "x"\n[gyro]\n'
     'bias_bound_deg_per_s = { value = 1, assumed = "for this test" }\n'
@@ -39,7 +39,7 @@ def logs(tmp_path):
 
 
 def test_trials_of_a_scenario_with_a_sensor(tmp_path):
-    bench = bench_attitude(
+    bench = compare_attitude(
         "alexiev-fig2c", sensor="stim300", trials=2, seed=3, tolerance_deg=0.2, **ASKED
     )
     seal = write_attitude(bench, tmp_path / "bundle")
@@ -53,7 +53,7 @@ def test_trials_of_a_scenario_with_a_sensor(tmp_path):
 def test_a_sensor_of_ones_own(tmp_path):
     own = tmp_path / "own.toml"
     own.write_text(SENSOR)
-    bench = bench_attitude("alexiev-fig2c", sensor=own, **ASKED)
+    bench = compare_attitude("alexiev-fig2c", sensor=own, **ASKED)
     seal = write_attitude(bench, tmp_path / "bundle")
     simulated = simulate(
         "alexiev-fig2c", tmp_path / "s", rate=50, sensor=str(tmp_path / "own.toml")
@@ -64,7 +64,7 @@ def test_a_sensor_of_ones_own(tmp_path):
 
 
 def test_several_logs_of_one_name_and_a_bias_of_another(logs, tmp_path):
-    bench = bench_attitude(logs[:2], gyro_bias=logs[2], **ASKED)
+    bench = compare_attitude(logs[:2], gyro_bias=logs[2], **ASKED)
     seal = write_attitude(bench, tmp_path / "bundle")
     told = json.loads((seal.path / "manifest.json").read_text(encoding="utf-8"))
     assert [i["name"] for i in told["inputs"]] == [
@@ -82,7 +82,7 @@ def test_a_second_log_rests_and_an_interpolation(logs, tmp_path):
     simulate("gestures", tmp_path / "first", rate=50, formats=["csv"])
     simulate("gestures", tmp_path / "second", rate=100, formats=["csv"])
     first, second = tmp_path / "first" / "log.csv", tmp_path / "second" / "log.csv"
-    bench = bench_attitude(
+    bench = compare_attitude(
         first,
         reference_log=second,
         reference=["rests", "13 same place as 6"],
@@ -98,7 +98,7 @@ def test_a_second_log_rests_and_an_interpolation(logs, tmp_path):
 
 @pytest.mark.skipif("vqf" not in available_peers(), reason="the library vqf is not installed")
 def test_other_libraries(logs, tmp_path):
-    bench = bench_attitude(logs[0], peers=["vqf"], **ASKED)
+    bench = compare_attitude(logs[0], peers=["vqf"], **ASKED)
     assert bench.peers
     seal = write_attitude(bench, tmp_path / "bundle")
     assert verify(moved(seal, logs, tmp_path / "elsewhere")).verdict == "identical"

@@ -8,11 +8,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from strapdown import simulate
-from strapdown.attitude import RotationVector, attitude_history, make_algorithm
+from strapdown.api.attitude import compare_attitude
+from strapdown.attitude_algorithms import RotationVector, attitude_history, make_algorithm
 from strapdown.formats.log_writers import LOG_WRITERS
 from strapdown.increments import increments_from_imu
 from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
-from strapdown.systems.attitude_bench import bench_attitude
 from strapdown.tables import QUATERNION, imu_table
 
 SINGLE = 2.0**-24
@@ -34,12 +34,12 @@ def scipy(table):
 @pytest.mark.parametrize(("name", "sensor", "sampling"), CASES)
 def test_sensor_and_algorithm_recombine_to_the_total(name, sensor, sampling):
     bias = "none" if name == "coning-slow" else "rest"
-    bench = bench_attitude(
+    bench = compare_attitude(
         name,
         sensor=sensor,
         sampling=sampling,
-        rate=50,
-        rates=[50],
+        rate_hz=50,
+        rates_hz=[50],
         gyro_bias=bias,
         algorithms=["quaternion", "dcm", "rk4"],
     )
@@ -79,7 +79,7 @@ def test_sensor_and_algorithm_recombine_to_the_total(name, sensor, sampling):
 
 
 def test_without_sensor_errors_all_of_it_is_the_algorithms():
-    bench = bench_attitude("alexiev-fig4", rates=[100], algorithms=["naive", "euler", "dcm"])
+    bench = compare_attitude("alexiev-fig4", rates_hz=[100], algorithms=["naive", "euler", "dcm"])
     for share, score in zip(bench.shares, bench.scores, strict=True):
         assert max(share.sensor_deg) < ROUNDING
         expected = (score.error_deg, score.rms_deg, score.max_deg)
@@ -87,9 +87,9 @@ def test_without_sensor_errors_all_of_it_is_the_algorithms():
 
 
 def test_a_start_that_was_given_is_not_the_algorithms_error():
-    at = {"algorithms": ["quaternion"], "rates": [100]}
-    plain = bench_attitude("alexiev-fig2c", **at)
-    turned = bench_attitude("alexiev-fig2c", initial="10,-20,5", **at)
+    at = {"algorithms": ["quaternion"], "rates_hz": [100]}
+    plain = compare_attitude("alexiev-fig2c", **at)
+    turned = compare_attitude("alexiev-fig2c", initial="10,-20,5", **at)
     assert turned.shares[0].own_deg == pytest.approx(plain.shares[0].own_deg, abs=1e-9)
     # The start: what a rotation of 10, -20, 5 deg from level turns by.
     start = np.degrees(Rotation.from_euler("ZYX", [5, -20, 10], degrees=True).magnitude())
@@ -113,7 +113,7 @@ def log(tmp_path_factory):
 
 
 def test_on_a_log_the_most_accurate_algorithm_stands_for_the_truth(log):
-    bench = bench_attitude(log, reference=log.with_name("truth.csv"), rates=[50])
+    bench = compare_attitude(log, reference=log.with_name("truth.csv"), rates_hz=[50])
     best = RotationVector(samples=4, coefficients="fit")
     q = attitude_history(
         best, increments_from_imu(bench.imu), bench.runs[0].attitude[QUATERNION].to_numpy()[0]
@@ -130,7 +130,7 @@ def test_on_a_log_the_most_accurate_algorithm_stands_for_the_truth(log):
 
 
 def test_on_a_log_without_a_truth_nothing_is_the_sensors(log):
-    bench = bench_attitude(log, rates=[50], reference="end same as 6")
+    bench = compare_attitude(log, rates_hz=[50], reference="end same as 6")
     assert {s.sensor_deg for s in bench.shares} == {None}
     assert all(s.own_deg[2] < 180.0 for s in bench.shares)
 
@@ -149,7 +149,7 @@ def test_single_precision_grows_with_the_steps(name, tmp_path):
     found = []
     for steps in (400, 12800):
         path = turning(steps, 1.0, tmp_path / f"{steps}.csv")
-        bench = bench_attitude(path, algorithms=[name], rates=[100])
+        bench = compare_attitude(path, algorithms=[name], rates_hz=[100])
         final, _, largest = bench.shares[0].single_deg
         turn = 0.01 * steps
         assert largest <= np.degrees(SINGLE * (3.0 * turn + 40.0 * steps))

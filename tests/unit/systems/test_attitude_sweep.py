@@ -7,20 +7,19 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from strapdown.attitude import make_algorithm
-from strapdown.errors import ConfigError
-from strapdown.evaluation.differences import Known
-from strapdown.increments import increments_from_imu
-from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
-from strapdown.systems.attitude_bench import bench_attitude
-from strapdown.systems.attitude_sweep import (
+from strapdown.api.attitude import compare_attitude
+from strapdown.attitude_algorithms import make_algorithm
+from strapdown.attitude_comparison.sweep import (
     Grounds,
-    OwnTruth,
     choose_factors,
     chosen_samples,
     sum_increments,
     sweep_rates,
 )
+from strapdown.errors import ConfigError
+from strapdown.evaluation.differences import Known
+from strapdown.increments import increments_from_imu
+from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
 from strapdown.tables import DTHETA, QUATERNION, THETA, imu_table, references_table
 
 ALGORITHMS = ["naive", "euler", "dcm", "quaternion", "rk4", "rotvec", "rotvec:samples=4"]
@@ -37,11 +36,11 @@ def cells(bench, meaning, factor):
 def test_leaving_samples_out_is_the_scenario_at_the_lower_rate(name, interpolation):
     """Stamps are k/100 and k/50, the nearest floating-point numbers to the same instants."""
     asked = {"algorithms": ALGORITHMS, "interpolation": interpolation}
-    full = bench_attitude(name, rate=100, rates=[50, 25], **asked)
+    full = compare_attitude(name, rate_hz=100, rates_hz=[50, 25], **asked)
     for rate, factor in ((50, 2), (25, 4)):
         if len(full.imu) % factor != 1:
             continue  # a scenario at the lower rate would end earlier
-        slow = bench_attitude(name, rate=rate, rates=[rate], **asked)
+        slow = compare_attitude(name, rate_hz=rate, rates_hz=[rate], **asked)
         found, expected = cells(full, "drop", factor), cells(slow, "drop", 1)
         np.testing.assert_array_equal(found[NUMBERS], expected.loc[found.index, NUMBERS])
         assert found["rate_hz"].iloc[0] == pytest.approx(rate, rel=1e-12)
@@ -49,11 +48,15 @@ def test_leaving_samples_out_is_the_scenario_at_the_lower_rate(name, interpolati
 
 @pytest.mark.parametrize("name", ["alexiev-fig2c", "coning-slow", "intensive"])
 def test_summing_mean_rates_is_the_slower_integrating_sensor(name):
-    full = bench_attitude(name, rate=100, rates=[50, 25], sampling="mean", algorithms=ALGORITHMS)
+    full = compare_attitude(
+        name, rate_hz=100, rates_hz=[50, 25], sampling="mean", algorithms=ALGORITHMS
+    )
     for rate, factor in ((50, 2), (25, 4)):
         if len(full.imu) % factor != 1:
             continue
-        slow = bench_attitude(name, rate=rate, rates=[rate], sampling="mean", algorithms=ALGORITHMS)
+        slow = compare_attitude(
+            name, rate_hz=rate, rates_hz=[rate], sampling="mean", algorithms=ALGORITHMS
+        )
         found, expected = cells(full, "sum", factor), cells(slow, "sum", 1)
         # Sums are rounded, by 1e-16 of the turn in each of a few thousand steps; the exact
         # attitude is the same function of the same instants.
@@ -65,7 +68,7 @@ def test_summing_mean_rates_is_the_slower_integrating_sensor(name):
 
 
 def test_the_full_rate_is_the_same_by_both_meanings_and_is_what_the_runs_say():
-    bench = bench_attitude("alexiev-fig2e", algorithms=ALGORITHMS, rates=[20])
+    bench = compare_attitude("alexiev-fig2e", algorithms=ALGORITHMS, rates_hz=[20])
     drop, both = cells(bench, "drop", 1), cells(bench, "sum", 1)
     assert drop.drop(columns="meaning").equals(both.drop(columns="meaning"))
     scores = {s.algorithm: s for s in bench.scores if s.against == "truth"}
@@ -129,7 +132,7 @@ def test_a_ragged_end_is_judged_at_the_last_sample():
     exact[:, 0] = np.cos(angle)
     exact[:, 1:] = np.sin(angle)[:, None] * np.array([0.3, -0.2, 0.5]) / np.sqrt(0.38)
     known = Known(exact, np.ones(102, dtype=bool))
-    grounds = Grounds(imu, q_nb, OwnTruth(known, imu), known, references_table([]), "linear")
+    grounds = Grounds(imu, q_nb, "linear", references_table([]), known, known, imu)
     sweep = sweep_rates(algorithms, grounds, (1, 2, 7, 40, 60), lambda stage, share: None)
     # Rounding of some 100 steps, and the square root of rounding nowhere: the angle is by sines.
     assert sweep[NUMBERS].to_numpy().max() < 1e-11
@@ -150,10 +153,11 @@ def test_what_does_not_count_in_the_truth_is_not_judged():
     grounds = Grounds(
         still,
         q[0],
-        OwnTruth(Known(q, np.ones(41, dtype=bool)), None),
-        Known(wrong, counts),
-        references_table([]),
         "linear",
+        references_table([]),
+        Known(wrong, counts),
+        Known(q, np.ones(41, dtype=bool)),
+        None,
     )
     sweep = sweep_rates([make_algorithm("dcm")], grounds, (1, 2, 15), lambda stage, share: None)
     assert (sweep["max_deg"] == 0.0).all()
@@ -180,11 +184,11 @@ def test_what_is_no_rate_is_refused(rate):
     with pytest.raises(ConfigError):
         choose_factors(irregular(), (rate,), [])
     with pytest.raises(ConfigError):
-        bench_attitude("alexiev-fig2a", rates=[rate])
+        compare_attitude("alexiev-fig2a", rates_hz=[rate])
 
 
 def test_a_scenario_without_a_rate_is_sampled_at_the_highest_asked_for():
-    bench = bench_attitude("alexiev-fig2a", rates=[50, 200, 25], algorithms=["dcm"])
+    bench = compare_attitude("alexiev-fig2a", rates_hz=[50, 200, 25], algorithms=["dcm"])
     assert bench.sweep[bench.sweep["meaning"] == "drop"]["factor"].tolist() == [1, 4, 8]
     assert bench.sweep["rate_hz"].max() == pytest.approx(200.0)
 
@@ -197,7 +201,7 @@ def test_an_algorithm_that_leaves_the_numbers_has_an_infinite_error():
     q_nb = np.array([1.0, 0.0, 0.0, 0.0])
     known = Known(np.tile(q_nb, (41601, 1)), np.ones(41601, dtype=bool))
     points = references_table([{"time": 400.0, "kind": "same", "since": 0.0}])
-    grounds = Grounds(imu, q_nb, OwnTruth(known, None), known, points, "linear")
+    grounds = Grounds(imu, q_nb, "linear", points, known, known, None)
     sweep = sweep_rates([growing], grounds, (1, 128), lambda stage, share: None)
     assert np.isfinite(sweep[sweep["factor"] == 1][NUMBERS].to_numpy()).all()
     columns = [*NUMBERS, "reference_deg"]
@@ -205,7 +209,7 @@ def test_an_algorithm_that_leaves_the_numbers_has_an_infinite_error():
 
 
 def test_errors_at_reference_points_are_at_the_same_instants_at_every_rate():
-    bench = bench_attitude("gestures", algorithms=["quaternion"], rates=[100, 50])
+    bench = compare_attitude("gestures", algorithms=["quaternion"], rates_hz=[100, 50])
     assert (bench.sweep["reference_deg"] > 0.0).all()
     assert (bench.sweep["error_deg"] >= bench.sweep["reference_deg"]).all()
     largest = max(s.error_deg for s in bench.scores if s.against != "truth")

@@ -8,12 +8,12 @@ import pytest
 from scipy import stats
 
 from strapdown import simulate
+from strapdown.api.attitude import compare_attitude
+from strapdown.attitude_comparison.sweep import rank, trial_names, worst_sweep
 from strapdown.config import LogSpec, ScenarioSpec
 from strapdown.errors import ConfigError
 from strapdown.formats.log_writers import LOG_WRITERS
 from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
-from strapdown.systems.attitude_bench import bench_attitude
-from strapdown.systems.attitude_sweep import rank, trial_names, worst_sweep
 
 ALGORITHMS = ["naive", "quaternion"]
 
@@ -96,12 +96,12 @@ def test_names_are_all_different():
 
 
 def test_seeds_of_a_scenario_are_those_of_separate_runs():
-    asked = {"algorithms": ALGORITHMS, "rates": [100, 50]}
-    bench = bench_attitude("alexiev-fig2d", trials=3, seed=5, **asked)
+    asked = {"algorithms": ALGORITHMS, "rates_hz": [100, 50]}
+    bench = compare_attitude("alexiev-fig2d", trials=3, seed=5, **asked)
     assert bench.trials.names == tuple(f"alexiev-fig2d, seed {k}" for k in (5, 6, 7))
     table = bench.trials.errors.set_index(["trial", "algorithm"])
     assert len(table) == 6
-    alone = [bench_attitude("alexiev-fig2d", seed=k, **asked) for k in (5, 6, 7)]
+    alone = [compare_attitude("alexiev-fig2d", seed=k, **asked) for k in (5, 6, 7)]
     for k, one in zip((5, 6, 7), alone, strict=True):
         for score in one.scores:
             cell = table.loc[(f"alexiev-fig2d, seed {k}", score.algorithm)]
@@ -117,22 +117,22 @@ def test_seeds_of_a_scenario_are_those_of_separate_runs():
 
 def test_the_answer_holds_for_the_worst_trial():
     """Between the smallest and the largest error of the trials no trial's answer may decide."""
-    asked = {"algorithms": ["quaternion"], "rates": [100]}
-    alone = [bench_attitude("alexiev-fig2d", seed=k, **asked) for k in (0, 1, 2)]
+    asked = {"algorithms": ["quaternion"], "rates_hz": [100]}
+    alone = [compare_attitude("alexiev-fig2d", seed=k, **asked) for k in (0, 1, 2)]
     largest = [float(a.sweep["error_deg"].max()) for a in alone]
     between = 0.5 * (min(largest) + max(largest))
     assert min(largest) < between < max(largest)
-    bench = bench_attitude("alexiev-fig2d", trials=3, tolerance_deg=between, **asked)
+    bench = compare_attitude("alexiev-fig2d", trials=3, tolerance_deg=between, **asked)
     assert bench.answer.verdict != "enough"
-    wide = bench_attitude("alexiev-fig2d", trials=3, tolerance_deg=max(largest), **asked)
+    wide = compare_attitude("alexiev-fig2d", trials=3, tolerance_deg=max(largest), **asked)
     assert wide.answer.verdict == "enough"
     assert f"{max(largest):.3g}°" in wide.answer.sentence
 
 
 def test_what_would_help_several_trials_is_what_helps_the_worst():
-    bench = bench_attitude("alexiev-fig2e", trials=2, algorithms=["quaternion"], rates=[100])
+    bench = compare_attitude("alexiev-fig2e", trials=2, algorithms=["quaternion"], rates_hz=[100])
     alone = [
-        bench_attitude("alexiev-fig2e", seed=k, algorithms=["quaternion"], rates=[100])
+        compare_attitude("alexiev-fig2e", seed=k, algorithms=["quaternion"], rates_hz=[100])
         for k in (0, 1)
     ]
 
@@ -141,7 +141,7 @@ def test_what_would_help_several_trials_is_what_helps_the_worst():
         return float(said.split(") ")[1].split("°")[0])
 
     assert left(bench.answer) == max(left(a.answer) for a in alone)
-    coning = bench_attitude(["coning", "coning-slow"], algorithms=["rk4"], rates=[100])
+    coning = compare_attitude(["coning", "coning-slow"], algorithms=["rk4"], rates_hz=[100])
     # By the trapezoid rk4 is of second order: sqrt of the error, and not its fourth root.
     error = float(coning.sweep["error_deg"].max())
     needed = next(h for h in coning.answer.helps if "higher rate" in h)
@@ -160,8 +160,8 @@ def logs(tmp_path_factory):
 
 def test_logs_of_different_rates_are_judged_at_rates_that_both_have(logs):
     for order in (logs, logs[::-1]):
-        bench = bench_attitude(order, algorithms=ALGORITHMS)
-        alone = {p: bench_attitude(p, algorithms=ALGORITHMS).sweep for p in order}
+        bench = compare_attitude(order, algorithms=ALGORITHMS)
+        alone = {p: compare_attitude(p, algorithms=ALGORITHMS).sweep for p in order}
         assert bench.trials.names == ("log.csv (1)", "log.csv (2)")
         for cell in bench.sweep.to_dict("records"):
             # What is said of a rate holds for each log at that rate or at a lower one.
@@ -203,14 +203,14 @@ def test_a_log_of_which_nothing_is_known_among_others(logs, tmp_path):
     imu, _ = simulate_imu(find_scenario("alexiev-fig2c").motion, ImuErrors(), rate=50.0)
     LOG_WRITERS["csv"](tmp_path / "unknown.csv", imu, None)
     for order in ([logs[0], tmp_path / "unknown.csv"], [tmp_path / "unknown.csv", logs[0]]):
-        bench = bench_attitude(order, algorithms=ALGORITHMS, rates=[50])
+        bench = compare_attitude(order, algorithms=ALGORITHMS, rates_hz=[50])
         assert bench.answer.verdict == "enough"
         told = [f for f in bench.findings if "nothing is known" in f.what]
         assert [f.file for f in told] == ["unknown.csv"]
 
 
 def test_findings_and_inputs_are_told_of_every_trial(logs):
-    bench = bench_attitude(logs, algorithms=ALGORITHMS, rates=[50])
+    bench = compare_attitude(logs, algorithms=ALGORITHMS, rates_hz=[50])
     assert [i.path for i in bench.inputs] == logs
     assert all(f.file for f in bench.findings)
     assert len(bench.specification["also"]) == 1
@@ -229,11 +229,11 @@ def test_findings_and_inputs_are_told_of_every_trial(logs):
 )
 def test_what_are_no_trials_is_refused(asked):
     with pytest.raises(ConfigError):
-        bench_attitude(asked.pop("source"), **asked)
+        compare_attitude(asked.pop("source"), **asked)
 
 
 def test_a_log_is_not_drawn_again_or_named_twice(logs):
     with pytest.raises(ConfigError, match="several logs"):
-        bench_attitude(logs[0], trials=3)
+        compare_attitude(logs[0], trials=3)
     with pytest.raises(ConfigError, match="named twice"):
-        bench_attitude([logs[0], logs[0]])
+        compare_attitude([logs[0], logs[0]])

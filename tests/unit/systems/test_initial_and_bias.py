@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from strapdown.api.attitude import compare_attitude
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats.log_writers import LOG_WRITERS
-from strapdown.systems.attitude_bench import bench_attitude
 from strapdown.tables import GYRO, imu_table
 
 BIAS = np.array([0.02, -0.03, 0.01])
@@ -29,26 +29,26 @@ def log(tmp_path) -> Path:
     "bias", ["rest", "0.02,-0.03,0.01", "0.02, -0.03, 0.01 rad/s", tuple(BIAS), BIAS, "REST"]
 )
 def test_the_bias_is_taken_off(log, bias):
-    bench = bench_attitude(log, gyro_bias=bias)
+    bench = compare_attitude(log, gyro_bias=bias)
     assert np.abs(bench.imu[GYRO].to_numpy()[:500]).max() < 1e-15
 
 
 def test_a_bias_in_degrees_and_from_a_log(log):
     words = ",".join(str(v) for v in np.degrees(BIAS)) + " deg/s"
     for bias in (words, log, str(log)):
-        bench = bench_attitude(log, gyro_bias=bias)
+        bench = compare_attitude(log, gyro_bias=bias)
         assert np.abs(bench.imu[GYRO].to_numpy()[:500]).max() < 1e-15
 
 
 @pytest.mark.parametrize("bias", ["1,2", "a,b,c", "1,2,3 rpm", "nan,0,0", "typo", ""])
 def test_what_is_no_bias_is_refused(log, bias):
     with pytest.raises(ConfigError):
-        bench_attitude(log, gyro_bias=bias)
+        compare_attitude(log, gyro_bias=bias)
 
 
 @pytest.mark.parametrize("initial", ["10,-20,300", (10, -20, 300), np.array([10.0, -20, 300])])
 def test_the_start_is_as_given(log, initial):
-    found = bench_attitude(log, initial=initial).initial
+    found = compare_attitude(log, initial=initial).initial
     angles = [found[k] for k in ("roll_deg", "pitch_deg", "heading_deg")]
     assert angles == pytest.approx([10, -20, 300], abs=1e-9)
 
@@ -56,7 +56,7 @@ def test_the_start_is_as_given(log, initial):
 @pytest.mark.parametrize("initial", ["1,2", "north", "nan,0,0", "1e300,0,0", "truth", "level"])
 def test_a_start_that_cannot_be_had_is_refused(log, initial):
     with pytest.raises(ConfigError):
-        bench_attitude(log, initial=initial)
+        compare_attitude(log, initial=initial)
 
 
 @pytest.mark.parametrize(
@@ -64,8 +64,8 @@ def test_a_start_that_cannot_be_had_is_refused(log, initial):
     [
         {"seed": -1},
         {"seed": 1.5},
-        {"rate": float("nan")},
-        {"rate": "fast"},
+        {"rate_hz": float("nan")},
+        {"rate_hz": "fast"},
         {"from_s": float("-inf")},
         {"axes": ["x"]},
         {"columns": {"time": 1}},
@@ -78,29 +78,29 @@ def test_a_start_that_cannot_be_had_is_refused(log, initial):
 )
 def test_values_that_do_not_fit_are_our_own_errors(log, options):
     with pytest.raises((ConfigError, DataError)):
-        bench_attitude(log, **options)
+        compare_attitude(log, **options)
 
 
 def test_one_text_stands_for_a_list_of_one(log):
-    bench = bench_attitude(log, algorithms="QUATERNION", reference="end same as start")
+    bench = compare_attitude(log, algorithms="QUATERNION", reference="end same as start")
     assert [s.algorithm for s in bench.scores] == ["quaternion"]
 
 
 @pytest.mark.parametrize("option", [{"axes": "x,-y,-z"}, {"gyro_unit": "deg/s"}, {"repair": True}])
 def test_a_scenario_is_not_read_from_a_file(option):
     with pytest.raises(ConfigError, match="not read from a file"):
-        bench_attitude("alexiev-fig4", **option)
+        compare_attitude("alexiev-fig4", **option)
 
 
 def test_the_part_that_was_used_is_told(log):
-    bench = bench_attitude(log, from_s=2.0, to_s=8.0)
+    bench = compare_attitude(log, from_s=2.0, to_s=8.0)
     assert "601 samples in 6 s" in bench.description
     assert "the part from 2 to 8 s" in bench.description
 
 
 def test_a_run_through_the_pole_is_told_at_any_rate():
     for rate in (5, 20, 50):
-        bench = bench_attitude("alexiev-fig4", rate=rate, algorithms=["euler"])
+        bench = compare_attitude("alexiev-fig4", rate_hz=rate, algorithms=["euler"])
         near = bench.runs[0].diagnostics["closest_to_pole_deg"]
         pitch = bench.runs[0].attitude["pitch"]
         # Read as 3-2-1 angles an attitude beyond the pole has turned roll and heading around.
@@ -113,7 +113,7 @@ def test_turns_on_a_log_of_means(tmp_path):
     gyro = np.zeros((101, 3))
     gyro[1:51, 2] = 2 * np.pi / 5.0
     LOG_WRITERS["csv"](tmp_path / "log.csv", imu_table(time, gyro, sampling="mean"), None)
-    bench = bench_attitude(
+    bench = compare_attitude(
         tmp_path / "log.csv",
         algorithms=["naive", "euler", "dcm", "quaternion"],
         reference="end 1 turn about z since start",
@@ -123,6 +123,6 @@ def test_turns_on_a_log_of_means(tmp_path):
 
 
 def test_a_summary_of_nothing_still_has_its_columns(log):
-    summary = bench_attitude(log).summary
+    summary = compare_attitude(log).summary
     assert len(summary) == 0
     assert {"algorithm", "against", "error_deg"} <= set(summary.columns)

@@ -7,11 +7,11 @@ import json
 import pytest
 
 from strapdown import simulate, verify
+from strapdown.attitude_comparison.source import simulate_scenario
 from strapdown.config import ScenarioSpec, specify
 from strapdown.errors import ConfigError
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.simulation import find_scenario, simulate_imu
-from strapdown.systems.attitude_source import simulate_scenario
 
 
 def test_the_errors_are_those_of_the_unit_that_the_seed_draws():

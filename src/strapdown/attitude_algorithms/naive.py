@@ -8,7 +8,12 @@ import numpy as np
 
 from strapdown import rotation
 from strapdown._kernels import attitude as kernel
-from strapdown.attitude.algorithm import Accuracy, Array, AttitudeAlgorithm, quaternions_from_angles
+from strapdown.attitude_algorithms.algorithm import (
+    Accuracy,
+    Array,
+    AttitudeAlgorithm,
+    quaternions_from_angles,
+)
 
 
 @dataclass(frozen=True)
@@ -40,7 +45,3 @@ class Naive(AttitudeAlgorithm):
     def accuracy(self) -> Accuracy:
         """Zero: a commutation error, independent of the step."""
         return Accuracy(increments=0, rates=0, coning=0)
-
-    def kernel_options(self) -> tuple[float, float]:
-        """Return no options: there are none."""
-        return 0.0, 0.0

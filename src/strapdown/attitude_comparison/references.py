@@ -3,33 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.config import AttitudeSpec, ScenarioSpec
+from strapdown.attitude_algorithms.algorithm import AttitudeRun
+from strapdown.attitude_comparison.options import AttitudeSpec
+from strapdown.attitude_comparison.source import Source
+from strapdown.bundle.seal import input_files
+from strapdown.config import ScenarioSpec
 from strapdown.errors import ConfigError, Finding
 from strapdown.evaluation.differences import error_angles, known_at
-from strapdown.evaluation.position_references import PlaceReference, is_place, parse_place
 from strapdown.evaluation.reference_points import (
+    SamePose,
+    Score,
     references_from_words,
     same_pose_candidates,
     score_references,
     tilt_references,
 )
-from strapdown.evaluation.second_log import align_second_log, second_clock, truth_from_second_log
+from strapdown.evaluation.second_log import SecondLog
 from strapdown.formats import read_log
 from strapdown.formats.recording import Recording
 from strapdown.peers import PEERS, align_heading, run_peers
-from strapdown.results.attitude_bench import AttitudeRun, PeerRun, Score, SecondLog
-from strapdown.results.rests import RestStretch, SamePose
-from strapdown.sensors.rest import find_rests
-from strapdown.simulation import find_scenario
-from strapdown.systems.attitude_source import Source
-from strapdown.systems.inputs import input_files
+from strapdown.sensors.rest import RestStretch, find_rests
 from strapdown.tables import QUATERNION, THETA, attitude_table, find_gaps
+
+if TYPE_CHECKING:
+    from strapdown.evaluation.position_references import PlaceReference, PositionScore
+    from strapdown.evaluation.second_log import SecondLog
 
 Array = NDArray[np.float64]
 
@@ -38,12 +43,43 @@ RESTS = "rests"
 
 
 @dataclass(frozen=True)
-class Told:
+class PeerRun:
+    """Another library's filter over the same log.
+
+    Attributes
+    ----------
+    peer : str
+        Name and version.
+    aiding : str
+        ``gyro``, ``gyro+accel`` or ``gyro+accel+mag``; compare only equal aidings.
+    attitude : DataFrame
+        Attitude table.
+    scores : tuple of Score
+    """
+
+    peer: str
+    aiding: str
+    attitude: pd.DataFrame = field(repr=False)
+    scores: tuple[Score, ...]
+
+
+@dataclass(frozen=True)
+class KnownReferences:
     """Reference points of attitude and position, and suggestions for more."""
 
     points: pd.DataFrame
     places: tuple[PlaceReference, ...]
     offers: tuple[SamePose, ...]
+
+    def score_positions(
+        self, run: AttitudeRun, imu: pd.DataFrame, rests: Sequence[RestStretch]
+    ) -> tuple[PositionScore, ...]:
+        """Compare the displacements of a run with the known ones."""
+        if not self.places:
+            return ()
+        from strapdown.evaluation.position_references import score_places
+
+        return score_places(run, self.places, imu, rests)
 
 
 def gather_references(
@@ -52,7 +88,7 @@ def gather_references(
     span: tuple[float, float],
     rests: tuple[RestStretch, ...],
     levelled: bool,
-) -> Told:
+) -> KnownReferences:
     """Collect reference points from sentences, a scenario, and rests.
 
     Parameters
@@ -67,7 +103,8 @@ def gather_references(
 
     Returns
     -------
-    Told
+    KnownReferences
+    ----------
 
     Raises
     ------
@@ -78,10 +115,18 @@ def gather_references(
     words = list(spec.references)
     whole = spec.from_s is spec.to_s is spec.duration_s is None
     if isinstance(spec.source, ScenarioSpec) and not words and whole:
+        from strapdown.simulation import find_scenario
+
         words = list(find_scenario(spec.source.name).references)
     asked = [w for w in words if w.strip().lower() == RESTS]
     words = [w for w in words if w.strip().lower() != RESTS]
-    points = references_from_words([w for w in words if not is_place(w)], *span)
+    positions: tuple[PlaceReference, ...] = ()
+    if words:
+        from strapdown.evaluation.position_references import is_place, parse_place
+
+        positions = tuple(parse_place(w, *span) for w in words if is_place(w))
+        words = [w for w in words if not is_place(w)]
+    points = references_from_words(words, *span)
     usable = [r for r in rests if r.accel_mean is not None and r.start >= span[0]]
     if asked:
         tilts = tilt_references(usable, levelled_from=usable[0] if levelled and usable else None)
@@ -92,9 +137,9 @@ def gather_references(
                 quantity="--reference rests",
             )
         points = pd.concat([points, tilts], ignore_index=True) if len(points) else tilts
-    return Told(
+    return KnownReferences(
         points,
-        tuple(parse_place(w, *span) for w in words if is_place(w)),
+        positions,
         same_pose_candidates(usable) if points.empty else (),
     )
 
@@ -132,6 +177,12 @@ def read_second(spec: AttitudeSpec, source: Source) -> tuple[Source, Second | No
         return source, None
     if spec.truth_path is not None:
         raise ConfigError("attitude.attitude-truth-given-too", quantity="--reference-log")
+    from strapdown.evaluation.second_log import (
+        align_second_log,
+        second_clock,
+        truth_from_second_log,
+    )
+
     recording = read_log(spec.reference_log_path)
     aligned = align_second_log(source.imu, recording.imu)
     inside = (source.imu.index >= aligned.start) & (source.imu.index <= aligned.end)
@@ -173,6 +224,8 @@ def truth_of_second(source: Source, second: Second, imu: pd.DataFrame, q_nb: Arr
     Source
         With a truth, and a finding if the second log's own bias is unknown.
     """
+    from strapdown.evaluation.second_log import truth_from_second_log
+
     rests = find_rests(second.recording.imu)
     bias = rests[0].gyro_mean if rests else (0.0, 0.0, 0.0)
     findings = source.findings
@@ -363,6 +416,7 @@ def run_beside(
     """
     if not names:
         return ()
+
     wanted = list(PEERS) if [n.lower() for n in names] == ["all"] else list(names)
     runs, found = run_peers(wanted, imu, q_nb, longest_s=LONGEST)
     findings += found
@@ -377,6 +431,7 @@ def run_beside(
 
 
 def _headed(attitude: pd.DataFrame, truth: pd.DataFrame) -> pd.DataFrame:
+
     inside = truth[(truth.index >= attitude.index[0]) & (truth.index <= attitude.index[-1])]
     if inside.empty:
         return attitude

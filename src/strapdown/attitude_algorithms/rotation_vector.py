@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from strapdown._kernels import rotation_vector as kernel
-from strapdown.attitude.algorithm import Accuracy, Array, AttitudeAlgorithm, unit_quaternions
+from strapdown.attitude_algorithms.algorithm import Accuracy, Array, AttitudeAlgorithm
 from strapdown.errors import ConfigError
 
 _COEFFICIENTS = {"auto": kernel.AUTO, "miller": kernel.MILLER, "fit": kernel.FIT}
@@ -41,7 +41,6 @@ class RotationVector(AttitudeAlgorithm):
     equations = ""
     source = "Bortz (1971), Miller (1983)"
     summary = "rotation vector of 1 to 4 increments, compensated for coning"
-    width = 4
     advance_kernel = staticmethod(kernel.rotvec_advance)
     update_kernel = staticmethod(kernel.rotvec_update)
 
@@ -67,10 +66,6 @@ class RotationVector(AttitudeAlgorithm):
         state = np.zeros(kernel.STATE)
         state[:4] = state[4:8] = q_nb
         return state
-
-    def quaternions(self, history: Array) -> Array:
-        """Scale each to norm 1, against rounding."""
-        return unit_quaternions(history)
 
     @property
     def accuracy(self) -> Accuracy:

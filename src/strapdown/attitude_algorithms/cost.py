@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
 
@@ -14,13 +15,38 @@ from numpy.typing import ArrayLike, NDArray
 from strapdown import rotation
 from strapdown._kernels import arithmetic
 from strapdown._kernels.arithmetic import single_precision
-from strapdown.attitude.algorithm import Array, AttitudeAlgorithm
+from strapdown.attitude_algorithms.algorithm import Array, AttitudeAlgorithm
 from strapdown.constants import CORTEX_M4F_CYCLES
-from strapdown.results.attitude_bench import Cost
 from strapdown.tables import GYRO
 
 STEPS = 12
 TURN = 0.01
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Computational cost of one sample.
+
+    Attributes
+    ----------
+    algorithm : str
+    add, multiply, divide, sqrt, trig : float
+        Operations, counted on the kernel itself in steps of 0.01 rad, and averaged over the
+        samples of a block. Subtractions count as additions.
+    cycles : float
+        The same in cycles of a Cortex-M4F (`constants.CORTEX_M4F_CYCLES`): a weight for ranking.
+    memory : int
+        Count of numbers stored between samples.
+    """
+
+    algorithm: str
+    add: float
+    multiply: float
+    divide: float
+    sqrt: float
+    trig: float
+    cycles: float
+    memory: int
 
 
 class _State(list[Any]):
@@ -46,7 +72,7 @@ def _counted_run(
         return arithmetic.Counted(value, count)
 
     home, name = step_kernel(algorithm)
-    step = getattr(arithmetic.counted_kernels()[home], name)
+    step = getattr(arithmetic.counted_kernels(home), name)
     start = algorithm.begin(rotation.quaternion_from_euler([20.0, -35.0, 250.0]))
     state = _State(number(float(v)) for v in start)
     for k, dt in enumerate(lengths):
@@ -58,11 +84,16 @@ def _counted_run(
     return count, state
 
 
+def kernel_home(algorithm: AttitudeAlgorithm) -> str:
+    """Module of an algorithm's kernels: one of `arithmetic.SOURCES`, or a plug-in's."""
+    home: str = type(algorithm).advance_kernel.py_func.__module__
+    return home.removeprefix(f"{arithmetic.PACKAGE}.")
+
+
 def step_kernel(algorithm: AttitudeAlgorithm) -> tuple[str, str]:
     """Return the module and the name of the kernel of one step."""
-    kernel: Any = type(algorithm).advance_kernel
-    home = kernel.py_func.__module__.rpartition(".")[2]
-    return home, kernel.py_func.__name__.replace("_advance", "_step")
+    name: str = type(algorithm).advance_kernel.py_func.__name__
+    return kernel_home(algorithm), name.replace("_advance", "_step")
 
 
 def operation_count(algorithm: AttitudeAlgorithm) -> dict[str, float]:
@@ -201,9 +232,8 @@ def single_increments(imu: pd.DataFrame, interpolation: str = "linear") -> tuple
 
 def single_kernel(algorithm: AttitudeAlgorithm) -> Any:
     """Return the loop of an algorithm over many steps, compiled in single precision."""
-    function = type(algorithm).advance_kernel.py_func
-    module = single_precision(function.__module__.rpartition(".")[2])
-    return getattr(module, function.__name__)
+    name = type(algorithm).advance_kernel.py_func.__name__
+    return getattr(single_precision(kernel_home(algorithm)), name)
 
 
 def run_single(

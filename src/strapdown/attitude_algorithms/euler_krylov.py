@@ -9,7 +9,12 @@ import numpy as np
 
 from strapdown import rotation
 from strapdown._kernels import attitude as kernel
-from strapdown.attitude.algorithm import Accuracy, Array, AttitudeAlgorithm, quaternions_from_angles
+from strapdown.attitude_algorithms.algorithm import (
+    Accuracy,
+    Array,
+    AttitudeAlgorithm,
+    quaternions_from_angles,
+)
 from strapdown.errors import ConfigError
 
 

@@ -1,4 +1,4 @@
-"""Answer of the attitude bench: simplest algorithm and lowest rate of sufficient accuracy."""
+"""Answer of a comparison: simplest algorithm and lowest rate of sufficient accuracy."""
 
 from __future__ import annotations
 
@@ -8,12 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
-from strapdown.attitude import AttitudeAlgorithm, RotationVector
+from strapdown.attitude_algorithms import AttitudeAlgorithm, RotationVector
+from strapdown.attitude_algorithms.cost import Cost
+from strapdown.attitude_comparison.sweep import (
+    MOST_ACCURATE,
+    Grounds,
+    error_at_full_rate,
+)
 from strapdown.evaluation.differences import Errors
-from strapdown.results.attitude_bench import Answer, Cost
-from strapdown.results.rests import RestStretch
-from strapdown.rotation.euler_angles import unit_rotation_angle
-from strapdown.systems.attitude_sweep import MOST_ACCURATE, Grounds, best_error, error_at_full_rate
+from strapdown.rotation import unit_rotation_angle
+from strapdown.sensors.rest import RestStretch
 from strapdown.tables import GYRO
 
 # Where the sensor error exceeds the tolerance, an algorithm error below this share of it is
@@ -30,6 +34,35 @@ LOST = 90.0
 
 
 @dataclass(frozen=True)
+class Answer:
+    """The simplest algorithm, and the lowest rate, that are accurate enough.
+
+    Attributes
+    ----------
+    verdict : str
+        ``enough``: one is found; ``sensor``: none, because of the sensor; ``rate``: none,
+        because of the rate; ``own``: the attitude has no reference, and the algorithm error
+        was judged.
+    sentence : str
+        The answer as text.
+    tolerance_deg : float
+    algorithm, meaning : str or None
+    rate_hz : float or None
+    why, helps : tuple of str
+        Reasons, and possible remedies.
+    """
+
+    verdict: str
+    sentence: str
+    tolerance_deg: float
+    algorithm: str | None
+    meaning: str | None
+    rate_hz: float | None
+    why: tuple[str, ...]
+    helps: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Evidence:
     """Evidence for the answer.
 
@@ -39,7 +72,7 @@ class Evidence:
     costs : sequence of Cost
         In the same order.
     sweep : DataFrame
-        As `results.AttitudeBench.sweep`.
+        As `AttitudeComparison.sweep`.
     sensor : tuple of float or None
         Error of the sensor alone, deg, where it is known.
     known : bool
@@ -377,9 +410,9 @@ def find_evidence(
     costs : sequence of Cost
         In the same order.
     sweep : DataFrame
-        As `results.AttitudeBench.sweep`.
+        As `AttitudeComparison.sweep`.
     bias : dict
-        As `results.AttitudeBench.gyro_bias`.
+        As `AttitudeComparison.gyro_bias`.
     rests : tuple of RestStretch
     between_deg : float or None, deg
         Possible effect of the rate between its stamps.
@@ -388,18 +421,17 @@ def find_evidence(
     -------
     Evidence
     """
-    own, known, references = grounds.own, grounds.truth, grounds.references
     return Evidence(
         algorithms=algorithms,
         costs=costs,
         sweep=sweep,
-        sensor=best_error(own, known, grounds.imu, grounds.q_nb, grounds.interpolation),
-        known=known is not None or bool(len(references)),
-        exact=own.exact,
+        sensor=grounds.sensor_errors(),
+        known=grounds.known,
+        exact=grounds.exact,
         without_bias=_without_bias(grounds, bias, rests),
         with_cubic=_with_cubic(grounds),
         start=_start_error(grounds),
-        sampling=0.0 if own.exact or between_deg is None else between_deg,
+        sampling=0.0 if grounds.exact or between_deg is None else between_deg,
         reference_sd=_reference_sd(grounds),
     )
 
@@ -412,7 +444,7 @@ def worst_evidence(evidence: Sequence[Evidence], sweep: pd.DataFrame) -> Evidenc
     evidence : sequence of Evidence
         Of each trial, over the same algorithms.
     sweep : DataFrame
-        Of all trials (`attitude_sweep.worst_sweep`).
+        Of all trials (`sweep.worst_sweep`).
 
     Returns
     -------
@@ -458,8 +490,7 @@ def _without_bias(
     grounds: Grounds, bias: dict[str, object], rests: tuple[RestStretch, ...]
 ) -> float | None:
     """Remaining error of the most accurate algorithm with the bias of a rest removed."""
-    nothing_known = grounds.truth is None and grounds.references.empty
-    if bias["rad_per_s"] is not None or not rests or nothing_known:
+    if bias["rad_per_s"] is not None or not rests or not grounds.known:
         return None
     imu = grounds.imu.copy()
     imu[GYRO] = imu[GYRO].to_numpy() - np.asarray(rests[0].gyro_mean)
@@ -470,6 +501,6 @@ def _with_cubic(grounds: Grounds) -> float | None:
     """Remaining error with cubic interpolation of the rates, where it was linear."""
     if grounds.interpolation == "cubic" or grounds.imu.attrs["sampling"] == "mean":
         return None
-    if grounds.truth is None and grounds.references.empty:
+    if not grounds.known:
         return None
     return error_at_full_rate(RotationVector(samples=1), replace(grounds, interpolation="cubic"))

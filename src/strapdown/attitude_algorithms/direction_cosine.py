@@ -9,7 +9,7 @@ import numpy as np
 from strapdown import rotation
 from strapdown._kernels import attitude as kernel
 from strapdown._kernels import rotation as kernel_rotation
-from strapdown.attitude.algorithm import Accuracy, Array, AttitudeAlgorithm
+from strapdown.attitude_algorithms.algorithm import Accuracy, Array, AttitudeAlgorithm
 from strapdown.errors import ConfigError
 
 

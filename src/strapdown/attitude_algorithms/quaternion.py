@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from strapdown._kernels import attitude as kernel
-from strapdown.attitude.algorithm import Accuracy, Array, AttitudeAlgorithm, unit_quaternions
+from strapdown.attitude_algorithms.algorithm import Accuracy, Array, AttitudeAlgorithm
 from strapdown.errors import ConfigError
 
 
@@ -31,7 +31,6 @@ class Quaternion(AttitudeAlgorithm):
     title = "Quaternion"
     equations = "(20)-(22)"
     summary = "four numbers, multiplied by the quaternion of each increment"
-    width = 4
     advance_kernel = staticmethod(kernel.quaternion_advance)
     update_kernel = staticmethod(kernel.quaternion_update)
 
@@ -41,14 +40,6 @@ class Quaternion(AttitudeAlgorithm):
     def __post_init__(self) -> None:
         if not 0 <= self.order <= 20:
             raise ConfigError("attitude.out-range-2", quantity="quaternion:order", order=self.order)
-
-    def begin(self, q_nb: Array) -> Array:
-        """Return the quaternion itself."""
-        return np.array(q_nb, dtype=np.float64)
-
-    def quaternions(self, history: Array) -> Array:
-        """Scale each to norm 1: a truncated series without `normalise` grows or shrinks."""
-        return unit_quaternions(history)
 
     @property
     def accuracy(self) -> Accuracy:

@@ -1,29 +1,30 @@
-"""Input of the attitude bench: a log or a scenario, its truth, its window."""
+"""Source of a comparison: a log or a scenario, its truth, and the part that is used."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.attitude import Quaternion, run_attitude
-from strapdown.config import AttitudeSpec, LogSpec, ScenarioSpec
+from strapdown.attitude_algorithms import Quaternion, run_attitude
+from strapdown.attitude_comparison.options import AttitudeSpec
+from strapdown.bundle.seal import InputFiles, input_files, sensor_file
+from strapdown.config import LogSpec, ScenarioSpec
 from strapdown.errors import DataError, Finding
 from strapdown.evaluation.differences import error_angles
 from strapdown.formats import read_log
-from strapdown.formats.recording import Origin, ReadOptions
-from strapdown.formats.references import read_truth
+from strapdown.formats.recording import Origin, Reading, ReadOptions
 from strapdown.increments import increments_from_imu
-from strapdown.results.inputs import InputFiles, Reading
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
-from strapdown.systems.inputs import input_files, sensor_file
 from strapdown.tables import QUATERNION
 
-Array = NDArray[np.float64]
+if TYPE_CHECKING:
+    from strapdown.simulation import ImuErrors
 
 
 @dataclass(frozen=True)
@@ -79,6 +80,8 @@ def scenario_errors(spec: ScenarioSpec) -> ImuErrors:
     ConfigError
         The scenario or the sensor is unknown.
     """
+    from strapdown.simulation import find_scenario
+
     if spec.sensor is None:
         return find_scenario(spec.name).errors
     return load_sensor(spec.sensor).draw(spec.seed)
@@ -125,6 +128,8 @@ def read_source(spec: AttitudeSpec) -> Source:
 
 
 def _scenario(spec: ScenarioSpec) -> Source:
+    from strapdown.simulation import ImuErrors
+
     scenario = find_scenario(spec.name)
     imu, truth = simulate_scenario(spec)
     clean, _ = simulate_imu(
@@ -189,6 +194,8 @@ def with_truth(source: Source, spec: AttitudeSpec) -> Source:
         if not inside.any():
             return replace(source, truth=None, scored=None)
         return replace(source, truth=source.truth[inside], scored=source.scored[inside])
+    from strapdown.formats.references import read_truth
+
     path = Path(spec.truth_path)
     options = read_options(spec.source) if isinstance(spec.source, LogSpec) else None
     truth = read_truth(path, options, source.origin)

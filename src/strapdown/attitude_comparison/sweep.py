@@ -1,9 +1,9 @@
-"""Run the bench at lower rates, by dropping samples and by summing increments."""
+"""Errors at lower rates, by dropping samples and by summing increments; their shares and ranks."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,17 +11,17 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.attitude import AttitudeAlgorithm, RotationVector, attitude_history
-from strapdown.attitude.algorithm import Steps, steps_of
-from strapdown.attitude.cost import run_single, single_increments
+from strapdown.attitude_algorithms import AttitudeAlgorithm, RotationVector, attitude_history
+from strapdown.attitude_algorithms.algorithm import AttitudeRun, Steps, steps_of
+from strapdown.attitude_algorithms.cost import run_single, single_increments
+from strapdown.attitude_comparison.options import refuse_no_rate
 from strapdown.config import LogSpec, ScenarioSpec
 from strapdown.errors import ConfigError, DivergenceError, Finding
 from strapdown.evaluation.differences import Errors, Known, angles_to_errors
 from strapdown.evaluation.reference_points import reference_errors
 from strapdown.increments import increments_from_imu
 from strapdown.progress import Progress
-from strapdown.results.attitude_bench import AttitudeBench, AttitudeRun, Share, Trials
-from strapdown.rotation.euler_angles import unit_rotation_angle
+from strapdown.rotation import unit_rotation_angle
 from strapdown.tables import DTHETA, QUATERNION, THETA, increments_table
 
 Array = NDArray[np.float64]
@@ -31,14 +31,64 @@ COLUMNS = [
     *("algorithm", "meaning", "factor", "rate_hz", "own_deg", "final_deg", "rms_deg"),
     *("max_deg", "reference_deg", "error_deg"),
 ]
+#: Reference for the algorithm error on a log: of fourth order from rates and of sixth from
+#: increments, for any steps.
+MOST_ACCURATE = RotationVector(samples=4, coefficients="fit")
 # Halved while enough samples remain.
 FACTORS = (1, 2, 4, 8, 16, 32)
 LEAST_STEPS = 20
 
 
 @dataclass(frozen=True)
+class Share:
+    """Error of one algorithm, separated into algorithm, sensor and single-precision error.
+
+    Attributes
+    ----------
+    algorithm : str
+    own_deg : tuple of float
+        Algorithm and rate error: at the end, RMS, largest. On a simulation the error on
+        error-free samples; on a log the difference from the most accurate algorithm on the same
+        samples, which is an estimate.
+    sensor_deg : tuple of float, or None
+        Likewise the sensor error: on a simulation the change that the sensor errors cause in
+        this algorithm, on a log the error of the most accurate algorithm against the truth;
+        None without a truth.
+    single_deg : tuple of float
+        Likewise the difference between single and double precision on the same samples.
+    """
+
+    algorithm: str
+    own_deg: tuple[float, float, float]
+    sensor_deg: tuple[float, float, float] | None
+    single_deg: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Trials:
+    """Results of the same bench over several logs or seeds.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of the trials.
+    errors : DataFrame
+        One row per trial and algorithm: ``trial``, ``algorithm``, ``error_deg`` (the error used
+        for the answer), ``own_deg``, ``rms_deg``, ``final_deg``.
+    ranking : DataFrame
+        One row per algorithm, best first: ``algorithm``, ``mean_deg``, ``low_deg``, ``high_deg``
+        (95 % interval of the mean), ``luck`` (probability that the next one is no worse, from
+        paired differences; NaN for the last).
+    """
+
+    names: tuple[str, ...]
+    errors: pd.DataFrame = field(repr=False)
+    ranking: pd.DataFrame
+
+
+@dataclass(frozen=True)
 class Grounds:
-    """Input and references common to all cells of a sweep.
+    """Samples and references common to all cells of a sweep.
 
     Attributes
     ----------
@@ -46,25 +96,71 @@ class Grounds:
         The used samples, at the full rate.
     q_nb : ndarray, (4,)
         Initial attitude.
-    own : OwnTruth
-    truth : Known or None
+    interpolation : str
+        Of the rates between their stamps.
     references : DataFrame
         A References table.
-    interpolation : str
+    truth : Known or None
+    own : Known
+        Reference of the algorithm errors: in a simulation the exact attitude, rotated to the
+        start of the run; for a log that of the most accurate algorithm.
+    clean : DataFrame or None
+        In a simulation, the samples without the errors of the sensor: `own` is then exact.
     """
 
     imu: pd.DataFrame
     q_nb: Array
-    own: OwnTruth
-    truth: Known | None
-    references: pd.DataFrame
     interpolation: str
+    references: pd.DataFrame
+    truth: Known | None
+    own: Known
+    clean: pd.DataFrame | None
 
+    @classmethod
+    def of(
+        cls,
+        imu: pd.DataFrame,
+        q_nb: Array,
+        interpolation: str,
+        *,
+        references: pd.DataFrame,
+        truth: Known | None,
+        clean: pd.DataFrame | None,
+    ) -> Grounds:
+        """Find the reference for the algorithm errors, and gather the rest."""
+        if clean is not None and truth is not None:
+            # The error of the initial attitude is not the algorithm's: the truth is rotated to
+            # start with the run.
+            start = rotation.compose(q_nb, rotation.conjugate(truth.q_nb[0]))
+            own = replace(truth, q_nb=rotation.compose(start, truth.q_nb))
+        else:
+            clean = None
+            best = attitude_history(MOST_ACCURATE, increments_from_imu(imu, interpolation), q_nb)
+            own = Known(best, np.ones(len(best), dtype=bool))
+        return cls(imu, q_nb, interpolation, references, truth, own, clean)
 
-def refuse_no_rate(rate: float) -> None:
-    """Raise ConfigError unless a rate in Hz is positive and finite."""
-    if not (np.isfinite(rate) and rate > 0.0):
-        raise ConfigError("attitude.hz-no-rate", quantity="--rates", rate=rate)
+    @property
+    def exact(self) -> bool:
+        """Whether `own` is the truth itself, not an estimate."""
+        return self.clean is not None
+
+    @property
+    def known(self) -> bool:
+        """Whether a truth or a reference point of the attitude is known."""
+        return self.truth is not None or bool(len(self.references))
+
+    def sensor_errors(self) -> Errors | None:
+        """Error against the truth due to sensor and initial attitude: final, RMS, largest, deg."""
+        if self.truth is None or self.clean is None:
+            return None if self.truth is None else self.truth.errors(self.own.q_nb)
+        with_errors, without = (
+            attitude_history(
+                MOST_ACCURATE, increments_from_imu(table, self.interpolation), self.q_nb
+            )
+            for table in (self.imu, self.clean)
+        )
+        sensor = rotation.compose(rotation.conjugate(without), with_errors)
+        return self.truth.errors(rotation.compose(self.own.q_nb, sensor))
 
 
 def choose_factors(
@@ -142,13 +238,13 @@ def sweep_rates(
     Returns
     -------
     DataFrame
-        As `results.AttitudeBench.sweep`. ``drop`` keeps one sample in `factor` and forms
+        As `results.AttitudeComparison.sweep`. ``drop`` keeps one sample in `factor` and forms
         increments between those, as a slow logger would; ``sum`` adds up the increments of the
         full rate, as an integrating sensor would. The last step may be shorter, so that every
         cell ends at the end of the log. An algorithm that overflows has an infinite error.
     """
     cells = [(meaning, factor) for meaning in MEANINGS for factor in factors]
-    clean = grounds.own.clean
+    clean = grounds.clean
     whole = increments_from_imu(grounds.imu, grounds.interpolation)
     whole_clean = None if clean is None else increments_from_imu(clean, grounds.interpolation)
     rows: list[dict[str, object]] = []
@@ -167,7 +263,7 @@ def sweep_rates(
         used = grounds.imu.iloc[samples]
         there = replace(
             grounds,
-            own=replace(grounds.own, known=grounds.own.known.at(samples)),
+            own=grounds.own.at(samples),
             truth=None if grounds.truth is None else grounds.truth.at(samples),
         )
         for algorithm in algorithms:
@@ -243,7 +339,7 @@ def _cell(
     infinite: Errors = (np.inf, np.inf, np.inf)
     try:
         q = attitude_history(algorithm, steps, grounds.q_nb)
-        own = grounds.own.known.errors(
+        own = grounds.own.errors(
             q if error_free is None else attitude_history(algorithm, error_free, grounds.q_nb)
         )
         total = None if grounds.truth is None else grounds.truth.errors(q)
@@ -274,67 +370,6 @@ def _largest_reference(q: Array, references: pd.DataFrame, used: pd.DataFrame) -
 # Shares of the error: sensor, algorithm, single precision.
 
 
-#: Reference for the algorithm error on a log: of fourth order from rates and of sixth from
-#: increments, for any steps.
-MOST_ACCURATE = RotationVector(samples=4, coefficients="fit")
-
-
-@dataclass(frozen=True)
-class OwnTruth:
-    """Attitude by an error-free algorithm, with an error-free sensor or the actual one.
-
-    Attributes
-    ----------
-    known : Known
-        In a simulation the exact attitude, rotated to the start of the run; for a log that of
-        the most accurate algorithm.
-    clean : DataFrame or None
-        The Imu table without the sensor's errors, on a simulation.
-    """
-
-    known: Known
-    clean: pd.DataFrame | None
-
-    @property
-    def exact(self) -> bool:
-        """Whether it is the truth itself, not an estimate."""
-        return self.clean is not None
-
-
-def own_truth(
-    imu: pd.DataFrame,
-    clean: pd.DataFrame | None,
-    truth: Known | None,
-    q_nb: Array,
-    interpolation: str,
-) -> OwnTruth:
-    """Find the reference for the algorithm errors.
-
-    Parameters
-    ----------
-    imu : DataFrame
-        The used samples.
-    clean : DataFrame or None
-        The same without the sensor's errors, for a simulation.
-    truth : Known or None
-    q_nb : ndarray, (4,)
-        Initial attitude.
-    interpolation : str
-
-    Returns
-    -------
-    OwnTruth
-    """
-    if clean is not None and truth is not None:
-        # The error of the initial attitude is not the algorithm's: the truth is rotated to start
-        # with the run.
-        start = rotation.compose(q_nb, rotation.conjugate(truth.q_nb[0]))
-        return OwnTruth(replace(truth, q_nb=rotation.compose(start, truth.q_nb)), clean)
-    increments = increments_from_imu(imu, interpolation)
-    best = attitude_history(MOST_ACCURATE, increments, q_nb)
-    return OwnTruth(Known(best, np.ones(len(best), dtype=bool)), None)
-
-
 def between_samples(imu: pd.DataFrame, q_nb: Array) -> tuple[float, float] | None:
     """Estimate the effect of the rate between the samples.
 
@@ -360,13 +395,7 @@ def between_samples(imu: pd.DataFrame, q_nb: Array) -> tuple[float, float] | Non
 
 
 def find_shares(
-    algorithms: Sequence[AttitudeAlgorithm],
-    runs: Sequence[AttitudeRun],
-    imu: pd.DataFrame,
-    own: OwnTruth,
-    truth: Known | None,
-    q_nb: Array,
-    interpolation: str,
+    algorithms: Sequence[AttitudeAlgorithm], runs: Sequence[AttitudeRun], grounds: Grounds
 ) -> tuple[Share, ...]:
     """Split the error of each run into the shares of sensor and algorithm.
 
@@ -374,13 +403,8 @@ def find_shares(
     ----------
     algorithms : sequence of AttitudeAlgorithm
     runs : sequence of AttitudeRun
-        In the same order.
-    imu : DataFrame
-        The samples of the runs.
-    own : OwnTruth
-    truth : Known or None
-    q_nb : ndarray, (4,)
-    interpolation : str
+        In the same order, on the samples of `grounds`.
+    grounds : Grounds
 
     Returns
     -------
@@ -389,53 +413,27 @@ def find_shares(
         ``q_true^-1 q = (q_true^-1 q_clean)(q_clean^-1 q)``, so that their rotation vectors add up
         to within half their product.
     """
-    clean = None if own.clean is None else increments_from_imu(own.clean, interpolation)
-    rounded = single_increments(imu, interpolation)
-    # For a log the sensor error is that of the most accurate algorithm.
-    of_sensor = None if truth is None or own.exact else truth.errors(own.known.q_nb)
+    q_nb, own = grounds.q_nb, grounds.own
+    rounded = single_increments(grounds.imu, grounds.interpolation)
+    clean = of_sensor = None
+    if grounds.clean is not None:
+        clean = increments_from_imu(grounds.clean, grounds.interpolation)
+    elif grounds.truth is not None:
+        # For a log the sensor error is that of the most accurate algorithm.
+        of_sensor = grounds.truth.errors(own.q_nb)
     shares = []
     for algorithm, run in zip(algorithms, runs, strict=True):
         q = run.attitude[QUATERNION].to_numpy()
         if clean is None:
-            mine, sensor = own.known.errors(q), of_sensor
+            mine, sensor = own.errors(q), of_sensor
         else:
             q_clean = attitude_history(algorithm, clean, q_nb)
-            mine = own.known.errors(q_clean)
+            mine = own.errors(q_clean)
             sensor = angles_to_errors(unit_rotation_angle(q, q_clean))
         assert mine is not None
         apart = unit_rotation_angle(run_single(algorithm, rounded, q_nb), q)
         shares.append(Share(run.algorithm, mine, sensor, angles_to_errors(apart)))
     return tuple(shares)
-
-
-def best_error(
-    own: OwnTruth, truth: Known | None, imu: pd.DataFrame, q_nb: Array, interpolation: str
-) -> Errors | None:
-    """Error against the truth due to sensor and initial attitude, common to all algorithms.
-
-    Parameters
-    ----------
-    own : OwnTruth
-    truth : Known or None
-    imu : DataFrame
-    q_nb : ndarray, (4,)
-    interpolation : str
-
-    Returns
-    -------
-    tuple of float, or None
-        Final, RMS and largest, deg.
-    """
-    if truth is None:
-        return None
-    if own.clean is None:
-        return truth.errors(own.known.q_nb)
-    with_errors, without = (
-        attitude_history(MOST_ACCURATE, increments_from_imu(table, interpolation), q_nb)
-        for table in (imu, own.clean)
-    )
-    sensor = rotation.compose(rotation.conjugate(without), with_errors)
-    return truth.errors(rotation.compose(own.known.q_nb, sensor))
 
 
 # Statistics over several logs or seeds, so that a rank is not due to chance.
@@ -472,13 +470,13 @@ def trial_names(sources: Sequence[ScenarioSpec | LogSpec]) -> list[str]:
     return [n if names.count(n) == 1 else f"{n} ({k + 1})" for k, n in enumerate(names)]
 
 
-def gather(benches: Sequence[AttitudeBench], names: Sequence[str]) -> Trials:
-    """Combine the errors of several benches.
+def gather(sweeps: Sequence[pd.DataFrame], names: Sequence[str]) -> Trials:
+    """Combine the errors of several trials.
 
     Parameters
     ----------
-    benches : sequence of AttitudeBench
-        With the same algorithms.
+    sweeps : sequence of DataFrame
+        As `AttitudeComparison.sweep`, of the same algorithms.
     names : sequence of str
         Names of the trials.
 
@@ -489,8 +487,8 @@ def gather(benches: Sequence[AttitudeBench], names: Sequence[str]) -> Trials:
         Student's test of paired differences, that the next algorithm is in truth no worse.
     """
     rows = []
-    for name, bench in zip(names, benches, strict=True):
-        full = bench.sweep[(bench.sweep["factor"] == 1) & (bench.sweep["meaning"] == "drop")]
+    for name, sweep in zip(names, sweeps, strict=True):
+        full = sweep[(sweep["factor"] == 1) & (sweep["meaning"] == "drop")]
         for _, cell in full.iterrows():
             rows.append(
                 {"trial": name}
@@ -512,7 +510,7 @@ def rank(errors: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        As `results.Trials.ranking`.
+        As `Trials.ranking`.
     """
     from scipy import stats
 
@@ -561,7 +559,7 @@ def worst_sweep(sweeps: Sequence[pd.DataFrame]) -> pd.DataFrame:
     Parameters
     ----------
     sweeps : sequence of DataFrame
-        As `results.AttitudeBench.sweep`, over the same algorithms.
+        As `results.AttitudeComparison.sweep`, over the same algorithms.
 
     Returns
     -------

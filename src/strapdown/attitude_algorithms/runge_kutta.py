@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from strapdown._kernels import attitude as kernel
-from strapdown.attitude.algorithm import Accuracy, Array, AttitudeAlgorithm, unit_quaternions
+from strapdown.attitude_algorithms.algorithm import Accuracy, Array, AttitudeAlgorithm
 
 
 @dataclass(frozen=True)
@@ -28,19 +28,10 @@ class RungeKutta(AttitudeAlgorithm):
     title = "Runge-Kutta quaternion"
     equations = "(18)"
     summary = "dq/dt = q (0, rate)/2 by the classical fourth-order step, rate linear over it"
-    width = 4
     advance_kernel = staticmethod(kernel.rk4_advance)
     update_kernel = staticmethod(kernel.rk4_update)
 
     normalise: bool = True
-
-    def begin(self, q_nb: Array) -> Array:
-        """Return the quaternion itself."""
-        return np.array(q_nb, dtype=np.float64)
-
-    def quaternions(self, history: Array) -> Array:
-        """Scale each to norm 1: without `normalise` the step shrinks it."""
-        return unit_quaternions(history)
 
     @property
     def accuracy(self) -> Accuracy:

@@ -1,0 +1,360 @@
+"""Interface of every attitude algorithm, and its run over a record or sample by sample."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar, NoReturn
+
+import numpy as np
+import pandas as pd
+from numba.core.errors import NumbaError
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown import rotation
+from strapdown._kernels import rotation as kernel
+from strapdown._kernels.increments import HEAD, LARGEST, MEAN, OPTIONS, SAMPLES, TIME
+from strapdown.errors import ConfigError, DataError, DivergenceError
+from strapdown.tables import DTHETA, SAMPLINGS, THETA, attitude_table
+
+Array = NDArray[np.float64]
+
+
+def quaternions_from_angles(roll_pitch_heading: Array) -> Array:
+    """Quaternions of 3-2-1 angles in rad, (n, 3), of any size: pitch beyond ±90° is legal."""
+    q = np.empty((len(roll_pitch_heading), 4))
+    kernel.quats_from_eulers(np.ascontiguousarray(roll_pitch_heading), q)
+    return q
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Increments for the kernels: (n,) s, (n, 3) rad, (n, 3) rad."""
+
+    dt: Array
+    theta: Array
+    dtheta: Array
+
+
+def steps_of(increments: pd.DataFrame) -> Steps:
+    """Return the arrays of an Increments table, without its time stamps."""
+    return Steps(
+        np.ascontiguousarray(increments["dt"].to_numpy(dtype=np.float64)),
+        np.ascontiguousarray(increments[THETA].to_numpy(dtype=np.float64)),
+        np.ascontiguousarray(increments[DTHETA].to_numpy(dtype=np.float64)),
+    )
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """Order of an algorithm's attitude error in the step; 0: it does not decrease.
+
+    Attributes
+    ----------
+    increments : int
+        On general smooth motion, from exact increments.
+    rates : int
+        On general smooth motion, from rates at the stamps that are interpolated by a cubic;
+        by the trapezoid it is this, and at most 2.
+    coning : int
+        Drift on pure coning, from exact increments.
+    """
+
+    increments: int
+    rates: int
+    coning: int
+
+
+@dataclass(frozen=True)
+class AttitudeAlgorithm(ABC):
+    """One attitude algorithm with its options; stateless.
+
+    By default the state is the quaternion ``q_nb``.
+
+    Attributes
+    ----------
+    name : str
+        The word for it on the command line.
+    title : str
+        The words for it in a report.
+    equations : str
+        Equation numbers in its source.
+    source : str
+        That source.
+    width : int
+        Number of elements of the state that are the attitude, the first ones.
+    advance_kernel, update_kernel : callable
+        The compiled loops over many steps and for one sample.
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    equations: ClassVar[str]
+    source: ClassVar[str] = "Alexiev (2021)"
+    summary: ClassVar[str]
+    width: ClassVar[int] = 4
+    advance_kernel: ClassVar[Any]
+    update_kernel: ClassVar[Callable[..., Any]]
+
+    def begin(self, q_nb: Array) -> Array:
+        """Return the state of an attitude given as a unit quaternion, shape (4,)."""
+        return np.array(q_nb, dtype=np.float64)
+
+    def quaternions(self, history: Array) -> Array:
+        """Return unit quaternions ``q_nb``, (n, 4), of `width` numbers a row."""
+        norm = np.sqrt((history * history).sum(axis=1, keepdims=True))
+        return np.asarray(history / norm)
+
+    @property
+    @abstractmethod
+    def accuracy(self) -> Accuracy:
+        """Order of its error in the step."""
+
+    def kernel_options(self) -> tuple[float, float]:
+        """Return the two options for the kernels, as numbers; zero for a missing one."""
+        return 0.0, 0.0
+
+    def diagnostics(self, state: Array, time: Array) -> dict[str, float]:
+        """Return the algorithm's diagnostics after a run.
+
+        Parameters
+        ----------
+        state : ndarray
+            As left by `advance`.
+        time : ndarray, (n+1,), s
+            The start, and the end of every step since.
+        """
+        return {}
+
+    def advance(self, state: Array, increments: pd.DataFrame | Steps) -> tuple[Array, Array]:
+        """Advance over a segment of increments.
+
+        Parameters
+        ----------
+        state : ndarray
+            From `begin`, or from an earlier segment; it is not changed.
+        increments : DataFrame or Steps
+            An Increments table of any length, one row included, or its arrays.
+
+        Returns
+        -------
+        state : ndarray
+            After the last step.
+        history : ndarray, (n, width)
+            The attitude part of the state after each step.
+        """
+        steps = increments if isinstance(increments, Steps) else steps_of(increments)
+        history = np.empty((len(steps.dt), self.width))
+        after = state.copy()
+        options = self.kernel_options()
+        type(self).advance_kernel(after, steps.dt, steps.theta, steps.dtheta, history, *options)
+        return after, history
+
+    @property
+    def label(self) -> str:
+        """The name with every option that is not at its default."""
+        changed = [
+            f"{f.name}={getattr(self, f.name)}".lower()
+            for f in fields(self)
+            if getattr(self, f.name) != f.default
+        ]
+        return f"{self.name}:{','.join(changed)}" if changed else self.name
+
+
+@dataclass(frozen=True)
+class AttitudeRun:
+    """One algorithm over one record.
+
+    Attributes
+    ----------
+    algorithm : str
+        Name and options, as the command line takes them.
+    title, equations : str
+        Display text; the equations are numbered as in the algorithm's source.
+    attitude : DataFrame
+        Attitude table at every sample.
+    diagnostics : dict of str to float
+        Condition measures of the algorithm; each key has its unit.
+    """
+
+    algorithm: str
+    title: str
+    equations: str
+    attitude: pd.DataFrame = field(repr=False)
+    diagnostics: dict[str, float]
+
+
+def attitude_history(
+    algorithm: AttitudeAlgorithm, increments: pd.DataFrame | Steps, q_nb: ArrayLike
+) -> Array:
+    """Quaternions of `run_attitude` alone, (n+1, 4): at the start and after each step."""
+    return _run(algorithm, increments, q_nb)[0]
+
+
+def _run(
+    algorithm: AttitudeAlgorithm, increments: pd.DataFrame | Steps, q_nb: ArrayLike
+) -> tuple[Array, Array]:
+    """Quaternions at the start and after each step, and the state at the end."""
+    state = algorithm.begin(rotation.normalise(q_nb))
+    first = state[None, : algorithm.width]
+    steps = increments if isinstance(increments, Steps) else steps_of(increments)
+    state, history = algorithm.advance(state, steps)
+    # A truncated series may overflow.
+    bad = np.flatnonzero(~(np.abs(history) < LARGEST).all(axis=1))
+    if bad.size:
+        raise DivergenceError(
+            "attitude.numbers-left-range-floating-point",
+            row=int(bad[0]) + 1,
+            quantity=algorithm.label,
+        )
+    return algorithm.quaternions(np.vstack([first, history])), state
+
+
+def run_attitude(
+    algorithm: AttitudeAlgorithm,
+    increments: pd.DataFrame,
+    q_nb: ArrayLike = (1.0, 0.0, 0.0, 0.0),
+) -> AttitudeRun:
+    """Run an attitude algorithm over a whole record.
+
+    Parameters
+    ----------
+    algorithm : AttitudeAlgorithm
+    increments : DataFrame
+        An Increments table; the run starts where its first step begins.
+    q_nb : array_like, (4,)
+        Attitude at the start, body to local level.
+
+    Returns
+    -------
+    AttitudeRun
+        Attitude at the start and at the end of each step, and the diagnostics of the
+        algorithm.
+
+    Raises
+    ------
+    DataError
+        `q_nb` is not a rotation.
+    DivergenceError
+        The algorithm left the range of floating point.
+    """
+    q, state = _run(algorithm, increments, q_nb)
+    ends = increments.index.to_numpy(dtype=np.float64)
+    time = np.concatenate([[ends[0] - increments["dt"].iloc[0]], ends])
+    return AttitudeRun(
+        algorithm=algorithm.label,
+        title=algorithm.title,
+        equations=algorithm.equations,
+        attitude=attitude_table(time, q),
+        diagnostics=algorithm.diagnostics(state, time),
+    )
+
+
+# Sample by sample, as on a device or live.
+
+
+# Looked up once: attribute lookup is a tenth of a call of half a microsecond.
+_ndarray = np.ndarray
+
+
+class AttitudeTracker:
+    """Propagate an attitude from gyro samples, one call per sample.
+
+    Its result equals that of a batch over the same samples to the last bit.
+
+    Parameters
+    ----------
+    algorithm : AttitudeAlgorithm
+    q_nb : array_like, (4,), optional
+        Initial attitude, body to local level; identity if not given.
+    sampling : {'instantaneous', 'mean'}
+        Sample type: the rate at its stamp, or its mean over the interval that ends there.
+
+    Raises
+    ------
+    ConfigError
+        `sampling` is unknown.
+    DataError
+        `q_nb` is not a rotation.
+    """
+
+    __slots__ = ("_algorithm", "_record", "_update")
+
+    def __init__(
+        self,
+        algorithm: AttitudeAlgorithm,
+        q_nb: ArrayLike = (1.0, 0.0, 0.0, 0.0),
+        sampling: str = "instantaneous",
+    ) -> None:
+        if sampling not in SAMPLINGS:
+            raise ConfigError(
+                "attitude.no-kind-sampling",
+                quantity="sampling",
+                sampling=sampling,
+                samplings=SAMPLINGS,
+            )
+        unit = rotation.normalise(q_nb)
+        head = np.zeros(HEAD)
+        head[MEAN] = float(sampling == "mean")
+        options = algorithm.kernel_options()
+        head[OPTIONS:] = options
+        self._algorithm = algorithm
+        self._record = np.concatenate([head, algorithm.begin(unit)])
+        self._update = type(algorithm).update_kernel
+
+    def update(self, time: float, gyro: Array | Sequence[float]) -> None:
+        """Process one sample.
+
+        Parameters
+        ----------
+        time : float, s
+            Later than that of the sample before.
+        gyro : ndarray or sequence of float, (3,), rad/s
+            Body rate, forward-right-down.
+
+        Raises
+        ------
+        DataError
+            Time does not advance, or the rate is not three finite numbers. The sample is
+            then not taken, and the state is as before.
+        """
+        try:
+            if gyro.__class__ is not _ndarray:
+                gyro = np.asarray(gyro, dtype=np.float64)
+            if self._update(self._record, time, gyro) >= 0.0:
+                return
+        except (NumbaError, TypeError, ValueError):
+            # Of a type that cannot be compiled for, or not numbers.
+            self._refuse(float("nan"), gyro)
+        self._refuse(time, gyro)
+
+    def _refuse(self, time: float, gyro: Array | Sequence[float]) -> NoReturn:
+        if self._record[SAMPLES] > 0 and time <= self._record[TIME] and np.size(gyro) == 3:
+            raise DataError(
+                "attitude.time-does-not-advance-followed",
+                row=int(self._record[SAMPLES]) + 1,
+                quantity="time",
+                record=self._record[TIME],
+                time=time,
+            )
+        raise DataError(
+            "attitude.time-rate-time-three-finite",
+            row=int(self._record[SAMPLES]) + 1,
+            quantity="gyro",
+            time=time,
+            asarray=np.asarray(gyro).tolist(),
+            largest=LARGEST,
+        )
+
+    @property
+    def quaternion(self) -> Array:
+        """The attitude ``q_nb``, (4,), unit norm."""
+        native = self._record[HEAD : HEAD + self._algorithm.width]
+        q: Array = self._algorithm.quaternions(native[None, :].copy())[0]
+        return q
+
+    @property
+    def roll_pitch_heading(self) -> Array:
+        """The attitude as 3-2-1 angles, (3,), deg."""
+        return rotation.euler_from_quaternion(self.quaternion)

@@ -1,0 +1,1 @@
+"""Comparison of attitude algorithms: errors, costs, and the simplest that suffices."""

@@ -1,0 +1,630 @@
+"""Comparison of attitude algorithms on one log or several (system A, Alexiev 2021)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field, fields, replace
+from math import nan
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown import rotation
+from strapdown.attitude_algorithms import (
+    AttitudeAlgorithm,
+    AttitudeRun,
+    make_algorithm,
+    run_attitude,
+)
+from strapdown.attitude_algorithms.cost import Cost, count_cost
+from strapdown.attitude_comparison.answer import (
+    Answer,
+    Evidence,
+    find_answer,
+    find_evidence,
+    worst_evidence,
+)
+from strapdown.attitude_comparison.options import AttitudeSpec
+from strapdown.attitude_comparison.references import (
+    PeerRun,
+    gather_references,
+    judge_runs,
+    judge_truth,
+    judge_turns,
+    read_second,
+    run_beside,
+    truth_of_second,
+    truth_score,
+)
+from strapdown.attitude_comparison.source import (
+    Source,
+    describe,
+    read_options,
+    read_source,
+    with_truth,
+)
+from strapdown.attitude_comparison.sweep import (
+    Grounds,
+    Share,
+    Trials,
+    between_samples,
+    choose_factors,
+    find_shares,
+    gather,
+    not_judged,
+    sweep_rates,
+    trial_names,
+    worst_sweep,
+)
+from strapdown.bundle.seal import InputFiles, Seal, check_destination, input_files
+from strapdown.config import LogSpec
+from strapdown.constants import GYRO_SUMS, GYRO_UNITS
+from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.evaluation.differences import Known, known_at, largest_differences
+from strapdown.evaluation.reference_points import SamePose, Score, score_references
+from strapdown.formats import read_log
+from strapdown.formats.columns import factor_of, parse_unit
+from strapdown.formats.recording import Reading
+from strapdown.increments import increments_from_imu
+from strapdown.progress import Progress, silent
+from strapdown.sensors.rest import RestStretch, find_rests, gyro_bias_from_rests, without_gyro_bias
+from strapdown.systems.inputs import part_of_log
+from strapdown.tables import GYRO
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from strapdown.evaluation.position_references import PositionScore
+    from strapdown.evaluation.second_log import SecondLog
+
+__all__ = ["AttitudeComparison", "run_comparison"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, repr=False)
+class AttitudeComparison:
+    """Comparison of attitude algorithms on one record.
+
+    `answer` names the simplest algorithm and the lowest rate that are accurate enough; `summary`,
+    `sweep`, `shares` and `costs` are the basis.
+
+    Attributes
+    ----------
+    source : str
+        Name of the log or the scenario.
+    description : str
+    specification : dict
+        Everything that determines the run, as stored with the outputs.
+    imu : DataFrame
+        Samples as used: body axes, SI, bias removed if requested.
+    runs : tuple of AttitudeRun
+    truth : DataFrame or None
+        Attitude table at (some of) the samples' stamps.
+    scored : ndarray of bool or None
+        Rows of `truth` that are scored.
+    scores : tuple of Score
+    sampling_error_deg : tuple of float, or None
+        For a scenario: error of noise-free samples with exact arithmetic, at the end and at
+        most. For a log an estimate: the difference between linear and cubic interpolation of
+        the rates between their stamps; None for mean rates.
+    differences_deg : DataFrame
+        Largest rotation angle between each pair of algorithms.
+    rests : tuple of RestStretch
+    initial : dict
+        Initial attitude in degrees, and its source.
+    gyro_bias : dict
+        Subtracted bias in rad/s, and its source.
+    references : DataFrame
+    readings : tuple of Reading
+    findings : tuple of Finding
+        Warnings and notes, in words.
+    inputs : tuple of InputFiles
+    costs : tuple of Cost
+        One per algorithm, in the order of `runs`.
+    shares : tuple of Share
+        Likewise.
+    sweep : DataFrame
+        One row per algorithm, rate and decimation method: ``algorithm``, ``meaning``
+        (``drop``: samples are decimated; ``sum``: increments are summed, as in an
+        integrating sensor), ``factor``, ``rate_hz``, ``own_deg`` (largest error of algorithm and
+        rate, as in `Share`), ``final_deg``, ``rms_deg``, ``max_deg`` (against the truth),
+        ``reference_deg`` (largest at a reference point), ``error_deg`` (the one used for the
+        answer: against the truth, else at the reference points, else ``own_deg``).
+    answer : Answer
+    trials : Trials or None
+    peers : tuple of PeerRun
+    places : tuple of PositionScore
+        One per algorithm and position reference point.
+    offers : tuple of SamePose
+        Stationary intervals of similar pose, if no reference point is given.
+    second : SecondLog or None
+        Alignment of a second sensor's log with this one.
+    on_disk : callable or None
+        Of samples in memory: gives for a while the comparison whose inputs are files.
+    """
+
+    source: str
+    description: str
+    specification: dict[str, Any] = field(repr=False)
+    imu: pd.DataFrame = field(repr=False)
+    runs: tuple[AttitudeRun, ...] = field(repr=False)
+    truth: pd.DataFrame | None = field(repr=False)
+    scored: Any = field(repr=False)
+    scores: tuple[Score, ...]
+    sampling_error_deg: tuple[float, float] | None
+    differences_deg: pd.DataFrame = field(repr=False)
+    rests: tuple[RestStretch, ...]
+    initial: dict[str, Any]
+    gyro_bias: dict[str, Any]
+    references: pd.DataFrame = field(repr=False)
+    readings: tuple[Reading, ...] = field(repr=False)
+    findings: tuple[Finding, ...]
+    inputs: tuple[InputFiles, ...] = field(repr=False)
+    costs: tuple[Cost, ...] = field(repr=False)
+    shares: tuple[Share, ...] = field(repr=False)
+    sweep: pd.DataFrame = field(repr=False)
+    answer: Answer
+    trials: Trials | None = None
+    peers: tuple[PeerRun, ...] = field(default=(), repr=False)
+    places: tuple[PositionScore, ...] = field(default=(), repr=False)
+    offers: tuple[SamePose, ...] = field(default=(), repr=False)
+    second: SecondLog | None = field(default=None, repr=False)
+    on_disk: Callable[[AttitudeComparison], AbstractContextManager[AttitudeComparison]] | None = (
+        field(default=None, repr=False, compare=False)
+    )
+
+    def __repr__(self) -> str:
+        return f"<AttitudeComparison {self.source}: {self.answer.sentence}>"
+
+    @property
+    def summary(self) -> pd.DataFrame:
+        """One row per algorithm and comparison; angles in degrees, time in seconds."""
+        columns = [f.name for f in fields(Score)]
+        return pd.DataFrame([vars(score) for score in self.scores], columns=columns)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """One row per algorithm and comparison, with error shares and cost.
+
+        Returns
+        -------
+        DataFrame
+            The columns of `summary`, then ``own_*_deg``, ``sensor_*_deg`` and ``single_*_deg``
+            with ``final``, ``rms`` and ``max`` for the star, and the fields of `Cost`. Without
+            a reference, one row per algorithm.
+        """
+        table = self.summary
+        if table.empty:
+            table = table.reindex(range(len(self.runs)))
+            table["algorithm"] = [run.algorithm for run in self.runs]
+        shares = pd.DataFrame([_flat(share) for share in self.shares], columns=_flat_names())
+        costs = pd.DataFrame(
+            [vars(cost) for cost in self.costs], columns=[f.name for f in fields(Cost)]
+        )
+        table = table.merge(shares, on="algorithm", how="left")
+        return table.merge(costs, on="algorithm", how="left")
+
+    def save(
+        self, out: str | Path, *, report: bool = True, force: bool = False, png: bool = False
+    ) -> Seal:
+        """Write the comparison as a sealed bundle, which `verify` runs again.
+
+        Parameters
+        ----------
+        out : str or Path
+            New folder. Tables given in memory become input files in it.
+        report : bool
+            Whether to write the page and the figures as well.
+        force : bool
+            Overwrite an existing bundle.
+        png : bool
+            Write each figure as PNG as well.
+
+        Returns
+        -------
+        Seal
+
+        Raises
+        ------
+        ConfigError
+            `out` exists and may not be overwritten.
+        DataError
+            An input file has changed since it was read.
+        """
+        from strapdown.report.attitude import write_attitude
+
+        check_destination(Path(out), force)
+        with self.on_disk(self) if self.on_disk else nullcontext(self) as there:
+            return write_attitude(there, out, report=report, force=force, png=png)
+
+    def plot(self, kind: str = "cost") -> Figure:
+        """Draw one chart of the report.
+
+        Parameters
+        ----------
+        kind : str
+            ``cost``, ``sweep``, ``gyro``, ``attitude``, ``error``, ``reference-error``,
+            ``difference``, ``share``, ``trials`` or ``peers``.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Independent of windows and global state; displayed by a notebook.
+
+        Raises
+        ------
+        ConfigError
+            The chart does not exist or has no data.
+        """
+        from strapdown.report.attitude_view import plot
+
+        return plot(self, kind)
+
+    def _repr_html_(self) -> str:
+        """Answer and table of results, for a notebook."""
+        from strapdown.report.attitude_view import short_html
+
+        return short_html(self)
+
+
+_PARTS, _MOMENTS = ("own", "sensor", "single"), ("final", "rms", "max")
+
+
+def _flat_names() -> list[str]:
+    return ["algorithm", *(f"{part}_{moment}_deg" for part in _PARTS for moment in _MOMENTS)]
+
+
+def _flat(share: Share) -> list[Any]:
+    known = (share.own_deg, share.sensor_deg, share.single_deg)
+    values = [v for three in known for v in (three or (nan, nan, nan))]
+    return [share.algorithm, *values]
+
+
+def run_comparison(spec: AttitudeSpec, progress: Progress = silent) -> AttitudeComparison:
+    """Run attitude algorithms over a log or a scenario and compare them with the known attitude.
+
+    Parameters
+    ----------
+    spec : AttitudeSpec
+    progress : callable, optional
+        Called with the name of a stage and the share that is done, 0 to 1.
+
+    Returns
+    -------
+    AttitudeComparison
+
+    Raises
+    ------
+    DataError
+        The log or a reference cannot be used.
+    ConfigError
+        An option is unknown, or not available for this log.
+    """
+    specs = [spec.model_copy(update={"source": s, "also": ()}) for s in (spec.source, *spec.also)]
+    judged = []
+    for k, one in enumerate(specs):
+        judged.append(_bench(one, _part_of(progress, k, len(specs))))
+    bench = judged[0][0]
+    if len(judged) == 1:
+        return bench
+    benches = [b for b, _ in judged]
+    names = trial_names([s.source for s in specs])
+    sweep = worst_sweep([b.sweep for b in benches])
+    together = worst_evidence([e for _, e in judged], sweep)
+    return replace(
+        bench,
+        specification=spec.model_dump(mode="json"),
+        sweep=sweep,
+        answer=find_answer(together, spec.tolerance_deg),
+        trials=gather([b.sweep for b in benches], names),
+        findings=tuple(
+            f.replace(file=f.file or name)
+            for b, name in zip(benches, names, strict=True)
+            for f in b.findings
+        )
+        + not_judged([e.known for _, e in judged], names),
+        inputs=tuple(item for b in benches for item in b.inputs),
+    )
+
+
+def _part_of(progress: Progress, k: int, count: int) -> Progress:
+    """Progress of one of several equal parts."""
+    return lambda stage, share: progress(stage, (k + share) / count)
+
+
+def _make_algorithms(texts: Sequence[str]) -> list[AttitudeAlgorithm]:
+    algorithms = [make_algorithm(text) for text in texts]
+    if not algorithms:
+        raise ConfigError("attitude.none-named", quantity="algorithms")
+    if len({a.label for a in algorithms}) < len(algorithms):
+        raise ConfigError(
+            "attitude.named-twice", quantity="algorithms", algorithms=[a.label for a in algorithms]
+        )
+    return algorithms
+
+
+def _cost(algorithm: AttitudeAlgorithm, dt: pd.Series) -> Cost:
+    """Operations of one sample; the kernels of a plug-in may be beyond counting."""
+    try:
+        return count_cost(algorithm, dt)
+    except Exception as error:  # code of others can fail in every way
+        if type(algorithm).__module__.startswith("strapdown."):
+            raise
+        raise ConfigError(
+            "attitude.plugin-not-countable",
+            quantity="algorithms",
+            name=algorithm.name,
+            home=type(algorithm).__module__,
+            error=f"{type(error).__name__}: {error}",
+        ) from None
+
+
+def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, Evidence]:
+    """Run the bench on one source; return the result and the evidence for its answer."""
+    algorithms = _make_algorithms(spec.algorithms)
+    progress("reading", 0.0)
+    source = read_source(spec)
+    whole = source.imu
+    part = part_of_log(whole, spec.from_s, spec.to_s, spec.duration_s, source.name)
+    source = replace(source, imu=part)
+    source, second = read_second(spec, with_truth(source, spec))
+    rests = find_rests(source.imu)
+    imu, bias, bias_input = _gyro_bias(spec, source, rests)
+    findings: list[Finding] = []
+    q_nb, initial, begin = initial_attitude(spec.initial, source.imu, rests, findings, source.truth)
+    imu = imu[imu.index >= begin]
+    if len(imu) < 2:
+        raise DataError("attitude.fewer-than-two-samples-left", file=source.name, begin=begin)
+    if second is not None and source.truth is None:
+        source = truth_of_second(source, second, imu, q_nb)
+    findings = [*source.findings, *findings]
+    increments = increments_from_imu(imu, spec.interpolation)
+    costs = tuple(_cost(algorithm, increments["dt"]) for algorithm in algorithms)
+    runs = []
+    for k, algorithm in enumerate(algorithms):
+        progress(algorithm.title, 0.05 + 0.15 * k / len(algorithms))
+        runs.append(run_attitude(algorithm, increments, q_nb))
+    span = (float(imu.index[0]), float(imu.index[-1]))
+    levelled = initial["method"] == "level"
+    told = gather_references(spec, source, span, rests, levelled)
+    references = told.points
+    scores = [s for run in runs for s in truth_score(run, source)]
+    scores += [s for run in runs for s in score_references(run, references, imu)]
+    findings += judge_runs(runs, increments)
+    findings += judge_turns(scores)
+    findings += judge_truth(source, span)
+    grounds = Grounds.of(
+        imu,
+        q_nb,
+        spec.interpolation,
+        references=references,
+        truth=_known(source, imu),
+        clean=None if source.clean is None else source.clean.loc[imu.index],
+    )
+    progress("sharing out the error", 0.2)
+    shares = find_shares(algorithms, runs, grounds)
+    factors = choose_factors(imu, spec.rates_hz, findings)
+    sweep = sweep_rates(
+        algorithms, grounds, factors, lambda stage, share: progress(stage, 0.3 + 0.65 * share)
+    )
+    between = source.sampling_error_deg or between_samples(imu, q_nb)
+    evidence = find_evidence(
+        grounds, algorithms, costs, sweep, bias, rests, None if between is None else between[1]
+    )
+    beside = run_beside(spec.peers, source, imu, q_nb, references, findings)
+    truth, scored = source.truth, source.scored
+    if truth is not None and scored is not None:
+        inside = np.asarray((truth.index >= span[0]) & (truth.index <= span[1]))
+        truth, scored = truth[inside], scored[inside]
+    bench = AttitudeComparison(
+        source=source.name,
+        description=describe(source.imu, source.what, whole),
+        specification=spec.model_dump(mode="json"),
+        imu=imu,
+        runs=tuple(runs),
+        truth=truth,
+        scored=scored,
+        scores=tuple(scores),
+        sampling_error_deg=between,
+        differences_deg=largest_differences(tuple(runs)),
+        rests=rests,
+        initial=initial,
+        gyro_bias=bias,
+        references=references,
+        readings=source.readings,
+        findings=tuple(findings),
+        inputs=source.inputs + bias_input,
+        costs=costs,
+        shares=shares,
+        sweep=sweep,
+        answer=find_answer(evidence, spec.tolerance_deg),
+        places=tuple(p for run in runs for p in told.score_positions(run, imu, rests)),
+        peers=beside,
+        offers=told.offers,
+        second=None if second is None else second.aligned,
+    )
+    return bench, evidence
+
+
+def _known(source: Source, imu: pd.DataFrame) -> Known | None:
+    """The truth at the samples, where some of them are scored."""
+    if source.truth is None or source.scored is None:
+        return None
+    found = known_at(source.truth, source.scored, imu.index.to_numpy(dtype=np.float64))
+    return found if found.counts.any() else None
+
+
+# Initial attitude and gyro bias of a run.
+
+
+def _gyro_bias(
+    spec: AttitudeSpec, source: Source, rests: tuple[RestStretch, ...]
+) -> tuple[pd.DataFrame, dict[str, Any], tuple[InputFiles, ...]]:
+    """The samples without the gyro bias, the bias as `AttitudeComparison.gyro_bias`, its files."""
+    imu = source.imu
+    files: tuple[InputFiles, ...] = ()
+    bias: Sequence[float]
+    choice = spec.gyro_bias.lower()
+    if spec.gyro_bias_path is not None:
+        options = read_options(spec.source) if isinstance(spec.source, LogSpec) else None
+        other = read_log(spec.gyro_bias_path, options)
+        found = find_rests(other.imu)
+        if not found:
+            raise DataError(
+                "attitude.no-stationary-stretch-second-or", file=other.name, quantity="gyro bias"
+            )
+        longest = max(found, key=lambda r: r.end - r.start)
+        files = (input_files("gyro-bias", spec.gyro_bias_path, other.files),)
+        bias, where = (
+            longest.gyro_mean,
+            f"{longest.end - longest.start:.4g} s of rest in {other.name}",
+        )
+    elif choice == "none":
+        return imu, {"rad_per_s": None, "from": "not removed: nothing was asked for"}, ()
+    elif choice in ("rest", "rests"):
+        if not rests:
+            raise DataError(
+                "attitude.no-stationary-stretch-second-or-2", file=source.name, quantity="gyro bias"
+            )
+        if choice == "rests" and len(rests) > 1:
+            course = gyro_bias_from_rests(rests)
+            where = (
+                f"course over {len(rests)} rests from {rests[0].start:.3f} to "
+                f"{rests[-1].end:.3f} s, straight between them; shown: their average"
+            )
+            less = without_gyro_bias(imu, course)
+            return less, {"rad_per_s": list(course.average), "from": where}, ()
+        first = rests[0]
+        bias, where = first.gyro_mean, f"mean over the rest {first.start:.3f}–{first.end:.3f} s"
+    else:
+        numbers, unit = _stated_bias(spec.gyro_bias)
+        factor = factor_of(unit, GYRO_UNITS)
+        bias, where = [v * factor for v in numbers], f"stated: {spec.gyro_bias}"
+    less = imu.copy()
+    less[GYRO] = imu[GYRO].to_numpy() - np.asarray(bias)
+    return less, {"rad_per_s": list(bias), "from": where}, files
+
+
+def _stated_bias(text: str) -> tuple[list[float], str]:
+    match = re.fullmatch(r"([^,]+),([^,]+),\s*([+-]?[\d.]+(?:e[+-]?\d+)?)\s*(\D.*)?", text, re.I)
+    try:
+        if match is None:
+            raise ValueError
+        numbers = [float(match.group(k)) for k in (1, 2, 3)]
+        if not np.isfinite(numbers).all():
+            raise ValueError
+    except ValueError:
+        raise ConfigError("attitude.no-bias", quantity="--gyro-bias", text=text) from None
+    unit = parse_unit((match.group(4) or "rad/s").strip(), "gyro")
+    if unit in GYRO_SUMS:
+        raise ConfigError(
+            "attitude.increment-bias-rate", quantity="--gyro-bias", unit=unit, gyro_units=GYRO_UNITS
+        )
+    return numbers, unit
+
+
+def initial_attitude(
+    text: str,
+    imu: pd.DataFrame,
+    rests: tuple[RestStretch, ...],
+    findings: list[Finding],
+    truth: pd.DataFrame | None = None,
+) -> tuple[Array, dict[str, Any], float]:
+    """Initial attitude ``q_nb`` of a run, its description, and the start time in s.
+
+    Parameters
+    ----------
+    text : str
+        As `AttitudeOptions.initial`.
+    imu : DataFrame
+    rests : tuple of RestStretch
+        Of `imu`.
+    findings : list of Finding
+        A leveling upside down is appended.
+    truth : DataFrame, optional
+        An Attitude table.
+    """
+    name = imu.attrs.get("source")
+    start = float(imu.index[0])
+    at_rest = bool(rests) and rests[0].start - start <= 1.0 and rests[0].accel_mean is not None
+    choice = text.strip().lower()
+    if choice == "auto":
+        choice = "truth" if truth is not None else "level" if at_rest else "zero"
+        how = {
+            "truth": "from the truth",
+            "level": "levelled; heading zero, because nothing says what it is",
+            "zero": "zero, because none was given and the log does not begin at rest with an "
+            "accelerometer",
+        }[choice]
+    else:
+        how = {"truth": "from the truth", "level": "levelled; heading zero", "zero": "zero"}.get(
+            choice, "given"
+        )
+    begin = start
+    if choice == "truth":
+        if truth is None:
+            raise ConfigError("attitude.log-no-truth-take", file=name, quantity="--initial")
+        q_nb, begin = _first_truth(truth, imu)
+    elif choice == "level":
+        q_nb = _levelled(rests, at_rest, name, findings)
+    elif choice == "zero":
+        q_nb = np.array([1.0, 0.0, 0.0, 0.0])
+    else:
+        q_nb = rotation.quaternion_from_euler(_three_angles(text))
+    roll, pitch, heading = (float(a) for a in rotation.euler_from_quaternion(q_nb))
+    words = {
+        "roll_deg": roll,
+        "pitch_deg": pitch,
+        "heading_deg": heading,
+        "time_s": begin,
+        "from": how,
+        "method": choice if choice in ("truth", "level", "zero") else "given",
+    }
+    return q_nb, words, begin
+
+
+def _first_truth(truth: pd.DataFrame, imu: pd.DataFrame) -> tuple[Array, float]:
+    stamps = imu.index.to_numpy(dtype=np.float64)
+    # A known attitude is a valid start, even at samples that are not scored.
+    known = known_at(truth, np.ones(len(truth), dtype=bool), stamps)
+    good = np.flatnonzero(known.counts)
+    if not good.size:
+        raise ConfigError(
+            "attitude.truth-nowhere-known-sample-between",
+            file=imu.attrs.get("source"),
+            quantity="--initial",
+            stamps=stamps[0],
+            stamps_2=stamps[-1],
+        )
+    return known.q_nb[good[0]], float(stamps[good[0]])
+
+
+def _levelled(
+    rests: tuple[RestStretch, ...], at_rest: bool, name: str | None, findings: list[Finding]
+) -> Array:
+    if not at_rest:
+        raise ConfigError(
+            "attitude.levelling-needs-accelerometer-log-begins", file=name, quantity="--initial"
+        )
+    assert rests[0].accel_mean is not None
+    roll, pitch = rotation.level(rests[0].accel_mean)
+    if abs(roll) > 90.0:
+        findings.append(
+            Finding("attitude.levelled-upside-down-roll", file=name, quantity="accel", roll=roll)
+        )
+    return rotation.quaternion_from_euler([roll, pitch, 0.0])
+
+
+def _three_angles(text: str) -> list[float]:
+    try:
+        angles = [float(part) for part in text.split(",")]
+    except ValueError:
+        angles = []
+    if len(angles) != 3 or not (np.abs(angles) <= 1e6).all():
+        raise ConfigError("attitude.no-attitude", quantity="--initial", text=text)
+    return angles

@@ -1,0 +1,298 @@
+"""Options of a comparison of attitude algorithms, and what they are resolved to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import Field, FiniteFloat
+
+from strapdown.config import LogSpec, ScenarioSpec
+from strapdown.config.spec import Spec, specify
+from strapdown.errors import ConfigError
+from strapdown.systems.inputs import check_part
+
+__all__ = ["ALL_ALGORITHMS", "COMPARED", "AttitudeOptions", "AttitudeSpec", "refuse_no_rate"]
+
+#: Algorithms that are compared by default.
+COMPARED = ("naive", "euler", "dcm", "quaternion", "rk4", "rotvec")
+#: Meaning of ``all``: Alexiev's four, Runge-Kutta, and 1 to 4 increments.
+ALL_ALGORITHMS = (*COMPARED[:5], *(f"rotvec:samples={n}" for n in (1, 2, 3, 4)))
+
+AnySource = Annotated[ScenarioSpec | LogSpec, Field(discriminator="kind")]
+
+
+class AttitudeSpec(Spec):
+    """A comparison as it is sealed: `AttitudeOptions`, with sources, words and files told apart."""
+
+    source: AnySource
+    also: tuple[AnySource, ...] = ()
+    algorithms: tuple[str, ...] = COMPARED
+    interpolation: Literal["linear", "cubic"] = "linear"
+    rates_hz: tuple[FiniteFloat, ...] = ()
+    tolerance_deg: FiniteFloat = Field(default=1.0, gt=0.0)
+    initial: str = "auto"
+    gyro_bias: str = "none"
+    references: tuple[str, ...] = ()
+    truth_path: str | None = None
+    gyro_bias_path: str | None = None
+    reference_log_path: str | None = None
+    peers: tuple[str, ...] = ()
+    from_s: FiniteFloat | None = None
+    to_s: FiniteFloat | None = None
+    duration_s: FiniteFloat | None = None
+
+
+@dataclass(frozen=True)
+class AttitudeOptions:
+    """Options of a comparison of attitude algorithms.
+
+    Attributes
+    ----------
+    algorithms : sequence of str
+        Names with options, as in ``quaternion:order=3`` (`attitude_algorithms.make_algorithm`),
+        plug-ins included; or ``all``: the paper's four, Runge-Kutta, and rotation vectors of 1 to
+        4 increments.
+    rates_hz : sequence of float
+        Lower rates to try; the full rate and its halves, if empty.
+    tolerance_deg : float
+        Required accuracy: limit of the largest known error.
+    interpolation : {'linear', 'cubic'}
+        Interpolation of the rates between stamps (`increments.increments_from_imu`).
+    trials : int
+        Number of seeds of a scenario, from `seed` on.
+    reference : str or sequence of str
+        Reference points in words (``end same as start``, `evaluation.reference_points`), or the
+        path of a file with reference points or an attitude truth; ``rests``: gravity at every
+        rest.
+    reference_log : str or Path, optional
+        Log of a second, better sensor on the same body: synchronized and aligned with this one,
+        its attitude serves as the truth.
+    initial : str or array_like, (3,), deg
+        ``auto``, ``truth``, ``level``, ``zero``, or ``roll,pitch,heading`` in deg. ``auto`` is
+        the truth where there is one, leveled where the log begins at rest, and zero otherwise.
+    gyro_bias : str or array_like, (3,), rad/s
+        ``none``; ``rest``, the mean over the first stationary stretch; ``rests``, interpolated
+        between all of them; three numbers and a unit about forward, right, down; or the path of a
+        log of the stationary sensor.
+    peers : sequence of str
+        Filters of other libraries to compare (`peers.PEERS`), or ``all``.
+    from_s, to_s, duration_s : float, optional
+        Part of the log: from an instant, to an instant, or of a duration.
+    rate_hz : float, optional
+        Sample rate of a scenario (100 if not given), or of a log without a time column.
+    sampling : {'instantaneous', 'mean'}, optional
+        Meaning of a row: the rate at its stamp, or its mean over the interval ending there.
+    seed : int, optional
+        Seed of a scenario's noise; 0 if not given.
+    sensor : str or Path, optional
+        For a scenario: a sensor of the catalogue, or a file like its entries.
+    columns, gyro_unit, accel_unit, time_unit, axes, repair
+        How to read a log, as in `formats.recording.ReadOptions`.
+    """
+
+    algorithms: Sequence[str] = COMPARED
+    rates_hz: Sequence[float] = ()
+    tolerance_deg: float = 1.0
+    interpolation: str = "linear"
+    trials: int = 1
+    reference: str | Sequence[str] = ()
+    reference_log: str | Path | None = None
+    initial: str | ArrayLike = "auto"
+    gyro_bias: str | ArrayLike = "none"
+    peers: Sequence[str] = ()
+    from_s: float | None = None
+    to_s: float | None = None
+    duration_s: float | None = None
+    rate_hz: float | None = None
+    sampling: str | None = None
+    seed: int | None = None
+    sensor: str | Path | None = None
+    columns: Mapping[str, str] = field(default_factory=dict)
+    gyro_unit: str | None = None
+    accel_unit: str | None = None
+    time_unit: str | None = None
+    axes: str | None = None
+    repair: bool = False
+
+    def specify(self, source: str | Path | Sequence[str | Path]) -> AttitudeSpec:
+        """Resolve the options for one source, or for several trials of one question.
+
+        Parameters
+        ----------
+        source : str, Path, or a sequence of both
+            Names of scenarios (`simulation.SCENARIOS`), or paths of logs.
+
+        Raises
+        ------
+        DataError, ConfigError
+            An option or a source is unknown, or the two do not go together.
+        """
+        sources = _texts(source)
+        if not sources:
+            raise ConfigError("attitude.nothing-named", quantity="source")
+        for rate in self.rates_hz:
+            refuse_no_rate(float(rate))
+        check_part(self.from_s, self.to_s, self.duration_s)
+        first, *others = _one_of_each(one for text in sources for one in self._of_source(text))
+        words, truth_path = _sort_references(_texts(self.reference))
+        bias = _text(self.gyro_bias)
+        bias_path = str(Path(bias)) if _exists(bias) else None
+        algorithms = _texts(self.algorithms)
+        return specify(
+            AttitudeSpec,
+            source=first,
+            also=tuple(others),
+            algorithms=ALL_ALGORITHMS if algorithms == ["all"] else tuple(algorithms),
+            interpolation=self.interpolation.strip(),
+            rates_hz=tuple(float(r) for r in self.rates_hz),
+            tolerance_deg=self.tolerance_deg,
+            initial=_text(self.initial),
+            gyro_bias="log" if bias_path else bias,
+            references=words,
+            truth_path=truth_path,
+            gyro_bias_path=bias_path,
+            peers=tuple(_texts(self.peers)),
+            reference_log_path=None if self.reference_log is None else str(self.reference_log),
+            from_s=self.from_s,
+            to_s=self.to_s,
+            duration_s=self.duration_s,
+        )
+
+    def _of_source(self, text: str) -> list[ScenarioSpec] | list[LogSpec]:
+        """Specify a scenario, once per trial, or a log."""
+        if self.trials < 1:
+            raise ConfigError("attitude.no-number-trials", quantity="--trials", trials=self.trials)
+        name = text.strip().lower()
+        if not name:
+            raise ConfigError("attitude.nothing-named", quantity="source")
+        reading = {
+            "columns": dict(self.columns) or None,
+            "gyro_unit": self.gyro_unit,
+            "accel_unit": self.accel_unit,
+            "time_unit": self.time_unit,
+            "axes": self.axes,
+            "repair": self.repair or None,
+        }
+        said = {key: value for key, value in reading.items() if value is not None}
+        # The name of a scenario has neither a suffix nor a folder.
+        if not Path(name).suffix and len(Path(name).parts) == 1:
+            from strapdown.simulation import SCENARIOS, find_scenario
+
+            if name not in SCENARIOS and not _exists(text):
+                self._refuse_of_scenario()
+                find_scenario(name)  # lists the valid names
+            if name in SCENARIOS:
+                if said:
+                    raise ConfigError(
+                        "attitude.scenario-not-read-file", quantity=name, given=list(said)
+                    )
+                highest = max((float(r) for r in self.rates_hz), default=100.0)
+                first = specify(
+                    ScenarioSpec,
+                    name=name,
+                    rate_hz=highest if self.rate_hz is None else self.rate_hz,
+                    sampling=(self.sampling or "instantaneous").lower(),
+                    seed=0 if self.seed is None else self.seed,
+                    sensor=None if self.sensor is None else str(self.sensor),
+                )
+                return [
+                    first.model_copy(update={"seed": first.seed + k}) for k in range(self.trials)
+                ]
+        self._refuse_of_scenario()
+        return [
+            specify(
+                LogSpec,
+                path=str(Path(text)),
+                sampling=self.sampling,
+                rate_hz=self.rate_hz,
+                **said,
+            )
+        ]
+
+    def _refuse_of_scenario(self) -> None:
+        """Refuse options of a scenario for a recorded log."""
+        if self.seed is not None:
+            raise ConfigError("attitude.recorded-log-no-noise-drawn", quantity="seed")
+        if self.sensor is not None:
+            raise ConfigError("attitude.recorded-log-sensor", quantity="sensor")
+        if self.trials > 1:
+            raise ConfigError("attitude.recorded-log-not-drawn-again", quantity="--trials")
+
+
+def refuse_no_rate(rate: float) -> None:
+    """Raise ConfigError unless a rate in Hz is positive and finite."""
+    if not (np.isfinite(rate) and rate > 0.0):
+        raise ConfigError("attitude.hz-no-rate", quantity="--rates", rate=rate)
+
+
+def _text(value: Any) -> str:
+    """Return a text unchanged, three numbers as text."""
+    if isinstance(value, str | Path):
+        return str(value).strip()
+    return ",".join(str(v) for v in np.asarray(value).ravel().tolist())
+
+
+def _texts(values: object) -> list[str]:
+    """Return one text, several or none as a list."""
+    if values is None:
+        return []
+    if isinstance(values, str | Path) or not isinstance(values, Iterable):
+        return [str(values)]
+    return [str(v) for v in values]
+
+
+def _one_of_each(
+    sources: Iterable[ScenarioSpec | LogSpec],
+) -> list[ScenarioSpec | LogSpec]:
+    """Refuse a source that is named twice: it would count as two trials."""
+    found: list[ScenarioSpec | LogSpec] = []
+    for source in sources:
+        if source in found:
+            name = source.name if isinstance(source, ScenarioSpec) else source.path
+            raise ConfigError("attitude.named-twice-trial-does-not", file=name, quantity="source")
+        found.append(source)
+    return found
+
+
+def _exists(text: str) -> bool:
+    """Whether a text is an existing path; False for sentences and invalid characters."""
+    if text in ("", "none", "rest", "rests"):
+        return False
+    try:
+        return Path(text).exists()
+    except (OSError, ValueError):
+        return False
+
+
+def _sort_references(items: Sequence[str]) -> tuple[tuple[str, ...], str | None]:
+    """Separate reference sentences from the path of a truth."""
+    words: list[str] = []
+    truth: str | None = None
+    for item in items:
+        path = Path(item)
+        if not _exists(item):
+            if " " not in item.strip() and path.suffix:
+                raise ConfigError("attitude.no-such-file", file=item, quantity="reference")
+            words.append(item)
+        elif path.is_dir():
+            raise ConfigError("attitude.folder", file=item, quantity="reference")
+        elif (listed := _listed(path)) is not None:
+            words += listed
+        elif truth is None:
+            truth = str(path)
+        else:
+            raise ConfigError(
+                "attitude.two-attitude-truths-given", quantity="reference", truth=truth, item=item
+            )
+    return tuple(words), truth
+
+
+def _listed(path: Path) -> list[str] | None:
+    from strapdown.formats.references import read_reference_words
+
+    return read_reference_words(path)
