@@ -16,7 +16,6 @@ from strapdown.alignment.fine import FineResult, alignment_of, settled_epoch
 from strapdown.alignment.inertial_sums import sum_inertially
 from strapdown.alignment.mean_errors import sensor_covariance, sensor_noise
 from strapdown.alignment.stationary import home_of
-from strapdown.attitude_algorithms import Quaternion, run_attitude
 from strapdown.errors import ConfigError, DataError
 from strapdown.estimation.error_filter import FilterState
 from strapdown.increments import increments_from_imu
@@ -475,6 +474,9 @@ def carried_attitude(alignment: Alignment, imu: pd.DataFrame, site: Site) -> pd.
     DataError
         The instant of the alignment is not in the record.
     """
+    from strapdown.attitude import Quaternion
+    from strapdown.attitude_algorithms.algorithm import run_attitude
+
     clean = _without_gyro_bias(imu, alignment)
     run = run_attitude(Quaternion(), increments_from_imu(clean)).attitude
     time = run.index.to_numpy(dtype=np.float64)

@@ -99,8 +99,9 @@ def print_navigation(
     if verbose:
         print_findings(findings)
         return
-    # The verdict says the first of these already.
-    others = [one for one in findings if one not in verdict.against[:MOST_SAID]]
+    # The verdict says the first of these already; alone, they have room for row and remedy.
+    said_already = verdict.against[:MOST_SAID]
+    others = [one for one in findings if one not in said_already] or list(findings)
     others.sort(key=lambda one: one.severity == "note")
     print_findings(others, _fitting(others, room, out.width))
 

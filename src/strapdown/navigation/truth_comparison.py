@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -33,6 +34,9 @@ from strapdown.tables import (
     places_of,
     trajectory_error_table,
 )
+
+if TYPE_CHECKING:
+    from strapdown.simulation.earth_motion import EarthMotion
 
 __all__ = [
     "COMPONENTS",
@@ -146,7 +150,7 @@ def compare_with_truth(
     """
     stamps = trajectory.index.to_numpy(dtype=np.float64)
     row, mark = _rows_of_marks(stamps, np.asarray(marks, dtype=np.float64))
-    if isinstance(truth, EarthMotion):
+    if not isinstance(truth, pd.DataFrame):
         inside = stamps[row] <= truth.duration
         span = (0.0, truth.duration)
     else:
@@ -158,7 +162,7 @@ def compare_with_truth(
     if not row.size:
         raise _nothing_in_common(trajectory, span)
     computed, time = trajectory.iloc[row], stamps[row]
-    if isinstance(truth, EarthMotion):
+    if not isinstance(truth, pd.DataFrame):
         true = truth.trajectory(time)
         differences = trajectory_differences(computed, true, ellipsoid)
     else:
