@@ -185,7 +185,7 @@ def print_findings(findings: Sequence[Finding], most: int | None = None) -> None
     out = console(err=True)
     for finding in findings[:most]:
         head, _, remedy = finding.text(WORDS.get()).partition("\n")
-        out.print(f"note: {head}", style="yellow")
+        out.print(f"{finding.severity}: {head}", style="yellow")
         if remedy:
             out.print(remedy, style="dim")
     if most is not None and len(findings) > most:
