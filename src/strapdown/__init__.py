@@ -52,6 +52,7 @@ if TYPE_CHECKING:
         navigate,
     )
     from strapdown.api.reading import GnssFixes, Imu, Streams, read, read_gnss, read_imu
+    from strapdown.api.simulation import Simulation, simulate
     from strapdown.crash.entry import Entry
     from strapdown.crash.monte_carlo import sample_paths
     from strapdown.evaluation.trajectory_differences import (
@@ -66,7 +67,6 @@ if TYPE_CHECKING:
     from strapdown.increments import motion_increments
     from strapdown.mechanization import NavTracker, NorthEastDown, WanderAzimuth, run_mechanization
     from strapdown.nav_state import NavState
-    from strapdown.report.simulation import simulate
     from strapdown.report.verify import verify
     from strapdown.sensors.crash_unit import Assumed, CrashUnit, Mounting, RecordedTriad
     from strapdown.sensors.imu_health import check_imu_channels
@@ -104,6 +104,7 @@ __all__ = [
     "OrientationFilter",
     "OutageRun",
     "RecordedTriad",
+    "Simulation",
     "Site",
     "Streams",
     "TriadUncertainty",
@@ -168,6 +169,8 @@ _HOMES = {
     "read": "strapdown.api.reading",
     "read_gnss": "strapdown.api.reading",
     "read_imu": "strapdown.api.reading",
+    "Simulation": "strapdown.api.simulation",
+    "simulate": "strapdown.api.simulation",
     "CrashReconstruction": "strapdown.systems.crash_reconstruction",
     "Entry": "strapdown.crash.entry",
     "sample_paths": "strapdown.crash.monte_carlo",
@@ -184,7 +187,6 @@ _HOMES = {
     "WanderAzimuth": "strapdown.mechanization",
     "run_mechanization": "strapdown.mechanization",
     "NavState": "strapdown.nav_state",
-    "simulate": "strapdown.report.simulation",
     "verify": "strapdown.report.verify",
     "Assumed": "strapdown.sensors.crash_unit",
     "CrashUnit": "strapdown.sensors.crash_unit",

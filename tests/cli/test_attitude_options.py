@@ -30,7 +30,7 @@ def logs(tmp_path_factory):
         ("b", "gestures", 100),
         ("c", "alexiev-fig2e", 50),
     ):
-        simulate(scenario, folder / name, rate=rate, formats=["csv"])
+        simulate(scenario, rate_hz=rate).save(folder / name, formats=["csv"])
     return {name: folder / name / "log.csv" for name in "abc"}
 
 

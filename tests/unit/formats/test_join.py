@@ -110,7 +110,9 @@ def test_a_sensor_that_covers_half_is_left_out(tmp_path, gyro):
 def test_clocks_without_common_time_are_refused(tmp_path, gyro):
     path, t = gyro
     other = table(tmp_path / "a.csv", t + 1.7e9, line_of(t))
-    with pytest.raises(DataError, match="do not count from the same moment") as error:
+    with pytest.raises(
+        DataError, check=lambda refused: refused.finding.code == "io.stamps-run-after-first-gyro"
+    ) as error:
         read_joined([path, other])
     assert error.value.finding.file == "a.csv"
     assert "one clock" in error.value.finding.remedy
@@ -138,12 +140,18 @@ def test_samples_that_are_no_numbers_or_repeat_are_not_used(tmp_path, gyro):
 def test_no_gyro_two_gyros_and_mute_clocks_are_refused(tmp_path, gyro):
     path, t = gyro
     accel = table(tmp_path / "a.csv", t, line_of(t))
-    with pytest.raises(DataError, match=r"no gyroscope in it; it holds: a\.csv"):
+    with pytest.raises(
+        DataError, check=lambda refused: refused.finding.code == "io.no-gyroscope-holds"
+    ):
         read_joined([accel, accel])
-    with pytest.raises(ConfigError, match=r"g\.csv and g\.csv have one each"):
+    with pytest.raises(
+        ConfigError, check=lambda refused: refused.finding.code == "io.gyro-in-several-logs"
+    ):
         read_joined([path, path])
     mute = table(tmp_path / "m.csv", t, line_of(t), "time,accel_x_g,accel_y_g,accel_z_g")
-    with pytest.raises(DataError, match="its stamps have no unit") as error:
+    with pytest.raises(
+        DataError, check=lambda refused: refused.finding.code == "io.stamps-no-unit-those-other"
+    ) as error:
         read_joined([path, mute])
     assert error.value.finding.file == "m.csv"
 

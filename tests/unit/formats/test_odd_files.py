@@ -106,7 +106,9 @@ def test_a_clock_with_a_unit_goes_before_one_without(tmp_path):
 def test_three_names_by_prefix_must_be_x_y_and_z(tmp_path):
     lines = ["time_s,gx,gmax,gy,GyroZ"] + [f"{0.01 * k},1,2,3,4" for k in range(30)]
     path = written(tmp_path / "log.csv", "\n".join(lines))
-    with pytest.raises(ConfigError, match="no column 'g'"):
+    with pytest.raises(
+        ConfigError, check=lambda refused: refused.finding.code == "io.no-such-column"
+    ):
         read_log(path, ReadOptions(columns={"gyro": "g"}, gyro_unit="rad/s"))
     lines[0] = "time_s,GyrX_dps,Extra,GyrY_dps,GyrZ_dps"
     imu = read_log(written(path, "\n".join(lines)), ReadOptions(columns={"gyro": "gyr"})).imu
@@ -120,7 +122,9 @@ def test_of_an_array_of_four_nothing_is_guessed(tmp_path, transposed):
     time = np.arange(50) * 0.01
     block = np.column_stack([time, np.ones((50, 3))])
     np.savez(tmp_path / "log.npz", time_s=time, gyro_rad_s=block.T if transposed else block)
-    with pytest.raises(DataError, match="no column was recognised"):
+    with pytest.raises(
+        DataError, check=lambda refused: refused.finding.code == "io.no-gyro-columns"
+    ):
         read_log(tmp_path / "log.npz")
     imu = read_log(tmp_path / "log.npz", ReadOptions(columns={"gyro": "gyro_rad_s[1]"})).imu
     assert (imu[GYRO].to_numpy() == 1).all()
@@ -130,14 +134,20 @@ def test_unsigned_stamps_that_go_back_are_seen(tmp_path):
     stamps = np.concatenate([np.arange(5000, 6000, 10), np.arange(0, 1000, 10)])
     for kind in (np.uint32, np.int16, np.int64, np.float32):
         np.savez(tmp_path / "log.npz", time_ms=stamps.astype(kind), gyro_rad_s=np.ones((200, 3)))
-        with pytest.raises(DataError, match=r"row 101, time: time goes back from 5990"):
+        with pytest.raises(
+            DataError,
+            match="row 101, time",
+            check=lambda refused: refused.finding.code == "io.time-goes-back",
+        ):
             read_log(tmp_path / "log.npz")
 
 
 def test_a_fall_to_zero_that_is_no_wrap_is_none(tmp_path):
     ticks = np.concatenate([np.arange(100), np.arange(100)]) * 10
     lines = ["time_ms,gx_dps,gy_dps,gz_dps"] + [f"{t},0,0,1" for t in ticks]
-    with pytest.raises(DataError, match="time goes back"):
+    with pytest.raises(
+        DataError, check=lambda refused: refused.finding.code == "io.time-goes-back"
+    ):
         read_log(written(tmp_path / "log.csv", "\n".join(lines)))
 
 
@@ -218,7 +228,10 @@ def test_the_start_is_taken_from_the_truth_only_where_there_is_some(tmp_path):
     holed = written(tmp_path / "holed.csv", "\n".join([*lines[:3], *lines[95:]]))
     bench = bench_attitude(log, reference=[str(holed)], from_s=4.5, initial="truth")
     assert bench.initial["time_s"] == pytest.approx(9.3, abs=0.11)
-    with pytest.raises(DataError, match="0 of its instants"):
+    with pytest.raises(
+        DataError,
+        check=lambda refused: refused.finding.code == "attitude.instants-lie-within-log-runs",
+    ):
         bench_attitude(log, reference=[str(written(holed, "\n".join(lines[:20])))], from_s=5.0)
 
 
@@ -238,7 +251,7 @@ def test_a_truth_on_dates(tmp_path):
 
 @pytest.mark.parametrize("axes", ["y,z,x", "z,x,y", "x,-y,-z", "-y,x,z"])
 def test_axes_turn_a_log_s_own_truth_with_its_sensor(tmp_path, axes):
-    simulate("alexiev-fig2c", tmp_path / "log", rate=100)
+    simulate("alexiev-fig2c", rate_hz=100).save(tmp_path / "log")
     plain = bench_attitude(tmp_path / "log" / "log.csv", algorithms=["quaternion"])
     turned = bench_attitude(tmp_path / "log" / "log.csv", algorithms=["quaternion"], axes=axes)
     # The error is a rotation angle: what is called forward cannot change it.
@@ -257,7 +270,9 @@ def test_a_truth_whose_clock_has_no_unit_says_what_to_do(tmp_path):
     lines = truth.read_text().splitlines()
     in_ms = ["time,roll_deg,pitch_deg,heading_deg"]
     in_ms += [f"{float(line.split(',')[0]) * 1e3},{line.partition(',')[2]}" for line in lines[1:]]
-    with pytest.raises(DataError, match="as in time_ms"):
+    with pytest.raises(
+        DataError, check=lambda refused: refused.finding.code == "io.truth-time-unusable"
+    ):
         bench_attitude(log, reference=[str(written(truth, "\n".join(in_ms)))])
     in_ms[0] = "time_ms,roll_deg,pitch_deg,heading_deg"
     bench = bench_attitude(log, reference=[str(written(truth, "\n".join(in_ms)))])

@@ -192,10 +192,12 @@ def test_sensor_logger_json(tmp_path):
     with pytest.raises(DataError, match=r"rec\.json/Gyroscope, row 246, x: 'n/a' is not a number"):
         read_log(path)
     path.write_text(json.dumps(records)[:5000])
-    with pytest.raises(DataError, match="no JSON from there on"):
+    with pytest.raises(DataError, check=lambda refused: refused.finding.code == "io.no-json"):
         read_log(path)
     path.write_text(json.dumps(records[:N]))
-    with pytest.raises(DataError, match="no gyroscope in it"):
+    with pytest.raises(
+        DataError, check=lambda refused: refused.finding.code == "io.no-gyroscope-read-here-holds"
+    ):
         read_log(path)
 
 
@@ -206,7 +208,9 @@ def test_sensor_logger_single_file(tmp_path):
     assert np.array_equal(read_log(path).imu[GYRO], body(RATE))
     alone = tmp_path / "Accelerometer.csv"
     alone.write_text(sl_csv(RATE))
-    with pytest.raises(DataError, match="no gyroscope in it"):
+    with pytest.raises(
+        DataError, check=lambda refused: refused.finding.code == "io.no-gyroscope-read-here-holds"
+    ):
         read_log(alone)
     # Under another name nothing says which sensor it is.
     other = path.rename(tmp_path / "log.csv")
@@ -270,7 +274,9 @@ def test_phyphox_single_file(tmp_path):
     imu = read_log(path).imu
     assert np.allclose(imu[GYRO], body(RATE), rtol=1e-15, atol=0)
     path.write_text(px_accel(T, FORCE))
-    with pytest.raises(DataError, match="no gyroscope in it") as error:
+    with pytest.raises(
+        DataError, check=lambda refused: refused.finding.code == "io.no-gyroscope-holds"
+    ) as error:
         read_log(path)
     assert "gyroscope switched on" in error.value.finding.remedy
 
@@ -335,7 +341,9 @@ def test_sensorstream_faults(tmp_path):
     with pytest.raises(DataError, match=r"log\.csv, row 41: '891\.11.*' is not a stamp and blocks"):
         read_log(path)
     path.write_text("\n".join(ss_lines((3, 5))) + "\n")
-    with pytest.raises(DataError, match=r"no line has a gyroscope \(id 4\); it has the ids 3, 5"):
+    with pytest.raises(
+        DataError, check=lambda refused: refused.finding.code == "io.no-line-gyroscope-id-ids"
+    ):
         read_log(path)
     path.write_bytes(b"\xff\xfe\x00" + "\n".join(ss_lines()).encode())
     with pytest.raises(DataError):
@@ -369,9 +377,15 @@ def test_archives_that_cannot_be_used_are_refused_by_name(tmp_path):
     broken = bytearray(whole)
     broken[200] ^= 0xFF
     path.write_bytes(bytes(broken))
-    with pytest.raises(DataError, match=r"rec\.zip/Gyroscope\.csv: it cannot be read|no table"):
+    with pytest.raises(
+        DataError,
+        match=r"rec\.zip/Gyroscope\.csv",
+        check=lambda refused: refused.finding.code == "io.member-unreadable",
+    ):
         read_log(path)
-    with pytest.raises(DataError, match=r"no table of a gyro in it; it holds: notes\.txt"):
+    with pytest.raises(
+        DataError, check=lambda refused: refused.finding.code == "io.no-table-gyro-holds"
+    ):
         read_log(zipped(tmp_path / "other.zip", {"notes.txt": "hello"}))
     with pytest.raises(DataError, match=r"empty\.zip/Gyroscope\.csv: the file is empty|no table"):
         read_log(zipped(tmp_path / "empty.zip", {"Gyroscope.csv": ""}))
@@ -382,7 +396,9 @@ def test_archives_that_cannot_be_used_are_refused_by_name(tmp_path):
 
 def test_a_bomb_is_refused_before_it_unfolds(tmp_path):
     members = {"Gyroscope.csv": sl_csv(RATE)[:200] + "0" * 80_000_000}
-    with pytest.raises(DataError, match="it claims 80000200 bytes, and"):
+    with pytest.raises(
+        DataError, check=lambda refused: refused.finding.code == "io.claims-bytes-stored"
+    ):
         read_raw(zipped(tmp_path / "rec.zip", members))
 
 

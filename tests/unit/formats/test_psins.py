@@ -141,7 +141,9 @@ def test_increments_in_another_unit_are_not_guessed(tmp_path, scale):
     """In g·s, as rates, or ten times too small: read as a table without names, and asked for."""
     rows = rates(2)
     rows[:, 3:6] *= scale
-    with pytest.raises(DataError, match="no column was recognised"):
+    with pytest.raises(
+        DataError, check=lambda refused: refused.finding.code == "io.nameless-seven-columns"
+    ):
         read_log(matrix(tmp_path, rows))
 
 

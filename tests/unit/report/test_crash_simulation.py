@@ -15,9 +15,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 from crash_case_folder import read_spec, reconstruct, unit
 
 from strapdown import simulate, verify
+from strapdown.api import simulation as api_simulation
 from strapdown.constants import TWO_SIDED_95
 from strapdown.formats import read_raw
-from strapdown.report import crash_simulation
 from strapdown.simulation.crash_cases import CASES, record_case
 from strapdown.simulation.crash_scenarios import CRASHES
 from strapdown.simulation.exact_answers import ExactAnswers
@@ -38,8 +38,8 @@ def simulated(tmp_path_factory):
     def make(name):
         if name not in made:
             with pytest.MonkeyPatch.context() as patch:
-                patch.setattr(crash_simulation, "record_case", keeping)
-                made[name] = (simulate(name, root / name).path, kept.pop())
+                patch.setattr(api_simulation, "record_case", keeping)
+                made[name] = (simulate(name).save(root / name).path, kept.pop())
         return made[name]
 
     return make
@@ -228,13 +228,8 @@ def test_verify_finds_the_same_bytes(name, folder):
 
 
 def test_options_are_in_the_seal_and_come_back(tmp_path):
-    seal = simulate(
-        "pole",
-        tmp_path / "own",
-        rate=500,
-        sampling="mean",
-        seed=9,
-        units=["imu2"],
+    seal = simulate("pole", rate_hz=500, sampling="mean", seed=9, recorders=["imu2"]).save(
+        tmp_path / "own"
     )
     assert verify(seal.path).verdict == "identical"
     spec = read_spec(seal.path)
@@ -250,7 +245,7 @@ def test_options_are_in_the_seal_and_come_back(tmp_path):
 def test_records_in_iso_mme_are_the_same_records(tmp_path):
     from strapdown.formats.crash_records import read_crash_record
 
-    folder = simulate("pole", tmp_path / "mme", formats=["mme"], units=["imu1"]).path
+    folder = simulate("pole", recorders=["imu1"]).save(tmp_path / "mme", formats=["mme"]).path
     assert not list(folder.glob("imu*.csv"))
     (told,) = read_spec(folder).units
     (of,) = record_case(CASES["pole"], ["IMU1"]).units
@@ -268,6 +263,6 @@ def test_records_in_iso_mme_are_the_same_records(tmp_path):
 
 
 def test_the_case_reads_the_format_that_was_named_first(tmp_path):
-    folder = simulate("no-gyro", tmp_path / "both", formats=["csv", "mme"]).path
+    folder = simulate("no-gyro").save(tmp_path / "both", formats=["csv", "mme"]).path
     assert (folder / "imu1" / "imu1.mme").is_file()
     assert read_spec(folder).units[0].accelerometers[0].path == "imu1_low_g.csv"

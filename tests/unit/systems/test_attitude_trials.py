@@ -154,7 +154,7 @@ def logs(tmp_path_factory):
     """Two logs of one name with a truth each, the second of twice the rate and of errors."""
     folder = tmp_path_factory.mktemp("logs")
     for name, scenario, rate in (("a", "alexiev-fig2c", 50), ("b", "alexiev-fig2e", 100)):
-        simulate(scenario, folder / name, rate=rate, formats=["csv"])
+        simulate(scenario, rate_hz=rate).save(folder / name, formats=["csv"])
     return [folder / "a" / "log.csv", folder / "b" / "log.csv"]
 
 
