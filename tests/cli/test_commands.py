@@ -114,7 +114,7 @@ def test_without_a_reference_it_says_what_it_can_tell_and_how_to_give_one(here, 
     (here / "log.csv").write_text("\n".join(lines) + "\n")
     text = run_cli("attitude", "log.csv").out
     assert "differ by up to" in text
-    assert "no stationary stretch" in text
+    assert "no stationary interval" in text
     assert "--reference 'end same as start'" in text
 
 
@@ -170,7 +170,7 @@ def test_python_m_strapdown_and_a_closed_pipe(tmp_path):
     assert shell("--version").stdout.startswith("strapdown 0.")
     done = shell("attitude", "no-such-log.csv", cwd=tmp_path)
     assert done.returncode == 4
-    assert done.stderr.startswith("error: no-such-log.csv: there is no such file")
+    assert done.stderr.startswith("error: no-such-log.csv: the file")
     piped = subprocess.run(
         ["bash", "-c", f"set -o pipefail; {sys.executable} -m strapdown modules | head -1"],
         capture_output=True,

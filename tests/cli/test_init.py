@@ -69,14 +69,14 @@ def test_a_record_that_fails_leaves_nothing(run_cli, tmp_path):
     bad.write_text("t,ax\n0,1\n")
     done = run_cli("init", "crash", bad, "--out", tmp_path / "case.toml")
     assert done.code == 3
-    assert "bad.csv: 1 sample, too few for a crash" in done.err
+    assert "bad.csv: 1 sample is too few for a crash" in done.err
     assert [p.name for p in tmp_path.iterdir()] == ["bad.csv"]
 
 
 @pytest.mark.parametrize(
     ("arguments", "code", "told"),
     [
-        (["nowhere.csv"], 4, "nowhere.csv: there is no such file"),
+        (["nowhere.csv"], 4, "nowhere.csv: the file"),
         ([], 2, "Missing argument"),
     ],
 )

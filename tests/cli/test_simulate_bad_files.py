@@ -13,11 +13,11 @@ BAD = {
     "long": (REST + "duration_s = 1e300", "gives 1e+302 samples"),
     "deep": (
         REST + "duration_s = 2\nalt_m = -7e6",
-        "alt_m: the motion comes to a height of -7e+06",
+        "alt_m: the motion reaches a height of -7e+06",
     ),
     "down": (
         SINE + "duration_s = 100\nmean_velocity_m_per_s = [5, 0, 20000]",
-        "alt_m: the motion comes to a height of -1.0",
+        "alt_m: the motion reaches a height of -1.0",
     ),
     "two components": (
         SINE + "duration_s = 2\nmean_velocity_m_per_s = [1, 2]",

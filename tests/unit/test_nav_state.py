@@ -104,8 +104,8 @@ def test_an_attitude_that_is_none(q):
 @pytest.mark.parametrize(
     ("lat", "lon", "quantity", "remedy"),
     [
-        (55.0, 37.0, "lat", "this looks like degrees"),
-        (1.0, 37.0, "lon", "this looks like degrees"),
+        (55.0, 37.0, "lat", "seem to be degrees"),
+        (1.0, 37.0, "lon", "seem to be degrees"),
         (2.5, 0.9, "lat", "swapped"),
         (-3.0, -0.5, "lat", "swapped"),
     ],

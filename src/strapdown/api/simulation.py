@@ -210,14 +210,23 @@ def simulate(
     )
     imu, truth = simulate_scenario(scenario)
     spec = specify(SimulateSpec, scenario=scenario)
-    return Simulation(scenario.name, Imu(imu), truth, _source=spec, _made=(imu, truth))
+    return Simulation(scenario.name, _imu(imu), truth, _source=spec, _made=(imu, truth))
+
+
+def _imu(table: pd.DataFrame) -> Imu:
+    """The samples as the public type, with their kind of sampling."""
+    imu = Imu(table)
+    imu.attrs = dict(table.attrs)
+    return imu
 
 
 def _trajectory(spec: TrajectorySpec, receiver: GnssReceiver) -> Simulation:
     made: SimulatedTrajectory = simulate_trajectory(spec)
     motion, _, imu, _, trajectory = made
     fixes = simulate_gnss(motion, receiver, seed=spec.seed, source=spec.name)
-    return Simulation(spec.name, Imu(imu), trajectory, GnssFixes(fixes), _source=spec, _made=made)
+    gnss = GnssFixes(fixes)
+    gnss.attrs = dict(fixes.attrs)
+    return Simulation(spec.name, _imu(imu), trajectory, gnss, _source=spec, _made=made)
 
 
 def _crash(spec: CrashSimulationSpec) -> Simulation:

@@ -169,7 +169,7 @@ def test_gaps_jumps_and_repeats_are_told_with_their_rows():
     assert jump.row in (101, 102)
     assert "jumps in rows 101, 102" in jump.what
     (frozen,) = gnss_readiness(remade(inject_gnss_faults(table, [Frozen(60.0, 61.6)])))
-    assert "repeats itself in rows" in frozen.what
+    assert "repeats its fixes in rows" in frozen.what
     wild = inject_gnss_faults(table, [Outliers(share=0.1, size=50.0)])
     assert any("jumps" in one.what for one in gnss_readiness(remade(wild)))
 
@@ -209,7 +209,7 @@ def test_places_that_move_faster_than_anything_are_refused():
     place = table[GEODETIC].to_numpy().copy()
     place[:, 1] *= 100.0 * (np.arange(len(place)) % 2)
     place[:, 1] %= 180.0
-    with pytest.raises(DataError, match="m/s from fix to fix"):
+    with pytest.raises(DataError, match="m/s between fixes"):
         gnss_readiness(remade(table, place=place, velocity_sd=(np.inf,) * 3))
 
 

@@ -32,6 +32,12 @@ def test_the_same_seed_gives_the_same_bits_and_another_one_others():
     assert not np.array_equal(first.to_numpy(), other.to_numpy())
 
 
+def test_samples_state_their_kind():
+    means = sd.simulate("alexiev-fig4", rate_hz=20, sampling="mean").imu
+    assert means.attrs["sampling"] == "mean"
+    assert sd.simulate("drive-town", rate_hz=20).imu.attrs["sampling"] == "instantaneous"
+
+
 def test_samples_go_into_the_other_functions():
     turned = sd.simulate("alexiev-fig4", rate_hz=100)
     assert turned.gnss is None

@@ -131,11 +131,11 @@ def line_of(text, key):
     [
         (GOOD.replace("lat_deg", "lat"), "lat", "no unit", "lat_deg"),
         (GOOD.replace("lat_deg = 55.0", "lat_deg = 95.0"), "lat_deg", "beyond a pole", "-90 to 90"),
-        (GOOD.replace("55.0", '"?"'), None, "still open", "question|what you know"),
+        (GOOD.replace("55.0", '"?"'), None, "value is missing", "question|by its value"),
         (GOOD.replace("fog-1000", "fog-100"), "sensor", "fog-100", "fog-1000"),
         (GOOD.replace('sensor = "fog-1000"', ""), None, "sensors are not stated", "catalogue"),
         (GOOD + '[coarse]\nkind = "inertial"\n', "kind", "no 'inertial'", "inertial_frame"),
-        (GOOD + "[coarse]\nblocks = 3\n", "blocks", "no such key", ""),
+        (GOOD + "[coarse]\nblocks = 3\n", "blocks", "unknown key", ""),
         (GOOD + '[coarse]\nkind = "two_vector"\nblocks = 1\n', "blocks", "1 is no number", "2 to"),
         (GOOD + '[coarse]\nkind = "two_vector"\nblocks = 2.5\n', "blocks", "2.5", "whole number"),
         (GOOD + '[coarse]\nkind = "known_heading"\nsd_deg = 1.0\n', None, "missing", "heading_deg"),
@@ -145,12 +145,12 @@ def line_of(text, key):
         (GOOD + "[fine]\ninterval_s = 0\n", "interval_s", "no interval", "1 s"),
         (GOOD + '[fine]\nmechanization = "nde"\n', "mechanization", "no 'nde'", "ned"),
         (GOOD + '[fine]\nerror_model = "quaternions"\n', None, "wander azimuth", "wander_azimuth"),
-        (GOOD + '[fine]\nobserve = ["rate"]\n', "observe", "not what a rest tells", "velocity"),
+        (GOOD + '[fine]\nobserve = ["rate"]\n', "observe", "not a measurement", "velocity"),
         (GOOD + '[fine.mechanization]\nheight = "up"\n', "height", "up", "free"),
         (
             GOOD + "[axes]\nmatrix = [[1,0,0],[0,1,0],[0,0,-1]]\n",
             "matrix",
-            "mirror image",
+            "reflection",
             "down is",
         ),
         (
@@ -159,7 +159,7 @@ def line_of(text, key):
             "are at|long",
             "cosines",
         ),
-        (GOOD + '[axes]\ndesign = "chernodarov"\n', "design", "no such design", "chernodarov-2009"),
+        (GOOD + '[axes]\ndesign = "chernodarov"\n', "design", "unknown axes", "chernodarov-2009"),
         (
             GOOD + '[axes]\naxes = "x,y,z"\ndesign = "chernodarov-2009"\n',
             "design",
@@ -172,16 +172,16 @@ def line_of(text, key):
             "accel_matrix is missing",
             "give both",
         ),
-        (GOOD + "[sensors.gyro]\nbias_sd_deg = 1\n", None, "no such key", "bias_sd_deg_per_h"),
+        (GOOD + "[sensors.gyro]\nbias_sd_deg = 1\n", None, "unknown key", "bias_sd_deg_per_h"),
         (GOOD + '[log]\npath = "x.csv"\n', None, "is given, too", "keep one"),
         (
             GOOD.replace("[simulation]", "[simulations]"),
             "[simulations]",
-            "no such key",
+            "unknown key",
             "simulation",
         ),
         (GOOD.replace("60.0", "-1.0"), "duration_s", "-1.0 is out of range", "above 0"),
-        ('name = "x"\n' + GOOD, "name", "no such key", "title"),
+        ('name = "x"\n' + GOOD, "name", "unknown key", "title"),
     ],
 )
 def test_what_does_not_fit_names_its_line(tmp_path, text, key, what, remedy):

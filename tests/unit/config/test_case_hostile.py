@@ -124,15 +124,15 @@ def test_other_files_are_refused(folder, content):
         (b"a = " + b"[" * 100_000, "nested too deep"),
         (b"a." * 50_000 + b"a = 1", "nested too deep"),
         (b"[" + b"a." * 2_000 + b"a]", "nested too deep"),
-        (b"x" * 1_000_000 + b" = 1", "there is no such key"),
+        (b"x" * 1_000_000 + b" = 1", "unknown key"),
         (b"a = " + b"1" * 1_000_000, "it is not TOML"),
-        (b"a = 1" + b"0" * 4_000, "there is no such key"),
+        (b"a = 1" + b"0" * 4_000, "unknown key"),
         (b"title = '" + b"x" * 1_000_000 + b"'", "1000000 characters"),
         (b"title" + b" " * 300_000 + b"= ", "it is not TOML"),
         (b"title = " + b"1," * 300_000, "it is not TOML"),
         (b"title = 'x'\n" * 2, "line 2, title: the key is repeated; it is in line 1 too"),
         (b"[entry]\n" * 3, "line 2, entry: the key is repeated; it is in line 1 too"),
-        (b'"\\u001b[31m" = 1', "'\\x1b[31m': there is no such key"),
+        (b'"\\u001b[31m" = 1', "'\\x1b[31m': unknown key"),
     ],
 )
 def test_files_that_are_no_case_say_so_at_once(folder, content, words):
@@ -152,7 +152,7 @@ def test_what_is_no_file_is_named(folder):
         (folder, "it is not a file"),
         (folder / "nothing.toml", "the file does not exist"),
         (folder / "a\x00b.toml", "the file does not exist"),
-        (folder / ("x" * 300 + ".toml"), "no such file|cannot be read"),
+        (folder / ("x" * 300 + ".toml"), "does not exist|cannot be read"),
     ):
         with pytest.raises(ConfigError, match=words):
             read_case_spec(path)

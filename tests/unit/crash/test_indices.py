@@ -217,7 +217,7 @@ class TestThiv:
             thiv(time, one)
         with pytest.raises(DataError, match="not within the record"):
             thiv(time, plane(one), start=7.0)
-        with pytest.raises(ConfigError, match="no way to fly"):
+        with pytest.raises(ConfigError, match="a flight distance of"):
             thiv(time, plane(one), forward=0.0)
         with pytest.raises(ConfigError, match="no average"):
             thiv(time, plane(one), phd_average="10")

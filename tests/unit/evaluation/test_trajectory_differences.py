@@ -284,7 +284,7 @@ def test_only_what_the_reference_spans_is_compared():
     assert d.attrs["interpolated"] == 20
     (finding,) = d.attrs["findings"]
     assert "20 instants" in finding.what
-    assert "costs up to" in finding.what
+    assert "is up to" in finding.what
     assert finding.file == "ref"
 
 
@@ -293,18 +293,18 @@ def test_gaps_of_the_reference_are_named():
     ref = made.weaving(time[(time < 20.2) | (time > 24.8)])
     d = trajectory_differences(made.weaving(np.arange(0.0, 49.0, 0.25), source="est"), ref)
     gap, cost = d.attrs["findings"]
-    assert "19 instants of the estimate lie in 1 gaps of the reference" in gap.what
+    assert "19 instants of the estimate are in 1 gaps of the reference" in gap.what
     assert "longest 5 s at 20 s" in gap.what
     # The cost that is told knows of the gap.
     worst = np.linalg.norm(d[NED], axis=1).max()
-    told = float(cost.what.split("costs up to ")[1].split(" m")[0])
+    told = float(cost.what.split("is up to ")[1].split(" m")[0])
     assert 0.3 * worst < told < 10.0 * worst
 
 
 def test_a_reference_of_two_rows():
     ref = made.weaving([0.0, 1.0])
     d = trajectory_differences(made.weaving([0.0, 0.5, 1.0], source="est"), ref)
-    assert "cannot be told" in d.attrs["findings"][0].what
+    assert "is not known" in d.attrs["findings"][0].what
 
 
 # --- errors ------------------------------------------------------------------------------------

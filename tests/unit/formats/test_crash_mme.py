@@ -222,7 +222,7 @@ def test_damaged_headers(test_of, tmp_path):
     with pytest.raises(DataError, match=r"holds 2 tests: T1\.mme, T2\.mme"):
         read_crash_record(tmp_path)
     assert read_crash_record(tmp_path / "T1.mme").format == "mme"
-    with pytest.raises(DataError, match="are of other tests, and none has its name: T1"):
+    with pytest.raises(DataError, match="belong to other tests: T1"):
         read_crash_record(tmp_path / "T2.mme")
 
 
@@ -234,13 +234,13 @@ def test_failed_missing_and_renamed_channels_are_told(test_of, tmp_path):
     index.write_text(index.read_text().replace(HEAD, "11HEAD0000H3ACXC"))
     told = " ".join(str(f) for f in read_crash_record(tmp_path).findings)
     assert "1 of 2 listed channels are not in the folder: 002" in told
-    assert "the index has 11HEAD0000H3ACXC for it" in told
+    assert "the index states 11HEAD0000H3ACXC" in told
 
 
 def test_a_code_that_is_none_and_a_unit_against_the_code(test_of):
     record = test_of(channel("LEFT FRONT"), channel(unit="deg/s"))
     assert record.channel("LEFT FRONT").axis == ""
-    assert "no channel code of sixteen" in record.findings[0].what
+    assert "not a channel code of sixteen" in record.findings[0].what
     assert record.channel(HEAD).quantity == "rate"
     assert record.channel(HEAD).remarks[0].startswith("its code says acceleration")
 

@@ -41,7 +41,7 @@ def test_a_triad_in_g_with_a_minus(read):
     assert triad.index.name == "time"
     assert (triad.attrs["sampling"], triad.attrs["source"]) == ("instantaneous", "log.csv")
     told = " ".join(f.what for f in triad.attrs["findings"])
-    assert "along y, and it is taken along -y" in told
+    assert "the axis y, and -y is used" in told
 
 
 def test_missing_axes_are_left_out(read):

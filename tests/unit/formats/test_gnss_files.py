@@ -176,7 +176,7 @@ def swapped_names(line):
 @pytest.mark.parametrize(
     ("head", "rows", "message"),
     [
-        (HEAD, [f"0,{ROW}", f"0,{ROW}"], "row 3, time: the stamp 0 s is that of a row before"),
+        (HEAD, [f"0,{ROW}", f"0,{ROW}"], "row 3, time: the stamp 0 s repeats an earlier one"),
         (HEAD, [f"1,{ROW}", f"0,{ROW}"], "row 3, time: the stamp 0 s comes after 1 s"),
         (HEAD, [f"0,{ROW},7"], "row 2: 14 fields, where the first line has 13"),
         (HEAD, [f"0,{ROW.replace('0.02', 'x')}"], "row 2, east_sd: 'x' is not a number"),
@@ -184,14 +184,14 @@ def swapped_names(line):
         (HEAD, [f"0,{ROW.replace('0.02', '-2')}"], "row 2, east_sd: -2 is no standard deviation"),
         (HEAD, [f"0,{ROW.replace('45.0', '')}"], "row 2, lat: it is no number"),
         (HEAD, [f"0,{ROW.replace('45.0', '95.0')}"], "row 2, lat: a latitude of 95 deg is beyond"),
-        (HEAD.replace("lat", "lat_m"), [f"0,{ROW}"], "lat: 'm' is no unit of it (column 'lat_m')"),
-        (HEAD.replace("VE", "V2", 1), [f"0,{ROW}"], "VE: it is missing, while VN is there"),
+        (HEAD.replace("lat", "lat_m"), [f"0,{ROW}"], "lat: 'm' is not a unit of this quantity"),
+        (HEAD.replace("VE", "V2", 1), [f"0,{ROW}"], "VE: the column is missing, and VN is given"),
         (HEAD.replace("lon", "x"), [f"0,{ROW}"], "missing columns: lon"),
         (HEAD.replace("lon", "latitude"), [f"0,{ROW}"], "lat: columns 'lat' and 'latitude' could"),
-        ("time,lat,lon,alt", ["0,1,2,3"], "no standard deviations of the places are in it"),
+        ("time,lat,lon,alt", ["0,1,2,3"], "the positions have no standard deviations"),
         (f"{HEAD},quality", [f"0,{ROW},9"], "row 2, quality: a quality of 9 is unknown"),
-        (f"{HEAD},Q", [f"0,{ROW},9"], "row 2, Q: a solution of kind 9 is unknown"),
-        (HEAD, [], "row 1: a header, and no data under it"),
+        (f"{HEAD},Q", [f"0,{ROW},9"], "row 2, Q: unknown solution type 9"),
+        (HEAD, [], "row 1: the file has a header and no data"),
         (HEAD, [swapped_names(r) for r in FAST], "lat, lon: the velocity (11.1 m/s) is not that"),
     ],
 )

@@ -137,34 +137,34 @@ def test_zero_means_unknown(tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"note": NOTE.replace("ellipsoidal", "geodetic")}, "alt: its heights are over the geoid"),
-        ({"note": NOTE.replace("WGS84", "Tokyo")}, "lat, lon: the places refer to the datum Tokyo"),
+        ({"note": NOTE.replace("ellipsoidal", "geodetic")}, "alt: the header states heights"),
+        ({"note": NOTE.replace("WGS84", "Tokyo")}, "lat, lon: the positions refer to the datum"),
         (
             {
                 "header": LEVEL.replace(
                     "latitude(deg) longitude(deg)", "e-baseline(m) n-baseline(m)"
                 )
             },
-            "row 3, lat, lon: it holds the way from the base station",
+            "row 3, lat, lon: the file has baselines from the base station",
         ),
         (
             {"header": LEVEL.replace(" height(m)", " heit(m)")},
-            "row 3, height(m): the line that names the columns is damaged",
+            "row 3, height(m): the line with the names of the columns is damaged",
         ),
-        ({"header": "nothing of use"}, "no line names its columns"),
-        ({"rows": []}, "row 3: a header, and no solution under it"),
+        ({"header": "nothing of use"}, "no line names the columns"),
+        ({"rows": []}, "row 3: the file has a header and no solution"),
         ({"rows": [row(), row(later(1)) + " 1.0", row(later(2))]}, "row 5: 20 numbers"),
         (
             {"rows": [row(), row(later(1), sds=SDS.replace("0.0098", "0,0098")), row(later(2))]},
             "row 5, sde(m): '0,0098' is not a number\n  Remedy: correct or delete that row; dec",
         ),
-        ({"rows": [row(), row(later(1), q=8)]}, "row 5, Q: a solution of kind 8 is unknown"),
+        ({"rows": [row(), row(later(1), q=8)]}, "row 5, Q: unknown solution type 8"),
         (
             {"rows": [row(later(1)), row()]},
             "row 5, time: the stamp 97445.25 s comes after 97446.25",
         ),
-        ({"rows": [row(), row()]}, "row 5, time: the stamp 97445.25 s is that of a row before"),
-        ({"rows": [row(), row("1979/01/15 03:04:05.250")]}, "row 5, time: its time is no date"),
+        ({"rows": [row(), row()]}, "row 5, time: the stamp 97445.25 s repeats an earlier one"),
+        ({"rows": [row(), row("1979/01/15 03:04:05.250")]}, "row 5, time: the time is neither"),
         (
             {"rows": [row(), row(later(1), sds=SDS.replace("0.0098", "-0.098"))]},
             "row 5, east_sd: -0.098 is no standard deviation",

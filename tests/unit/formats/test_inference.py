@@ -263,9 +263,9 @@ def test_a_gyro_that_turns_the_other_way_is_told(tmp_path):
     t, gyro, accel = turning()
     header = "time_s,gx_rad_s,gy_rad_s,gz_rad_s,ax_m_s2,ay_m_s2,az_m_s2"
     path = write(tmp_path / "log.csv", t, -gyro, accel, header)
-    assert any("turns the other way" in f.what for f in read_log(path).findings)
+    assert any("rotates opposite to gravity" in f.what for f in read_log(path).findings)
     mirrored = read_log(path, ReadOptions(axes="x,y,-z")).findings
-    assert not any("turns the other way" in f.what for f in mirrored)
+    assert not any("rotates opposite to gravity" in f.what for f in mirrored)
 
 
 def test_a_magnetometer_is_read_in_body_axes(tmp_path):

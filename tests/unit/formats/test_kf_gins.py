@@ -83,7 +83,7 @@ def test_the_end_of_a_week(tmp_path):
     recording = read_log(written(tmp_path / "imu.txt", rows))
     assert recording.imu.index[-1] == pytest.approx(604799.9 + 39 * STEP, abs=1e-9)
     assert np.diff(recording.imu.index) == pytest.approx(STEP, abs=1e-9)
-    said = [f for f in recording.findings if "seconds of week begin again" in f.what]
+    said = [f for f in recording.findings if "seconds of week start again" in f.what]
     assert said[0].row == 21
 
 
@@ -105,7 +105,7 @@ def spoiled(tmp_path, change, name="imu.txt"):
             "row 10, time: '45630o.o500' is not a number",
         ),
         (lambda r: r.__setitem__(9, r[8]), "row 10, time: the stamp 456300.045 repeats"),
-        (lambda r: r.insert(20, r[5]), "row 21, time: time goes back from 456300.1 to 456300.03"),
+        (lambda r: r.insert(20, r[5]), "row 21, time: time decreases from 456300.1 to 456300.03"),
         (lambda r: r.__setitem__(9, "nan" + r[9][11:]), "row 10, time: nan is not a finite number"),
     ],
 )
@@ -121,7 +121,7 @@ def test_a_file_that_is_cut(tmp_path):
     (tmp_path / "imu.txt").write_text(text[:-40])
     recording = read_log(tmp_path / "imu.txt")
     assert len(recording.imu) == 39
-    assert any("the last line is cut" in f.what and f.row == 40 for f in recording.findings)
+    assert any("the last line is incomplete" in f.what and f.row == 40 for f in recording.findings)
 
 
 @pytest.mark.parametrize(
@@ -166,5 +166,5 @@ def test_a_third_axis_up_is_said(tmp_path):
     rows = increments(4000)
     rows[:, 6] *= -1.0
     recording = read_log(written(tmp_path / "imu.txt", rows))
-    assert any("the third axis feels 9.7" in f.what for f in recording.findings)
+    assert any("the specific force of the third axis is 9.7" in f.what for f in recording.findings)
     assert any("points up" in f.what for f in recording.findings)

@@ -65,7 +65,7 @@ def test_decimal_commas_that_come_late_are_seen(tmp_path):
 def test_a_last_line_that_was_cut_is_left_out(tmp_path, end):
     log = read_log(written(tmp_path / "log.csv", "\n".join([HEAD, *ROWS, end])))
     assert len(log.imu) == 30
-    assert any("the last line is cut" in f.what and f.row == 32 for f in log.findings)
+    assert any("the last line is incomplete" in f.what and f.row == 32 for f in log.findings)
 
 
 def test_rows_are_counted_as_an_editor_does(tmp_path):

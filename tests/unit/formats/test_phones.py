@@ -116,7 +116,7 @@ def test_sensor_logger_on_ios_turns_the_sign_unless_standardised(tmp_path, platf
     assert np.allclose(recording.imu[ACCEL], body(FORCE), rtol=0, atol=4e-15)
     # A phone on its back: down is -z of the phone, and specific force points up.
     assert (recording.imu["accel_z"] < -9.7).all()
-    assert bool(said(recording, "its sign is turned")) == (sign < 0)
+    assert bool(said(recording, "the sign was inverted")) == (sign < 0)
 
 
 @pytest.mark.parametrize(("standard", "unit"), [("false", -1 / 9.80665), ("true", 1.0)])
@@ -165,7 +165,7 @@ def test_sensor_logger_sums_sensors_with_stamps_of_their_own(tmp_path):
     assert np.allclose(recording.imu[ACCEL], expected, rtol=0, atol=2e-14)
     assert np.allclose(recording.imu.index, T[2:] - T[2], rtol=0, atol=1e-15)
     assert said(recording, "is the sum of rec/Accelerometer.csv and rec/Gravity.csv, interpolated")
-    assert said(recording, "2 of 120 rows left out")
+    assert said(recording, "2 of 120 rows dropped")
 
 
 def test_sensor_logger_json(tmp_path):
@@ -262,7 +262,7 @@ def test_phyphox(tmp_path, shape):
         # Sixteen digits were written, and one more would be needed.
         assert np.allclose(recording.imu[GYRO], body(RATE), rtol=1e-15, atol=0)
         assert np.allclose(recording.imu[ACCEL][inner], body(FORCE)[inner], rtol=0, atol=1e-13)
-        assert said(recording, "stood still for 5 s at 0.6 s")
+        assert said(recording, "paused for 5 s at 0.6 s")
         assert said(recording, "without gravity")
     assert tmp_path / "raw" / "meta" / "time.csv" in recording.files
 
@@ -329,7 +329,7 @@ def test_sensorstream_lines_without_a_block(tmp_path):
     # itself is known to 1e-13 s here.
     assert np.allclose(recording.imu[ACCEL], body(FORCE)[rows], rtol=0, atol=1e-12)
     assert said(recording, "lines have no gyroscope")
-    assert said(recording, "the last line is cut")
+    assert said(recording, "the last line is incomplete")
     assert said(recording, "interpolated to 89 stamps")
 
 

@@ -150,7 +150,7 @@ def test_an_attitude_of_unknown_origin_is_no_truth(tmp_path):
     path = csv(tmp_path / "log.csv", header, [TIME, RATES, RATES])
     log = read_log(path)
     assert log.truth is None
-    assert any("whose it is" in f.what for f in log.findings)
+    assert any("its source are not stated" in f.what for f in log.findings)
     assert len(read_truth(path)) == 30
 
 
@@ -291,7 +291,7 @@ def test_the_unused_tail_of_a_buffer_is_left_out(tmp_path):
     savemat(folder / "mpu6050_gyroscope.mat", {"gyroBuffer": buffer})
     log = read_log(folder)
     assert len(log.imu) == 30
-    assert any("tail of a buffer" in f.what for f in log.findings)
+    assert any("unfilled buffer" in f.what for f in log.findings)
     expected = RATES * [-1, 1, -1] * (np.pi / 180.0)
     assert np.array_equal(log.imu[GYRO].to_numpy(), expected)
 

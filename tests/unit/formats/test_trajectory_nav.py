@@ -53,10 +53,13 @@ def test_a_new_week_and_an_unknown_one(tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda rows: [r.rsplit(" ", 1)[0] for r in rows], "it has 10 columns, and this layout 11"),
+        (
+            lambda rows: [r.rsplit(" ", 1)[0] for r in rows],
+            "file has 10 columns; this layout has 11",
+        ),
         (lambda rows: [rows[0], rows[1] + " 1", rows[2]], "row 2: 12 fields"),
         (lambda rows: [rows[0], rows[1].replace("0.855", "x"), rows[2]], "row 2, roll: 'x' is not"),
-        (lambda rows: [rows[1], rows[0], rows[2]], "row 2, time: time does not advance"),
+        (lambda rows: [rows[1], rows[0], rows[2]], "row 2, time: time does not increase"),
         (lambda rows: [r.replace("30.4", "95.4") for r in rows], "row 1, lat: a latitude of 95.4"),
     ],
 )

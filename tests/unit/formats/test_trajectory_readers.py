@@ -69,7 +69,7 @@ def test_random_numbers_come_back_to_the_bit(tmp_path):
     back = read_trajectory(tmp_path / "a.csv")
     assert np.array_equal(back.to_numpy(), track.to_numpy())
     (finding,) = back.attrs["findings"]
-    assert "places and the integral of velocity disagree" in finding.what
+    assert "positions and the integral of velocity disagree" in finding.what
 
 
 @pytest.mark.parametrize(
@@ -110,7 +110,7 @@ def test_columns_that_are_called_otherwise(tmp_path):
     path = save(tmp_path / "a.csv", rows, head)
     with pytest.raises(
         DataError,
-        match="a.csv, alt",
+        match=r"a\.csv, alt",
         check=lambda refused: refused.finding.code == "io.column-names-ambiguous",
     ):
         read_trajectory(path, {"lat": "breite"})

@@ -64,7 +64,7 @@ def test_a_start_within_half_a_step_is_taken():
 def test_an_empty_log_is_refused():
     with pytest.raises(
         DataError,
-        match="rest.csv",
+        match=r"rest\.csv",
         check=lambda refused: refused.finding.code == "mechanization.no-increment",
     ):
         run_mechanization(NorthEastDown(), START, rest([0.1]).iloc[:0])
@@ -89,7 +89,7 @@ def test_wide_steps_are_told():
     log = rest([0.1] * 10 + [0.4] + [0.1] * 10 + [0.35])
     (found,) = run_mechanization(NorthEastDown(), START, log).findings
     assert "0.4 s, ends at 6.4 s" in found.what
-    assert "2 steps are more than three times as long as the usual 0.1 s" in found.what
+    assert "2 steps are more than three times the usual 0.1 s" in found.what
     assert found.remedy
 
 

@@ -196,7 +196,7 @@ def test_a_wrong_mounting_is_found_and_told(answers):
     told = [str(f) for f in found.findings]
     assert any("IMU1, delta-V: it and IMU2 disagree" in t for t in told)
     (turned,) = [
-        t for t in told if t.startswith("IMU2, mounting angles: it is turned against IMU1")
+        t for t in told if t.startswith("IMU2, mounting angles: it is rotated relative to IMU1")
     ]
     angle = float(turned.split(" deg about")[0].split(", ")[-1])
     # Mountings of 1 deg each, and the finding's own 0.9 deg: four of 1.7 deg.

@@ -121,7 +121,7 @@ def test_a_dead_gyro_is_named_in_words():
     (fault,) = check_imu_channels(inject_faults(imu, [Dead("gyro_z")])).faults
     assert fault.kind == "dead"
     assert str(fault.finding).startswith(
-        "row 1, gyro_z: the gyro about z (down) is dead: it reads exactly zero from the first "
+        "row 1, gyro_z: the gyro about z (down) is dead: exactly zero from the first "
         "sample to the last (9001 samples)"
     )
     late = check_imu_channels(inject_faults(imu, [Dead("gyro_z", 50.0)])).faults

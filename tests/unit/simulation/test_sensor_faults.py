@@ -77,7 +77,7 @@ def test_seeds():
     ("make", "word"),
     [
         (lambda: Stuck("gyro_w"), "no channel"),
-        (lambda: Stuck("gyro_x", 2.0, 2.0), "lasts no time"),
+        (lambda: Stuck("gyro_x", 2.0, 2.0), "has no duration"),
         (lambda: Jump("gyro_x", size=np.inf), "size"),
         (lambda: Noisy("gyro_x", sd=-1.0), "sd"),
         (lambda: Saturated("gyro_x", limit=0.0), "no range"),

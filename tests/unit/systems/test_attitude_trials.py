@@ -195,7 +195,7 @@ def test_rates_without_a_partner_are_left_out():
     assert found["rate_hz"].tolist() == [110.0, 50.0]
     assert found["error_deg"].tolist() == [1.0, 2.5]
     assert found["reference_deg"].isna().all()
-    with pytest.raises(ConfigError, match="no rate is common"):
+    with pytest.raises(ConfigError, match="no common rate"):
         worst_sweep([sweep(1.0), sweep(10.0)])
 
 
