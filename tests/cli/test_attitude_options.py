@@ -92,17 +92,20 @@ def test_a_second_log_and_rests(here, run_cli, logs):
         (["--tolerance-deg", "0"], "tolerance_deg"),
         (["--tolerance-deg", "nan"], "tolerance_deg"),
         (["--trials", "0"], "0 trials are out of range"),
-        (["--sensor", "nosuch"], "'nosuch' is no sensor"),
-        (["--sensor", "nosuch.toml"], "the file does not exist"),
+        (["--sensor", "nosuch"], "unknown sensor 'nosuch'"),
+        (["--sensor", "nosuch.toml"], "does not exist"),
         (["--interpolation", "spline"], "'linear' or 'cubic'"),
-        (["--peers", "nosuch"], "'nosuch' is no library"),
-        (["--peers", "vqf:nosuch"], "is no filter of vqf"),
-        (["--reference-log", "nosuch.csv"], "the file does not exist"),
-        (["--export-c", "nosuch/x.c"], "there is no such folder"),
-        (["--export-c", "there.c"], "it is there already"),
-        (["--export-c", "folder.c", "--force"], "it is there already"),
-        (["--export-c", "log.csv", "--force"], "no name of a C file"),
-        (["--export-c", "x.c", "--tolerance-deg", "1e-9"], "no algorithm was accurate enough"),
+        (["--peers", "nosuch"], "unknown library 'nosuch'"),
+        (["--peers", "vqf:nosuch"], "unknown filter 'nosuch' of vqf"),
+        (["--reference-log", "nosuch.csv"], "does not exist"),
+        (["--export-c", "nosuch/x.c"], "the folder does not exist"),
+        (["--export-c", "there.c"], "the file exists"),
+        (["--export-c", "folder.c", "--force"], "the file exists"),
+        (["--export-c", "log.csv", "--force"], "must end in .c"),
+        (
+            ["--export-c", "x.c", "--tolerance-deg", "1e-9"],
+            "no algorithm reached the required accuracy",
+        ),
     ],
 )
 def test_what_cannot_be_had_is_told_and_leaves_nothing(here, run_cli, options, said):
@@ -127,7 +130,7 @@ def test_a_log_is_not_drawn_again(here, run_cli, logs):
     assert "give several logs instead" in found.err
     twice = run_cli("attitude", logs["c"], logs["c"])
     assert twice.code == 4
-    assert "named twice" in twice.err
+    assert "given twice" in twice.err
 
 
 def test_a_second_log_of_another_motion(here, run_cli, logs):

@@ -126,7 +126,7 @@ BAD = {
     ),
     "assumed a turn of anything": (
         (BORROWED, "assumed = { turn_sd_deg = [2, 2, 60], because = 'x' }"),
-        ["more than 45"],
+        ["exceeds 45"],
     ),
     "assumed over nothing": ((BORROWED, f"{ASSUMED}, over_s = [1, 1] }}"), ["it lasts 0 s"]),
     "assumed in ms": ((BORROWED, f"{ASSUMED}, over_s = [0, 150] }}"), ["over_ms"]),

@@ -173,7 +173,7 @@ def test_real_crash_keeps_its_velocity_change(recordings):
         (60, 5e-3, "iso", ["CFC 60", "600 samples per second", "not 200"]),
         (1000, 1.01e-4, "iso", ["CFC 1000", "use CFC 600"]),
         (100, 1e-4, "iso", ["unknown channel frequency class", "Known: 60, 180"]),
-        (60, 1e-4, "din", ["no standard", "iso"]),
+        (60, 1e-4, "din", ["unknown standard", "iso"]),
         (60, 0.0, "iso", ["a sampling interval of"]),
     ],
 )

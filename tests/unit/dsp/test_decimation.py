@@ -145,7 +145,7 @@ def test_marked_samples_are_told_where_they_count():
         (lambda: low_pass_design(STEP, RATE, passband=1.0), ["passband"]),
         (lambda: low_pass_design(STEP, RATE, attenuation=200.0), ["40 to 150 dB"]),
         (lambda: mean_samples(np.zeros(9), 0.0, STEP, [STEP], STEP / 2), ["add no information"]),
-        (lambda: mean_samples(np.zeros(9), 0, STEP, [0], STEP, sampling="x"), ["no kind"]),
+        (lambda: mean_samples(np.zeros(9), 0, STEP, [0], STEP, sampling="x"), ["unknown kind"]),
     ],
 )
 def test_options_out_of_range_are_refused(call, words):

@@ -294,7 +294,7 @@ def test_gaps_of_the_reference_are_named():
     d = trajectory_differences(made.weaving(np.arange(0.0, 49.0, 0.25), source="est"), ref)
     gap, cost = d.attrs["findings"]
     assert "19 instants of the estimate are in 1 gaps of the reference" in gap.what
-    assert "longest 5 s at 20 s" in gap.what
+    assert "longest is 5 s at 20 s" in gap.what
     # The cost that is told knows of the gap.
     worst = np.linalg.norm(d[NED], axis=1).max()
     told = float(cost.what.split("is up to ")[1].split(" m")[0])

@@ -216,7 +216,7 @@ def test_damaged_headers(test_of, tmp_path):
         test_of("Channel code :x\nno colon here\n1\n")
     assert error.value.finding.row == 2
     record = test_of(channel(), mme="Title :x\nMass test object 1 :heavy\n")
-    assert "left out: 'heavy' is no number" in record.findings[0].what
+    assert "left out: 'heavy' is not a number" in record.findings[0].what
     assert "mass_kg" not in record.facts
     (tmp_path / "T2.mme").write_text(MME)
     with pytest.raises(DataError, match=r"holds 2 tests: T1\.mme, T2\.mme"):

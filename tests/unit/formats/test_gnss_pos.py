@@ -161,13 +161,13 @@ def test_zero_means_unknown(tmp_path):
         ({"rows": [row(), row(later(1), q=8)]}, "row 5, Q: unknown solution type 8"),
         (
             {"rows": [row(later(1)), row()]},
-            "row 5, time: the stamp 97445.25 s comes after 97446.25",
+            "row 5, time: the stamp 97445.25 s follows 97446.25",
         ),
         ({"rows": [row(), row()]}, "row 5, time: the stamp 97445.25 s repeats an earlier one"),
         ({"rows": [row(), row("1979/01/15 03:04:05.250")]}, "row 5, time: the time is neither"),
         (
             {"rows": [row(), row(later(1), sds=SDS.replace("0.0098", "-0.098"))]},
-            "row 5, east_sd: -0.098 is no standard deviation",
+            "row 5, east_sd: a standard deviation of -0.098",
         ),
         (
             {"rows": [row(), row(later(1), place="139.767125456 -35.681236123 40.0")]},
@@ -189,7 +189,7 @@ def test_a_file_that_is_cut(tmp_path):
     path.write_bytes(path.read_bytes()[:-60])
     table = read_gnss(path)
     assert len(table) == 1
-    assert [f.row for f in table.attrs["findings"] if "is cut" in f.what] == [5]
+    assert [f.row for f in table.attrs["findings"] if "is incomplete" in f.what] == [5]
 
 
 def test_a_file_of_one_line_that_is_cut(tmp_path):

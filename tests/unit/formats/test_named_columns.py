@@ -54,11 +54,11 @@ def test_units_and_deviations(tmp_path: Path) -> None:
         ),
         (
             "time,north,east,down\n0,1,2,3\n1,,2,3\n",
-            "cameras.csv, row 3, north: nan is no number",
+            "cameras.csv, row 3, north: nan is not a number",
         ),
         (
             "time,north [furlong],east,down\n0,1,2,3\n1,1,2,3\n",
-            "its unit is 'furlong', and m is needed",
+            "the unit is 'furlong', and m is needed",
         ),
         (
             "time,north,east,down,north_sd\n0,1,2,3,1\n1,1,2,3,1\n",

@@ -181,7 +181,7 @@ def test_an_accelerometer_that_cannot_be_used_is_left_out(tmp_path):
     log = read_log(written(tmp_path / "log.csv", "\n".join(lines)))
     assert not set(ACCEL) & set(log.imu.columns)
     (finding,) = [f for f in log.findings if f.quantity == "accel"]
-    assert "--accel-unit" in finding.remedy
+    assert "--accel-unit" in finding.advice("cli")
 
 
 def test_nan_in_the_first_row_does_not_reach_the_report(tmp_path):

@@ -236,7 +236,7 @@ def test_a_rate_for_a_log_with_stamps_is_said_to_be_unused(tmp_path):
     path = csv(tmp_path / "log.csv", ["time_s", "wx_dps", "wy_dps", "wz_dps"], [TIME, RATES])
     log = read_log(path, ReadOptions(rate=10.0))
     assert np.array_equal(log.imu.index, TIME)
-    assert any("--rate 10 is not used" in f.what for f in log.findings)
+    assert any(f.code == "io.rate-not-used" for f in log.findings)
 
 
 def synthetic_broad(path):

@@ -85,7 +85,7 @@ def test_a_name_that_says_increments_without_a_unit_asks_for_it(tmp_path, triad)
     if triad == "gyro":
         with pytest.raises(DataError, match="rad or deg") as error:
             read_log(path)
-        assert error.value.finding.remedy == "state it with --gyro-unit"
+        assert error.value.finding.code == "io.file-leaves-open-whether"
     else:
         recording = read_log(path)
         assert ACCEL[0] not in recording.imu.columns

@@ -127,4 +127,4 @@ def test_columns_without_names_are_shown(tmp_path):
     path.write_text("\n".join(f"{k * 10},1.5,-2.25,3,4,5,6,7,8,9" for k in range(N)) + "\n")
     with pytest.raises(DataError, match=r"1: 0, 2: 1.5, 3: -2.25, 4: 3") as caught:
         read_log(path)
-    assert "--columns time=1,gyro_x=2" in caught.value.finding.remedy
+    assert "--columns time=1,gyro_x=2" in caught.value.finding.advice("cli")

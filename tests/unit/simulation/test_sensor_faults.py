@@ -76,12 +76,12 @@ def test_seeds():
 @pytest.mark.parametrize(
     ("make", "word"),
     [
-        (lambda: Stuck("gyro_w"), "no channel"),
+        (lambda: Stuck("gyro_w"), "unknown channel '"),
         (lambda: Stuck("gyro_x", 2.0, 2.0), "has no duration"),
         (lambda: Jump("gyro_x", size=np.inf), "size"),
         (lambda: Noisy("gyro_x", sd=-1.0), "sd"),
-        (lambda: Saturated("gyro_x", limit=0.0), "no range"),
-        (lambda: Burst("gyro_x", share=2.0), "no share"),
+        (lambda: Saturated("gyro_x", limit=0.0), "is not positive"),
+        (lambda: Burst("gyro_x", share=2.0), "is not between 0 and 1"),
         (lambda: inject_faults(table(), [Dead("gyro_x", 50.0)]), "has no gyro_x between"),
         (lambda: inject_faults(table()[["gyro_x"]], [Dead("accel_x")]), "has no accel_x"),
     ],

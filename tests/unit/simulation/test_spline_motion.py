@@ -154,7 +154,7 @@ def euler(pitch):
     ("change", "words"),
     [
         ({"time": [0.0, 5.0, 5.0]}, "place 3, time: 5 s is not after 5 s"),
-        ({"time": [1.0, 5.0, 6.0]}, "place 1, time: it is 1 s"),
+        ({"time": [1.0, 5.0, 6.0]}, "place 1, time: the first time is 1 s"),
         ({"time": [0.0, 5.0]}, "times have the shape"),
         ({"time": [0.0, np.nan, 6.0]}, "not finite"),
         ({"place": [(1, 2, 0), (91, 2, 0), (1, 4, 0)]}, "place 2, lat_deg: a latitude of 91"),
@@ -182,9 +182,13 @@ def test_a_path_that_cannot_be_is_refused(change, words):
             "place 3: the position repeats the previous one",
         ),
         (PLACES, {}, "either times or speeds"),
-        (PLACES, {"times": [0.0] * 5, "speeds": [1.0] * 4}, "or both"),
-        (PLACES, {"speeds": [1.0] * 3}, "3 speeds for 4 legs"),
-        (PLACES, {"speeds": [1.0, 0.0, 1.0, 1.0]}, "place 3, speed: it is 0 m/s"),
+        (PLACES, {"times": [0.0] * 5, "speeds": [1.0] * 4}, "give either times or speeds"),
+        (PLACES, {"speeds": [1.0] * 3}, "3 speeds are given for 4 legs"),
+        (
+            PLACES,
+            {"speeds": [1.0, 0.0, 1.0, 1.0]},
+            "place 3, speed: a speed of 0 m/s is not positive",
+        ),
         (PLACES, {"speeds": [300.0] * 4}, "more than the 30 m/s² allowed"),
     ],
 )
