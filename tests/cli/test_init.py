@@ -89,7 +89,7 @@ def test_what_was_not_understood(run_cli, arguments, code, told):
 def test_one_record_twice(run_cli, record, tmp_path):
     done = run_cli("init", "crash", record, record, "--out", tmp_path / "case.toml")
     assert done.code == 4
-    assert "left.csv, RECORD: it is named twice" in done.err
+    assert "left.csv, RECORD: the record is given twice" in done.err
 
 
 def test_a_folder_is_no_place(run_cli, record, tmp_path):
