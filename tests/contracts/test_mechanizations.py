@@ -157,9 +157,9 @@ def test_a_damped_height_without_references_is_free_but_for_its_damping(name):
 @pytest.mark.parametrize(
     ("heights", "height", "message"),
     [
-        (None, "damped", "no reference"),
-        (np.zeros(3), "damped", r"shape is \(3,\)"),
-        ([[1.0]], "damped", "shape is"),
+        (None, "damped", "needs reference heights"),
+        (np.zeros(3), "damped", r"have the shape \(3,\)"),
+        ([[1.0]], "damped", "have the shape"),
         (np.r_[1.0, -np.inf, np.zeros(297)], "damped", "row 2.*infinite"),
         (np.zeros(299), "free", "height is 'free'"),
         (np.zeros(299), "held", "height is 'held'"),

@@ -94,7 +94,7 @@ def test_the_stated_deviation_of_a_delay_is_that_of_its_errors():
 def test_places_that_are_later_than_velocities_have_a_remedy_too():
     (told,) = find_velocity_delay(late(-0.2))
     assert "earlier" in told.what
-    assert "two aids" in told.remedy
+    assert "two measurements" in told.remedy
 
 
 @pytest.mark.parametrize("offset", [0.15, -0.4, 4.0, 18.0])

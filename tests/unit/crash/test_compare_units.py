@@ -284,7 +284,7 @@ def test_what_is_refused():
         compare_units([one, unit("B", B, 2)], window=(0.0, 5.0))
     with pytest.raises(ConfigError, match="pieces"):
         compare_units([one, one], pieces=1)
-    with pytest.raises(ConfigError, match="three pieces"):
+    with pytest.raises(ConfigError, match="three parts"):
         compare_units([one, one], window=(0.0, 0.02))
     with pytest.raises(ConfigError, match="three or more"):
         combine_units([one, one], "median")

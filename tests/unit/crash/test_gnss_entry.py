@@ -167,7 +167,7 @@ def test_an_impact_that_is_named_late_distrusts_by_what_was_felt():
     for (reason,) in struck["why"]:
         assert reason.code == "crash.fix-under-acceleration-and-jerk"
         assert 230.0 <= reason.data["acceleration"] < 240.0
-    assert any("not believed" in f.what for f in found.findings)
+    assert any("are rejected" in f.what for f in found.findings)
     off = errors_of(found, clean)
     assert (np.abs(off[3:6]) < 5.0 * found.sd[3:6]).all()
 

@@ -219,7 +219,7 @@ def test_gravity_in_g():
 
 def test_a_length_that_contradicts_what_is_stated():
     made, _, _ = unit(low_bias=(0.0, 0.0, -1.4))
-    assert "off gravity" in words(prepare_unit(made))
+    assert "from gravity" in words(prepare_unit(made))
 
 
 def test_on_its_roof():

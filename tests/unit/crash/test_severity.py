@@ -227,7 +227,7 @@ class TestFile:
     def test_no_terms_no_toml_no_file(self, write, tmp_path):
         with pytest.raises(ConfigError, match="there are none"):
             load_severity_model(write(FILE[: FILE.index("[[terms]]")]))
-        with pytest.raises(ConfigError, match="no TOML"):
+        with pytest.raises(ConfigError, match="not valid TOML"):
             load_severity_model(write("= 1"))
         with pytest.raises(ConfigError, match="does not exist"):
             load_severity_model(tmp_path / "none.toml")

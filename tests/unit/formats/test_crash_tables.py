@@ -124,7 +124,7 @@ def test_a_table_without_a_header(read):
     record = read(rows)
     assert [c.name for c in record.channels] == ["column 1", "column 2", "column 3"]
     assert record.channel("column 1").quantity == "time"
-    assert "advances evenly" in record.findings[0].what
+    assert "increases evenly" in record.findings[0].what
     np.testing.assert_array_equal(record.channel("column 2").load()[1], np.arange(10.0))
 
 

@@ -217,8 +217,7 @@ def test_what_a_range_cuts_off_is_told_and_missing(answers):
         # more by the bias of up to 12 m/s² over 55 ms.
         assert lost == pytest.approx(4.6, abs=0.055 * 12.0 + 0.5)
         assert any(
-            f.file is not None and of.name in str(f) and "at the end of the range" in str(f)
-            for f in found.findings
+            f.file is not None and of.name in str(f) and "clipped" in str(f) for f in found.findings
         )
 
 

@@ -157,7 +157,7 @@ def test_a_file_of_ones_own_is_read_in_the_same_form(tmp_path):
         ("output_rate_hz", "bias_instability_deg_per_h", "gyro.correlation_time_s", "missing"),
         ("output_rate_hz", "scale_bound_percent", "gyro: scale", "leaves no signal"),
         ("value = 500.0", "value = 0.0", "gyro: full_scale", "not positive"),
-        ("[gyro]", "[gyro", None, "no TOML"),
+        ("[gyro]", "[gyro", None, "not valid TOML"),
     ],
 )
 def test_a_bad_file_is_refused_by_file_and_key(tmp_path, old, new, key, message):

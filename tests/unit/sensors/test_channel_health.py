@@ -63,7 +63,7 @@ def test_saturation_by_the_range_and_by_a_flat_top():
     by_shape = [f for f in check(clipped).faults if f.kind == "saturation"]
     first = TIME[np.flatnonzero(np.abs(values) >= 196.0)[0]]
     assert by_range[0].at == pytest.approx(first)
-    assert "flat over" in by_shape[0].finding.what
+    assert "constant over" in by_shape[0].finding.what
     assert "a range of 200" in by_range[0].finding.what
 
 

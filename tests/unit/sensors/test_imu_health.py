@@ -234,7 +234,7 @@ def test_what_is_refused():
     imu, _ = at_rest("fog-1000")
     with pytest.raises(DataError, match="too few"):
         check_imu_channels(imu.iloc[:30])
-    with pytest.raises(ConfigError, match="false alarms"):
+    with pytest.raises(ConfigError, match="false alarm"):
         check_imu_channels(imu, false_alarm=2.0)
     with pytest.raises(ConfigError, match="gravity"):
         check_imu_channels(imu, gravity=-9.8)

@@ -341,7 +341,7 @@ def test_a_range_that_ends_before_it_is_said_to_is_seen_between_stamps_and_throu
         raw = np.abs(force(both.time) @ C) >= 70.0
         assert raw.any() and clipped[raw].all()
         assert not clipped[np.abs(both.time - 0.05) > 0.2].any()
-        said = [f for f in both.findings if "end of its range" in f.what]
+        said = [f for f in both.findings if f.code.endswith("clipped-before-resampling")]
         assert bool(said) == (name == "LAB1")
         assert all(f.file.startswith("HELD") and "delta-V" in f.remedy for f in said)
 
@@ -359,7 +359,7 @@ def test_what_a_shorter_record_takes_from_the_others_is_told():
     [
         (lambda: [imu(trigger=None)], ["IMU1", "no trigger", "by correlation"]),
         (lambda: [lab(), imu("IMU9")], ["LAB1", "'IMU1'", "did you mean 'IMU9'"]),
-        (lambda: [lab(), replace(imu(), gyro=None)], ["LAB1", "none either"]),
+        (lambda: [lab(), replace(imu(), gyro=None)], ["LAB1", "has no gyro"]),
         (
             lambda: [with_table(imu(), lambda t: t.drop(columns="accel_y"))],
             ["IMU1, accel, accel_y", "no accel_y"],
@@ -431,7 +431,7 @@ def test_bad_input_is_refused_by_name(units, words):
     ("keys", "word"),
     [
         ({"method": "triger"}, "did you mean 'trigger'"),
-        ({"rate": 0.0}, "no rate"),
+        ({"rate": 0.0}, "not positive"),
         ({"reference": "IMU"}, "did you mean 'IMU1'"),
         ({"sampling": "means"}, "did you mean 'mean'"),
     ],

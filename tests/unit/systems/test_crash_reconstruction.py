@@ -165,7 +165,7 @@ class TestArguments:
             ({"units": "IMU1"}, "kind str"),
             ({"units": ["IMU1"]}, "kind str"),
             ({"entry": 7.1}, "entry: a value of type float"),
-            ({"point": (0.0, 0.0)}, "point: .* not three"),
+            ({"point": (0.0, 0.0)}, "point: .* three"),
             ({"point": "cg"}, "point: 'cg'"),
             ({"point": (1600.0, 0.0, 0.0)}, "1600 m from the vehicle's origin"),
             ({"window": 0.75}, "0.75 is no window"),

@@ -220,7 +220,7 @@ def test_the_file_that_is_written_asks_for_the_latitude_alone(tmp_path):
     assert [one.key for one in draft.asked] == ["lat_deg"]
     file = tmp_path / "foot.toml"
     file.write_text(draft.text)
-    with pytest.raises(ConfigError, match="still open") as refused:
+    with pytest.raises(ConfigError, match="is missing") as refused:
         read_navigation_spec(file)
     assert "latitude" in str(refused.value)
     file.write_text(draft.text.replace('lat_deg = "?"', "lat_deg = 48.0"))
