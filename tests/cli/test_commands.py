@@ -114,7 +114,7 @@ def test_without_a_reference_it_says_what_it_can_tell_and_how_to_give_one(here, 
     (here / "log.csv").write_text("\n".join(lines) + "\n")
     text = run_cli("attitude", "log.csv").out
     assert "differ by up to" in text
-    assert "no stationary interval" in text
+    assert "no stationary stretch" in text
     assert "--reference 'end same as start'" in text
 
 

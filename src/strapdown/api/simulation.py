@@ -107,7 +107,8 @@ class Simulation:
             TrajectorySpec: write_trajectory_simulation,
             CrashSimulationSpec: write_crash_simulation,
         }[type(source)]
-        return write(source, Path(out), force=force, made=self._made)  # type: ignore[operator]
+        seal: Seal = write(source, Path(out), force=force, made=self._made)  # type: ignore[operator]
+        return seal
 
     def __repr__(self) -> str:
         if self.imu is None:

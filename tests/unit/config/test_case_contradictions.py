@@ -37,7 +37,7 @@ BAD = {
         ["time_s = 1", "(line 16)"],
     ),
     "no file of fixes": ((STATED, 'kind="gnss"\n'), ["entry, path: it is missing"]),
-    "blank source": (('"speed trap"', '"  "'), ["source: it is missing"]),
+    "blank source": (('"speed trap"', '"  "'), ["config.entry-source-missing"]),
     "speed of nobody": ((SPEED, ""), ["write speed_m_per_s or speed_km_per_h"]),
     "sd of a bullet": (
         ("_km_per_h = 0.36", "_m_per_s = 36"),
@@ -214,7 +214,7 @@ BAD = {
     "a number for a list": (("[-0.1, 0.75]", "0.75"), ["line 74, options, window_s: 0.75"]),
     "no unit": (
         (TEXT[TEXT.index("[[units]]") : TEXT.index("[[ref")], ""),
-        ["units: it is missing"],
+        ["units: the value is missing"],
     ),
     "a long title": (("Impact on a pole", "x" * 201), ["201 characters"]),
     "a title of two lines": (("Impact on", "Impact\\non"), ["line 1, title: character 7 is"]),

@@ -280,4 +280,4 @@ def test_comments_that_are_no_channels_are_told(read):
         '# channel: {"column": 2, "quantity": "speed"}\n# channel: [\nt [s],a\n0,1\n1,1\n'
     )
     assert [f.row for f in record.findings] == [1, 2]
-    assert "'speed' is no quantity" in record.findings[0].what
+    assert "unknown quantity: 'speed'" in record.findings[0].what

@@ -107,7 +107,7 @@ def test_one_axis_says_the_unit_of_all(read):
         record, {"x": "ax [g]", "y": "ay", "z": "az"}, quantity="acceleration"
     )
     assert triad["accel_z"].iloc[0] == pytest.approx(-G)
-    assert any("taken as g, as that of ax [g]" in f.what for f in triad.attrs["findings"])
+    assert any("g is assumed, as that of ax [g]" in f.what for f in triad.attrs["findings"])
 
 
 def test_an_unknown_channel_names_the_nearest(read):

@@ -251,7 +251,7 @@ def test_gravity_says_which_axis_points_up(tmp_path):
     header = "time_s,gx_rad_s,gy_rad_s,gz_rad_s,ax_m_s2,ay_m_s2,az_m_s2"
     flat = np.tile([0.1, 0.2, 9.8], (t.size, 1))
     path = write(tmp_path / "log.csv", t, 0.001 * gyro, flat, header)
-    told = [str(f) for f in read_log(path).findings if f.quantity == "axes"]
+    told = [f.text("cli") for f in read_log(path).findings if f.quantity == "axes"]
     assert "z points up in 100 % of the log" in told[0]
     assert "--axes x,-y,-z" in told[0]
     told = [str(f) for f in read_log(path, ReadOptions(axes="x,y,z")).findings]
