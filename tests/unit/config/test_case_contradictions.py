@@ -237,7 +237,7 @@ def test_it_is_refused_with_its_lines_and_a_remedy(name, tmp_path):
     codes = [word for word in words if word.startswith("config.")]
     assert codes in ([], [caught.value.finding.code])
     assert "Remedy: " in said
-    assert "line " in said or "units: it is missing" in said
+    assert "line " in said or "units: the value is missing" in said
     assert len(said) < 1500
 
 

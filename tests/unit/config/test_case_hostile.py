@@ -115,8 +115,11 @@ def test_other_files_are_refused(folder, content):
     ("content", "words"),
     [
         (b"", "title: the value is missing"),
-        (b"\xff\xfe\x00t", "line 1: not valid TOML: byte 0xff is not UTF-8"),
-        (b"title = 'x'\nauthor = '\xe4'", "line 2: not valid TOML: byte 0xe4 is not UTF-8"),
+        (b"\xff\xfe\x00t", "line 1: the file is not valid TOML: byte 0xff is not UTF-8"),
+        (
+            b"title = 'x'\nauthor = '\xe4'",
+            "line 2: the file is not valid TOML: byte 0xe4 is not UTF-8",
+        ),
         (b"\x89PNG\r\n\x1a\n" + bytes(range(256)), "byte 0x89 is not UTF-8"),
         (b"PK\x03\x04" + b"\x00" * 50, "not valid TOML"),
         (b"a = " + b"[" * 20_000 + b"]" * 20_000, "nested too deep"),
