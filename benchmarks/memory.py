@@ -15,7 +15,7 @@ def ratios() -> Iterator[Ratio]:
     from strapdown import compare_attitude, read_log, simulate
 
     with TemporaryDirectory() as folder:
-        seal = simulate("alexiev-fig2c", Path(folder) / "log", rate=20_000, formats=["npz"])
+        seal = simulate("alexiev-fig2c", rate_hz=20_000).save(Path(folder) / "log", formats=["npz"])
         log = seal.path / "log.npz"
         compare_attitude(log)  # everything is loaded and compiled before memory is counted
         table = read_log(log).imu

@@ -53,6 +53,7 @@ if TYPE_CHECKING:
         navigate,
     )
     from strapdown.api.reading import GnssFixes, Imu, Streams, read, read_gnss, read_imu
+    from strapdown.api.simulation import Simulation, simulate
     from strapdown.crash.entry import Entry
     from strapdown.crash.path import sample_paths
     from strapdown.crash.reconstruction import CrashReconstruction, reconstruct_crash
@@ -68,7 +69,6 @@ if TYPE_CHECKING:
     from strapdown.increments import motion_increments
     from strapdown.mechanization import NavTracker, NorthEastDown, WanderAzimuth, run_mechanization
     from strapdown.nav_state import NavState
-    from strapdown.report.simulation import simulate
     from strapdown.report.verify import verify
     from strapdown.sensors.crash_unit import Assumed, CrashUnit, Mounting, RecordedTriad
     from strapdown.sensors.imu_health import check_imu_channels
@@ -106,6 +106,7 @@ __all__ = [
     "OrientationFilter",
     "OutageRun",
     "RecordedTriad",
+    "Simulation",
     "Site",
     "Streams",
     "TriadUncertainty",
@@ -173,6 +174,8 @@ _HOMES = {
     "read_gnss": "strapdown.api.reading",
     "read_imu": "strapdown.api.reading",
     "CrashReconstruction": "strapdown.crash.reconstruction",
+    "Simulation": "strapdown.api.simulation",
+    "simulate": "strapdown.api.simulation",
     "Entry": "strapdown.crash.entry",
     "sample_paths": "strapdown.crash.path",
     "trajectory_differences": "strapdown.evaluation.trajectory_differences",
@@ -188,7 +191,6 @@ _HOMES = {
     "WanderAzimuth": "strapdown.mechanization",
     "run_mechanization": "strapdown.mechanization",
     "NavState": "strapdown.nav_state",
-    "simulate": "strapdown.report.simulation",
     "verify": "strapdown.report.verify",
     "Assumed": "strapdown.sensors.crash_unit",
     "CrashUnit": "strapdown.sensors.crash_unit",

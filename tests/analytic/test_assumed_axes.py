@@ -161,7 +161,7 @@ class TestViolated:
         unit = replace(without(crash.unit, "y"), assumed=Assumed(delta_v_sd=1.0))
         found = crash.reconstruct(unit)
         assert found.events.events == ()
-        assert any("along right would not show" in f.what for f in found.findings)
+        assert any("along right cannot be detected" in f.what for f in found.findings)
         place, sd = crash.error(found.path, LATE)
         # 7 m/s that nobody recorded: 5 m, and a bound of 1.3 m that was stated for 1 m/s.
         assert abs(place[1]) == pytest.approx(5.0, abs=0.2)

@@ -96,7 +96,7 @@ def test_a_draft_is_aligned_once_its_questions_are_answered(run_cli, tmp_path):
     assert done.code == 0, done.err
     assert "lat_deg" in done.out and "sensor" in done.out
     open_ = run_cli("align", path, "--out", tmp_path / "out")
-    assert open_.code == 4 and "still open" in open_.err
+    assert open_.code == 4 and "is missing" in open_.err
     text = path.read_text()
     for key, value in (("lat_deg", "55.0"), ("lon_deg", "37.0"), ("sensor", '"fog-1000"')):
         text = text.replace(f'{key} = "?"', f"{key} = {value}")
@@ -131,4 +131,4 @@ def test_bad_input_leaves_nothing_and_says_why(case, run_cli, tmp_path):
     if code:
         assert said.startswith("error: ") and "Remedy: " in said
     else:
-        assert "note: " in said
+        assert "note: " in said or "warning: " in said

@@ -30,7 +30,7 @@ def logs(tmp_path_factory):
         ("b", "gestures", 100),
         ("c", "alexiev-fig2e", 50),
     ):
-        simulate(scenario, folder / name, rate=rate, formats=["csv"])
+        simulate(scenario, rate_hz=rate).save(folder / name, formats=["csv"])
     return {name: folder / name / "log.csv" for name in "abc"}
 
 
@@ -85,24 +85,27 @@ def test_a_second_log_and_rests(here, run_cli, logs):
     ("options", "said"),
     [
         (["--rates", "abc"], "'abc' is not a list of numbers"),
-        (["--rates=-5"], "-5 Hz is no rate"),
-        (["--rates", "nan"], "nan Hz is no rate"),
-        (["--rates", "50,0"], "0 Hz is no rate"),
+        (["--rates=-5"], "a rate of -5 Hz is not positive"),
+        (["--rates", "nan"], "a rate of nan Hz is not positive"),
+        (["--rates", "50,0"], "a rate of 0 Hz is not positive"),
         (["--rate", "100", "--rates", "0.01"], "fewer than two steps"),
         (["--tolerance-deg", "0"], "tolerance_deg"),
         (["--tolerance-deg", "nan"], "tolerance_deg"),
-        (["--trials", "0"], "0 is no number of trials"),
-        (["--sensor", "nosuch"], "'nosuch' is no sensor"),
-        (["--sensor", "nosuch.toml"], "there is no such file"),
+        (["--trials", "0"], "0 trials are out of range"),
+        (["--sensor", "nosuch"], "unknown sensor 'nosuch'"),
+        (["--sensor", "nosuch.toml"], "does not exist"),
         (["--interpolation", "spline"], "'linear' or 'cubic'"),
-        (["--peers", "nosuch"], "'nosuch' is no library"),
-        (["--peers", "vqf:nosuch"], "is no filter of vqf"),
-        (["--reference-log", "nosuch.csv"], "there is no such file"),
-        (["--export-c", "nosuch/x.c"], "there is no such folder"),
-        (["--export-c", "there.c"], "it is there already"),
-        (["--export-c", "folder.c", "--force"], "it is there already"),
-        (["--export-c", "log.csv", "--force"], "no name of a C file"),
-        (["--export-c", "x.c", "--tolerance-deg", "1e-9"], "no algorithm was accurate enough"),
+        (["--peers", "nosuch"], "unknown library 'nosuch'"),
+        (["--peers", "vqf:nosuch"], "unknown filter 'nosuch' of vqf"),
+        (["--reference-log", "nosuch.csv"], "does not exist"),
+        (["--export-c", "nosuch/x.c"], "the folder does not exist"),
+        (["--export-c", "there.c"], "the file exists"),
+        (["--export-c", "folder.c", "--force"], "the file exists"),
+        (["--export-c", "log.csv", "--force"], "must end in .c"),
+        (
+            ["--export-c", "x.c", "--tolerance-deg", "1e-9"],
+            "no algorithm reached the required accuracy",
+        ),
     ],
 )
 def test_what_cannot_be_had_is_told_and_leaves_nothing(here, run_cli, options, said):
@@ -124,10 +127,10 @@ def test_what_cannot_be_had_is_told_and_leaves_nothing(here, run_cli, options, s
 def test_a_log_is_not_drawn_again(here, run_cli, logs):
     found = run_cli("attitude", logs["c"], "--trials", "3")
     assert found.code == 4
-    assert "name several logs instead" in found.err
+    assert "give several logs instead" in found.err
     twice = run_cli("attitude", logs["c"], logs["c"])
     assert twice.code == 4
-    assert "named twice" in twice.err
+    assert "given twice" in twice.err
 
 
 def test_a_second_log_of_another_motion(here, run_cli, logs):

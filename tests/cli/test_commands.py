@@ -170,7 +170,7 @@ def test_python_m_strapdown_and_a_closed_pipe(tmp_path):
     assert shell("--version").stdout.startswith("strapdown 0.")
     done = shell("attitude", "no-such-log.csv", cwd=tmp_path)
     assert done.returncode == 4
-    assert done.stderr.startswith("error: no-such-log.csv: there is no such file")
+    assert done.stderr.startswith("error: no-such-log.csv: the file")
     piped = subprocess.run(
         ["bash", "-c", f"set -o pipefail; {sys.executable} -m strapdown modules | head -1"],
         capture_output=True,

@@ -2,7 +2,7 @@
 
 from numba import njit
 
-from strapdown.cli.compiling import Compilations
+from strapdown.cli.console import Compilations
 
 
 def test_compiling_is_told_once_for_nested_functions():

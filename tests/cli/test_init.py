@@ -69,14 +69,14 @@ def test_a_record_that_fails_leaves_nothing(run_cli, tmp_path):
     bad.write_text("t,ax\n0,1\n")
     done = run_cli("init", "crash", bad, "--out", tmp_path / "case.toml")
     assert done.code == 3
-    assert "bad.csv: 1 sample, too few for a crash" in done.err
+    assert "bad.csv: 1 sample is too few for a crash" in done.err
     assert [p.name for p in tmp_path.iterdir()] == ["bad.csv"]
 
 
 @pytest.mark.parametrize(
     ("arguments", "code", "told"),
     [
-        (["nowhere.csv"], 4, "nowhere.csv: there is no such file"),
+        (["nowhere.csv"], 4, "nowhere.csv: the file"),
         ([], 2, "Missing argument"),
     ],
 )
@@ -89,7 +89,7 @@ def test_what_was_not_understood(run_cli, arguments, code, told):
 def test_one_record_twice(run_cli, record, tmp_path):
     done = run_cli("init", "crash", record, record, "--out", tmp_path / "case.toml")
     assert done.code == 4
-    assert "left.csv, RECORD: it is named twice" in done.err
+    assert "left.csv, RECORD: the record is given twice" in done.err
 
 
 def test_a_folder_is_no_place(run_cli, record, tmp_path):

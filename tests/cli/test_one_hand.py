@@ -131,7 +131,7 @@ def test_a_draft_keeps_the_part_that_flags_name(
     [
         (("--to", "5", "--duration", "5"), "error: --to, --duration: "),
         (("--duration", "0"), "error: --duration: 0 s is no duration"),
-        (("--from", "7", "--to", "5"), "error: --to: 5 s is not after --from 7 s"),
+        (("--from", "7", "--to", "5"), "error: --to: 5 s is not after the begin at 7 s"),
         (("--from", "nan"), "error: --from: nan is no number"),
     ],
 )
@@ -209,13 +209,13 @@ def test_a_folder_of_logs_names_them(tmp_path, run_cli):
     assert "it holds: LICENSE, notes.txt" in said
     log(tmp_path / "one.csv")
     said = run_cli("init", "navigate", tmp_path, "--foot", "--out", tmp_path / "x.toml").err
-    assert "it holds one: one.csv" in said
+    assert "contains one recording: one.csv" in said
     assert f"give it: {tmp_path / 'one.csv'}" in said
     log(tmp_path / "two.csv")
     # A table of fixes is no log to navigate by.
     (tmp_path / "fixes.csv").write_text("time,lat,lon,alt\n1,55,37,100\n2,55,37,100\n")
     said = run_cli("init", "navigate", tmp_path, "--foot", "--out", tmp_path / "x.toml").err
-    assert "it holds 2: one.csv, two.csv" in said
+    assert "contains 2 recordings: one.csv, two.csv" in said
 
 
 # --- modules ------------------------------------------------------------------------------

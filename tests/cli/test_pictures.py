@@ -149,6 +149,6 @@ def test_the_walk_of_the_manual_is_what_is_drawn_now(recordings, tmp_path):
 
 
 def test_the_picture_in_a_bundle_is_that_of_the_manual(tmp_path):
-    seal = simulate(str(EXAMPLES / "car.toml"), tmp_path / "car")
+    seal = simulate(str(EXAMPLES / "car.toml")).save(tmp_path / "car")
     redraw("car", tmp_path / "now.svg")
     assert (seal.path / "trajectory.svg").read_bytes() == (tmp_path / "now.svg").read_bytes()

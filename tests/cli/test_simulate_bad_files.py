@@ -7,21 +7,21 @@ import pytest
 REST = '[motion]\nkind = "stationary"\nlat_deg = 10\nlon_deg = 20\n'
 SINE = '[motion]\nkind = "sine_velocity"\nlat_deg = 10\nlon_deg = 20\n'
 BAD = {
-    "a sensor without a name": ('sensor = ""\n' + REST + "duration_s = 2", "is no sensor"),
+    "a sensor without a name": ('sensor = ""\n' + REST + "duration_s = 2", "unknown sensor"),
     "no format": ("formats = []\n" + REST + "duration_s = 2", "formats: [] does not fit"),
     "for ever": (REST + "duration_s = 1e308", "gives inf samples"),
     "long": (REST + "duration_s = 1e300", "gives 1e+302 samples"),
     "deep": (
         REST + "duration_s = 2\nalt_m = -7e6",
-        "alt_m: the motion comes to a height of -7e+06",
+        "alt_m: the motion reaches a height of -7e+06",
     ),
     "down": (
         SINE + "duration_s = 100\nmean_velocity_m_per_s = [5, 0, 20000]",
-        "alt_m: the motion comes to a height of -1.0",
+        "alt_m: the motion reaches a height of -1.0",
     ),
     "two components": (
         SINE + "duration_s = 2\nmean_velocity_m_per_s = [1, 2]",
-        "mean_velocity_m_per_s 3: it is missing",
+        "mean_velocity_m_per_s 3: the value is missing",
     ),
     "nested": ("a = " + "[" * 5000 + "]" * 5000, "nested too deep"),
 }

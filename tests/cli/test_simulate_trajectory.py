@@ -117,9 +117,9 @@ def test_options_replace_what_the_file_says(here, run_cli):
 
 
 def test_the_same_seed_is_the_same_folder(here):
-    first = simulate("sine.toml", here / "a", sensor="mpu-6050", seed=3)
-    again = simulate("sine.toml", here / "b", sensor="mpu-6050", seed=3)
-    other = simulate("sine.toml", here / "c", sensor="mpu-6050", seed=4)
+    first = simulate("sine.toml", sensor="mpu-6050", seed=3).save(here / "a")
+    again = simulate("sine.toml", sensor="mpu-6050", seed=3).save(here / "b")
+    other = simulate("sine.toml", sensor="mpu-6050", seed=4).save(here / "c")
     assert first.digest == again.digest != other.digest
     assert (here / "a/log.csv").read_bytes() != (here / "c/log.csv").read_bytes()
     assert (here / "a/trajectory.csv").read_bytes() == (here / "c/trajectory.csv").read_bytes()
@@ -133,7 +133,7 @@ def test_a_sensor_beside_the_file_is_found_and_kept(here, monkeypatch):
         'noise_density_deg_per_sqrt_h = { value = 0.1, source = "a", place = "1" }\n'
     )
     (here / "lab" / "sine.toml").write_text('sensor = "mine.toml"\n' + SINE)
-    seal = simulate("lab/sine.toml", here / "out")
+    seal = simulate("lab/sine.toml").save(here / "out")
     manifest = json.loads((seal.path / "manifest.json").read_text())
     assert [item["name"].endswith("mine.toml") for item in manifest["inputs"]] == [True]
     (here / "lab" / "mine.toml").unlink()

@@ -124,8 +124,8 @@ def test_a_bad_sample_is_refused_and_changes_nothing(variant):
     tracker.update(1.1, np.array([0.1, 0.2, 0.3]))
     before = tracker.quaternion
     bad = [
-        (1.1, [0.1, 0.2, 0.3], "time does not advance"),
-        (0.5, [0.1, 0.2, 0.3], "time does not advance"),
+        (1.1, [0.1, 0.2, 0.3], "time does not increase"),
+        (0.5, [0.1, 0.2, 0.3], "time does not increase"),
         (np.nan, [0.1, 0.2, 0.3], "three finite rates"),
         (1.2, [np.nan, 0.2, 0.3], "three finite rates"),
         (1.2, [0.1, np.inf, 0.3], "three finite rates"),
@@ -153,7 +153,7 @@ def test_the_label_makes_the_same_algorithm_again(variant):
 def test_a_truncated_series_that_runs_away_says_so(variant):
     """Each step of 3 rad stretches by sqrt(1 + 9) or sqrt(1 + 9/4); 1e150 is soon reached."""
     increments = increments_table(np.arange(1, 2001.0), np.ones(2000), np.full((2000, 3), 3**0.5))
-    with pytest.raises(DivergenceError, match=f"row .*{variant[:3]}.*range of floating point"):
+    with pytest.raises(DivergenceError, match=f"row .*{variant[:3]}.*overflowed"):
         run_attitude(make_algorithm(variant), increments)
 
 
@@ -246,7 +246,7 @@ def test_the_order_of_accuracy_that_it_declares(variant, source):
         ("dcm:orthogonalise_every=-1", "negative"),
         ("quaternion:order=-1", "out of range"),
         ("quaternion:normalise=maybe", "not true or false"),
-        ("euler:step=heun", "no step"),
+        ("euler:step=heun", "unknown step '"),
         ("naive:order=2", "has no options"),
         ("rotvec:samples=5", "out of range"),
         ("rotvec:coefficients=milner", "did you mean 'miller'"),

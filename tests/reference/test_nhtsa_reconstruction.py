@@ -96,7 +96,7 @@ def mean_of(crash):
     """Of units that ring, and so disagree by what they state: it is not told, but can be made."""
     assert not crash.comparison.agree
     assert crash.combined is None
-    assert any("no mean is told" in f.what for f in crash.findings)
+    assert any("no mean is given" in f.what for f in crash.findings)
     return reconstruct_unit(
         combine_units([u.at_point for u in crash.units]), ENTRY, window=(-0.03, 0.2)
     )
@@ -141,13 +141,13 @@ def test_what_was_assumed_is_told_and_in_the_bounds(crash):
     for found in (*crash.units, mean):
         (changes,) = found.body
         assert found.types[0].name == "front"
-        assert "rolled over cannot be told" in found.types[0].reason
+        assert "a rollover cannot be detected" in found.types[0].reason
         lines = changes.event.bound.by_contributor.index
         assert {"assumed: no turning", "assumed: missing axis"} <= set(lines)
         # 0.5 m/s over 150 ms, of which the event has the larger part.
         assert 0.3 < changes.event.bound.sd[1] < 0.6
         assert changes.event.pdof.clock == 12
-    told = [f for f in crash.findings if "it is taken that" in f.what]
+    told = [f for f in crash.findings if "is assumed to be" in f.what]
     assert {f.file for f in told} == set(UNITS)
     assert len(told) == 2 * len(UNITS)
 

@@ -21,7 +21,7 @@ pytestmark = pytest.mark.usefixtures("sketched_module")
 def log(tmp_path_factory):
     """A simulated log, and a second one to take a bias from."""
     folder = tmp_path_factory.mktemp("logs")
-    simulate("alexiev-fig2e", folder / "log", rate=50, seed=3, formats=["csv"])
+    simulate("alexiev-fig2e", rate_hz=50, seed=3).save(folder / "log", formats=["csv"])
     return folder / "log" / "log.csv"
 
 
@@ -192,9 +192,9 @@ def test_what_is_no_bundle_is_said_to_be_none(tmp_path):
 
 
 def test_a_simulation_verifies_too(tmp_path):
-    seal = simulate("alexiev-fig2f", tmp_path / "s", rate=20, seed=9, formats=["all"])
+    seal = simulate("alexiev-fig2f", rate_hz=20, seed=9).save(tmp_path / "s", formats=["all"])
     assert verify(seal.path).verdict == "identical"
-    other = simulate("alexiev-fig2f", tmp_path / "t", rate=20, seed=10, formats=["all"])
+    other = simulate("alexiev-fig2f", rate_hz=20, seed=10).save(tmp_path / "t", formats=["all"])
     assert other.digest != seal.digest
 
 
@@ -280,15 +280,15 @@ def test_a_configuration_that_reads_what_is_not_sealed_is_refused(copy):
 
 @pytest.mark.parametrize("name", ["log.npz", "log.h5", "log.mat"])
 def test_a_forged_simulation_is_found_elsewhere(tmp_path, name):
-    seal = simulate("alexiev-fig2c", tmp_path / "s", rate=20, formats=["all"])
-    other = simulate("alexiev-fig2c", tmp_path / "t", rate=20.1, formats=["all"])
+    seal = simulate("alexiev-fig2c", rate_hz=20).save(tmp_path / "s", formats=["all"])
+    other = simulate("alexiev-fig2c", rate_hz=20.1).save(tmp_path / "t", formats=["all"])
     reseal(seal.path, name, (other.path / name).read_bytes(), elsewhere=True)
     assert verify(seal.path).verdict == "changed"
 
 
 @pytest.mark.slow
 def test_every_way_of_naming_a_log_gives_one_seal(tmp_path, monkeypatch):
-    simulate("alexiev-fig2e", tmp_path / "logs", rate=20)
+    simulate("alexiev-fig2e", rate_hz=20).save(tmp_path / "logs")
     monkeypatch.chdir(tmp_path)
     names = ["logs/log.csv", "./logs/log.csv", "logs//log.csv", "logs/../logs/log.csv"]
     names.append(str(tmp_path / "logs" / "log.csv"))

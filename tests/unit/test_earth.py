@@ -229,15 +229,21 @@ def test_numbers_and_arrays_go_together():
 
 
 REFUSED = [
-    (lambda: earth.gravity([0.0, 90.5], 0.0), "row 2, lat_deg: a latitude beyond the pole: 90.5"),
+    (lambda: earth.gravity([0.0, 90.5], 0.0), "row 2, lat_deg: .*latitude beyond the pole"),
     (lambda: earth.earth_rate(math.nan), "row 1, lat_deg: not a finite number"),
-    (lambda: earth.radii_of_curvature(["north"]), "lat_deg: these are no numbers"),
+    (lambda: earth.radii_of_curvature(["north"]), "lat_deg: .*numbers are needed"),
     (lambda: earth.centrifugal(0.0, [0.0, 0.0, math.inf]), "row 3, alt: not a finite number"),
-    (lambda: earth.centrifugal(0.0, -6.4e6), "row 1, alt: not a height over the ellipsoid"),
-    (lambda: earth.gravity(0.0, 2e6), "not continued farther than 1000 km"),
-    (lambda: earth.gravity([1.0, 2.0], [1.0, 2.0, 3.0]), "do not go together"),
-    (lambda: earth.transport_rate(90.0, 0.0, [1.0, 0.0, 0.0]), "no direction at a pole"),
-    (lambda: earth.transport_rate(0.0, 0.0, [1.0, 0.0]), r"its shape is \(2,\)"),
+    (
+        lambda: earth.centrifugal(0.0, -6.4e6),
+        "row 1, alt: .*height over the ellipsoid out of range",
+    ),
+    (lambda: earth.gravity(0.0, 2e6), "normal gravity is limited to 1000 km from the ellipsoid"),
+    (lambda: earth.gravity([1.0, 2.0], [1.0, 2.0, 3.0]), "do not match"),
+    (
+        lambda: earth.transport_rate(90.0, 0.0, [1.0, 0.0, 0.0]),
+        "north and east are not defined at a pole",
+    ),
+    (lambda: earth.transport_rate(0.0, 0.0, [1.0, 0.0]), "the velocity has the shape"),
     (lambda: earth.transport_rate(0.0, 0.0, [1.0, math.nan, 0.0]), "v_n_east: not a finite"),
 ]
 

@@ -217,17 +217,23 @@ NAN = float("nan")
 REFUSED = [
     (
         lambda: frames.ecef_from_geodetic([[0, 0, 0], [91, 0, 0]]),
-        "row 2, lat_deg: a latitude beyond",
+        "row 2, lat_deg: .*latitude beyond the pole",
     ),
-    (lambda: frames.ecef_from_geodetic([0.0, 361.0, 0.0]), "lon_deg: a longitude of more than"),
-    (lambda: frames.ecef_from_geodetic([0.0, 0.0, 6.4e9]), "alt: not a height over the ellipsoid"),
-    (lambda: frames.ecef_from_geodetic([0.0, 0.0]), r"place: shape \(2,\) does not end in \(3,\)"),
+    (
+        lambda: frames.ecef_from_geodetic([0.0, 361.0, 0.0]),
+        "lon_deg: .*longitude of more than a full turn",
+    ),
+    (
+        lambda: frames.ecef_from_geodetic([0.0, 0.0, 6.4e9]),
+        "alt: .*height over the ellipsoid out of range",
+    ),
+    (lambda: frames.ecef_from_geodetic([0.0, 0.0]), r"place: .*does not end in \(3"),
     (lambda: frames.geodetic_from_ecef([6.4e6, NAN, 0.0]), "y: not a finite number"),
     (lambda: frames.geodetic_from_ecef([[6.4e6, 0, 0], [0, 0, 0]]), "row 2, position: not within"),
     (lambda: frames.geodetic_from_ecef([1e200, 0.0, 0.0]), "position: not within"),
-    (lambda: frames.q_ne([0.0, -90.1], 0.0), "row 2, lat_deg: a latitude beyond"),
+    (lambda: frames.q_ne([0.0, -90.1], 0.0), "row 2, lat_deg: .*latitude beyond the pole"),
     (lambda: frames.ned_from_ecef([6.4e6, 0, 0], [[0, 0, 0]] * 2), "origin: shape"),
-    (lambda: frames.place_difference(np.zeros((2, 3)), np.zeros((3, 3))), "do not go together"),
+    (lambda: frames.place_difference(np.zeros((2, 3)), np.zeros((3, 3))), "do not match"),
     (lambda: frames.place_difference([0, 0, 0], [0, 180, 0]), "not within"),
 ]
 

@@ -52,9 +52,9 @@ def test_a_table_keeps_what_it_was_given():
         ("alt", 2, np.nan, r"a.csv, row 3, alt: not a finite number"),
         ("VE", 1, np.inf, r"a.csv, row 2, VE: not a finite number"),
         ("lat", 4, 95.0, r"row 5, lat: a latitude of 95 deg is beyond the pole(.|\n)*swapped"),
-        ("north_sd", 0, -1.0, r"row 1, north_sd: -1 is no standard deviation"),
-        ("VD_sd", 3, np.nan, r"row 4, VD_sd: nan is no standard deviation"),
-        ("quality", 1, 12.0, r"row 2, quality: a quality of 12 is unknown(.|\n)*GGA"),
+        ("north_sd", 0, -1.0, "row 1, north_sd: .*a standard deviation of"),
+        ("VD_sd", 3, np.nan, "row 4, VD_sd: .*a standard deviation of"),
+        ("quality", 1, 12.0, "row 2, quality: .*unknown fix quality"),
     ],
 )
 def test_a_bad_value_is_named(column, row, value, message):
@@ -67,7 +67,11 @@ def test_a_bad_value_is_named(column, row, value, message):
 def test_time_and_columns_are_checked():
     back = FIXES.copy()
     back.index = back.index.to_numpy()[::-1]
-    with pytest.raises(DataError, match="row 2, time: time does not advance"):
+    with pytest.raises(
+        DataError,
+        match="row 2, time",
+        check=lambda refused: refused.finding.code == "tables.time-does-not-advance-followed",
+    ):
         made(back)
     with pytest.raises(DataError, match="missing columns: VD_sd"):
         tables.check_gnss(FIXES.drop(columns="VD_sd"))
@@ -76,7 +80,7 @@ def test_time_and_columns_are_checked():
 @pytest.mark.parametrize(
     ("change", "remedy"),
     [
-        ({"VN": 3.6, "VE": 3.6}, "km/h: divide them by 3.6"),
+        ({"VN": 3.6, "VE": 3.6}, r"m/s\) contradicts the positions, which move at"),
         ({"VN": 1.943844, "VE": 1.943844}, "knots"),
     ],
 )
@@ -89,7 +93,9 @@ def test_exchanged_columns_are_told():
     with pytest.raises(DataError, match="exchange VN and VE"):
         made(FIXES.assign(VN=FIXES["VE"], VE=FIXES["VN"]))
     # Both are below 90 here, so that only the motion tells it.
-    with pytest.raises(DataError, match="latitude and longitude are swapped"):
+    with pytest.raises(
+        DataError, check=lambda refused: refused.finding.code == "tables.places-swapped"
+    ):
         made(FIXES.assign(lat=FIXES["lon"], lon=FIXES["lat"]))
 
 

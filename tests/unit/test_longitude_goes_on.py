@@ -52,5 +52,5 @@ def test_within_a_full_turn_no_digit_changes():
 
 def test_its_files_and_its_picture_are_made(tmp_path):
     (tmp_path / "east.toml").write_text(DRIVE.format(359.9999, 90))
-    seal = simulate(str(tmp_path / "east.toml"), tmp_path / "out", rate=10)
+    seal = simulate(str(tmp_path / "east.toml"), rate_hz=10).save(tmp_path / "out")
     assert (seal.path / "trajectory.csv").is_file()

@@ -55,7 +55,9 @@ def test_a_row_of_a_trajectory_by_its_position():
     table = pd.concat(rows)
     assert NavState.from_trajectory(table).time == 1.0
     assert NavState.from_trajectory(table, -1).lat == pytest.approx(math.radians(2.0))
-    with pytest.raises(DataError, match="there is no row"):
+    with pytest.raises(
+        DataError, check=lambda refused: refused.finding.code == "mechanization.no-row-among"
+    ):
         NavState.from_trajectory(table, 5)
 
 
@@ -83,9 +85,13 @@ def test_every_number_is_finite(name, value):
 def test_velocity_is_three_finite_numbers():
     with pytest.raises(DataError, match="v_n east: not a finite number"):
         state(v_n=[0.0, math.nan, 0.0])
-    with pytest.raises(DataError, match=r"v_n: its shape is \(2,\)"):
+    with pytest.raises(
+        DataError, match="v_n", check=lambda refused: refused.finding.code == "mechanization.shape"
+    ):
         state(v_n=[0.0, 1.0])
-    with pytest.raises(DataError, match=r"v_n: its shape is \(1, 3\)"):
+    with pytest.raises(
+        DataError, match="v_n", check=lambda refused: refused.finding.code == "mechanization.shape"
+    ):
         state(v_n=[[0.0, 1.0, 2.0]])
 
 
@@ -98,8 +104,8 @@ def test_an_attitude_that_is_none(q):
 @pytest.mark.parametrize(
     ("lat", "lon", "quantity", "remedy"),
     [
-        (55.0, 37.0, "lat", "this looks like degrees"),
-        (1.0, 37.0, "lon", "this looks like degrees"),
+        (55.0, 37.0, "lat", "seem to be degrees"),
+        (1.0, 37.0, "lon", "seem to be degrees"),
         (2.5, 0.9, "lat", "swapped"),
         (-3.0, -0.5, "lat", "swapped"),
     ],

@@ -506,7 +506,7 @@ def test_a_quaternion_whose_norm_is_not_one_is_refused_and_its_row_named(name):
         values = random_quaternions(5)
         values[2] *= scale
         message = refused(function, values, row=3)
-        assert f"this one has {shown}" in message
+        assert f"norm 1, not {shown}" in message
         assert "scalar first" in message
     values[4] *= 3.0
     refused(function, values, row=3)

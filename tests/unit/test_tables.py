@@ -22,12 +22,12 @@ def spoiled(array, index, value):
     ("time", "gyro", "message"),
     [
         (spoiled(TIME, 2, np.nan), RATE, r"row 3, time: not a finite number"),
-        (spoiled(TIME, 2, 0.1), RATE, r"row 3, time: time does not advance"),
-        (spoiled(TIME, 2, 0.05), RATE, r"row 3, time: time does not advance"),
+        (spoiled(TIME, 2, 0.1), RATE, "row 3, time: .*time does not increase"),
+        (spoiled(TIME, 2, 0.05), RATE, "row 3, time: .*time does not increase"),
         (TIME, spoiled(RATE, (1, 2), np.inf), r"row 2, gyro_z: not a finite number"),
         (TIME[:1], RATE[:1], "1 sample"),
         (TIME, RATE[:3], "different lengths"),
-        (["a", "b"], RATE[:2], "no array of numbers"),
+        (["a", "b"], RATE[:2], "an array of numbers of shape"),
         (TIME, RATE[:, :2], "shape"),
     ],
 )

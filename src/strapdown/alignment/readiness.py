@@ -474,8 +474,8 @@ def carried_attitude(alignment: Alignment, imu: pd.DataFrame, site: Site) -> pd.
     DataError
         The instant of the alignment is not in the record.
     """
-    from strapdown.attitude import Quaternion
     from strapdown.attitude_algorithms.algorithm import run_attitude
+    from strapdown.attitude_algorithms.quaternion import Quaternion
 
     clean = _without_gyro_bias(imu, alignment)
     run = run_attitude(Quaternion(), increments_from_imu(clean)).attitude

@@ -8,9 +8,7 @@ from collections.abc import Callable, Container, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from time import perf_counter
-from typing import TYPE_CHECKING
-
-from strapdown.cli.compiling import Compilations
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -19,6 +17,7 @@ if TYPE_CHECKING:
     from strapdown.errors import Finding, Words
     from strapdown.report.document import TableBlock
 
+_EVENT = "numba:compile"
 _log = logging.getLogger("strapdown")
 
 #: Terms of messages: options, or the keys of the file that a command runs.
@@ -85,6 +84,55 @@ class Stopwatch:
             self.seconds[name] = self.seconds.get(name, 0.0) + taken
             _log.info("%s: %.2f s", name, taken)
         self._stage = None
+
+
+class Compilations:
+    """Report begin and end of compilations, once numba is loaded.
+
+    Parameters
+    ----------
+    tell : callable
+        Called with True at the begin of the first of nested compilations, with False at its end.
+    """
+
+    def __init__(self, tell: Callable[[bool], None]) -> None:
+        self._tell = tell
+        self._listener: Any = None
+
+    def listen(self) -> None:
+        """Start to listen if numba is loaded; this does not load it."""
+        if self._listener is not None or "numba.core.event" not in sys.modules:
+            return
+        from numba.core import event
+
+        tell = self._tell
+
+        class Listener(event.Listener):
+            depth = 0
+
+            def on_start(self, _: Any) -> None:
+                self.depth += 1
+                if self.depth == 1:
+                    tell(True)
+
+            def on_end(self, _: Any) -> None:
+                self.depth -= 1
+                if not self.depth:
+                    tell(False)
+
+        self._listener = Listener()
+        self._events().register(_EVENT, self._listener)
+
+    def stop(self) -> None:
+        """Stop listening."""
+        if self._listener is not None:
+            self._events().unregister(_EVENT, self._listener)
+            self._listener = None
+
+    def _events(self) -> Any:
+        from numba.core import event
+
+        return event
 
 
 @contextmanager
@@ -185,7 +233,7 @@ def print_findings(findings: Sequence[Finding], most: int | None = None) -> None
     out = console(err=True)
     for finding in findings[:most]:
         head, _, remedy = finding.text(WORDS.get()).partition("\n")
-        out.print(f"note: {head}", style="yellow")
+        out.print(f"{finding.severity}: {head}", style="yellow")
         if remedy:
             out.print(remedy, style="dim")
     if most is not None and len(findings) > most:

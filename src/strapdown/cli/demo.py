@@ -3,16 +3,26 @@
 from __future__ import annotations
 
 import os
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.resources import as_file, files
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from strapdown.cli.shared_options import WriteFlags, folder_to_make, spread
 
 if TYPE_CHECKING:
     from strapdown.progress import Progress
+    from strapdown.report.demo_page import Shown
 
 EPILOG = "Example: strapdown demo --out demo"
 _PAGE = "index.html"
+_TURNS = "mpu6050_turns"
+_TURN = "rotate-360ccw-around-z-pointing-up"
+_VERDICT = (("report.html", "The report"), ("verdict.html", "The verdict"))
+_OUTAGE = 30.0  # s
+_RECORDING = "phone-recording"
 
 
 @spread
@@ -21,13 +31,12 @@ def demo(
     out: Annotated[Path, folder_to_make("demo")] = Path("demo"),
     write: WriteFlags,
 ) -> None:
-    """Run all systems and show the results on one page: attitude, crash, navigation.
+    """Run all systems and show the results on one page: navigation, attitude, crash.
 
-    Runs on built-in data; recordings are added if they are in the folder named by STRAPDOWN_DATA,
-    by default ../shared/data.
+    Runs on one minute of a real drive and on simulations; further recordings are added if they are
+    in the folder named by STRAPDOWN_DATA, by default ../shared/data.
     """
     from strapdown.cli.console import console, progress
-    from strapdown.cli.demo_runs import demo_runs
     from strapdown.report.demo_page import demo_page, shown_answer, shown_truth
 
     data = Path(os.environ.get("STRAPDOWN_DATA", "../shared/data"))
@@ -35,9 +44,8 @@ def demo(
     there = [run for run in runs if run.needs is None or (data / run.needs).is_dir()]
     absent = [run for run in runs if run not in there]
     missing = (
-        "All of this is simulated. Three public recordings stand here, too, where STRAPDOWN_DATA "
-        f"names the folder that has them ({', '.join(str(run.needs) for run in absent)}); "
-        "docs/start.md says what they are."
+        "Further public recordings are shown if STRAPDOWN_DATA names the folder that holds them: "
+        f"{', '.join(str(run.needs) for run in absent)}. See docs/start.md."
         if absent
         else None
     )
@@ -94,3 +102,224 @@ def _write_whole(path: Path, text: str) -> None:
         partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)
+
+
+@dataclass(frozen=True)
+class DemoRun:
+    """One run of the demonstration.
+
+    Attributes
+    ----------
+    shown : Shown
+    make : callable
+        Called with the folder of the demonstration, whether to replace results, and progress.
+    takes : float
+        Approximate duration, relative to the others.
+    folders : tuple of str
+        Folders that it writes.
+    needs : str, optional
+        Folder of recordings.
+    """
+
+    shown: Shown
+    make: Callable[[Path, bool, Progress], object]
+    takes: float
+    folders: tuple[str, ...]
+    needs: str | None = None
+
+
+def demo_runs(out: Path, data: Path) -> list[DemoRun]:
+    """Return every run of the demonstration, in the order of its page.
+
+    Parameters
+    ----------
+    out : Path
+        Folder of the demonstration, as named in commands.
+    data : Path
+        Folder of the recordings.
+    """
+    from strapdown.report.demo_page import Shown
+
+    turns = data / _TURNS
+
+    def scenario(folder: Path, force: bool, progress: Progress) -> None:
+        _attitude(["alexiev-fig6"], folder / "hand", force, progress, options={"rate": 200.0})
+
+    def turn(folder: Path, force: bool, progress: Progress) -> None:
+        _attitude(
+            [str(turns / _TURN)],
+            folder / "turn",
+            force,
+            progress,
+            reference=["end 2 turns about up since start"],
+            gyro_bias=str(turns / "unmoved-10min"),
+        )
+
+    def pole(folder: Path, force: bool, progress: Progress) -> None:
+        from strapdown.api.crash import reconstruct
+        from strapdown.api.simulation import simulate
+
+        progress("simulating the records", 0.0)
+        simulate("pole").save(folder / "pole-records", force=force)
+        case = folder / "pole-records" / "case.toml"
+        made = reconstruct(case, progress=progress)
+        made.save(folder / "pole", force=force, progress=progress)
+
+    def coasting(folder: Path, force: bool, progress: Progress) -> None:
+        from strapdown.api.alignment import coast
+
+        made = coast(folder / "tunnel", _OUTAGE, progress=progress)
+        made.save(folder / "cone", force=force, progress=progress)
+
+    return [
+        DemoRun(
+            Shown(
+                "A",
+                "phone",
+                "A real drive, one minute, by a phone",
+                "A public recording (comma2k19, MIT license), part of the package: a phone, and a "
+                "receiver that states no standard deviations; 5 m and 0.3 m/s are assumed. Errors "
+                "of such fixes are correlated over minutes, which the filter does not model: its "
+                "bound of the height is too small, as the comparison shows.",
+                f"strapdown navigate {out / 'phone.toml'} \\\n  --out {out / 'phone'}",
+                ("plan", "heading-light"),
+                _VERDICT,
+            ),
+            _navigation("phone", data),
+            5.0,
+            ("phone.toml", "phone"),
+        ),
+        DemoRun(
+            Shown(
+                "A",
+                "tunnel",
+                "A drive, half a minute of it in a tunnel",
+                "A simulation: fixes with outliers, none in the tunnel; smoothed at the end. Below "
+                "the path: the heading status.",
+                f"strapdown navigate {out / 'tunnel.toml'} \\\n  --out {out / 'tunnel'}",
+                ("plan", "heading-light"),
+                _VERDICT,
+            ),
+            _navigation("tunnel", data),
+            6.0,
+            ("tunnel.toml", "tunnel"),
+        ),
+        DemoRun(
+            Shown(
+                "A",
+                "cone",
+                "How far would it have drifted?",
+                f"The same drive with a GNSS outage of {_OUTAGE:g} s at each of ten instants: the "
+                "predicted drift, its sources, and the drift that occurred.",
+                f"strapdown coast {out / 'tunnel'} --outage {_OUTAGE:g} \\\n  --out {out / 'cone'}",
+                ("cone",),
+            ),
+            coasting,
+            5.0,
+            ("cone",),
+        ),
+        DemoRun(
+            Shown(
+                "A",
+                "car",
+                "A real car",
+                "A recording: a small unit with vibration, and an RTK receiver; fixes are withheld "
+                "at times, to compare the result with them.",
+                f"strapdown navigate {out / 'car.toml'} \\\n  --out {out / 'car'}",
+                ("plan", "heading-light"),
+                _VERDICT,
+            ),
+            _navigation("car", data),
+            8.0,
+            ("car.toml", "car"),
+            "car_rtk",
+        ),
+        DemoRun(
+            Shown(
+                "A",
+                "walk",
+                "A real walk, without satellites",
+                "A recording: a unit on a shoe, which is stationary at each step.",
+                f"strapdown navigate {out / 'walk.toml'} \\\n  --out {out / 'walk'}",
+                ("plan",),
+                _VERDICT,
+            ),
+            _navigation("walk", data),
+            4.0,
+            ("walk.toml", "walk"),
+            "foot",
+        ),
+        DemoRun(
+            Shown(
+                "B",
+                "hand",
+                "A phone, moved as fast as a hand can",
+                "A scenario whose attitude is known exactly, as in Fig. 6 of Alexiev (2021).",
+                f"strapdown attitude alexiev-fig6 --rate 200 \\\n  --out {out / 'hand'}",
+                ("sweep",),
+            ),
+            scenario,
+            3.0,
+            ("hand",),
+        ),
+        DemoRun(
+            Shown(
+                "B",
+                "turn",
+                "A cheap sensor, turned twice by hand",
+                "A recording. Known: two full turns about the vertical end in the first attitude.",
+                f"strapdown attitude {turns / _TURN} \\\n"
+                "  --reference 'end 2 turns about up since start' \\\n"
+                f"  --gyro-bias {turns / 'unmoved-10min'} \\\n  --out {out / 'turn'}",
+                ("sweep",),
+            ),
+            turn,
+            2.0,
+            ("turn",),
+            _TURNS,
+        ),
+        DemoRun(
+            Shown(
+                "C",
+                "pole",
+                "A car against a pole",
+                "A simulation: two low-cost recorders with sensor errors; the truth is known.",
+                f"strapdown simulate pole --out {out / 'pole-records'}\n"
+                f"strapdown crash {out / 'pole-records' / 'case.toml'} \\\n  --out {out / 'pole'}",
+                ("path",),
+                (("report.html", "The report"), ("report.pdf", "as PDF")),
+                "pole-records",
+            ),
+            pole,
+            7.0,
+            ("pole-records", "pole"),
+        ),
+    ]
+
+
+def _attitude(
+    sources: list[str], out: Path, force: bool, progress: Progress, **options: Any
+) -> None:
+    from strapdown.api.attitude import compare_attitude
+
+    made = compare_attitude(sources, progress=progress, **options)
+    progress("writing", 0.9)
+    made.save(out, force=force)
+
+
+def _navigation(name: str, data: Path) -> Callable[[Path, bool, Progress], None]:
+    def make(folder: Path, force: bool, progress: Progress) -> None:
+        from strapdown.api.navigation import navigate
+
+        packaged = files("strapdown").joinpath("demo_data")
+        text = packaged.joinpath(f"{name}.toml").read_text("utf-8")
+        text = text.replace("{data}", data.resolve().as_posix())
+        folder.mkdir(parents=True, exist_ok=True)
+        if _RECORDING in text:
+            with as_file(packaged.joinpath("comma2k19")) as recording:
+                shutil.copytree(recording, folder / _RECORDING, dirs_exist_ok=True)
+        file = folder / f"{name}.toml"
+        file.write_text(text, encoding="utf-8", newline="\n")
+        navigate(file, progress=progress).save(folder / name, force=force, progress=progress)
+
+    return make

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import tempfile
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -18,6 +21,7 @@ from strapdown.cli.shared_options import (
     log_keys,
     spread,
 )
+from strapdown.errors import ConfigError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -81,11 +85,10 @@ def crash(
     strapdown crash case.toml
     """
     from strapdown.cli.console import progress
-    from strapdown.cli.draft_file import check_free, write_file
     from strapdown.cli.result_folder import refuse_result
     from strapdown.crash.template import draft_case, read_records
 
-    check_free(out, "case.toml", force=force)
+    _check_free(out, "case.toml", force=force)
     for record in records:
         refuse_result(record, "record")
     with progress(quiet) as report:
@@ -93,7 +96,7 @@ def crash(
         there = read_records(records)
         report("looking through", 0.5)
         draft = draft_case(there, folder=out.absolute().parent)
-        write_file(out, draft.text, "case.toml", force=force)
+        _write_file(out, draft.text, "case.toml", force=force)
     if quiet:
         return
     page = _say_found(draft.findings, draft.found)
@@ -131,19 +134,18 @@ def align(
     Then: strapdown align align.toml
     """
     from strapdown.cli.console import progress
-    from strapdown.cli.draft_file import check_free, write_file
     from strapdown.cli.result_folder import refuse_result
     from strapdown.config.alignment import LogTable
     from strapdown.config.spec import specify
     from strapdown.systems.alignment_draft import draft_alignment
 
-    check_free(out, "align.toml", force=force)
+    _check_free(out, "align.toml", force=force)
     refuse_result(log, "log")
     with progress(quiet) as report:
         report("reading", 0.3)
         table = specify(LogTable, path=str(log), **log_keys(flags.given()))
         draft = draft_alignment(table, folder=out.absolute().parent, axes=flags.axes)
-        write_file(out, draft.text, "align.toml", force=force)
+        _write_file(out, draft.text, "align.toml", force=force)
     if quiet:
         return
     page = _say_found(draft.findings, draft.found)
@@ -196,13 +198,12 @@ def navigate(
     Then: strapdown navigate navigate.toml
     """
     from strapdown.cli.console import progress
-    from strapdown.cli.draft_file import check_free, write_file
     from strapdown.cli.result_folder import refuse_result
     from strapdown.config.alignment import LogTable
     from strapdown.config.spec import specify
     from strapdown.systems.navigation_draft import draft_navigation
 
-    check_free(out, "navigate.toml", force=force)
+    _check_free(out, "navigate.toml", force=force)
     refuse_result(log, "log")
     table = specify(LogTable, path=str(log), **log_keys(flags.given()))
     with progress(quiet) as report:
@@ -215,7 +216,7 @@ def navigate(
             sensor=sensor,
             foot=foot,
         )
-        write_file(out, draft.text, "navigate.toml", force=force)
+        _write_file(out, draft.text, "navigate.toml", force=force)
     if quiet:
         return
     page = _say_found(draft.findings, draft.found)
@@ -243,3 +244,39 @@ def _list(page: Console, head: str, lines: Sequence[Asked]) -> None:
         page.print(f"\n{head}", style="bold")
     for one in lines:
         page.print(f"  line {one.line:>3}  {one.key}: {one.what}")
+
+
+def _check_free(path: Path, usual: str, *, force: bool) -> None:
+    """Refuse an existing file, unless `force`, or a folder; `usual` is the usual name."""
+    if path.is_dir():
+        raise ConfigError("cli.out-is-folder", file=str(path), quantity="--out", path=path / usual)
+    if path.exists() and not force:
+        raise ConfigError("cli.file-exists", file=str(path), quantity="--out")
+
+
+def _write_file(path: Path, text: str, usual: str, *, force: bool) -> None:
+    """Write a text file atomically; refuse as `_check_free`."""
+    _check_free(path, usual, force=force)
+    path = path.absolute()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".partial", dir=path.parent)
+    staged = Path(name)
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as stream:
+            stream.write(text)
+        staged.chmod(0o644)
+        if force:
+            staged.replace(path)
+            return
+        try:
+            # Creating a link fails if the path exists, in one atomic step.
+            path.hardlink_to(staged)
+        except FileExistsError:
+            _check_free(path, usual, force=force)
+        except OSError:
+            # A file system without links.
+            _check_free(path, usual, force=force)
+            staged.replace(path)
+    finally:
+        with suppress(FileNotFoundError):
+            staged.unlink()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _thread
 import errno
 import gc
 import inspect
@@ -9,7 +10,8 @@ import io
 import os
 import signal
 import sys
-from typing import NoReturn
+import threading
+from typing import Any, NoReturn
 
 import typer
 
@@ -27,8 +29,9 @@ from strapdown.cli import (
     verify,
 )
 from strapdown.cli.console import WORDS, logged
-from strapdown.cli.interrupts import keep_interrupts
 from strapdown.errors import Finding, StrapdownError
+
+_RESEND_S = 0.005
 
 EXIT_CODES = (
     "Exit codes: 0 done; 1 an error of strapdown itself; 2 the command line was not understood; "
@@ -95,7 +98,7 @@ def run() -> None:
     # A closed terminal, or a scheduler that ends a job, must not leave partial files either.
     for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
         signal.signal(number, lambda got, _: sys.exit(128 + got))
-    keep_interrupts()
+    _keep_interrupts()
     try:
         with logged():
             app()
@@ -123,3 +126,37 @@ def _reader_gone() -> NoReturn:
     """Exit quietly: the reader has closed the pipe, as with ``| head``, which is not an error."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.__stdout__.fileno() if sys.__stdout__ else 1)
     sys.exit(0)
+
+
+def _keep_interrupts() -> None:
+    """Deliver an interrupt again where Python drops it.
+
+    A signal handler runs between any two steps of the program, and so at times within a callback
+    of a weak reference or a finalizer, whose exceptions Python reports and ignores: the program
+    would continue to its end. While matplotlib draws, one interrupt of twelve is lost in this way.
+    It is sent again until it is raised elsewhere.
+    """
+    before = sys.unraisablehook
+
+    def hook(lost: Any) -> None:
+        number = _signal_of(lost)
+        if number is None:
+            before(lost)
+            return
+        # From another thread and later: within the callback it would be dropped once more.
+        again = threading.Timer(_RESEND_S, _thread.interrupt_main, (number,))
+        again.daemon = True
+        again.start()
+
+    sys.unraisablehook = hook
+
+
+def _signal_of(lost: Any) -> int | None:
+    """Signal of a dropped exception; None for another error."""
+    if issubclass(lost.exc_type, KeyboardInterrupt):
+        return int(signal.SIGINT)
+    if issubclass(lost.exc_type, SystemExit):
+        code = getattr(lost.exc_value, "code", None)
+        if isinstance(code, int) and code > 128:
+            return code - 128
+    return None

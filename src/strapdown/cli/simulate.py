@@ -80,27 +80,29 @@ def simulate(
     write: OutFlags,
 ) -> None:
     """Write the log of a scenario, a trajectory or a crash together with its exact truth."""
+    from strapdown.api.simulation import simulate as run_simulation
+    from strapdown.bundle.seal import check_destination
     from strapdown.cli.console import WORDS, console, print_seal, progress
     from strapdown.cli.result_folder import default_folder
-    from strapdown.report.simulation import simulate as simulate_and_write
 
     own = name.lower().endswith(".toml")
     WORDS.set("file" if own else "cli")
     title = Path(name).stem if own else name
     folder = out or default_folder(name, "simulated")
+    check_destination(folder, write.force)
     with progress(write.quiet or write.json) as report:
-        report("simulating and writing", 0.5)
-        seal = simulate_and_write(
+        report("simulating", 0.1)
+        made = run_simulation(
             name,
-            folder,
-            rate=rate,
+            rate_hz=rate,
             sampling=sampling,
             seed=seed,
             sensor=sensor,
-            formats=None if formats is None else formats.replace(",", " ").split(),
-            units=() if units is None else units.replace(",", " ").split(),
-            force=write.force,
+            recorders=() if units is None else units.replace(",", " ").split(),
         )
+        report("writing", 0.6)
+        wanted = None if formats is None else formats.replace(",", " ").split()
+        seal = made.save(folder, formats=wanted, force=write.force)
     if write.json:
         typer.echo((seal.path / "scenario.json").read_text(encoding="utf-8"), nl=False)
     elif not write.quiet:

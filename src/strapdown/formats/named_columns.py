@@ -80,7 +80,7 @@ def columns_of(raw: RawLog, units: Mapping[str, str], wanted: Sequence[str]) -> 
         if unit:
             of, factor = UNITS.get(unit, ("", 1.0))
             if of != units[name]:
-                known = ", ".join(u for u in UNITS if UNITS[u][0] == units[name])
+                known = [u for u in UNITS if UNITS[u][0] == units[name]]
                 raise DataError(
                     "io.unit-needed",
                     file=raw.name,

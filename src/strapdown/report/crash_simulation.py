@@ -55,7 +55,9 @@ __all__ = [
 SPAN = 0.15  # s
 
 
-def write_crash_simulation(spec: CrashSimulationSpec, out: Path, *, force: bool = False) -> Seal:
+def write_crash_simulation(
+    spec: CrashSimulationSpec, out: Path, *, force: bool = False, made: RecordedCase | None = None
+) -> Seal:
     """Write the records of a simulated crash.
 
     Parameters
@@ -65,6 +67,8 @@ def write_crash_simulation(spec: CrashSimulationSpec, out: Path, *, force: bool 
         Folder to create.
     force : bool
         Overwrite an existing bundle.
+    made : RecordedCase, optional
+        From `record_case` of this specification, if it has been simulated already.
 
     Returns
     -------
@@ -83,9 +87,12 @@ def write_crash_simulation(spec: CrashSimulationSpec, out: Path, *, force: bool 
     """
     check_destination(out, force)
     formats = _formats(spec)
-    case = find_case(spec.name)
-    recorded = record_case(
-        case, spec.units, rate=spec.rate_hz, sampling=spec.sampling, seed=spec.seed
+    recorded = made or record_case(
+        find_case(spec.name),
+        spec.units,
+        rate=spec.rate_hz,
+        sampling=spec.sampling,
+        seed=spec.seed,
     )
     seals: list[Seal] = []
     with write_bundle(

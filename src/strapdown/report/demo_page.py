@@ -179,11 +179,17 @@ def _navigation_truth(told: dict[str, Any]) -> str | None:
             f"{plain(100.0 * points['rms_m'] / points['way_m'], 2)} %."
         )
     if told["against"]:
-        error = told["against"]["errors"]["horizontal"]
+        errors = told["against"]["errors"]
+        sides = (("horizontal", "the horizontal position"), ("down", "the height"))
         return (
-            f"Against {told['against']['name']} the place is off by {plain(error['rms_m'], 3)} m "
-            f"(root mean square), {plain(error['largest_m'], 3)} m at most, and within its bound "
-            f"of 95 % for {plain(100.0 * error['share_within_bound'], 1)} % of the time."
+            f"Against {told['against']['name']} "
+            + "; ".join(
+                f"{name} is off by {plain(errors[key]['rms_m'], 3)} m (root mean square), "
+                f"{plain(errors[key]['largest_m'], 3)} m at most, and within its 95 % bound for "
+                f"{plain(100.0 * errors[key]['share_within_bound'], 1)} % of the time"
+                for key, name in sides
+            )
+            + "."
         )
     if told["withheld"]:
         return _withheld_truth(told["withheld"])
@@ -201,8 +207,8 @@ def _withheld_truth(withheld: list[dict[str, Any]]) -> str:
         else f" (before smoothing by {', '.join(plain(error, 1) for error in forward)} m)"
     )
     return (
-        f"Fixes kept back for {length} s at {len(tried)} places: off by {errors} m at most"
-        f"{before}, within the bound of 95 % at {sum(w['inside'] for w in tried)} of {len(tried)}."
+        f"Fixes withheld for {length} s, {len(tried)} times: off by {errors} m at most"
+        f"{before}, within the 95 % bound {sum(w['inside'] for w in tried)} of {len(tried)} times."
     )
 
 

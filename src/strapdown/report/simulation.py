@@ -2,137 +2,56 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from strapdown.attitude_comparison.source import scenario_errors, simulate_scenario
 from strapdown.bundle.seal import Seal, check_destination, sensor_file, to_json
 from strapdown.bundle.writing import write_bundle
-from strapdown.config import (
-    CrashSimulationSpec,
-    ScenarioSpec,
-    SimulateSpec,
-    read_trajectory_spec,
-    specify,
-)
-from strapdown.errors import ConfigError
+from strapdown.config import SimulateSpec
 from strapdown.formats.log_writers import LOG_WRITERS, log_formats, write_attitude_csv
-from strapdown.report.crash_simulation import stated_errors, write_crash_simulation
-from strapdown.report.trajectory_simulation import write_trajectory_simulation
-from strapdown.simulation import SCENARIOS, Motion, PulseMotion, TriadErrors, find_scenario
-from strapdown.simulation.crash_cases import CASES
+from strapdown.report.crash_simulation import stated_errors
+from strapdown.simulation import Motion, PulseMotion, TriadErrors, find_scenario
 
-__all__ = ["simulate", "write_simulation"]
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["write_simulation"]
 
 
-def simulate(
-    name: str,
-    out: str | Path,
+def write_simulation(
+    spec: SimulateSpec,
+    out: Path,
     *,
-    rate: float | None = None,
-    sampling: str | None = None,
-    seed: int | None = None,
-    sensor: str | None = None,
-    formats: str | Sequence[str] | None = None,
-    units: Sequence[str] = (),
     force: bool = False,
+    made: tuple[pd.DataFrame, pd.DataFrame] | None = None,
 ) -> Seal:
-    """Write the log of a scenario, a trajectory's file or a crash, with its exact truth.
+    """Write a simulated scenario.
 
     Parameters
     ----------
-    name : str
-        One of `simulation.SCENARIOS`, the path of a trajectory's file, which ends in ``.toml``, or
-        one of `simulation.crash_cases.CASES`. Arguments that are None take the value of the file,
-        else the default stated here.
-    out : str or Path
+    spec : SimulateSpec
+    out : Path
         Folder to create.
-    rate : float, Hz
-        100; for a crash each recorder's own rate.
-    sampling : {'instantaneous', 'mean'}
-        The rate at each stamp (the default), or its exact mean over the interval that ends there.
-    seed : int
-        Seed of the errors; 0.
-    sensor : str, optional
-        One of `sensors.catalogue.SENSORS`, or the path of a file in the same form: the errors
-        of one unit, drawn with the seed, replace those of the scenario.
-    formats : sequence of str
-        Of `formats.log_writers.LOG_WRITERS`, of a crash of `crash_simulation.RECORD_WRITERS`, or
-        ``all``; ``csv``.
-    units : sequence of str
-        For a crash: names of its recorders, or ``all``.
     force : bool
         Overwrite an existing bundle.
+    made : (DataFrame, DataFrame), optional
+        From `simulate_scenario` of this specification, if it has been simulated already.
 
     Returns
     -------
     Seal
-        The folder holds ``log.*`` (rad/s, body forward-right-down, with the true attitude in
-        further columns), ``scenario.json``, and the truth: ``truth.csv`` with the attitude of a
-        scenario, ``trajectory.csv`` with the position, velocity and attitude of a trajectory. For
-        a crash: as `crash_simulation.write_crash_simulation`.
+        The folder holds ``log.*``, ``truth.csv`` and ``scenario.json``.
 
     Raises
     ------
     ConfigError
-        The scenario, the rate, the sampling, the sensor or a format is unknown, `out` may not be
-        written, or an entry of the file is invalid; the message names the key.
+        A format is unknown, or `out` may not be written.
     """
-    wanted = [formats] if isinstance(formats, str) else formats and list(formats)
-    if wanted is not None and not wanted:
-        raise ConfigError("report.none-named", quantity="--format")
-    wanted = wanted and [f.lower() for f in wanted]
-    if name.lower() in CASES:
-        if sensor is not None:
-            raise ConfigError("report.recorders-crash-parts-their-own", quantity="--sensor")
-        crash = specify(
-            CrashSimulationSpec,
-            name=name.lower(),
-            units=tuple(units),
-            rate_hz=rate,
-            sampling=(sampling or "instantaneous").lower(),
-            seed=seed or 0,
-            formats=tuple(wanted or ["csv"]),
-        )
-        return write_crash_simulation(crash, Path(out), force=force)
-    if units:
-        raise ConfigError("report.no-crash-no-recorders", quantity="--units", name=name)
-    if name.lower().endswith(".toml"):
-        trajectory = read_trajectory_spec(
-            Path(name),
-            rate_hz=rate,
-            sampling=sampling and sampling.lower(),
-            seed=seed,
-            sensor=sensor,
-            formats=wanted,
-        )
-        return write_trajectory_simulation(trajectory, Path(out), force=force)
-    if name.lower() not in SCENARIOS:
-        raise ConfigError(
-            "report.no-scenario-no-crash",
-            quantity="scenario",
-            name=name,
-            word=name.lower(),
-            known=[*SCENARIOS, *CASES],
-        )
-    scenario = specify(
-        ScenarioSpec,
-        name=name.lower(),
-        rate_hz=100.0 if rate is None else rate,
-        sampling=(sampling or "instantaneous").lower(),
-        seed=seed or 0,
-        sensor=sensor,
-    )
-    spec = specify(SimulateSpec, scenario=scenario, formats=tuple(wanted or ["csv"]))
-    return write_simulation(spec, Path(out), force=force)
-
-
-def write_simulation(spec: SimulateSpec, out: Path, *, force: bool = False) -> Seal:
-    """Write a simulation from its specification; as `simulate`."""
     check_destination(out, force)
     formats = log_formats(spec.formats)
-    imu, truth = simulate_scenario(spec.scenario)
+    imu, truth = made or simulate_scenario(spec.scenario)
     scenario = find_scenario(spec.scenario.name)
     errors = scenario_errors(spec.scenario)
     seals: list[Seal] = []

@@ -24,7 +24,7 @@ from strapdown.report.crash_simulation import stated_errors
 from strapdown.report.path_marks import View, path_marks
 from strapdown.report.svg_chart import draw
 from strapdown.simulation import TriadErrors
-from strapdown.systems.trajectory_source import simulate_trajectory
+from strapdown.systems.trajectory_source import SimulatedTrajectory, simulate_trajectory
 from strapdown.tables import EULER, places_of
 
 __all__ = ["simulation_chart", "trajectory_chart", "write_trajectory_simulation"]
@@ -44,7 +44,13 @@ _ROW = {
 }
 
 
-def write_trajectory_simulation(spec: TrajectorySpec, out: Path, *, force: bool = False) -> Seal:
+def write_trajectory_simulation(
+    spec: TrajectorySpec,
+    out: Path,
+    *,
+    force: bool = False,
+    made: SimulatedTrajectory | None = None,
+) -> Seal:
     """Write a simulated trajectory.
 
     Parameters
@@ -54,6 +60,8 @@ def write_trajectory_simulation(spec: TrajectorySpec, out: Path, *, force: bool 
         Folder to create.
     force : bool
         Overwrite an existing bundle.
+    made : tuple, optional
+        From `simulate_trajectory` of this specification, if it has been simulated already.
 
     Returns
     -------
@@ -79,7 +87,7 @@ def write_trajectory_simulation(spec: TrajectorySpec, out: Path, *, force: bool 
                 word=name,
                 known=TRAJECTORY_WRITERS,
             )
-    motion, errors, imu, attitude, trajectory = simulate_trajectory(spec)
+    motion, errors, imu, attitude, trajectory = made or simulate_trajectory(spec)
     configuration = spec.model_dump(mode="json", exclude_none=True)
     seals: list[Seal] = []
     with write_bundle(

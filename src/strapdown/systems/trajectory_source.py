@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -59,9 +60,13 @@ _KEYS = {
 }
 
 
-def simulate_trajectory(
-    spec: TrajectorySpec,
-) -> tuple[EarthMotion, ImuErrors, pd.DataFrame, pd.DataFrame, pd.DataFrame]:
+#: Motion, errors, and the tables Imu, Attitude and Trajectory on the same stamps.
+SimulatedTrajectory: TypeAlias = tuple[
+    EarthMotion, ImuErrors, pd.DataFrame, pd.DataFrame, pd.DataFrame
+]
+
+
+def simulate_trajectory(spec: TrajectorySpec) -> SimulatedTrajectory:
     """Simulate a trajectory.
 
     Parameters

@@ -123,7 +123,7 @@ def test_gyros_of_a_tactical_class_that_find_north_to_degrees():
 def test_a_rocking_body_is_no_case_for_two_vectors():
     """It refuses, and says why."""
     imu, _, sensors = unit(rocking(900.0), 50.0, 1)
-    with pytest.raises(DataError, match=r"(?s)does not stand still.*inertial_frame") as refused:
+    with pytest.raises(DataError, match=r"(?s)is not stationary.*inertial_frame") as refused:
         TwoVector().align(imu, SITE, sensors)
     assert "rocks by" in str(refused.value)
 
@@ -134,7 +134,7 @@ def test_what_levels_a_rocking_body_covers_the_angle_at_the_end():
         found = KnownHeading(60.0, 3.0).align(imu.iloc[:end], SITE, sensors)
         # A sine is at most sqrt(2) of its root mean square from its middle, on three axes.
         assert chi_square(found, truth[end - 1]) < 3 * 2.0 * 1.5
-        assert any("does not stand still" in f.what for f in found.findings)
+        assert any("is not stationary" in f.what for f in found.findings)
 
 
 def test_a_drift_of_the_gyros_is_told():

@@ -47,7 +47,7 @@ def test_a_heading_that_is_stated_owes_nothing_to_the_gyros(rest):
 def test_a_stated_heading_that_is_wrong_is_told(rest):
     heading = float(roughly(rest, at="end").roll_pitch_heading[2])
     coarse = KnownHeading(heading + 60.0, 5.0).align(rest.imu, SITE, UNCERTAINTY)
-    with pytest.raises(DataError, match=r"turned the heading by -\d.*\n.*that was stated"):
+    with pytest.raises(DataError, match=r"changed the heading by -\d.*\n.*the stated heading"):
         FineAlignment().align(rest.imu, SITE, UNCERTAINTY, coarse)
 
 
@@ -64,7 +64,7 @@ def test_a_claim_beyond_the_floor_is_refused(fine):
     few = fine.alignment.covariance.copy()
     few[2, 2] = np.radians(0.5 * heading_floor_deg(fine, SITE)) ** 2
     claimed = replace(fine, alignment=replace(fine.alignment, covariance=few))
-    with pytest.raises(DataError, match=r"no rest tells more than .*\n.*--coarse-only"):
+    with pytest.raises(DataError, match=r"the limit is .*\n.*--coarse-only"):
         refuse_false_claims(claimed, SITE)
 
 
@@ -113,5 +113,5 @@ def test_one_step_is_one_step():
     values = np.random.default_rng(1).normal(size=(4000, 1))
     values[2000:] += 100.0
     (said,) = outlier_findings(values, ["gyro_x"], "x.csv")
-    assert said.what.startswith("one step from sample to sample is more than")
+    assert said.what.startswith("one step between samples")
     assert "robust_fir" in (said.remedy or "")

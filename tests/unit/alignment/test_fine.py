@@ -158,7 +158,7 @@ def test_gyros_that_cannot_find_north_say_so(rest):
     result = FineAlignment().align(rest.imu, SITE, poor, roughly(rest))
     # As unknown as it was: ten times what the coarse attitude claimed.
     assert result.alignment.sd_deg[2] > 0.9 * result.prior_heading_sd_deg
-    assert any("heading is known to" in f.what for f in result.findings)
+    assert any("heading standard deviation is" in f.what for f in result.findings)
 
 
 def test_a_body_that_is_pushed_about_is_found_out(rest):
@@ -167,7 +167,7 @@ def test_a_body_that_is_pushed_about_is_found_out(rest):
     t = pushed.index.to_numpy()
     pushed[ACCEL[0]] += 0.5 * np.sin(1.31 * t)
     result = FineAlignment().align(pushed, SITE, UNCERTAINTY, roughly(rest))
-    assert any("does not stand" in f.what for f in result.findings)
+    assert any("is not stationary" in f.what for f in result.findings)
     sd = np.sqrt(np.diagonal(result.alignment.covariance))
     assert np.all(np.abs(error_of(result.alignment, rest)) < 4.0 * sd)
 

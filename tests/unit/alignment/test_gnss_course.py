@@ -114,7 +114,7 @@ def test_reverse():
     imu, _ = ideal(DRIVE, 100.0)
     sensors = unit(DRIVE, 100.0, 0)[2]
     assert not GnssCourse().align(imu, SITE, sensors, fixes()).findings
-    with pytest.raises(DataError, match=r"log.csv, heading: the force along the forward axis fa"):
+    with pytest.raises(DataError, match=r"log.csv, heading: the forward specific force fa"):
         GnssCourse(reverse=True).align(imu, SITE, sensors, fixes())
 
 
@@ -225,7 +225,7 @@ def test_what_it_refuses():
         GnssCourse().align(imu, SITE, sensors, unmeasured)
     with pytest.raises(DataError, match=r"(?s)gnss.csv, row 301, VN, VE: .* m/s at 60 s.*at least"):
         GnssCourse(least_speed=9.0).align(imu, SITE, sensors, fixes())
-    with pytest.raises(DataError, match=r"(?s)its course is known to.*10 deg are needed"):
+    with pytest.raises(DataError, match=r"(?s)the course standard deviation.*10 deg are needed"):
         GnssCourse().align(imu, SITE, sensors, fixes(noise=2.0))
     rest, _ = ideal(still(20.0), 50.0)
     with pytest.raises(DataError, match=r"the vehicle moves at 0\.\d+ m/s"):

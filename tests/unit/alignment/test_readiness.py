@@ -55,9 +55,9 @@ def test_durations():
     times = durations_of(imu, 4)
     assert times == pytest.approx([5.0, 19.57, 76.63, 300.0], rel=1e-3)
     assert np.diff(np.log(times)) == pytest.approx(np.full(3, np.log(60.0) / 3.0))
-    with pytest.raises(ConfigError, match="count: 1 durations make no curve"):
+    with pytest.raises(ConfigError, match="count: a curve needs at least 2 durations, not 1"):
         durations_of(imu, 1)
-    with pytest.raises(DataError, match=r"log.csv, time: the record lasts 4\.\d s"):
+    with pytest.raises(DataError, match=r"log.csv, time: the record is 4\.\d s"):
         durations_of(imu.iloc[:50])
 
 

@@ -46,7 +46,7 @@ def test_what_is_stated_covers_the_error():
             found[method.name].append(chi_square(result, truth[-1]))
             if method.name == "two_vector":
                 heading.append(result.sd_deg[2])
-                assert "does not stand still" in str(result.findings[0])
+                assert "is not stationary" in str(result.findings[0])
     for name, values in found.items():
         assert max(values) < chi2.isf(1e-5, 3), name
         assert sum(values) < chi2.isf(1e-4, 3 * RUNS), name

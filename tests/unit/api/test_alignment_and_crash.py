@@ -135,5 +135,5 @@ def test_streams_of_a_file_by_name(tmp_path, rest):
         "time_s,lat_deg,lon_deg,alt_m,north_sd_m,east_sd_m,down_sd_m\n0,1,2,3,1,1,1\n1,1,2,3,1,1,1\n"
     )
     assert list(sd.read(tmp_path / "fixes.csv")) == ["gnss"]
-    with pytest.raises(ConfigError, match="no such file"):
+    with pytest.raises(ConfigError, match="does not exist"):
         sd.read(tmp_path / "none.csv")

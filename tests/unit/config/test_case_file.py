@@ -121,7 +121,7 @@ def test_all_that_is_still_open_is_named_at_once(tmp_path):
     with pytest.raises(ConfigError) as caught:
         read(tmp_path, *changes)
     assert str(caught.value) == (
-        "case.toml: 5 values are still open:\n"
+        "case.toml: 5 values are missing:\n"
         "  line 1, title: what the case is called in the report\n"
         "  line 9, vehicle, unheard_of\n"
         "  line 18, entry, speed_km_per_h: speed of the vehicle at the entry\n"
@@ -129,8 +129,8 @@ def test_all_that_is_still_open_is_named_at_once(tmp_path):
         "all positions share; delta-V and the direction of force move with it\n"
         "  line 34, unit 1, accelerometer 1, channels, y: column or channel of the axis to the "
         "right\n"
-        '  Remedy: put what you know in place of each "?", numbers without quotation marks; a key '
-        "that may be left out may be deleted"
+        '  Remedy: replace each "?" by its value, numbers without quotation marks; optional keys '
+        "may be deleted"
     )
 
 

@@ -114,25 +114,28 @@ def test_other_files_are_refused(folder, content):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (b"", "title: it is missing"),
-        (b"\xff\xfe\x00t", "line 1: it is not TOML: byte 0xff is not UTF-8"),
-        (b"title = 'x'\nauthor = '\xe4'", "line 2: it is not TOML: byte 0xe4 is not UTF-8"),
+        (b"", "title: the value is missing"),
+        (b"\xff\xfe\x00t", "line 1: the file is not valid TOML: byte 0xff is not UTF-8"),
+        (
+            b"title = 'x'\nauthor = '\xe4'",
+            "line 2: the file is not valid TOML: byte 0xe4 is not UTF-8",
+        ),
         (b"\x89PNG\r\n\x1a\n" + bytes(range(256)), "byte 0x89 is not UTF-8"),
-        (b"PK\x03\x04" + b"\x00" * 50, "it is not TOML"),
+        (b"PK\x03\x04" + b"\x00" * 50, "not valid TOML"),
         (b"a = " + b"[" * 20_000 + b"]" * 20_000, "nested too deep"),
         (b"a = " + b"{ a = " * 20_000 + b"1" + b"}" * 20_000, "nested too deep"),
         (b"a = " + b"[" * 100_000, "nested too deep"),
         (b"a." * 50_000 + b"a = 1", "nested too deep"),
         (b"[" + b"a." * 2_000 + b"a]", "nested too deep"),
-        (b"x" * 1_000_000 + b" = 1", "there is no such key"),
-        (b"a = " + b"1" * 1_000_000, "it is not TOML"),
-        (b"a = 1" + b"0" * 4_000, "there is no such key"),
+        (b"x" * 1_000_000 + b" = 1", "unknown key"),
+        (b"a = " + b"1" * 1_000_000, "not valid TOML"),
+        (b"a = 1" + b"0" * 4_000, "unknown key"),
         (b"title = '" + b"x" * 1_000_000 + b"'", "1000000 characters"),
-        (b"title" + b" " * 300_000 + b"= ", "it is not TOML"),
-        (b"title = " + b"1," * 300_000, "it is not TOML"),
+        (b"title" + b" " * 300_000 + b"= ", "not valid TOML"),
+        (b"title = " + b"1," * 300_000, "not valid TOML"),
         (b"title = 'x'\n" * 2, "line 2, title: the key is repeated; it is in line 1 too"),
         (b"[entry]\n" * 3, "line 2, entry: the key is repeated; it is in line 1 too"),
-        (b'"\\u001b[31m" = 1', "'\\x1b[31m': there is no such key"),
+        (b'"\\u001b[31m" = 1', "'\\x1b[31m': unknown key"),
     ],
 )
 def test_files_that_are_no_case_say_so_at_once(folder, content, words):
@@ -150,9 +153,9 @@ def test_files_that_are_no_case_say_so_at_once(folder, content, words):
 def test_what_is_no_file_is_named(folder):
     for path, words in (
         (folder, "it is not a file"),
-        (folder / "nothing.toml", "there is no such file"),
-        (folder / "a\x00b.toml", "no such file|not a file name"),
-        (folder / ("x" * 300 + ".toml"), "no such file|cannot be read"),
+        (folder / "nothing.toml", "the file does not exist"),
+        (folder / "a\x00b.toml", "the file does not exist"),
+        (folder / ("x" * 300 + ".toml"), "does not exist|cannot be read"),
     ):
         with pytest.raises(ConfigError, match=words):
             read_case_spec(path)

@@ -92,7 +92,7 @@ def test_all_that_does_not_fit_is_told_at_once(tmp_path):
     ("text", "said"),
     [
         ("", "spans_s: the time is not stated"),
-        ("spans_s = [[1.0, 2.0]]\nlengths_s = [3.0]\n", "lengths_s is given, too"),
+        ("spans_s = [[1.0, 2.0]]\nlengths_s = [3.0]\n", "lengths_s is given as well"),
         ("spans_s = [[2.0, 1.0]]\n", "the span from 2 to 1 s is empty"),
         ('aid = "rtc"\nlengths_s = [3.0]\n', "did you mean 'rtk'"),
     ],

@@ -76,15 +76,15 @@ def test_a_walk_is_of_the_root_of_an_hour(tmp_path):
     ("text", "said"),
     [
         ("[states.gyro_bais]\nsd_deg_per_h = 1.0\n", r"states, gyro_bais.*gyro_bias"),
-        ("[states.gyro_bias]\nsd_ppm = 1.0\n", r"sd_ppm: there is no such key"),
+        ("[states.gyro_bias]\nsd_ppm = 1.0\n", r"sd_ppm: unknown key"),
         ("[states.gyro_bias]\ncorrelation_time = 1.0\n", r"correlation_time_s"),
-        ("[states.gyro_scale]\ncorrelation_time_s = 9.0\n", r"how large 'gyro_scale'.*deviation"),
+        ("[states.gyro_scale]\ncorrelation_time_s = 9.0\n", r"deviation of 'gyro_scale'"),
         (
             "[states.gyro_bias]\nwalk_deg_per_h_per_sqrt_h = 1.0\ncorrelation_time_s = 9.0\n",
-            r"walk and come back",
+            r"random walk and a correlation time",
         ),
         ("[states.gyro_bias]\nsd_deg_per_h = 1.0\nsd_deg_per_s = 1.0\n", r"in two units"),
-        ("[states.gyro_drift]\nsd_deg_per_h = 1.0\n", r"over which time 'gyro_drift'"),
+        ("[states.gyro_drift]\nsd_deg_per_h = 1.0\n", r"correlation time of 'gyro_drift'"),
         ("[states.gyro_bias]\ncorrelation_time_s = 0.0\n", r"correlation_time_s"),
     ],
 )

@@ -137,7 +137,7 @@ def test_without_a_crash_there_is_a_path_and_a_word(at):
 def test_an_event_beyond_the_path_has_no_resolved_change(at):
     found = reconstruct_unit(at, Entry.from_speed(7.1, 0.05), window=(-0.05, 0.05))
     assert found.ned == (None,)
-    assert any("not within the path" in f.what for f in found.findings)
+    assert any("outside the path" in f.what for f in found.findings)
 
 
 def test_angle_rates_are_derivatives():

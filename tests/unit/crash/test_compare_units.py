@@ -174,7 +174,7 @@ def test_more_bias_than_stated_is_a_disagreement_with_words():
     words = " ".join(str(f) for f in out.findings)
     assert "A, delta-V: it and B disagree" in words
     assert "along right" in words
-    assert "B, delta-V: the others agree with one another and not with it" in words
+    assert "B, delta-V: the other units agree with each other and not with it" in words
 
 
 @pytest.mark.parametrize("index", range(48))
@@ -189,7 +189,7 @@ def test_every_signed_permutation_of_the_accelerometers_is_recognised(index):
         assert match.kind == "accelerometers"
         assert match.accelerometers_sure > 0.99
         assert any(
-            "its accelerometers have other axes" in str(f) or "its accelerometers" in str(f)
+            "the axes of its accelerometers differ" in str(f) or "its accelerometers" in str(f)
             for f in out.findings
         )
 
@@ -201,7 +201,7 @@ def test_a_unit_turned_as_a_whole_and_a_gyro_turned_alone():
     gyro = np.diag([1.0, 1.0, -1.0])
     alone = compare_units([unit("A", A, 1), unit("B", B, 2, gyro_axes=gyro)])
     assert np.array_equal(alone.pairs[0].axes.gyro, gyro)
-    assert any("its gyro has other axes" in str(f) for f in alone.findings)
+    assert any("the axes of its gyro differ" in str(f) for f in alone.findings)
 
 
 def test_a_small_rotation_of_the_mounting_is_estimated_with_its_sd():
@@ -213,7 +213,7 @@ def test_a_small_rotation_of_the_mounting_is_estimated_with_its_sd():
         found = out.pairs[0].turned
         error = rotation.rotation_vector_from_dcm(found.matrix @ C.T)
         z.append(error @ np.linalg.solve(found.covariance, error))
-        assert any("it is turned against A" in str(f) for f in out.findings)
+        assert any("it is rotated relative to A" in str(f) for f in out.findings)
     # Chi-square of three degrees of freedom: a mean over 20 scatters by sqrt(6/20).
     assert np.mean(z) == pytest.approx(3.0, abs=5 * math.sqrt(6 / 20))
 
@@ -284,7 +284,7 @@ def test_what_is_refused():
         compare_units([one, unit("B", B, 2)], window=(0.0, 5.0))
     with pytest.raises(ConfigError, match="pieces"):
         compare_units([one, one], pieces=1)
-    with pytest.raises(ConfigError, match="three pieces"):
+    with pytest.raises(ConfigError, match="three parts"):
         compare_units([one, one], window=(0.0, 0.02))
     with pytest.raises(ConfigError, match="three or more"):
         combine_units([one, one], "median")
@@ -306,9 +306,9 @@ def test_a_mean_lies_between_units_that_disagree_and_is_not_told_of_them():
     assert not found.comparison.agree
     assert found.combined is None
     assert found.main is found.units[0]
-    assert sum("no mean is told" in f.what for f in found.findings) == 1
+    assert sum("no mean is given" in f.what for f in found.findings) == 1
     silent = reconstruct_crash(units, Entry.from_speed(0.0, 0.05), combine=False).findings
-    assert not any("no mean is told" in f.what for f in silent)
+    assert not any("no mean is given" in f.what for f in silent)
     there = [u.at_point for u in found.units]
     mean = combine_units(there)
     edges = np.array([0.0, 0.05, 0.1, 0.2])
@@ -348,7 +348,7 @@ def test_what_was_cut_off_is_not_compared():
     assert not np.diff(pair.difference, axis=0)[gone].any()
     for name in ("IMU1", "IMU2"):
         assert any(
-            f.file == name and "left out where it is compared" in f.what for f in found.findings
+            f.file == name and "left out of the comparison" in f.what for f in found.findings
         )
 
 

@@ -299,7 +299,7 @@ def test_a_gap_in_the_window_is_refused_unless_bridged():
     time = stamps(1000.0)
     time = time[(time < 0.0395) | (time > 0.0555)]
     made = Acceleration(time, OBLIQUE.accel(time), source="unit 1")
-    with pytest.raises(DataError, match=r"unit 1, row 141, acceleration: no sample for 17 ms"):
+    with pytest.raises(DataError, match=r"unit 1, row 141, acceleration: a gap of 17 ms"):
         delta_v(made, 0.0, 0.1)
     assert delta_v(made, 0.06, 0.1).resultant > 0.0
     bridged = delta_v(made, 0.0, 0.1, across_gaps=True).vector

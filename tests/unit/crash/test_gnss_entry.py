@@ -167,7 +167,7 @@ def test_an_impact_that_is_named_late_distrusts_by_what_was_felt():
     for (reason,) in struck["why"]:
         assert reason.code == "crash.fix-under-acceleration-and-jerk"
         assert 230.0 <= reason.data["acceleration"] < 240.0
-    assert any("not believed" in f.what for f in found.findings)
+    assert any("are rejected" in f.what for f in found.findings)
     off = errors_of(found, clean)
     assert (np.abs(off[3:6]) < 5.0 * found.sd[3:6]).all()
 
@@ -196,7 +196,7 @@ def test_false_fixes_lose_their_weight(lively, size):
     used = record[record["used"]]
     assert (used["position_weight"] < 1.0).sum() + (used["velocity_weight"] < 1.0).sum() == 4
     assert record.loc[bad.index[20], "why"][0].code == "crash.fix-velocity-misfit"
-    assert any("4 fixes have less weight" in f.what for f in found.findings)
+    assert any("4 fixes are downweighted" in f.what for f in found.findings)
     # The answer moves by a part of what three of forty-nine fixes know.
     assert (
         np.abs(errors_of(found, lively, gyro, accel) - errors_of(clean, lively, gyro, accel))
@@ -306,7 +306,7 @@ def test_a_gap_before_the_impact_is_bridged_and_told(lively):
     found = entry(imu, fixes[fixes.index < IMPACT - 4.0])
     off = errors_of(found, lively, gyro, accel)
     assert off @ np.linalg.solve(found.covariance, off) < chi2.isf(1e-4, 15)
-    assert any("inertial sensors alone" in f.what for f in found.findings)
+    assert any("dead reckoning" in f.what for f in found.findings)
     assert (found.sd[3:5] > entry(imu, fixes).sd[3:5]).all()
 
 
@@ -321,12 +321,12 @@ def bad_cases(imu, fixes):
     return [
         (imu, few, {}, DataError, r"gnss.csv, fixes: 2 fixes over 0.2 s are left"),
         (imu, fixes.assign(quality=0), {}, DataError, r"0 fixes.*49 .the receiver had no fix"),
-        (imu, fixes, {"impact": 30.0}, DataError, r"imu.csv, time: it goes from 0 s to"),
+        (imu, fixes, {"impact": 30.0}, DataError, r"imu.csv, time: the record covers 0 s to"),
         (imu, fixes[fixes.index > 12.0], {}, DataError, "no fix from 1 s to 11 s"),
         (imu.drop(columns=["accel_x", "accel_y", "accel_z"]), fixes, {}, DataError, "no accel"),
         (imu, fixes.assign(VN_sd=0.0), {}, DataError, "row 1, VN_sd: a standard deviation of zero"),
         (imu, fixes, {"window": 0.2}, ConfigError, "a window of 0.2 s"),
-        (imu, fixes, {"anchor": 11.5}, ConfigError, "an anchor at 11.5 s"),
+        (imu, fixes, {"anchor": 11.5}, ConfigError, "the anchor at 11.5 s"),
         (imu, fixes, {"antenna": (0.0, 1.0)}, ConfigError, "three finite numbers"),
     ]
 

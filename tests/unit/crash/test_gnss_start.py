@@ -114,7 +114,7 @@ def test_units_that_find_their_own_biases_are_compared_with_them():
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"antenna": (1.0, 2.0)}, "antenna: .* not three finite numbers"),
+        ({"antenna": (1.0, 2.0)}, "antenna: .* three finite numbers"),
         ({"priors": {"side_slip": 1.0}}, "did you mean 'side_slip_sd_deg'"),
         ({"priors": {"antenna_sd": -1.0}}, "antenna_sd: -1.0 is no standard deviation"),
         ({"window": "10"}, "window: '10' is no number"),

@@ -206,7 +206,7 @@ class TestThiv:
         found = thiv(time, plane(-1.0 * one))
         assert found.velocity is None
         assert found.largest == pytest.approx(0.4, rel=1e-12)
-        assert "meets nothing" in found.findings[0].what
+        assert "THIV has no value" in found.findings[0].what
 
     def test_record_that_ends_with_the_impact_has_no_deceleration(self):
         time, one = constant(1.0, 0.112)
@@ -221,7 +221,7 @@ class TestThiv:
             thiv(time, one)
         with pytest.raises(DataError, match="not within the record"):
             thiv(time, plane(one), start=7.0)
-        with pytest.raises(ConfigError, match="no way to fly"):
+        with pytest.raises(ConfigError, match="a flight distance of"):
             thiv(time, plane(one), forward=0.0)
         with pytest.raises(ConfigError, match="no average"):
             thiv(time, plane(one), phd_average="10")
@@ -340,7 +340,7 @@ class TestOlc:
         assert olc(*constant(100.0)).value_g is None
 
     def test_ways_are_checked(self):
-        with pytest.raises(ConfigError, match="ways of"):
+        with pytest.raises(ConfigError, match="the distances of"):
             olc(*constant(-100.0), free=0.3, whole=0.3)
 
 
@@ -375,7 +375,7 @@ class TestFlailSpace:
         found = flail_space(time, plane(-2.0 * one))
         assert found.at is None
         assert found.oiv_x == pytest.approx(0.8, rel=1e-12)
-        assert "greatest change" in found.findings[0].what
+        assert "largest velocity change" in found.findings[0].what
         with pytest.raises(ConfigError, match="no space"):
             flail_space(time, plane(one), sideways=-0.3)
 

@@ -318,7 +318,7 @@ def test_what_cannot_be_is_told(case):
     _, imu, unit, effects, entry, _ = case
     with pytest.raises(DataError, match="not within the record"):
         reconstruct_path(imu, effects, unit.levelling, -0.1, entry, window=(-0.1, 5.0))
-    with pytest.raises(DataError, match="nothing says how fast"):
+    with pytest.raises(DataError, match="the entry speed is not stated"):
         reconstruct_path(imu, effects, unit.levelling, None, None, window=WINDOW)
     with pytest.raises(DataError, match="after the entry"):
         reconstruct_path(imu, effects, unit.levelling, 0.1, entry, window=WINDOW)

@@ -165,7 +165,7 @@ def test_swapped_axes_are_found(four):
     found = reconstruct_crash([units[2], wrong], ENTRY, combine=False)
     assert not found.comparison.agree
     words = [str(f) for f in found.comparison.findings]
-    assert any("IMU2, axes: its accelerometers have other axes" in w for w in words)
+    assert any("IMU2, axes: the axes of its accelerometers differ" in w for w in words)
     assert any("forward of IMU1 is right of it, right of IMU1 is forward of it" in w for w in words)
 
 

@@ -103,4 +103,4 @@ def test_huber_never_rejects():
 def test_parameters_are_checked(make, what):
     with pytest.raises(ConfigError, match=what) as told:
         make()
-    assert "rise in the order" in told.value.finding.remedy
+    assert "increasing in the order" in told.value.finding.remedy

@@ -95,8 +95,12 @@ def test_points_beyond_the_run_are_left_out_and_counted():
 @pytest.mark.parametrize(
     ("time", "places", "what"),
     [
-        ([100.0, 101.0], [[0.0, 0.0], [1.0, 0.0]], "lie within the run"),
-        ([1.0, 2.0], [[3.0, 4.0], [3.0, 4.0]], "at one place"),
+        ([100.0, 101.0], [[0.0, 0.0], [1.0, 0.0]], "control points are within the run"),
+        (
+            [1.0, 2.0],
+            [[3.0, 4.0], [3.0, 4.0]],
+            "all control points within the run are at one position, which does not ",
+        ),
     ],
 )
 def test_what_fits_any_heading_is_refused(time, places, what):

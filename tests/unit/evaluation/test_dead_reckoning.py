@@ -208,9 +208,9 @@ def test_words(text, moved, sd):
     [
         ("12.5 moved 0.3 m since 3", ConfigError, "not understood"),
         ("12.5 moved 1 2 3 ft since 3", ConfigError, "not understood"),
-        ("3 same place as 12.5", ConfigError, "not before it"),
+        ("3 same place as 12.5", ConfigError, "s, which is not earlier"),
         ("12.5 same place as 3 sd 0", ConfigError, "not positive"),
-        ("25 same place as 3", DataError, "runs from 0 to 20 s"),
+        ("25 same place as 3", DataError, "s, and the log covers"),
     ],
 )
 def test_words_that_cannot_be_used(text, error, message):
@@ -220,7 +220,10 @@ def test_words_that_cannot_be_used(text, error, message):
 
 @pytest.mark.parametrize(
     ("text", "message"),
-    [("5 same place as 1", "at no rest"), ("1.9 same place as 1", "two instants of one rest")],
+    [
+        ("5 same place as 1", r"s, which is not in a stationary interval \(intervals, s"),
+        ("1.9 same place as 1", "' names two instants of one stationary interval"),
+    ],
 )
 def test_instants_that_are_no_rests_are_refused(text, message):
     run, imu, rests = bench(*motion((0, 0, 0)))

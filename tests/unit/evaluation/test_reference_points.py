@@ -62,8 +62,8 @@ def test_words(text, row):
     [
         ("the end is the start", ConfigError, "not understood"),
         ("end 2 turns about w since start", ConfigError, "axis"),
-        ("0.5 same as start", DataError, "runs from 1 to 9 s"),
-        ("end same as 9.5", DataError, "runs from 1 to 9 s"),
+        ("0.5 same as start", DataError, "s, and the log covers"),
+        ("end same as 9.5", DataError, "s, and the log covers"),
         ("end roll 0 heading 0", ConfigError, "not understood"),
     ],
 )

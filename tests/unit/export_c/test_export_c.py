@@ -372,7 +372,9 @@ def test_what_is_not_understood_is_named():
     with pytest.raises(DataError):
         export_c(algorithm, q_nb=(0.0, 0.0, 0.0, 0.0))
     imu = imu_table([0.0, 1.0], np.zeros((2, 3)), sampling="mean")
-    with pytest.raises(ConfigError, match="leave the sampling out"):
+    with pytest.raises(
+        ConfigError, check=lambda refused: refused.finding.code == "attitude.asked-log-samples"
+    ):
         export_c(algorithm, sampling="instantaneous", imu=imu)
 
 

@@ -189,13 +189,17 @@ def test_a_rate_where_the_header_has_none(test_of):
 @pytest.mark.parametrize(
     ("text", "words", "row"),
     [
-        (channel(Number_of_samples="5"), "it has 3 samples, and its header says 5", 9),
-        (channel(Number_of_samples="2"), "it has 3 samples, and its header says 2", 9),
-        (channel(samples="1\nx y\n"), "'x y' is no number", 8),
-        (channel(samples="1\n1_0\n"), "'1_0' is no number", 8),
-        (channel(samples="1\ninf\n"), "'inf' is no number", 8),
-        (channel(samples="", Number_of_samples="NOVALUE"), "no samples under it", 6),
-        (channel(Sampling_interval="0"), "of 0 s is none", 5),
+        (channel(Number_of_samples="5"), "samples, and the header states", 9),
+        (channel(Number_of_samples="2"), "samples, and the header states", 9),
+        (channel(samples="1\nx y\n"), "' is not a number", 8),
+        (channel(samples="1\n1_0\n"), "' is not a number", 8),
+        (channel(samples="1\ninf\n"), "' is not a number", 8),
+        (
+            channel(samples="", Number_of_samples="NOVALUE"),
+            "the file has a header and no samples",
+            6,
+        ),
+        (channel(Sampling_interval="0"), "a sampling interval of", 5),
     ],
 )
 def test_damaged_channels_are_refused_with_their_row(test_of, text, words, row):
@@ -212,13 +216,13 @@ def test_damaged_headers(test_of, tmp_path):
         test_of("Channel code :x\nno colon here\n1\n")
     assert error.value.finding.row == 2
     record = test_of(channel(), mme="Title :x\nMass test object 1 :heavy\n")
-    assert "left out: 'heavy' is no number" in record.findings[0].what
+    assert "left out: 'heavy' is not a number" in record.findings[0].what
     assert "mass_kg" not in record.facts
     (tmp_path / "T2.mme").write_text(MME)
     with pytest.raises(DataError, match=r"holds 2 tests: T1\.mme, T2\.mme"):
         read_crash_record(tmp_path)
     assert read_crash_record(tmp_path / "T1.mme").format == "mme"
-    with pytest.raises(DataError, match="are of other tests, and none has its name: T1"):
+    with pytest.raises(DataError, match="belong to other tests: T1"):
         read_crash_record(tmp_path / "T2.mme")
 
 
@@ -230,13 +234,13 @@ def test_failed_missing_and_renamed_channels_are_told(test_of, tmp_path):
     index.write_text(index.read_text().replace(HEAD, "11HEAD0000H3ACXC"))
     told = " ".join(str(f) for f in read_crash_record(tmp_path).findings)
     assert "1 of 2 listed channels are not in the folder: 002" in told
-    assert "the index has 11HEAD0000H3ACXC for it" in told
+    assert "the index states 11HEAD0000H3ACXC" in told
 
 
 def test_a_code_that_is_none_and_a_unit_against_the_code(test_of):
     record = test_of(channel("LEFT FRONT"), channel(unit="deg/s"))
     assert record.channel("LEFT FRONT").axis == ""
-    assert "no channel code of sixteen" in record.findings[0].what
+    assert "not a channel code of sixteen" in record.findings[0].what
     assert record.channel(HEAD).quantity == "rate"
     assert record.channel(HEAD).remarks[0].startswith("its code says acceleration")
 

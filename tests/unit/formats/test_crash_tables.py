@@ -91,9 +91,15 @@ def test_units_by_their_definitions(text, quantity, si):
 
 def test_a_unit_of_something_else_is_refused():
     assert unit_of("furlong") is None
-    with pytest.raises(ConfigError, match="'deg/s' is a unit of rate, and one of acceleration"):
+    with pytest.raises(
+        ConfigError,
+        match="'deg/s' is a unit of rate",
+        check=lambda refused: refused.finding.code == "io.crash-unit-of-other-quantity",
+    ):
         state_unit("deg/s", "acceleration")
-    with pytest.raises(ConfigError, match="no unit that is known"):
+    with pytest.raises(
+        ConfigError, check=lambda refused: refused.finding.code == "io.crash-unit-unknown"
+    ):
         state_unit("gee", "acceleration")
 
 
@@ -117,14 +123,16 @@ def test_a_table_without_a_header(read):
     record = read(rows)
     assert [c.name for c in record.channels] == ["column 1", "column 2", "column 3"]
     assert record.channel("column 1").quantity == "time"
-    assert "advances evenly" in record.findings[0].what
+    assert "increases evenly" in record.findings[0].what
     np.testing.assert_array_equal(record.channel("column 2").load()[1], np.arange(10.0))
 
 
 def test_a_count_of_samples_is_no_clock(read):
     record = read("".join(f"{k},{k * k}\n" for k in range(10)))
     assert record.channel("column 1").quantity == "other"
-    with pytest.raises(DataError, match="no column is known to hold the time") as error:
+    with pytest.raises(
+        DataError, check=lambda refused: refused.finding.code == "io.crash-time-column-missing"
+    ) as error:
         record.channel("column 2").load()
     assert "rate_hz" in error.value.finding.remedy
 
@@ -145,9 +153,9 @@ def test_text_among_numbers_is_named_by_its_row(read):
 @pytest.mark.parametrize(
     ("stamps", "words", "row"),
     [
-        ("0 1 3 2", "goes back from 3.0 to 2.0", 5),
+        ("0 1 3 2", "time decreases from", 5),
         ("0 1 1 2", "repeats", 4),
-        ("0 x 1 2", "no stamp|is not a number", 3),
+        ("0 x 1 2", "missing stamp", 3),
     ],
 )
 def test_faults_of_time_are_named_by_their_row(read, stamps, words, row):
@@ -195,7 +203,9 @@ def test_the_sum_of_mean_accelerations_is_the_change(read):
 
 def test_mean_acceleration_of_something_else_or_with_a_hole_is_refused(read):
     record = read("t [s],ax [g],dv [m/s]\n0,1,0\n1,1,\n2,1,2\n")
-    with pytest.raises(DataError, match="it holds acceleration"):
+    with pytest.raises(
+        DataError, check=lambda refused: refused.finding.code == "io.holds-change-velocity-needed"
+    ):
         mean_acceleration(record.channel("ax [g]"))
     with pytest.raises(DataError, match="not a finite number") as error:
         mean_acceleration(record.channel("dv [m/s]"))
@@ -218,9 +228,9 @@ def test_texts_of_a_file_cannot_steer_a_terminal():
     [
         (b"", "is empty"),
         (b"\0\1\2\3" * 50, "zero bytes"),
-        ("t,ax\n", "no data under it"),
-        ("# a comment\n", "comments alone"),
-        ("a,b\nx,y\nz,w\n", "no column holds numbers"),
+        ("t,ax\n", "the file has a header and no data"),
+        ("# a comment\n", "the file has only comments"),
+        ("a,b\nx,y\nz,w\n", "no column is numeric"),
     ],
 )
 def test_files_that_are_no_record_are_refused(read, content, words):
@@ -230,12 +240,18 @@ def test_files_that_are_no_record_are_refused(read, content, words):
 
 
 def test_a_missing_file_an_unknown_folder_and_an_unknown_reader(tmp_path):
-    with pytest.raises(ConfigError, match="no such file"):
+    with pytest.raises(
+        ConfigError, check=lambda refused: refused.finding.code == "io.no-such-record"
+    ):
         read_crash_record(tmp_path / "none.csv")
     (tmp_path / "x.bin").write_bytes(b"1")
-    with pytest.raises(DataError, match=r"no known crash record; it holds: x\.bin"):
+    with pytest.raises(
+        DataError, check=lambda refused: refused.finding.code == "io.folder-no-known-crash-record"
+    ):
         read_crash_record(tmp_path)
-    with pytest.raises(ConfigError, match="no reader 'mmr'") as error:
+    with pytest.raises(
+        ConfigError, check=lambda refused: refused.finding.code == "io.unknown-reader"
+    ) as error:
         read_crash_record(tmp_path, format="mmr")
     assert "mme" in error.value.finding.remedy
     with pytest.raises(DataError, match="cannot be read"):
@@ -263,4 +279,4 @@ def test_comments_that_are_no_channels_are_told(read):
         '# channel: {"column": 2, "quantity": "speed"}\n# channel: [\nt [s],a\n0,1\n1,1\n'
     )
     assert [f.row for f in record.findings] == [1, 2]
-    assert "'speed' is no quantity" in record.findings[0].what
+    assert "unknown quantity: 'speed'" in record.findings[0].what

@@ -85,7 +85,7 @@ def test_without_utc_the_stamps_stay(tmp_path):
     value[5, 3] = np.nan
     table = read_gnss(written(tmp_path / "10", t, value), OPTIONS)
     assert np.array_equal(table.index, t)
-    assert "when they were written" in str(table.attrs["findings"][0])
+    assert "their time of writing" in str(table.attrs["findings"][0])
 
 
 def test_of_two_receivers_the_faster_is_taken_and_the_other_by_its_folder(tmp_path):

@@ -85,14 +85,14 @@ def test_no_fix_and_a_line_that_is_spoiled(tmp_path):
 @pytest.mark.parametrize(
     ("lines", "message"),
     [
-        ([rmc("000000.50", "160124")], "it holds no GGA sentence that is whole"),
+        ([rmc("000000.50", "160124")], "the file has no complete GGA sentence"),
         (
             [gga("000000.50", geoid="")],
-            "row 1, GGA height of the geoid: its height is over the sea",
+            "row 1, GGA height of the geoid: the height is over the sea",
         ),
         ([gga("000000.50", lat="x")], "row 1, GGA latitude: 'x' is not a number"),
         ([sentence("GNGGA,000000.50,1,N")], "row 1, GGA: a GGA of 3 fields"),
-        ([gga("000001.00"), gga("000000.50")], "row 2, time: the stamp 0.5 s comes after 1 s"),
+        ([gga("000001.00"), gga("000000.50")], "row 2, time: the stamp 0.5 s follows 1 s"),
     ],
 )
 def test_refused(tmp_path, lines, message):

@@ -137,37 +137,37 @@ def test_zero_means_unknown(tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"note": NOTE.replace("ellipsoidal", "geodetic")}, "alt: its heights are over the geoid"),
-        ({"note": NOTE.replace("WGS84", "Tokyo")}, "lat, lon: the places refer to the datum Tokyo"),
+        ({"note": NOTE.replace("ellipsoidal", "geodetic")}, "alt: the header states heights"),
+        ({"note": NOTE.replace("WGS84", "Tokyo")}, "lat, lon: the positions refer to the datum"),
         (
             {
                 "header": LEVEL.replace(
                     "latitude(deg) longitude(deg)", "e-baseline(m) n-baseline(m)"
                 )
             },
-            "row 3, lat, lon: it holds the way from the base station",
+            "row 3, lat, lon: the file has baselines from the base station",
         ),
         (
             {"header": LEVEL.replace(" height(m)", " heit(m)")},
-            "row 3, height(m): the line that names the columns is damaged",
+            "row 3, height(m): the line with the names of the columns is damaged",
         ),
-        ({"header": "nothing of use"}, "no line names its columns"),
-        ({"rows": []}, "row 3: a header, and no solution under it"),
+        ({"header": "nothing of use"}, "no line names the columns"),
+        ({"rows": []}, "row 3: the file has a header and no solution"),
         ({"rows": [row(), row(later(1)) + " 1.0", row(later(2))]}, "row 5: 20 numbers"),
         (
             {"rows": [row(), row(later(1), sds=SDS.replace("0.0098", "0,0098")), row(later(2))]},
             "row 5, sde(m): '0,0098' is not a number\n  Remedy: correct or delete that row; dec",
         ),
-        ({"rows": [row(), row(later(1), q=8)]}, "row 5, Q: a solution of kind 8 is unknown"),
+        ({"rows": [row(), row(later(1), q=8)]}, "row 5, Q: unknown solution type 8"),
         (
             {"rows": [row(later(1)), row()]},
-            "row 5, time: the stamp 97445.25 s comes after 97446.25",
+            "row 5, time: the stamp 97445.25 s follows 97446.25",
         ),
-        ({"rows": [row(), row()]}, "row 5, time: the stamp 97445.25 s is that of a row before"),
-        ({"rows": [row(), row("1979/01/15 03:04:05.250")]}, "row 5, time: its time is no date"),
+        ({"rows": [row(), row()]}, "row 5, time: the stamp 97445.25 s repeats an earlier one"),
+        ({"rows": [row(), row("1979/01/15 03:04:05.250")]}, "row 5, time: the time is neither"),
         (
             {"rows": [row(), row(later(1), sds=SDS.replace("0.0098", "-0.098"))]},
-            "row 5, east_sd: -0.098 is no standard deviation",
+            "row 5, east_sd: a standard deviation of -0.098",
         ),
         (
             {"rows": [row(), row(later(1), place="139.767125456 -35.681236123 40.0")]},
@@ -189,11 +189,15 @@ def test_a_file_that_is_cut(tmp_path):
     path.write_bytes(path.read_bytes()[:-60])
     table = read_gnss(path)
     assert len(table) == 1
-    assert [f.row for f in table.attrs["findings"] if "is cut" in f.what] == [5]
+    assert [f.row for f in table.attrs["findings"] if "is incomplete" in f.what] == [5]
 
 
 def test_a_file_of_one_line_that_is_cut(tmp_path):
     path = pos(tmp_path, [row()])
     path.write_bytes(path.read_bytes()[:-60])
-    with pytest.raises(DataError, match=r"row 4: its only line under the header is cut"):
+    with pytest.raises(
+        DataError,
+        match="row 4",
+        check=lambda refused: refused.finding.code == "io.only-line-under-header-cut",
+    ):
         read_gnss(path)

@@ -54,7 +54,7 @@ def test_values_between_two_samples_lie_on_the_line_between_them(tmp_path, gyro)
     assert np.array_equal(recording.imu[GYRO], np.sin(line_of(t)))
     finding = said(recording, "interpolated to 300 stamps")[0]
     nearest = np.abs(own[:, None] - t).min(axis=0).max()
-    assert f"{nearest:.3g} s from the sample nearest" in finding.what
+    assert f"{nearest:.3g} s from the nearest sample" in finding.what
     assert [f.name for f in recording.files] == ["g.csv", "a.csv"]
 
 
@@ -96,7 +96,7 @@ def test_nothing_is_extrapolated(tmp_path, gyro):
     recording = read_joined([path, table(tmp_path / "a.csv", own, line_of(own))])
     assert recording.imu.index[0] == t[11]
     assert recording.imu.index[-1] == t[289]
-    assert said(recording, "21 of 300 rows left out")
+    assert said(recording, "21 of 300 rows dropped")
 
 
 def test_a_sensor_that_covers_half_is_left_out(tmp_path, gyro):
@@ -104,13 +104,15 @@ def test_a_sensor_that_covers_half_is_left_out(tmp_path, gyro):
     recording = read_joined([path, table(tmp_path / "a.csv", t[:150], line_of(t[:150]))])
     assert list(recording.imu.columns) == GYRO
     assert len(recording.imu) == 300
-    assert said(recording, "left out: it has values for 150 of the 300")
+    assert said(recording, "left out: values for only 150 of the 300")
 
 
 def test_clocks_without_common_time_are_refused(tmp_path, gyro):
     path, t = gyro
     other = table(tmp_path / "a.csv", t + 1.7e9, line_of(t))
-    with pytest.raises(DataError, match="do not count from the same moment") as error:
+    with pytest.raises(
+        DataError, check=lambda refused: refused.finding.code == "io.stamps-run-after-first-gyro"
+    ) as error:
         read_joined([path, other])
     assert error.value.finding.file == "a.csv"
     assert "one clock" in error.value.finding.remedy
@@ -120,7 +122,7 @@ def test_a_gap_is_named(tmp_path, gyro):
     path, t = gyro
     own = np.concatenate([t[:100], t[150:]])
     recording = read_joined([path, table(tmp_path / "a.csv", own, line_of(own))])
-    assert said(recording, "gaps in it: 1, the longest 0.51 s")
+    assert said(recording, "1 gaps, the longest 0.51 s")
     assert "the farthest is 0.25 s" in said(recording, "interpolated")[0].what
 
 
@@ -138,12 +140,18 @@ def test_samples_that_are_no_numbers_or_repeat_are_not_used(tmp_path, gyro):
 def test_no_gyro_two_gyros_and_mute_clocks_are_refused(tmp_path, gyro):
     path, t = gyro
     accel = table(tmp_path / "a.csv", t, line_of(t))
-    with pytest.raises(DataError, match=r"no gyroscope in it; it holds: a\.csv"):
+    with pytest.raises(
+        DataError, check=lambda refused: refused.finding.code == "io.no-gyroscope-holds"
+    ):
         read_joined([accel, accel])
-    with pytest.raises(ConfigError, match=r"g\.csv and g\.csv have one each"):
+    with pytest.raises(
+        ConfigError, check=lambda refused: refused.finding.code == "io.gyro-in-several-logs"
+    ):
         read_joined([path, path])
     mute = table(tmp_path / "m.csv", t, line_of(t), "time,accel_x_g,accel_y_g,accel_z_g")
-    with pytest.raises(DataError, match="its stamps have no unit") as error:
+    with pytest.raises(
+        DataError, check=lambda refused: refused.finding.code == "io.stamps-no-unit-those-other"
+    ) as error:
         read_joined([path, mute])
     assert error.value.finding.file == "m.csv"
 

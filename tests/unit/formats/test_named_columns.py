@@ -47,24 +47,24 @@ def test_units_and_deviations(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("time,north,east\n0,1,2\n1,1,2\n", "cameras.csv, columns: there is no column 'down'"),
+        ("time,north,east\n0,1,2\n1,1,2\n", "cameras.csv, columns: unknown column 'down'"),
         (
             "time,north,east,down\n0,1,2,3\n0,1,2,3\n",
-            "cameras.csv, row 3, time: time goes from 0 s to 0 s",
+            "cameras.csv, row 3, time: time decreases from 0 s to 0 s",
         ),
         (
             "time,north,east,down\n0,1,2,3\n1,,2,3\n",
-            "cameras.csv, row 3, north: nan is no number",
+            "cameras.csv, row 3, north: nan is not a number",
         ),
         (
             "time,north [furlong],east,down\n0,1,2,3\n1,1,2,3\n",
-            "its unit is 'furlong', and m is needed",
+            "the unit is 'furlong', and m is needed",
         ),
         (
             "time,north,east,down,north_sd\n0,1,2,3,1\n1,1,2,3,1\n",
-            "east_sd: it is missing, while another standard deviation is there",
+            "east_sd: the column is missing, and another standard deviation is given",
         ),
-        ("time,north,east,down\n0,1,b,3\n1,1,2,3\n", "east: it holds text"),
+        ("time,north,east,down\n0,1,b,3\n1,1,2,3\n", "east: the column has text"),
     ],
 )
 def test_refused(tmp_path: Path, text: str, message: str) -> None:

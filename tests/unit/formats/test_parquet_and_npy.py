@@ -99,7 +99,9 @@ def test_parquet_that_claims_far_more_than_it_holds(tmp_path):
     zeros = np.zeros(10_000_000)
     pq.write_table(pa.table({"t": zeros, "gx": zeros}), path, compression="zstd")
     assert path.stat().st_size < 160_000
-    with pytest.raises(DataError, match="it claims 160000000 bytes"):
+    with pytest.raises(
+        DataError, check=lambda refused: refused.finding.code == "io.claims-bytes-stored"
+    ):
         read_raw(path)
 
 
@@ -124,11 +126,11 @@ def test_a_folder_of_arrays(tmp_path):
 @pytest.mark.parametrize(
     ("damage", "message"),
     [
-        (lambda b: b[:300], r"gyro\.npy: it claims 240 values of 8 bytes, and 172 bytes"),
+        (lambda b: b[:300], r"gyro\.npy: .*the header states"),
         (lambda b: b[:7], r"gyro\.npy: the array cannot be read"),
         (lambda b: b"hello", r"gyro\.npy: the array cannot be read"),
         (lambda b: b"", r"gyro\.npy: the array cannot be read"),
-        (lambda b: b.replace(b"(80, 3)", b"(80,30)"), r"gyro\.npy: it claims 2400 values"),
+        (lambda b: b.replace(b"(80, 3)", b"(80,30)"), r"gyro\.npy: .*the header states"),
     ],
 )
 def test_a_damaged_array(tmp_path, damage, message):
@@ -209,8 +211,14 @@ def test_comma2k19_of_another_shape_is_refused(tmp_path):
     folder = tmp_path / "10"
     segment(folder, True)
     np.save(folder / "IMU__gyro__value.npy", np.zeros((5, 3)))
-    with pytest.raises(DataError, match=r"10/IMU__gyro__value\.npy, gyro: stamps have the shape"):
+    with pytest.raises(
+        DataError,
+        match=r"10/IMU__gyro__value\.npy, gyro",
+        check=lambda refused: refused.finding.code == "io.stamps-shape-values-numbers-shapes",
+    ):
         read_log(folder)
     (folder / "IMU__gyro__value.npy").unlink()
-    with pytest.raises(DataError, match="the values of the gyro are not there"):
+    with pytest.raises(
+        DataError, check=lambda refused: refused.finding.code == "io.values-gyro-not"
+    ):
         read_log(folder)

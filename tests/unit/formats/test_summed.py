@@ -85,7 +85,7 @@ def test_a_name_that_says_increments_without_a_unit_asks_for_it(tmp_path, triad)
     if triad == "gyro":
         with pytest.raises(DataError, match="rad or deg") as error:
             read_log(path)
-        assert error.value.finding.remedy == "state it with --gyro-unit"
+        assert error.value.finding.code == "io.file-leaves-open-whether"
     else:
         recording = read_log(path)
         assert ACCEL[0] not in recording.imu.columns
@@ -102,7 +102,7 @@ def test_increments_are_no_values_at_their_stamps(tmp_path):
     with pytest.raises(ConfigError, match="interval that ends at their stamp"):
         read_log(path, ReadOptions(sampling="instantaneous"))
     said = [f.what for f in read_log(path).findings if f.quantity == "sampling"]
-    assert "accel is taken for such a mean, too" in said[0]
+    assert "accel is taken as such a mean as well" in said[0]
 
 
 def test_an_increment_after_a_row_left_out_is_of_its_own_step():

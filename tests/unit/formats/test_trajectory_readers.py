@@ -69,7 +69,7 @@ def test_random_numbers_come_back_to_the_bit(tmp_path):
     back = read_trajectory(tmp_path / "a.csv")
     assert np.array_equal(back.to_numpy(), track.to_numpy())
     (finding,) = back.attrs["findings"]
-    assert "places and the integral of velocity disagree" in finding.what
+    assert "positions and the integral of velocity disagree" in finding.what
 
 
 @pytest.mark.parametrize(
@@ -108,13 +108,19 @@ def test_columns_that_are_called_otherwise(tmp_path):
     head = HEAD.replace("lat", "breite").replace("alt", "alt,height")
     rows = [r.replace("500,", "500,600,", 1) for r in ROWS]
     path = save(tmp_path / "a.csv", rows, head)
-    with pytest.raises(DataError, match=r"a.csv, alt: columns 'alt' and 'height' could both"):
+    with pytest.raises(
+        DataError,
+        match=r"a\.csv, alt",
+        check=lambda refused: refused.finding.code == "io.column-names-ambiguous",
+    ):
         read_trajectory(path, {"lat": "breite"})
     back = read_trajectory(path, {"lat": "breite", "alt": "height"})
     assert back["alt"].tolist() == [600.0] * 3
     with pytest.raises(ConfigError, match="did you mean 'breite'"):
         read_trajectory(path, {"lat": "breit"})
-    with pytest.raises(ConfigError, match="is no quantity of a trajectory"):
+    with pytest.raises(
+        ConfigError, check=lambda refused: refused.finding.code == "io.unknown-quantity-of-table"
+    ):
         read_trajectory(path, {"latt": "breite"})
 
 
@@ -129,15 +135,21 @@ def test_dates_are_stamps(tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda r: (HEAD.replace(",VD", ",down"), r), r"missing columns: VD; it has time, lat"),
+        (lambda r: (HEAD.replace(",VD", ",down"), r), "missing columns"),
         (lambda r: (HEAD, [r[0], r[1].replace("500", "nan"), r[2]]), r"row 4, alt: not a finite"),
         (lambda r: (HEAD, [r[0], r[1].replace("500", ""), r[2]]), r"row 4, alt: not a finite"),
         (lambda r: (HEAD, [r[0], r[1].replace("500", "high"), r[2]]), r"row 4, alt: 'high' is not"),
-        (lambda r: (HEAD, [r[0], r[2], r[1]]), r"row 5, time: time does not advance: 2 s .* 1 s"),
+        (lambda r: (HEAD, [r[0], r[2], r[1]]), "row 5, time: .*time does not increase"),
         (lambda r: (HEAD, [r[0], r[1].replace("48", "98"), r[2]]), r"row 4, lat: .* beyond the"),
-        (lambda r: (HEAD.replace("alt", "alt_kn"), r), r"alt: 'kn' is no unit of it"),
-        (lambda r: (HEAD.replace("lat", "lat [gon]"), r), r"lat: 'gon' is no unit of it"),
-        (lambda r: (HEAD, r[:0]), r"a header, and no data under it"),
+        (
+            lambda r: (HEAD.replace("alt", "alt_kn"), r),
+            r"alt: .*' is not a unit of this quantity \(column '",
+        ),
+        (
+            lambda r: (HEAD.replace("lat", "lat [gon]"), r),
+            r"lat: .*' is not a unit of this quantity \(column '",
+        ),
+        (lambda r: (HEAD, r[:0]), "the file has a header and no data"),
         (lambda r: (HEAD, [r[0], r[1] + ",7", r[2]]), r"row 4: 11 fields"),
     ],
 )
@@ -151,13 +163,18 @@ def test_what_cannot_be_used(tmp_path, change, message):
 
 
 def test_files_that_are_none(tmp_path):
-    with pytest.raises(ConfigError, match="no such file"):
+    with pytest.raises(
+        ConfigError, check=lambda refused: refused.finding.code == "io.no-such-file"
+    ):
         read_trajectory(tmp_path / "none.csv")
     (tmp_path / "a.csv").write_text("")
     with pytest.raises(DataError, match="the file is empty"):
         read_trajectory(tmp_path / "a.csv")
     (tmp_path / "a.kml").write_text("<kml/>")
-    with pytest.raises(DataError, match="text table alone"):
+    with pytest.raises(
+        DataError,
+        check=lambda refused: refused.finding.code == "io.trajectory-read-text-table-alone",
+    ):
         read_trajectory(tmp_path / "a.kml")
 
 
@@ -199,7 +216,11 @@ def test_exchanged_latitude_and_longitude(tmp_path):
 def test_an_attitude_in_radians(tmp_path):
     rows = driven()
     rows[:, 7:] = np.radians(rows[:, 7:])
-    with pytest.raises(DataError, match=r"heading is \d+° from the course, and 0.0° if it is in"):
+    with pytest.raises(
+        DataError,
+        match=r"heading is \d+° from the course",
+        check=lambda refused: refused.finding.code == "io.heading-in-radians",
+    ):
         read_trajectory(save(tmp_path / "a.csv", rows))
     head = HEAD.replace("roll", "roll_rad").replace("pitch", "pitch_rad")
     back = read_trajectory(save(tmp_path / "b.csv", rows, head.replace("heading", "heading (rad)")))
@@ -231,7 +252,9 @@ def test_a_recorded_drive_is_believed_and_its_mistakes_are_seen(tmp_path, record
     plain = log.rename(columns={"lat_deg": "lat", "lon_deg": "lon"})
     with pytest.raises(DataError, match="if they are radians"):
         read(plain.assign(lat=np.radians(plain["lat"]), lon=np.radians(plain["lon"])))
-    with pytest.raises(DataError, match="if it is in radians"):
+    with pytest.raises(
+        DataError, check=lambda refused: refused.finding.code == "io.heading-in-radians"
+    ):
         read(log.assign(heading=np.radians(log["heading"])))
     with pytest.raises(DataError, match=r"row 2, lat: .* beyond the pole"):
         read(log.rename(columns={"lat_deg": "lon_deg", "lon_deg": "lat_deg"}))

@@ -64,7 +64,9 @@ def test_counts_of_a_log(tmp_path):
     counts = np.round(ROWS[:, 1:] * 1000).astype(int)
     rows = [f"{10 * k}," + ",".join(map(str, row)) for k, row in enumerate(counts)]
     path.write_text("millis,gx,gy,gz,ax,ay,az\n" + "\n".join(rows) + "\n")
-    with pytest.raises(DataError, match="raw counts, say how many are a unit, as in deg/s/131"):
+    with pytest.raises(
+        DataError, check=lambda refused: refused.finding.code == "io.counts-unit-undecided"
+    ):
         read_log(path)
     imu = read_log(path, ReadOptions(gyro_unit="deg/s/131", accel_unit="g/16384")).imu
     np.testing.assert_allclose(imu[GYRO], np.radians(counts[:, :3] / 131.0), rtol=1e-12)
@@ -124,4 +126,4 @@ def test_columns_without_names_are_shown(tmp_path):
     path.write_text("\n".join(f"{k * 10},1.5,-2.25,3,4,5,6,7,8,9" for k in range(N)) + "\n")
     with pytest.raises(DataError, match=r"1: 0, 2: 1.5, 3: -2.25, 4: 3") as caught:
         read_log(path)
-    assert "--columns time=1,gyro_x=2" in caught.value.finding.remedy
+    assert "--columns time=1,gyro_x=2" in caught.value.finding.advice("cli")

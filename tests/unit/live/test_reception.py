@@ -170,7 +170,7 @@ def test_an_end_that_is_commanded():
 def test_a_gap_that_is_not_bridged_ends_it_before_the_gap():
     good = [text for text in lines() if not 2.0 < float(text.split(",")[1]) < 3.5]
     live, _, _ = received(good)
-    assert "without samples" in live.error.finding.what
+    assert "a gap of" in live.error.finding.what
     assert live.got.samples[-1, 0] == 2.0
     assert live.run.record.trajectory.index[-1] == 2.0
 

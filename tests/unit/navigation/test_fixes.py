@@ -47,7 +47,7 @@ def test_a_site_is_the_median_of_the_fixes_of_the_rest():
     site, _ = site_of_fixes(fixes, 9.0, 10.0, WGS84)
     assert site.alt == 499.0
     bad = table([1.0, 2.0], quality=[0, 0])
-    with pytest.raises(DataError, match=r"fixes.csv.*no fix with a place until 5 s"):
+    with pytest.raises(DataError, match=r"fixes.csv.*no fix with a position before 5 s"):
         site_of_fixes(bad, 0.0, 5.0, WGS84)
     with pytest.raises(DataError, match="state the site"):
         site_of_fixes(None, 0.0, 5.0, WGS84)

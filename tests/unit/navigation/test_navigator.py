@@ -285,7 +285,7 @@ def test_scale_factors_and_held_height_go_the_same_way_in_both_engines(log, monk
 
 
 def test_names_are_of_one_aid_each():
-    with pytest.raises(ConfigError, match="two aids"):
+    with pytest.raises(ConfigError, match="two measurements"):
         Navigator(started()[0].filter, (Gnss(name="a"), Gnss(name="a")))
     with pytest.raises(ConfigError, match="no name"):
         Navigator(started()[0].filter, (Gnss(),))

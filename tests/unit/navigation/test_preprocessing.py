@@ -108,7 +108,7 @@ def test_what_cannot_be_is_named_with_its_row(cut):
         fed(time, values)
     time, values = samples()
     time[500] = 3.0
-    with pytest.raises(DataError, match=r"log.csv, row 501.*does not advance"):
+    with pytest.raises(DataError, match=r"log.csv, row 501.*does not increase"):
         fed(time, values)
     time, values = samples()
     time[600] = np.nan

@@ -136,7 +136,7 @@ def test_memory_grows_with_the_rate_of_the_recorder():
 
 
 def test_no_step_and_no_rate_are_refused():
-    with pytest.raises(DataError, match=r"run.csv.*made no step"):
+    with pytest.raises(DataError, match=r"run.csv.*no navigation step"):
         kept(FullRecorder(), [])
     for rate in (0.0, np.inf, "fast"):
         with pytest.raises(ConfigError, match="rate_hz"):

@@ -60,10 +60,10 @@ def rest(length=20.0, rate=20.0):
 @pytest.mark.parametrize(
     ("modes", "known", "what"),
     [
-        ((), False, "do not end with"),
-        ((Navigation(), LEVEL), False, "do not end with"),
-        ((LEVEL,), False, "do not end with"),
-        ((Navigation(),), False, "nothing to begin with"),
+        ((), False, "is not navigation"),
+        ((Navigation(), LEVEL), False, "is not navigation"),
+        ((LEVEL,), False, "is not navigation"),
+        ((Navigation(),), False, "navigation has no start"),
         ((LEVEL, Navigation()), True, "is known"),
         ((FineMode(), Navigation()), False, "no coarse alignment"),
         ((LEVEL, LEVEL, Navigation()), False, "two modes"),
@@ -95,9 +95,9 @@ def test_what_means_nothing_is_refused():
     for options in ({"duration": 0.0}, {"heading_sd_deg": -1.0}, {"pause": 2.0}, {"least": 0.0}):
         with pytest.raises(ConfigError):
             Until(**options)
-    with pytest.raises(ConfigError, match="no mode that can be commanded"):
+    with pytest.raises(ConfigError, match="unknown mode"):
         standing((LEVEL, Navigation()), commands=(Command(1.0, "fly"),))
-    with pytest.raises(ConfigError, match="sensors may err"):
+    with pytest.raises(ConfigError, match="needs the errors of its sensors"):
         NavigationPipeline(navigator(), modes=(LEVEL, Navigation()))
     with pytest.raises(ConfigError, match="no aid 'rtk'"):
         standing((LEVEL, Navigation()), fixes="rtk")

@@ -167,5 +167,8 @@ def test_nothing_in_common_is_said(run):
     later = MOTION.trajectory(np.arange(0.0, 10.0, 0.1))
     later.index = later.index + 1000.0
     for compare in (compare_with_truth, compare_with_places):
-        with pytest.raises(DataError, match="no instant in common"):
+        with pytest.raises(
+            DataError,
+            check=lambda refused: refused.finding.code == "evaluation.run-truth-no-instant-common",
+        ):
             compare(trajectory, time[::10], np.broadcast_to(P, (61, 9, 9)), later)

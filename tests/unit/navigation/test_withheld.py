@@ -82,7 +82,7 @@ def test_each_span_is_by_itself():
 @pytest.mark.parametrize(
     ("name", "span", "words"),
     [
-        ("gps", (60.0, 70.0), "no aid 'gps'"),
+        ("gps", (60.0, 70.0), "no measurement '"),
         ("gnss", (175.0, 190.0), "not within the record"),
         ("gnss", (60.1, 60.2), "no fixes"),
     ],

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from strapdown import simulate
 from strapdown.bundle.seal import to_json
 from strapdown.config.crash_case import AssumedSpec, ReferenceSpec
 from strapdown.config.crash_case_file import read_case_spec
@@ -19,7 +20,6 @@ from strapdown.formats import read_raw
 from strapdown.report.crash_case import file_name
 from strapdown.report.crash_json import crash_json, signals_table, trajectory_table, write_table
 from strapdown.report.crash_limits import limitations
-from strapdown.report.simulation import simulate
 from strapdown.report.values import spaced
 from strapdown.report.verify import changed_case
 
@@ -32,7 +32,7 @@ USUAL = {
 
 @pytest.fixture(scope="module")
 def case_file(tmp_path_factory):
-    return simulate("pole", tmp_path_factory.mktemp("pole") / "pole").path / "case.toml"
+    return simulate("pole").save(tmp_path_factory.mktemp("pole") / "pole").path / "case.toml"
 
 
 @pytest.fixture(scope="module")

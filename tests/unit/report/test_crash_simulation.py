@@ -15,9 +15,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 from crash_case_folder import read_spec, reconstruct, unit
 
 from strapdown import simulate, verify
+from strapdown.api import simulation as api_simulation
 from strapdown.constants import TWO_SIDED_95
 from strapdown.formats import read_raw
-from strapdown.report import crash_simulation
 from strapdown.simulation.crash_cases import CASES, record_case
 from strapdown.simulation.crash_motion import CRASHES
 from strapdown.simulation.mounted_motion import ExactAnswers
@@ -38,8 +38,8 @@ def simulated(tmp_path_factory):
     def make(name):
         if name not in made:
             with pytest.MonkeyPatch.context() as patch:
-                patch.setattr(crash_simulation, "record_case", keeping)
-                made[name] = (simulate(name, root / name).path, kept.pop())
+                patch.setattr(api_simulation, "record_case", keeping)
+                made[name] = (simulate(name).save(root / name).path, kept.pop())
         return made[name]
 
     return make
@@ -196,7 +196,7 @@ def test_a_wrong_mounting_is_found_and_told(answers):
     told = [str(f) for f in found.findings]
     assert any("IMU1, delta-V: it and IMU2 disagree" in t for t in told)
     (turned,) = [
-        t for t in told if t.startswith("IMU2, mounting angles: it is turned against IMU1")
+        t for t in told if t.startswith("IMU2, mounting angles: it is rotated relative to IMU1")
     ]
     angle = float(turned.split(" deg about")[0].split(", ")[-1])
     # Mountings of 1 deg each, and the finding's own 0.9 deg: four of 1.7 deg.
@@ -217,8 +217,7 @@ def test_what_a_range_cuts_off_is_told_and_missing(answers):
         # more by the bias of up to 12 m/s² over 55 ms.
         assert lost == pytest.approx(4.6, abs=0.055 * 12.0 + 0.5)
         assert any(
-            f.file is not None and of.name in str(f) and "at the end of the range" in str(f)
-            for f in found.findings
+            f.file is not None and of.name in str(f) and "clipped" in str(f) for f in found.findings
         )
 
 
@@ -228,13 +227,8 @@ def test_verify_finds_the_same_bytes(name, folder):
 
 
 def test_options_are_in_the_seal_and_come_back(tmp_path):
-    seal = simulate(
-        "pole",
-        tmp_path / "own",
-        rate=500,
-        sampling="mean",
-        seed=9,
-        units=["imu2"],
+    seal = simulate("pole", rate_hz=500, sampling="mean", seed=9, recorders=["imu2"]).save(
+        tmp_path / "own"
     )
     assert verify(seal.path).verdict == "identical"
     spec = read_spec(seal.path)
@@ -250,7 +244,7 @@ def test_options_are_in_the_seal_and_come_back(tmp_path):
 def test_records_in_iso_mme_are_the_same_records(tmp_path):
     from strapdown.formats.crash_records import read_crash_record
 
-    folder = simulate("pole", tmp_path / "mme", formats=["mme"], units=["imu1"]).path
+    folder = simulate("pole", recorders=["imu1"]).save(tmp_path / "mme", formats=["mme"]).path
     assert not list(folder.glob("imu*.csv"))
     (told,) = read_spec(folder).units
     (of,) = record_case(CASES["pole"], ["IMU1"]).units
@@ -268,6 +262,6 @@ def test_records_in_iso_mme_are_the_same_records(tmp_path):
 
 
 def test_the_case_reads_the_format_that_was_named_first(tmp_path):
-    folder = simulate("no-gyro", tmp_path / "both", formats=["csv", "mme"]).path
+    folder = simulate("no-gyro").save(tmp_path / "both", formats=["csv", "mme"]).path
     assert (folder / "imu1" / "imu1.mme").is_file()
     assert read_spec(folder).units[0].accelerometers[0].path == "imu1_low_g.csv"

@@ -157,7 +157,7 @@ def test_the_bytes_depend_on_nothing_around(tmp_path):
 )
 def test_a_picture_reaches_nothing_outside(inside, tmp_path):
     evil = Picture("evil", f"{HEAD}{inside}</svg>", "title", alt="alt")
-    with pytest.raises(DataError, match=r"cannot be laid out: failed to load linked image"):
+    with pytest.raises(DataError, match=r"cannot be typeset: failed to load linked image"):
         write_pdf(short(evil), tmp_path / "a.pdf")
     assert not (tmp_path / "a.pdf").exists()
 

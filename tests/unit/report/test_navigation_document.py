@@ -216,7 +216,7 @@ def test_a_truth_of_another_time_is_refused():
     made = record()
     truth = made.trajectory.set_index(made.trajectory.index + 1e4)
     truth.index.name = "time"
-    with pytest.raises(DataError, match="instant in common"):
+    with pytest.raises(DataError, match="do not overlap in time"):
         examine(told(made, truth=truth))
 
 

@@ -136,7 +136,7 @@ def test_a_file_of_ones_own_is_read_in_the_same_form(tmp_path):
     ("old", "new", "key", "message"),
     [
         ("full_scale_deg_per_s", "full_scale_deg", "gyro.full_scale_deg", "full_scale_deg_per_s"),
-        ("noise_density_deg_per_s_per_sqrt_hz", "noise", "gyro.noise", "no such key"),
+        ("noise_density_deg_per_s_per_sqrt_hz", "noise", "gyro.noise", "unknown key"),
         ("[gyro]", "[gyros]", "gyros", "did you mean 'gyro'"),
         ('class = "phone"', 'class = "phones"', "class", "did you mean 'phone'"),
         ('title = "Own part"', "", "title", "missing"),
@@ -157,7 +157,7 @@ def test_a_file_of_ones_own_is_read_in_the_same_form(tmp_path):
         ("output_rate_hz", "bias_instability_deg_per_h", "gyro.correlation_time_s", "missing"),
         ("output_rate_hz", "scale_bound_percent", "gyro: scale", "leaves no signal"),
         ("value = 500.0", "value = 0.0", "gyro: full_scale", "not positive"),
-        ("[gyro]", "[gyro", None, "no TOML"),
+        ("[gyro]", "[gyro", None, "not valid TOML"),
     ],
 )
 def test_a_bad_file_is_refused_by_file_and_key(tmp_path, old, new, key, message):
@@ -179,7 +179,7 @@ def test_a_file_without_a_triad_is_refused(tmp_path):
 def test_an_unknown_name_and_a_missing_file_are_told_apart(tmp_path):
     with pytest.raises(ConfigError, match=r"did you mean 'mpu-6050'[\s\S]*path of a \.toml"):
         load_sensor("mpu6050")
-    with pytest.raises(ConfigError, match="no such file"):
+    with pytest.raises(ConfigError, match="does not exist"):
         load_sensor(tmp_path / "none.toml")
 
 

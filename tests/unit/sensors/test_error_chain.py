@@ -231,7 +231,7 @@ def test_what_cannot_be_applied_is_refused():
         apply(KNOWN, t, u)
     with pytest.raises(DataError, match="shape"):
         apply(KNOWN, t, u, specific_force=force(3))
-    with pytest.raises(DataError, match="does not advance"):
+    with pytest.raises(DataError, match="does not increase"):
         apply(KNOWN, t[::-1], u, specific_force=force())
     with pytest.raises(DataError, match="two stamps"):
         compensate(KNOWN, t, u[:3], specific_force=force())

@@ -150,7 +150,7 @@ def test_what_is_no_number_is_refused_with_its_row():
     values[1][7, 1] = np.nan
     with pytest.raises(DataError, match="row 8, range 1 y"):
         merge_ranges(time, values, limits, [truth, truth])
-    with pytest.raises(DataError, match="does not advance"):
+    with pytest.raises(DataError, match="does not increase"):
         merge_ranges(time[::-1].copy(), [truth], limits[:1], [truth])
     with pytest.raises(ConfigError, match="leave no range"):
         merge_ranges(time, [truth], limits[:1], [truth], margin=0.6, hysteresis=0.5)

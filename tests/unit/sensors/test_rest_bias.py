@@ -72,7 +72,7 @@ def test_one_rest_says_nothing_of_drift_and_none_nothing_at_all():
     course = gyro_bias_from_rests([rest(0, [1, 2, 3])])
     assert course.drift is None
     assert course.average == (1, 2, 3)
-    with pytest.raises(DataError, match="no stationary stretch"):
+    with pytest.raises(DataError, match="no stationary interval"):
         gyro_bias_from_rests([])
     with pytest.raises(DataError, match="order of time"):
         gyro_bias_from_rests([rest(5, [0] * 3), rest(0, [0] * 3)])

@@ -108,5 +108,5 @@ def test_the_stated_priors_are_those_of_the_rate():
     assert priors["accel"].bias == (0.2,) * 3
     assert priors["accel"].scale == (0.02,) * 3
     assert priors["gyro"].bias[0] == pytest.approx(np.radians(0.3))
-    with pytest.raises(ConfigError, match="no rate"):
+    with pytest.raises(ConfigError, match="is not positive"):
         crash_priors(0.0)

@@ -53,8 +53,13 @@ def test_a_drift_is_stated_in_the_words_of_a_data_sheet():
         ({}, ACCEL, "gyro, bias_sd", "perfect sensor"),
         ({"bias_sd_deg_per_h": 0.01}, ACCEL, "gyro, noise_density", "perfect sensor"),
         (GYRO, {"bias_sd_ug": 50.0}, "accel, noise_density", "perfect sensor"),
-        ({**GYRO, "bias_deg": 1.0}, ACCEL, "gyro, bias_deg", "no such key"),
-        ({**GYRO, "correlation_time_s": [1, 2, 3]}, ACCEL, "gyro, correlation_time_s", "one time"),
+        ({**GYRO, "bias_deg": 1.0}, ACCEL, "gyro, bias_deg", "unknown key"),
+        (
+            {**GYRO, "correlation_time_s": [1, 2, 3]},
+            ACCEL,
+            "gyro, correlation_time_s",
+            "a correlation time applies",
+        ),
     ],
 )
 def test_what_is_missing_or_unknown(gyro, accel, quantity, what):

@@ -41,14 +41,14 @@ def test_what_is_not_stated_is_the_sensors() -> None:
     [
         (
             {"bias_sd_mgs": 20.0},
-            "uncertainty, bias_sd_mgs: there is no such key\n  Remedy: did you mean 'bias_sd_mg'?",
+            "uncertainty, bias_sd_mgs: unknown key\n  Remedy: did you mean 'bias_sd_mg'?",
         ),
         (
             {"bias_sd_mg": 20.0, "bias_bound_mg": 40.0},
             "uncertainty, bias_bound_mg: it states the same as bias_sd_mg",
         ),
         ({"bias_sd_mg": -1.0}, "bias: "),
-        ({"correlation_time_s": 1.0}, "there is no such key"),
+        ({"correlation_time_s": 1.0}, "unknown key"),
     ],
 )
 def test_refused(stated: dict[str, float], message: str) -> None:

@@ -31,7 +31,7 @@ def test_recorders_are_named_in_any_case_and_any_order():
     ("case", "units", "what", "remedy"),
     [
         ("pole", ["IMU3"], "'pole' has no recorder 'IMU3'", "IMU2"),
-        ("pole", ["LAB1"], "LAB1 has no gyro and borrows that of IMU1", "name IMU1, too"),
+        ("pole", ["LAB1"], "LAB1 has no gyro and uses that of IMU1", "give IMU1 too"),
         ("no-gyro", ["IMU2"], "'no-gyro' has no recorder 'IMU2'", "IMU1"),
     ],
 )

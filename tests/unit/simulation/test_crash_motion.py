@@ -198,7 +198,7 @@ def test_a_pulse_may_end_with_the_motion():
 def test_what_is_no_pulse_is_refused(pulse):
     with pytest.raises(ConfigError, match="pulse") as refused:
         HaversinePulse(*pulse)
-    assert "last longer than zero" in str(refused.value)
+    assert "a length above zero" in str(refused.value)
 
 
 def test_a_pulse_outside_the_motion_is_refused():
@@ -216,5 +216,5 @@ def test_a_change_is_three_numbers(change):
 
 def test_a_motion_that_does_not_know_its_angular_acceleration_says_so():
     motion = SineVelocityMotion(10.0, Origin(45.0, 20.0), (5.0, 1.0, 0.0), (1.0, 0.0, 0.0), 5.0)
-    with pytest.raises(ConfigError, match="SineVelocityMotion does not know"):
+    with pytest.raises(ConfigError, match="SineVelocityMotion has no"):
         motion.angular_acceleration([1.0])

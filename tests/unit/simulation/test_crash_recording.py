@@ -247,10 +247,10 @@ def test_the_same_seed_writes_the_same_and_a_part_does_not_move_another():
     ("more", "message"),
     [
         ({"start": 2.5, "end": 2.0}, "recorder 'one': a record from 2.5 s to 2 s"),
-        ({"end": 4.0}, "not within a motion of 3 s"),
+        ({"end": 4.0}, "outside the motion of 3 s"),
         ({"impact": 5.0}, "an impact at 5 s"),
         ({"start": 1.0, "end": 1.004}, "fewer than two samples"),
-        ({"sampling": "some"}, "no kind of sampling"),
+        ({"sampling": "some"}, "unknown kind of sampling '"),
     ],
 )
 def test_what_cannot_be_recorded_is_refused(more, message):
@@ -261,8 +261,8 @@ def test_what_cannot_be_recorded_is_refused(more, message):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: RecorderDesign("one", ()), "recorder 'one' has none"),
-        (lambda: TriadDesign("part", PERFECT, 0.0), "part: 0 Hz is no rate"),
+        (lambda: RecorderDesign("one", ()), "' has no ranges"),
+        (lambda: TriadDesign("part", PERFECT, 0.0), "part: a rate of 0 Hz is not positive"),
         (lambda: design(trigger_sd=-1.0), "trigger_sd"),
         (lambda: design(clock_drift_ppm=5000.0), "clock_drift_ppm"),
         (lambda: design(clock_offset=np.inf), "clock_offset"),

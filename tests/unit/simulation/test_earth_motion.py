@@ -169,7 +169,7 @@ def test_angles_over_their_range_are_those_of_the_attitude():
 
 
 def test_a_stop_has_no_heading():
-    with pytest.raises(ConfigError, match="falls to 0 m/s, where a path has no heading"):
+    with pytest.raises(ConfigError, match="falls to 0 m/s, where the heading"):
         sine(mean_velocity=(0.0, 0.0, 0.0), amplitude=(1.0, 0.0, 0.0))
 
 
@@ -180,7 +180,7 @@ def test_a_period_is_checked():
 
 def test_a_pole_is_refused():
     motion = sine(duration=3600.0, origin=Origin(88.9, 0.0), mean_velocity=(9.0, 1.0, 0.0))
-    with pytest.raises(ConfigError, match=r"comes to a latitude of 89\.\d+ deg"):
+    with pytest.raises(ConfigError, match=r"reaches a latitude of 89\.\d+ deg"):
         motion.trajectory([0.0])
 
 

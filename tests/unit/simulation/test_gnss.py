@@ -112,7 +112,7 @@ def test_a_seed_is_a_receiver():
     [
         ({"rate": 0.0}, "rate"),
         ({"position_noise": -1.0}, "position_noise"),
-        ({"antenna": (1.0, 2.0)}, "right shape"),
+        ({"antenna": (1.0, 2.0)}, "wrong shape"),
         ({"on_excess": "explode"}, "lost, garbage, unaffected"),
         ({"correlation_time": np.nan}, "correlation_time"),
     ],

@@ -272,23 +272,23 @@ def test_means_are_integrals_of_what_is_felt():
     [
         (0.0, [Turn(90.0, 10.0)], "manoeuvre 1, turn, speed: a turn needs a speed"),
         (20.0, [Straight(1.0), Turn(90.0, 10.0)], "manoeuvre 2, turn, radius: 20 m/s on a radius"),
-        (20.0, [Turn(90.0, 0.0)], "radius: it is 0"),
-        (20.0, [Turn(0.0, 90.0)], "angle: a turn by 0 deg"),
-        (0.0, [Accelerate(50.0, 2.0)], "takes up to 46.9 m/s²"),
+        (20.0, [Turn(90.0, 0.0)], "radius: 0 is not above zero"),
+        (20.0, [Turn(0.0, 90.0)], "angle: a turn of 0 deg"),
+        (0.0, [Accelerate(50.0, 2.0)], "needs up to 46.9 m/s²"),
         (0.0, [Accelerate(-5.0, 2.0)], "a speed of -5 m/s"),
-        (5.0, [Brake(7.0, 2.0)], "to brake from 5 to 7 m/s"),
-        (0.0, [Stop(2.0, 1.0)], "to brake from 0 to 0 m/s"),
-        (5.0, [Straight(0.0)], "duration: it is 0"),
+        (5.0, [Brake(7.0, 2.0)], "braking from 5 to 7 m/s"),
+        (0.0, [Stop(2.0, 1.0)], "braking from 0 to 0 m/s"),
+        (5.0, [Straight(0.0)], "duration: 0 is not above zero"),
         (0.0, [Along(5.0)], "a distance needs a speed"),
-        (20.0, [LaneChange(20.0, 2.0)], "allowed to the side"),
-        (20.0, [LaneChange(3.0, -1.0)], "duration: it is -1"),
-        (20.0, [Climb(30.0)], "a climb at 30 deg"),
+        (20.0, [LaneChange(20.0, 2.0)], "lateral acceleration allowed"),
+        (20.0, [LaneChange(3.0, -1.0)], "duration: -1 is not above zero"),
+        (20.0, [Climb(30.0)], "a climb of 30 deg"),
         (20.0, [Climb(5.0, 1.0)], "the two ramps of 3 s alone gain"),
-        (20.0, [Climb(5.0), Climb(5.0, 100.0)], "begins level"),
+        (20.0, [Climb(5.0), Climb(5.0, 100.0)], "must begin level"),
         (20.0, [BankedTurn(90.0, -3.0)], "a bank of -3 deg"),
-        (20.0, [Level(0.0)], "ramp: it is 0"),
-        (-1.0, [Straight(1.0)], "cannot begin with -1 m/s"),
-        (1.0, [], "manoeuvres: there is none"),
+        (20.0, [Level(0.0)], "ramp: 0 is not above zero"),
+        (-1.0, [Straight(1.0)], "initial speed of -1 m/s"),
+        (1.0, [], "manoeuvres: none is given"),
     ],
 )
 def test_what_a_vehicle_cannot_do_is_said(speed, manoeuvres, words):
@@ -302,9 +302,13 @@ def test_waves_and_pitches_are_checked():
         Wave(1.0, 0.0)
     with pytest.raises(ConfigError, match="not finite"):
         Wave(math.inf, 1.0)
-    with pytest.raises(ConfigError, match="pitch goes up to 85 deg"):
+    with pytest.raises(ConfigError, match="pitch reaches 85 deg"):
         rocking_stand(1.0, PLACE, pitch_deg=-80.0, pitch_waves=(Wave(5.0, 3.0),))
-    with pytest.raises(ConfigError, match="a wave of 1e-05 s comes 1e\\+07 times"):
+    with pytest.raises(
+        ConfigError, check=lambda refused: refused.finding.code == "simulation.wave-comes-times"
+    ):
         rocking_stand(100.0, PLACE, roll_waves=(Wave(1.0, 1e-5),))
-    with pytest.raises(ConfigError, match="cannot last 0 s"):
+    with pytest.raises(
+        ConfigError, check=lambda refused: refused.finding.code == "simulation.motion-cannot-last"
+    ):
         rocking_stand(0.0, PLACE)

@@ -93,7 +93,7 @@ def test_a_log_without_noise_was_not_recorded(stand, tmp_path):
     held[:] = np.tile(stand.mean().to_numpy(), (len(stand), 1))
     found = result_of(write(tmp_path / "held.csv", held))
     assert trust(found).verdict != "trusted"
-    assert any("no channel ever changes" in f.what for f in found.findings)
+    assert any("no channel changes" in f.what for f in found.findings)
 
 
 def test_a_rocking_body_is_what_the_inertial_frame_is_for(tmp_path):

@@ -78,7 +78,7 @@ def test_any_mounting_is_taken_off_to_rounding(tmp_path):
     # Products of matrices of size 1: some roundings of the largest component.
     assert source.imu[GYRO].to_numpy() == pytest.approx(imu[GYRO].to_numpy(), abs=1e-18)
     assert source.imu[ACCEL].to_numpy() == pytest.approx(imu[ACCEL].to_numpy(), abs=1e-14)
-    assert sum("turned further" in f.what for f in source.findings) == 2
+    assert sum("rotated by the mounting" in f.what for f in source.findings) == 2
 
 
 def test_a_part_of_a_log_is_used(tmp_path):
@@ -89,7 +89,7 @@ def test_a_part_of_a_log_is_used(tmp_path):
     read = read_alignment_source(spec_of(path, log=log, axes=axes)).imu
     assert (read.index[0], read.index[-1], len(read)) == (10.0, 40.0, 601)
     log |= {"from_s": 100.0, "to_s": 140.0}
-    with pytest.raises(ConfigError, match="between 100 and 140 s; the log runs from 0 to 60 s"):
+    with pytest.raises(ConfigError, match="between 100 and 140 s; the log covers 0 to 60 s"):
         read_alignment_source(spec_of(path, log=log, axes=axes))
 
 

@@ -34,7 +34,7 @@ def moved(seal, inputs, to):
 def logs(tmp_path):
     """Two logs of one name, and another sensor's log of the first motion."""
     for name, rate, seed in (("a", 50, 1), ("b", 50, 2), ("c", 100, 3)):
-        simulate("alexiev-fig2e", tmp_path / name, rate=rate, seed=seed, formats=["csv"])
+        simulate("alexiev-fig2e", rate_hz=rate, seed=seed).save(tmp_path / name, formats=["csv"])
     return [tmp_path / name / "log.csv" for name in "abc"]
 
 
@@ -55,8 +55,8 @@ def test_a_sensor_of_ones_own(tmp_path):
     own.write_text(SENSOR)
     bench = compare_attitude("alexiev-fig2c", sensor=own, **ASKED)
     seal = write_attitude(bench, tmp_path / "bundle")
-    simulated = simulate(
-        "alexiev-fig2c", tmp_path / "s", rate=50, sensor=str(tmp_path / "own.toml")
+    simulated = simulate("alexiev-fig2c", rate_hz=50, sensor=str(tmp_path / "own.toml")).save(
+        tmp_path / "s"
     )
     for one in (seal, simulated):
         place = moved(one, [own], tmp_path / f"elsewhere-{one.path.name}")
@@ -79,8 +79,8 @@ def test_several_logs_of_one_name_and_a_bias_of_another(logs, tmp_path):
 
 
 def test_a_second_log_rests_and_an_interpolation(logs, tmp_path):
-    simulate("gestures", tmp_path / "first", rate=50, formats=["csv"])
-    simulate("gestures", tmp_path / "second", rate=100, formats=["csv"])
+    simulate("gestures", rate_hz=50).save(tmp_path / "first", formats=["csv"])
+    simulate("gestures", rate_hz=100).save(tmp_path / "second", formats=["csv"])
     first, second = tmp_path / "first" / "log.csv", tmp_path / "second" / "log.csv"
     bench = compare_attitude(
         first,

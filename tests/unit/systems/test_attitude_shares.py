@@ -103,7 +103,7 @@ def test_a_start_that_was_given_is_not_the_algorithms_error():
 def log(tmp_path_factory):
     """A noisy log with its truth in a file beside it."""
     folder = tmp_path_factory.mktemp("log") / "s"
-    simulate("alexiev-fig2e", folder, rate=50, seed=3, formats=["csv"])
+    simulate("alexiev-fig2e", rate_hz=50, seed=3).save(folder, formats=["csv"])
     plain = folder / "plain.csv"
     table = pd.read_csv(folder / "log.csv", comment="#")
     table[[c for c in table if not c.startswith(("q_", "roll", "pitch", "heading"))]].to_csv(

@@ -170,8 +170,8 @@ def test_rates_are_taken_as_what_one_sample_in_so_many_gives():
     assert choose_factors(imu, (50.0, 100.0, 10.0), findings) == (1, 2, 10)
     assert findings == []
     assert choose_factors(imu, (30.0, 200.0), findings) == (1, 3)
-    assert "30 Hz was asked for; 33.33 Hz is what one sample in 3 gives" in findings[0].what
-    assert "200 Hz was asked for; 100 Hz is the log's own rate" in findings[1].what
+    assert "30 Hz was requested; 33.33 Hz is what one sample in 3 gives" in findings[0].what
+    assert "200 Hz was requested; 100 Hz is the log's own rate" in findings[1].what
     # The remedy of the error is a rate that is not refused.
     with pytest.raises(ConfigError, match="at least") as refused:
         choose_factors(imu, (0.1,), findings)

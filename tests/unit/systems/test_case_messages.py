@@ -29,7 +29,7 @@ PYTHON = re.compile(
         (Finding("crash.no-event-perhaps-in-g"), 'unit = "g"'),
         (Finding("sensors.low-pass-at-ends"), 'sampling = "mean"'),
         (Finding("sensors.rates-beyond-vehicle"), 'unit = "deg/s"'),
-        (Finding("sensors.roll-assumed"), "gyro_from of the unit names whose"),
+        (Finding("sensors.roll-assumed"), "another unit: gyro_from"),
         (Finding("dsp.samples-not-evenly-spaced-usual"), "rate_hz"),
     ],
 )

@@ -32,7 +32,7 @@ def said(seconds, **tables):
 @pytest.mark.parametrize("aiding", [{}, BAROMETER])
 def test_quaternions_have_no_height_whatever_aids(aiding):
     (what,) = said(60.0, mechanization=FREE, filter=QUATERNIONS, aiding=aiding)
-    assert what.startswith("the error model 'quaternions' has no state of the height: no aid")
+    assert what.startswith("the error model 'quaternions' has no height state: the height")
     assert said(60.0, mechanization=HELD, filter=QUATERNIONS) == []
 
 

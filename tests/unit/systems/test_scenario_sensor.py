@@ -37,7 +37,7 @@ def test_every_sensor_samples_every_axis(name, sampling):
 
 
 def test_a_simulation_with_a_sensor_is_sealed_with_its_errors_and_runs_again(tmp_path):
-    seal = simulate("alexiev-fig2c", tmp_path / "s", rate=50, seed=2, sensor="stim300")
+    seal = simulate("alexiev-fig2c", rate_hz=50, seed=2, sensor="stim300").save(tmp_path / "s")
     told = json.loads((seal.path / "scenario.json").read_text(encoding="utf-8"))
     unit = load_sensor("stim300").draw(2)
     assert told["sensor"] == "stim300"
@@ -49,5 +49,5 @@ def test_a_simulation_with_a_sensor_is_sealed_with_its_errors_and_runs_again(tmp
 
 def test_an_unknown_sensor_is_named_with_the_nearest(tmp_path):
     with pytest.raises(ConfigError, match="did you mean 'stim300'"):
-        simulate("alexiev-fig2c", tmp_path / "s", sensor="stim30")
+        simulate("alexiev-fig2c", sensor="stim30").save(tmp_path / "s")
     assert not (tmp_path / "s").exists()

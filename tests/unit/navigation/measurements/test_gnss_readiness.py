@@ -95,7 +95,7 @@ def test_the_stated_deviation_of_a_delay_is_that_of_its_errors():
 def test_places_that_are_later_than_velocities_have_a_remedy_too():
     (told,) = find_velocity_delay(late(-0.2))
     assert "earlier" in told.what
-    assert "two aids" in told.remedy
+    assert "two measurements" in told.remedy
 
 
 @pytest.mark.parametrize("offset", [0.15, -0.4, 4.0, 18.0])
@@ -170,7 +170,7 @@ def test_gaps_jumps_and_repeats_are_told_with_their_rows():
     assert jump.row in (101, 102)
     assert "jumps in rows 101, 102" in jump.what
     (frozen,) = gnss_readiness(remade(inject_gnss_faults(table, [Frozen(60.0, 61.6)])))
-    assert "repeats itself in rows" in frozen.what
+    assert "repeats its fixes in rows" in frozen.what
     wild = inject_gnss_faults(table, [Outliers(share=0.1, size=50.0)])
     assert any("jumps" in one.what for one in gnss_readiness(remade(wild)))
 
@@ -210,7 +210,7 @@ def test_places_that_move_faster_than_anything_are_refused():
     place = table[GEODETIC].to_numpy().copy()
     place[:, 1] *= 100.0 * (np.arange(len(place)) % 2)
     place[:, 1] %= 180.0
-    with pytest.raises(DataError, match="m/s from fix to fix"):
+    with pytest.raises(DataError, match="m/s between fixes"):
         gnss_readiness(remade(table, place=place, velocity_sd=(np.inf,) * 3))
 
 
