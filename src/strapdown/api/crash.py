@@ -13,7 +13,6 @@ import pandas as pd
 
 from strapdown.bundle.seal import Seal
 from strapdown.config.crash_case import CaseSpec
-from strapdown.config.crash_case_file import read_case_spec
 from strapdown.crash.unit_reconstruction import UnitReconstruction
 from strapdown.errors import ConfigError
 from strapdown.report.crash_case import write_crash
@@ -161,6 +160,6 @@ def reconstruct(
         A path left the range possible for a vehicle.
     """
     file = None if isinstance(case, CaseSpec) else Path(case)
-    spec = case if isinstance(case, CaseSpec) else read_case_spec(Path(case))
+    spec = case if isinstance(case, CaseSpec) else CaseSpec.read(Path(case))
     result = run_case(spec, file, progress)
     return CrashRun(**{f.name: getattr(result, f.name) for f in fields(result)})

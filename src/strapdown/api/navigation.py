@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
-from pydantic import ValidationError
 
 from strapdown.api.reading import (
     NOWHERE,
@@ -25,8 +24,7 @@ from strapdown.api.reading import (
 from strapdown.bundle.seal import Seal, check_destination
 from strapdown.config.alignment import LogTable
 from strapdown.config.navigation import NavigationSpec
-from strapdown.config.navigation_file import navigation_spec, read_navigation_spec
-from strapdown.config.spec import misfit, specify
+from strapdown.config.spec import specify
 from strapdown.errors import ConfigError
 from strapdown.formats.clocks import on_clock_of
 from strapdown.report.navigation import write_navigation
@@ -316,7 +314,7 @@ def _moved(run: NavigationRun, old: Path, new: Path) -> NavigationRun:
         return run
     return replace(
         run,
-        spec=navigation_spec(moved_paths(run.spec.plain(), old, new)),
+        spec=NavigationSpec.checked(moved_paths(run.spec.plain(), old, new)),
         inputs=moved_inputs(run.inputs, old, new, copied=True),
     )
 
@@ -381,7 +379,7 @@ def navigate(
                 file=Path(imu).name,
                 quantity="measurements, sensor, start, reference, options",
             )
-        spec = read_navigation_spec(imu)
+        spec = NavigationSpec.read(imu)
         return run_specified(smoothed_too(spec) if smooth else spec, Path(imu), progress)
     memory = _memory(imu, measurements, reference)
     with memory.as_files() if memory.tables else nullcontext(NOWHERE) as folder:
@@ -394,10 +392,7 @@ def navigate(
             extra["truth"] = {"path": _path_in(reference, "reference", memory, folder)}
         if smooth:
             extra["smoother"] = {"kind": "rts"}
-        try:
-            spec = specify_navigation(log, aids, sensor=sensor, start=start, options=extra)
-        except ValidationError as error:
-            raise refused_value(error) from None
+        spec = specify_navigation(log, aids, sensor=sensor, start=start, options=extra)
         run = run_specified(spec, None, progress)
         return _moved(replace(run, memory=memory), folder, NOWHERE)
 
@@ -436,7 +431,7 @@ def smoothed_too(spec: NavigationSpec) -> NavigationSpec:
     """
     if spec.smoother.kind != "none":
         return spec
-    return navigation_spec({**spec.plain(), "smoother": {"kind": "rts"}})
+    return NavigationSpec.checked({**spec.plain(), "smoother": {"kind": "rts"}})
 
 
 def specify_navigation(
@@ -521,7 +516,7 @@ def specify_navigation(
         whole["aiding"] = {
             name: {**(proposed if name == receiver else {}), **aid} for name, aid in aids.items()
         }
-    return navigation_spec({**whole, **(options or {})})
+    return NavigationSpec.checked({**whole, **(options or {})})
 
 
 def _site(
@@ -599,11 +594,3 @@ def _aid_in(one: Measurement, memory: Memory, folder: Path) -> dict[str, Any]:
 
 def _path_in(data: Any, name: str, memory: Memory, folder: Path) -> str:
     return str(folder / f"{name}.csv") if f"{name}.csv" in memory.tables else str(data)
-
-
-def refused_value(error: ValidationError) -> ConfigError:
-    """Convert a pydantic error in the arguments of a run."""
-    first = error.errors()[0]
-    context = first.get("ctx", {})
-    place = [str(p) for p in first["loc"]] + ([context["key"]] if context.get("key") else [])
-    return ConfigError(misfit(first), quantity=", ".join(place))

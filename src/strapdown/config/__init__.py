@@ -7,10 +7,8 @@ from typing import Annotated, Literal
 from pydantic import Field, FiniteFloat
 
 from strapdown.config.crash_case import CaseSpec
-from strapdown.config.crash_case_file import read_case_spec
-from strapdown.config.crash_simulation import CrashSimulationSpec
+from strapdown.config.motions import TrajectorySpec
 from strapdown.config.spec import Spec, specify
-from strapdown.config.trajectory import TrajectorySpec, read_trajectory_spec
 
 __all__ = [
     "AttitudeSpec",
@@ -20,8 +18,6 @@ __all__ = [
     "ScenarioSpec",
     "SimulateSpec",
     "TrajectorySpec",
-    "read_case_spec",
-    "read_trajectory_spec",
     "specify",
 ]
 
@@ -77,4 +73,15 @@ class SimulateSpec(Spec):
     """One run of the simulator."""
 
     scenario: ScenarioSpec
+    formats: tuple[str, ...] = ("csv",)
+
+
+class CrashSimulationSpec(Spec):
+    """One crash and its recorders; without a rate each recorder uses its own."""
+
+    name: str
+    units: tuple[str, ...] = ()
+    rate_hz: FiniteFloat | None = Field(default=None, gt=0.0)
+    sampling: Literal["instantaneous", "mean"] = "instantaneous"
+    seed: int = Field(default=0, ge=0)
     formats: tuple[str, ...] = ("csv",)

@@ -1,45 +1,43 @@
-"""Configuration of motions on the Earth: every key with its unit."""
+"""Configuration of motions on the Earth and of simulated trajectories: every key with its unit."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
-from pydantic import Field, FiniteFloat, model_validator
+from pydantic import Field, StrictInt, model_validator
 
-from strapdown.config.spec import TableSpec, refuse
+from strapdown.config.reading import FileSpec
+from strapdown.config.spec import (
+    NotNegative,
+    Number,
+    Position,
+    Positive,
+    Several,
+    Spec,
+    Triple,
+    refuse,
+)
 
-__all__ = ["KINDS", "MANOEUVRES", "MotionSpec"]
-
-Positive = Annotated[FiniteFloat, Field(gt=0.0)]
-NotNegative = Annotated[FiniteFloat, Field(ge=0.0)]
-Triple = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
-
-
-class PlaceSpec(TableSpec):
-    """Initial position of a motion; the range of the angles is checked on use."""
-
-    lat_deg: FiniteFloat
-    lon_deg: FiniteFloat
-    alt_m: FiniteFloat = 0.0
+__all__ = ["KINDS", "MotionSpec", "TrajectorySpec"]
 
 
-class AngleWaveSpec(TableSpec):
+class AngleWaveSpec(Spec):
     """One sine component of an angle."""
 
-    amplitude_deg: FiniteFloat
+    amplitude_deg: Number
     period_s: Positive
-    phase_deg: FiniteFloat = 0.0
+    phase_deg: Number = 0.0
 
 
-class HeaveWaveSpec(TableSpec):
+class HeaveWaveSpec(Spec):
     """One sine component of the height, positive downward."""
 
-    amplitude_m: FiniteFloat
+    amplitude_m: Number
     period_s: Positive
-    phase_deg: FiniteFloat = 0.0
+    phase_deg: Number = 0.0
 
 
-class WavesSpec(TableSpec):
+class WavesSpec(Spec):
     """Sine components of the three angles."""
 
     roll_waves: tuple[AngleWaveSpec, ...] = ()
@@ -47,27 +45,27 @@ class WavesSpec(TableSpec):
     heading_waves: tuple[AngleWaveSpec, ...] = ()
 
 
-class StationarySpec(PlaceSpec):
+class StationarySpec(Position):
     """Stationary."""
 
     kind: Literal["stationary"]
     duration_s: Positive
-    roll_deg: FiniteFloat = 0.0
-    pitch_deg: FiniteFloat = 0.0
-    heading_deg: FiniteFloat = 0.0
+    roll_deg: Number = 0.0
+    pitch_deg: Number = 0.0
+    heading_deg: Number = 0.0
 
 
-class RockingStandSpec(PlaceSpec, WavesSpec):
+class RockingStandSpec(Position, WavesSpec):
     """Rocking about a fixed position."""
 
     kind: Literal["rocking_stand"]
     duration_s: Positive
-    roll_deg: FiniteFloat = 0.0
-    pitch_deg: FiniteFloat = 0.0
-    heading_deg: FiniteFloat = 0.0
+    roll_deg: Number = 0.0
+    pitch_deg: Number = 0.0
+    heading_deg: Number = 0.0
 
 
-class SineVelocitySpec(PlaceSpec):
+class SineVelocitySpec(Position):
     """Mean velocity plus a sine in each of north, east, down."""
 
     kind: Literal["sine_velocity"]
@@ -78,7 +76,7 @@ class SineVelocitySpec(PlaceSpec):
     phase_deg: Triple = (0.0, 90.0, 0.0)
 
 
-class WalkingSpec(PlaceSpec):
+class WalkingSpec(Position):
     """A foot-mounted unit, walking around blocks."""
 
     kind: Literal["walking"]
@@ -86,18 +84,18 @@ class WalkingSpec(PlaceSpec):
     strides: int = Field(ge=1, le=100_000, strict=True)
     #: Number of strides between turns; zero for none.
     corner_each: int = Field(default=10, ge=0, strict=True)
-    corner_deg: FiniteFloat = 90.0
+    corner_deg: Number = 90.0
     #: Strides that climb two stairs each, counted from zero.
     stairs: tuple[Annotated[int, Field(ge=0, strict=True)], ...] = ()
-    stair_m: FiniteFloat = 0.17
-    heading_deg: FiniteFloat = 0.0
+    stair_m: Number = 0.17
+    heading_deg: Number = 0.0
     #: At the beginning and at the end.
     stand_s: Positive = 5.0
-    roll_deg: FiniteFloat = 0.0
-    pitch_deg: FiniteFloat = 0.0
+    roll_deg: Number = 0.0
+    pitch_deg: Number = 0.0
 
 
-class SpeedSpec(TableSpec):
+class SpeedSpec(Spec):
     """Change to another speed."""
 
     do: Literal["accelerate", "brake"]
@@ -105,7 +103,7 @@ class SpeedSpec(TableSpec):
     duration_s: Positive
 
 
-class StopSpec(TableSpec):
+class StopSpec(Spec):
     """Brake to a stop, and remain stationary."""
 
     do: Literal["stop"]
@@ -113,7 +111,7 @@ class StopSpec(TableSpec):
     stay_s: NotNegative = 0.0
 
 
-class StraightSpec(TableSpec):
+class StraightSpec(Spec):
     """Continue straight, for a time or a distance."""
 
     do: Literal["straight"]
@@ -127,7 +125,7 @@ class StraightSpec(TableSpec):
         return self
 
 
-class TurnSpec(TableSpec):
+class TurnSpec(Spec):
     """Turn with a radius."""
 
     do: Literal["turn_left", "turn_right"]
@@ -136,7 +134,7 @@ class TurnSpec(TableSpec):
     ramp_s: Positive | None = None
 
 
-class BankedTurnSpec(TableSpec):
+class BankedTurnSpec(Spec):
     """Turn with a bank angle."""
 
     do: Literal["turn_left", "turn_right"]
@@ -145,15 +143,15 @@ class BankedTurnSpec(TableSpec):
     ramp_s: Positive | None = None
 
 
-class LaneChangeSpec(TableSpec):
+class LaneChangeSpec(Spec):
     """Change to the neighboring lane."""
 
     do: Literal["lane_change"]
-    offset_m: FiniteFloat
+    offset_m: Number
     duration_s: Positive
 
 
-class ClimbSpec(TableSpec):
+class ClimbSpec(Spec):
     """Climb or descend, to or by a height."""
 
     do: Literal["climb", "descend"]
@@ -162,7 +160,7 @@ class ClimbSpec(TableSpec):
     ramp_s: Positive | None = None
 
 
-class LevelSpec(TableSpec):
+class LevelSpec(Spec):
     """Level off after a climb."""
 
     do: Literal["level"]
@@ -182,10 +180,10 @@ Step = (
 )
 
 
-class VehicleSpec(PlaceSpec):
+class VehicleSpec(Position):
     """Common part of all vehicles."""
 
-    heading_deg: FiniteFloat = 0.0
+    heading_deg: Number = 0.0
     speed_m_per_s: NotNegative = 0.0
     most_acceleration_m_per_s2: Positive | None = None
     most_lateral_m_per_s2: Positive | None = None
@@ -195,8 +193,8 @@ class CarSpec(VehicleSpec):
     """A car."""
 
     kind: Literal["car"]
-    roll_deg_per_m_per_s2: FiniteFloat = 0.0
-    pitch_deg_per_m_per_s2: FiniteFloat = 0.0
+    roll_deg_per_m_per_s2: Number = 0.0
+    pitch_deg_per_m_per_s2: Number = 0.0
     manoeuvres: tuple[
         Annotated[
             SpeedSpec | StopSpec | StraightSpec | TurnSpec | LaneChangeSpec,
@@ -210,7 +208,7 @@ class AircraftSpec(VehicleSpec):
     """An aircraft."""
 
     kind: Literal["aircraft"]
-    angle_of_attack_deg: FiniteFloat = 0.0
+    angle_of_attack_deg: Number = 0.0
     most_bank_deg: Positive | None = None
     manoeuvres: tuple[
         Annotated[
@@ -235,14 +233,14 @@ class ShipSpec(VehicleSpec, WavesSpec):
     ]
 
 
-class WaypointSpec(PlaceSpec):
+class WaypointSpec(Position):
     """Waypoint, with its time or the speed of the leg that leads to it."""
 
     time_s: NotNegative | None = None
     speed_m_per_s: Positive | None = None
 
 
-class WaypointsSpec(TableSpec):
+class WaypointsSpec(Spec):
     """A path through waypoints."""
 
     kind: Literal["waypoints"]
@@ -278,26 +276,23 @@ MotionSpec = Annotated[
 ]
 
 #: Values of `kind` of a motion.
-KINDS = (
-    "stationary",
-    "rocking_stand",
-    "sine_velocity",
-    "walking",
-    "car",
-    "aircraft",
-    "ship",
-    "waypoints",
+KINDS = tuple(
+    get_args(form.model_fields["kind"].annotation)[0] for form in get_args(get_args(MotionSpec)[0])
 )
-#: Values of `do` of a maneuver, for one vehicle or another.
-MANOEUVRES = (
-    "accelerate",
-    "brake",
-    "stop",
-    "straight",
-    "turn_left",
-    "turn_right",
-    "lane_change",
-    "climb",
-    "descend",
-    "level",
-)
+
+
+class TrajectorySpec(FileSpec):
+    """One run of the simulator over a motion on the Earth."""
+
+    called = "trajectory"
+
+    name: str = "trajectory"
+    title: str = ""
+    ellipsoid: str = "wgs84"
+    rate_hz: Positive = 100.0
+    sampling: str = "instantaneous"
+    seed: StrictInt = Field(default=0, ge=0)
+    sensor: str | None = None
+    formats: Annotated[tuple[str, ...], Several] = Field(default=("csv",), min_length=1)
+    trajectory_formats: Annotated[tuple[str, ...], Several] = ()
+    motion: MotionSpec

@@ -12,7 +12,7 @@ from strapdown.config import (
     CrashSimulationSpec,
     ScenarioSpec,
     SimulateSpec,
-    read_trajectory_spec,
+    TrajectorySpec,
     specify,
 )
 from strapdown.errors import ConfigError
@@ -99,7 +99,7 @@ def simulate(
     if units:
         raise ConfigError("report.no-crash-no-recorders", quantity="--units", name=name)
     if name.lower().endswith(".toml"):
-        trajectory = read_trajectory_spec(
+        trajectory = TrajectorySpec.read(
             Path(name),
             rate_hz=rate,
             sampling=sampling and sampling.lower(),

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 import strapdown as sd
-from strapdown.config.crash_case_file import read_case_spec
+from strapdown.config.crash_case import CaseSpec
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats.log_writers import LOG_WRITERS
 from strapdown.sensors.catalogue import load_sensor
@@ -83,7 +83,7 @@ def test_a_case_is_reconstructed_as_by_the_engine(tmp_path, run_cli):
     assert run_cli("simulate", "pole", "-q", "--out", tmp_path / "pole").code == 0
     path = tmp_path / "pole" / "case.toml"
     case = sd.reconstruct(path)
-    engine = run_case(read_case_spec(path), path)
+    engine = run_case(CaseSpec.read(path), path)
     change = case.vehicles["1"].delta_v
     assert change.resultant == engine.reconstruction.main.body[0].event.resultant > 1.0
     assert change.resultant_bound > 0.0

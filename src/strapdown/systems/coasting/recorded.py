@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.config.alignment import sensors_of
 from strapdown.config.coast import CoastSpec
-from strapdown.config.navigation import NavigationSpec, aids_of
-from strapdown.config.navigation_modules import sensors_of
+from strapdown.config.navigation import NavigationSpec
 from strapdown.errors import ConfigError
 from strapdown.evaluation.gnss_outages import WithheldScore, blinded, score_of, spans_to_withhold
 from strapdown.evaluation.plane_bound import PLANE_95, plane_bound
@@ -127,8 +127,8 @@ def coast_of_run(
     chain = make_chain(navigation, sensors_of(navigation))
     # Measurements after an outage do not affect the solution during it.
     chain = replace(chain, navigator=replace(chain.navigator, smoother=None))
-    receivers = [name for name, aid in aids_of(navigation).items() if aid.kind == "gnss"]
-    stays = tuple(name for name in aids_of(navigation) if name not in receivers)
+    receivers = [name for name, aid in navigation.aiding.items() if aid.kind == "gnss"]
+    stays = tuple(name for name in navigation.aiding if name not in receivers)
     time, values = index_of(source.imu), values_of(source.imu, [*GYRO, *ACCEL])
     state = chain.begin(source.imu.attrs["sampling"], source.name)
     for aid, table in source.tables.items():

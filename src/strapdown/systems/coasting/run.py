@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from strapdown.config.alignment import sensors_of
 from strapdown.config.coast import CoastSpec
 from strapdown.config.navigation import NavigationSpec
-from strapdown.config.navigation_modules import sensors_of
 from strapdown.errors import ConfigError, Finding
 from strapdown.results.inputs import InputFiles
 from strapdown.sensors.catalogue import load_sensor

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from strapdown.aiding.aid import Measurement
 from strapdown.aiding.gnss import Gnss
-from strapdown.config.choice import SLOTS, make_choice
 from strapdown.config.coast import CoastSpec, CoastStartTable
 from strapdown.constants import DEG_PER_HOUR, MICRO_G
 from strapdown.errors import ConfigError
@@ -107,12 +106,8 @@ def coast_navigator(spec: CoastSpec, sensors: ImuUncertainty, fixes: bool) -> Na
     -------
     Navigator
     """
-    names = type(spec.aiding).model_fields
     aids: tuple[Measurement, ...] = tuple(
-        make_choice(
-            getattr(spec.aiding, kind), SLOTS["aiding"], {"name": kind, "ellipsoid": "wgs84"}
-        )
-        for kind in names
+        aid.make(name=kind, ellipsoid="wgs84") for kind, aid in spec.aiding.items()
     )
     filter_ = ErrorFilter(
         NorthEastDown(),
@@ -233,10 +228,10 @@ def _tables(
         )
         fixes = simulate_gnss(motion, receiver)
         out[RECEIVER] = fixes[fixes.index <= begin + 1e-6]
-    if "odometer" in type(spec.aiding).model_fields:
-        asked = spec.aiding.odometer  # type: ignore[attr-defined]
+    if "odometer" in spec.aiding:
         at = instants(motion, ODOMETER_RATE)[1:]
-        forward = velocity_of_point(motion, at, asked.lever_arm_m)[:, 0]
+        arm = spec.aiding["odometer"].make().lever_arm
+        forward = velocity_of_point(motion, at, arm)[:, 0]
         out["odometer"] = odometer_table(at, forward, ODOMETER_SD)
     return out
 

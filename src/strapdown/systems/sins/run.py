@@ -14,9 +14,15 @@ from numpy.typing import NDArray
 
 from strapdown.alignment.alignment import Alignment, Site
 from strapdown.alignment.fine_result import FineResult
-from strapdown.config.choice import SLOTS, make_choice
-from strapdown.config.navigation import CoarseModeSpec, FineModeSpec, NavigationSpec, StartTable
-from strapdown.config.navigation_modules import given_of, make_aids, make_filter, sensors_of
+from strapdown.config.alignment import sensors_of
+from strapdown.config.navigation import (
+    CoarseModeSpec,
+    FineModeSpec,
+    NavigationSpec,
+    StartTable,
+    make_aids,
+    make_filter,
+)
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
 from strapdown.errors import Finding
 from strapdown.evaluation.control_points import ControlPointScore, score_control_points
@@ -121,7 +127,7 @@ def run_navigation(
             channels = channel_findings(source.imu, sensors, spec.start)
     looked, channels = in_file(looked, *tables), in_file(channels, *tables)
     chain = make_chain(spec, sensors)
-    recorder: Recorder = make_choice(spec.recorder, SLOTS["recorder"], given_of(spec))
+    recorder: Recorder = spec.recorder.make(ellipsoid=spec.ellipsoid)
 
     def told(mode: str, share: float) -> None:
         progress(mode, BEGUN + (ENDED - BEGUN) * share)
@@ -293,19 +299,19 @@ def make_chain(spec: NavigationSpec, sensors: ImuUncertainty) -> NavigationPipel
     ConfigError
         A module refuses an option, or parts are incompatible.
     """
-    given = given_of(spec)
+    given = {"ellipsoid": spec.ellipsoid}
     aids = make_aids(spec)
-    options = make_choice(spec.filter, SLOTS["filter"], given)
+    options = spec.filter.make(**given)
     navigator = Navigator(
         with_states(make_filter(spec, sensors), aids),
         aids,
         options.mark_interval,
-        make_choice(spec.damping, SLOTS["damping"], given),
-        make_choice(spec.smoother, SLOTS["smoother"], given),
+        spec.damping.make(**given),
+        spec.smoother.make(**given),
     )
     prefilter = None
     if spec.prefilter.kind != "none":
-        prefilter = make_choice(spec.prefilter, SLOTS["prefilter"], given)
+        prefilter = spec.prefilter.make(**given)
     gaps = spec.gaps
     site, site_sd, velocity_sd = None, (1.0, 1.0, 1.0), (0.1, 0.1, 0.1)
     if spec.site is not None:
@@ -332,13 +338,13 @@ def make_chain(spec: NavigationSpec, sensors: ImuUncertainty) -> NavigationPipel
 
 
 def _modes(spec: NavigationSpec) -> tuple[Mode, ...]:
-    given = given_of(spec)
+    given = {"ellipsoid": spec.ellipsoid}
     modes: list[Mode] = []
-    coarse = make_choice(spec.coarse, SLOTS["coarse"], given)
+    coarse = spec.coarse.make(**given)
     if coarse is not None:
         window = math.inf if spec.coarse.window_s is None else spec.coarse.window_s
         modes.append(CoarseMode("coarse", _until(spec.coarse), way=coarse, window=window))
-    fine = make_choice(spec.fine, SLOTS["fine"], given)
+    fine = spec.fine.make(**given)
     if fine is not None:
         modes.append(FineMode("fine", _until(spec.fine), fine))
     return (*modes, Navigation())

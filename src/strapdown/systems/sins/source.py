@@ -16,13 +16,7 @@ from strapdown import rotation
 from strapdown.aiding.aid import TabulatedMeasurement
 from strapdown.alignment.alignment import Site
 from strapdown.config.choice import SLOTS
-from strapdown.config.navigation import (
-    AidSpec,
-    NavigationSpec,
-    ReceiverTable,
-    aids_of,
-    receivers_of,
-)
+from strapdown.config.navigation import AidSpec, NavigationSpec, ReceiverTable
 from strapdown.constants import MAD_TO_SD
 from strapdown.dsp.running_integral import running_integral
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
@@ -133,7 +127,7 @@ def read_navigation_source(spec: NavigationSpec) -> NavigationSource:
     tables: dict[str, pd.DataFrame] = {}
     inputs: list[InputFiles] = []
     findings: list[Finding] = []
-    for name, aid in aids_of(spec).items():
+    for name, aid in spec.aiding.items():
         if aid.path is not None:
             tables[name] = read_aid(aid)
             findings += tables[name].attrs.get("findings", ())
@@ -205,7 +199,7 @@ def _simulated(
             name: simulated_fixes(
                 motion, one, child(asked.seed, _FIXES, zlib.crc32(name.encode())), name
             )
-            for name, one in receivers_of(spec).items()
+            for name, one in spec.receivers.items()
         }
     if asked.sensor != spec.sensors.sensor:
         inputs = [*inputs, *sensor_file(asked.sensor)]

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown.aiding.aid import Measurement, TabulatedMeasurement, lasting
 from strapdown.aiding.gnss import Gnss
-from strapdown.config.navigation import NavigationSpec
-from strapdown.config.navigation_modules import make_filter
+from strapdown.config.navigation import NavigationSpec, make_filter
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
 from strapdown.errors import Finding, StrapdownError
 from strapdown.evaluation.heading_light import (

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.config.navigation import NavigationSpec, WithholdTable, aids_of
+from strapdown.config.navigation import NavigationSpec, WithholdTable
 from strapdown.errors import ConfigError
 from strapdown.evaluation.gnss_outages import (
     WithheldScore,
@@ -65,7 +65,7 @@ def withheld_aid(spec: NavigationSpec) -> str:
     """Name of the measurement whose fixes a specification withholds."""
     assert spec.withhold is not None
     named = spec.withhold.aid
-    return named or next(name for name, aid in aids_of(spec).items() if aid.kind == "gnss")
+    return named or next(name for name, aid in spec.aiding.items() if aid.kind == "gnss")
 
 
 def score_withholding(

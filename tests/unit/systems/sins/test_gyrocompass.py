@@ -10,7 +10,7 @@ import pytest
 from scipy import stats
 
 from strapdown.aiding.heading import Heading
-from strapdown.config.navigation_file import navigation_spec
+from strapdown.config.navigation import NavigationSpec
 from strapdown.ellipsoids import WGS84
 from strapdown.evaluation.heading_light import SURE
 from strapdown.sensors.catalogue import load_sensor
@@ -66,7 +66,7 @@ def spec_of(*, sensor="fog-1000", latitude=None, stated=None, heading=None, bias
             "heading_sd_deg": 1.0,
             "position_sd_m": 1.0,
         }
-    return navigation_spec(table)
+    return NavigationSpec.checked(table)
 
 
 def errors(result):
