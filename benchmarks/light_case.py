@@ -10,10 +10,8 @@ import pandas as pd
 
 from strapdown import rotation
 from strapdown.aiding.heading import Heading
-from strapdown.config.choice import SLOTS
-from strapdown.config.navigation import NavigationSpec
-from strapdown.config.navigation import NavigationSpec
 from strapdown.config.alignment import sensors_of
+from strapdown.config.navigation import NavigationSpec
 from strapdown.navigation.navigator import with_states
 from strapdown.systems.progress import silent
 from strapdown.systems.sins.chain import NavigationPipeline

@@ -7,8 +7,8 @@ import pandas as pd
 
 from benchmarks.light_case import KNOWN, LIMIT, Case, add_antennas, started
 from strapdown import rotation
-from strapdown.config.navigation import NavigationSpec
 from strapdown.config.alignment import sensors_of
+from strapdown.config.navigation import NavigationSpec
 from strapdown.tables import ACCEL, GYRO, POSITION_SD, VELOCITY_SD
 
 SENSORS = ("adis16495-1", "adis16470", "stim300", "hg1700")

@@ -9,8 +9,8 @@ import pandas as pd
 
 from benchmarks.light_case import KNOWN, Case, add_antennas
 from benchmarks.light_sway import pushed_body, rocking_body, swayed
-from strapdown.config.navigation import NavigationSpec
 from strapdown.config.alignment import sensors_of
+from strapdown.config.navigation import NavigationSpec
 from strapdown.tables import GYRO
 
 SENSORS = ("fog-1000", "hg9900")

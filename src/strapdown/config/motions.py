@@ -45,7 +45,13 @@ class WavesSpec(Spec):
     heading_waves: tuple[AngleWaveSpec, ...] = ()
 
 
-class StationarySpec(Position):
+class PlaceSpec(Position):
+    """Initial position of a motion, whose heights are checked by the motion."""
+
+    alt_m: Number = 0.0
+
+
+class StationarySpec(PlaceSpec):
     """Stationary."""
 
     kind: Literal["stationary"]
@@ -55,7 +61,7 @@ class StationarySpec(Position):
     heading_deg: Number = 0.0
 
 
-class RockingStandSpec(Position, WavesSpec):
+class RockingStandSpec(PlaceSpec, WavesSpec):
     """Rocking about a fixed position."""
 
     kind: Literal["rocking_stand"]
@@ -65,7 +71,7 @@ class RockingStandSpec(Position, WavesSpec):
     heading_deg: Number = 0.0
 
 
-class SineVelocitySpec(Position):
+class SineVelocitySpec(PlaceSpec):
     """Mean velocity plus a sine in each of north, east, down."""
 
     kind: Literal["sine_velocity"]
@@ -76,17 +82,17 @@ class SineVelocitySpec(Position):
     phase_deg: Triple = (0.0, 90.0, 0.0)
 
 
-class WalkingSpec(Position):
+class WalkingSpec(PlaceSpec):
     """A foot-mounted unit, walking around blocks."""
 
     kind: Literal["walking"]
     gait: Literal["walk", "run", "shuffle"] = "walk"
-    strides: int = Field(ge=1, le=100_000, strict=True)
+    strides: StrictInt = Field(ge=1, le=100_000)
     #: Number of strides between turns; zero for none.
-    corner_each: int = Field(default=10, ge=0, strict=True)
+    corner_each: StrictInt = Field(default=10, ge=0)
     corner_deg: Number = 90.0
     #: Strides that climb two stairs each, counted from zero.
-    stairs: tuple[Annotated[int, Field(ge=0, strict=True)], ...] = ()
+    stairs: tuple[Annotated[StrictInt, Field(ge=0)], ...] = ()
     stair_m: Number = 0.17
     heading_deg: Number = 0.0
     #: At the beginning and at the end.
@@ -167,20 +173,15 @@ class LevelSpec(Spec):
     ramp_s: Positive | None = None
 
 
+_BY_DO = Field(discriminator="do")
+CarStep = SpeedSpec | StopSpec | StraightSpec | TurnSpec | LaneChangeSpec
+AircraftStep = SpeedSpec | StopSpec | StraightSpec | BankedTurnSpec | ClimbSpec | LevelSpec
+ShipStep = SpeedSpec | StopSpec | StraightSpec | TurnSpec
 #: Any of the maneuvers.
-Step = (
-    SpeedSpec
-    | StopSpec
-    | StraightSpec
-    | TurnSpec
-    | BankedTurnSpec
-    | LaneChangeSpec
-    | ClimbSpec
-    | LevelSpec
-)
+Step = CarStep | AircraftStep
 
 
-class VehicleSpec(Position):
+class SteeredSpec(PlaceSpec):
     """Common part of all vehicles."""
 
     heading_deg: Number = 0.0
@@ -189,51 +190,33 @@ class VehicleSpec(Position):
     most_lateral_m_per_s2: Positive | None = None
 
 
-class CarSpec(VehicleSpec):
+class CarSpec(SteeredSpec):
     """A car."""
 
     kind: Literal["car"]
     roll_deg_per_m_per_s2: Number = 0.0
     pitch_deg_per_m_per_s2: Number = 0.0
-    manoeuvres: tuple[
-        Annotated[
-            SpeedSpec | StopSpec | StraightSpec | TurnSpec | LaneChangeSpec,
-            Field(discriminator="do"),
-        ],
-        ...,
-    ]
+    manoeuvres: tuple[Annotated[CarStep, _BY_DO], ...]
 
 
-class AircraftSpec(VehicleSpec):
+class AircraftSpec(SteeredSpec):
     """An aircraft."""
 
     kind: Literal["aircraft"]
     angle_of_attack_deg: Number = 0.0
     most_bank_deg: Positive | None = None
-    manoeuvres: tuple[
-        Annotated[
-            SpeedSpec | StopSpec | StraightSpec | BankedTurnSpec | ClimbSpec | LevelSpec,
-            Field(discriminator="do"),
-        ],
-        ...,
-    ]
+    manoeuvres: tuple[Annotated[AircraftStep, _BY_DO], ...]
 
 
-class ShipSpec(VehicleSpec, WavesSpec):
+class ShipSpec(SteeredSpec, WavesSpec):
     """A ship."""
 
     kind: Literal["ship"]
     heave_waves: tuple[HeaveWaveSpec, ...] = ()
-    manoeuvres: tuple[
-        Annotated[
-            SpeedSpec | StopSpec | StraightSpec | TurnSpec,
-            Field(discriminator="do"),
-        ],
-        ...,
-    ]
+    manoeuvres: tuple[Annotated[ShipStep, _BY_DO], ...]
 
 
-class WaypointSpec(Position):
+class WaypointSpec(PlaceSpec):
     """Waypoint, with its time or the speed of the leg that leads to it."""
 
     time_s: NotNegative | None = None

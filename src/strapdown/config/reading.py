@@ -118,8 +118,8 @@ def _refuse_placeholders(file: TomlFile, form: type[Spec]) -> None:
     for path in open_keys[:MOST_OPEN]:
         fields = fields_at(form, path)
         meaning = (fields[0].description if fields else None) or ""
-        where = {"line": file.line(path), "quantity": place_of(path)}
-        values.append(Finding("config.open-value", wanted=meaning, **where))
+        line, place = file.line(path), place_of(path)
+        values.append(Finding("config.open-value", wanted=meaning, line=line, quantity=place))
     count = len(open_keys)
     code = "config.open-values" if count > 1 else "config.one-open-value"
     raise ConfigError(

@@ -8,6 +8,7 @@ with the key, the value as written and a remedy: all of a table at once (`refusa
 from __future__ import annotations
 
 import math
+import operator
 import re
 import unicodedata
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -282,29 +283,34 @@ def faults_of(error: ValidationError, form: type[Spec], written: Mapping[str, An
     """
     errors = error.errors(include_url=False)
     faulty = {one["loc"][:end] for one in errors for end in range(len(one["loc"]))}
-    # A list with a faulty element is not also too short.
-    return [
-        _fault(one, form, written)
-        for one in errors
-        if one["type"] != "too_short" or one["loc"] not in faulty
-    ]
+    begun = {one["loc"] for one in errors if one["type"] == "extra_forbidden"}
+
+    def follows(one: Any) -> bool:
+        """A list with a faulty element is not also too short, a key in a wrong unit not missing."""
+        path, name = one["loc"][:-1], _parts(str(one["loc"][-1]))[0] if one["loc"] else ""
+        beside = [str(other[-1]) for other in begun if other[:-1] == path]
+        return (one["type"] == "too_short" and one["loc"] in faulty) or (
+            one["type"] == "missing" and any(f"{key}_".startswith(f"{name}_") for key in beside)
+        )
+
+    return [_fault(one, form, written) for one in errors if not follows(one)]
 
 
 def _fault(error: Any, form: type[Spec], written: Mapping[str, Any]) -> Fault:
     path, context, kind = tuple(error["loc"]), error.get("ctx", {}), error["type"]
     if kind == "refused":
-        fault: Fault = context["fault"]
+        own: Fault = context["fault"]
         data = {
             k: At((*path, *v.path), v.default) if isinstance(v, At) else v
-            for k, v in fault.data.items()
+            for k, v in own.data.items()
         }
-        return Fault((*path, *fault.path), fault.what, data)
+        return Fault((*path, *own.path), own.what, data)
     if kind.startswith("union_tag"):
         path = (*path, context["discriminator"].strip("'"))
     elif path[-1:] == ("[key]",):
         path = path[:-1]
     found, given = value_at(written, path)
-    if not found or error["loc"] != path:
+    if not found or error["loc"][-1:] == ("[key]",):
         given = error["input"].value if isinstance(error["input"], _Unknown) else error["input"]
     key = next((part for part in reversed(path) if isinstance(part, str)), "")
 
@@ -319,7 +325,8 @@ def _fault(error: Any, form: type[Spec], written: Mapping[str, Any]) -> Fault:
         case "extra_forbidden":
             return Fault(path, _unknown(key, given, error["input"].form, form))
         case "union_tag_not_found":
-            return fault("config.choice-missing", key=key, known=tags_of(form, path))
+            tags = [tag for one in fields_at(form, path) for tag in get_args(one.annotation)]
+            return fault("config.choice-missing", key=key, known=list(dict.fromkeys(tags)))
         case "union_tag_invalid" | "literal_error":
             known = re.findall(r"'([^']+)'", context.get("expected_tags") or context["expected"])
             return fault("config.unknown-choice", given=shown(given), word=str(given), known=known)
@@ -333,6 +340,9 @@ def _fault(error: Any, form: type[Spec], written: Mapping[str, Any]) -> Fault:
             return fault("config.number-for-text", key=shown_key(key), given=shown(given))
     for limit, code in _LIMITS.items():
         if isinstance(context.get(limit), int | float):
+            other = value_at(written, (*path[:-1], "lon_deg"))[1]
+            if key == "lat_deg" and is_number(other) and abs(other) <= 90.0:
+                return fault("config.latitude-longitude-exchanged", given=shown(given))
             return fault(code, given=shown(given), **_limited(limit, context[limit], path, written))
     code = _MISFITS.get(kind, "config.value-does-not-fit")
     return fault(code, given=shown(given), reason=error["msg"].lower())
@@ -340,25 +350,18 @@ def _fault(error: Any, form: type[Spec], written: Mapping[str, Any]) -> Fault:
 
 def _limited(kind: str, limit: float, path: KeyPath, table: Mapping[str, Any]) -> dict[str, Any]:
     """A limit in the unit of the key, and keys of other units in which the value is allowed."""
-    steps, at = written_path(table, path), len(path) - isinstance(path[-1], int)
-    name, key = str(path[at - 1]), str(steps[len(steps) - isinstance(steps[-1], int) - 1])
-    _, given = value_at(table, path)
-    allowed = {
-        "gt": lambda x: x > limit,
-        "ge": lambda x: x >= limit,
-        "lt": lambda x: x < limit,
-        "le": lambda x: x <= limit,
-    }[kind]
+    name = [str(part) for part in path if isinstance(part, str)][-1]
+    key = [str(part) for part in written_path(table, path) if isinstance(part, str)][-1]
+    given = value_at(table, path)[1]
+    if key not in keys_of(name) or not isinstance(given, int | float) or limit == 0.0:
+        return {"limit": limit, "hint": ""}
     keys = [
         other
         for other in keys_of(name)
-        if key in keys_of(name)
-        and not other.endswith(_SELDOM)
-        and isinstance(given, int | float)
-        and limit != 0.0
-        and allowed(_converted(given, other, name))
+        if not other.endswith(_SELDOM)
+        and getattr(operator, kind)(_converted(given, other, name), limit)
     ]
-    multiply, divide = _factors(key, name) if key in keys_of(name) else (1.0, 1.0)
+    multiply, divide = _factors(key, name)
     hint = Finding("config.in-another-unit", keys=keys) if keys else ""
     return {"limit": limit * divide / multiply, "hint": hint}
 
@@ -440,16 +443,19 @@ def fields_at(form: type[Spec], path: KeyPath) -> list[FieldInfo]:
             one for of in forms for name, one in of.model_fields.items() if part in keys_of(name)
         ]
         if not here and forms:
-            return []
+            # The tag of a union, or no field.
+            forms = [of for of in forms if part in _tags(of)]
+            if not forms:
+                return []
+            continue
         found = here or found
         forms = [inner for one in here for inner in _forms_of(one)]
         named = bool(forms) and get_origin(here[0].annotation) is dict
     return found
 
 
-def tags_of(form: type[Spec], path: KeyPath) -> list[str]:
-    """Values of a tag: those of the literals of each form of a union."""
-    return [tag for one in fields_at(form, path) for tag in get_args(one.annotation)]
+def _tags(form: type[Spec]) -> list[str]:
+    return [tag for one in form.model_fields.values() for tag in get_args(one.annotation)]
 
 
 def _tables(form: type[Spec], prefix: str = "") -> Iterator[tuple[str, type[Spec]]]:
@@ -538,11 +544,10 @@ def _located(fault: Fault, table: Mapping[str, Any], file: TomlFile | None) -> F
             data["shown"] = shown(value)
         finding = Finding(what, data=data)
     path = written_path(table, path)
+    finding = finding.replace(file=None, line=None, severity="error")
     if file is None:
-        place, where = ", ".join(str(part) for part in path), {"file": None, "line": None}
-    else:
-        place, where = place_of(path), {"file": file.path.name, "line": file.line(path)}
-    return finding.replace(quantity=place, severity="error", **where)
+        return finding.replace(quantity=", ".join(str(part) for part in path))
+    return finding.replace(quantity=place_of(path), file=file.path.name, line=file.line(path))
 
 
 def _said(at: At, table: Mapping[str, Any], file: TomlFile | None) -> Finding:
@@ -662,12 +667,3 @@ class Position(Spec):
     alt_m: Annotated[Number, Field(ge=-1e4, le=1e5)] = Field(
         default=0.0, description="height over the ellipsoid"
     )
-
-    @model_validator(mode="before")
-    @classmethod
-    def _in_order(cls, data: Any) -> Any:
-        if isinstance(data, Mapping):
-            lat, lon = data.get("lat_deg"), data.get("lon_deg")
-            if is_number(lat) and is_number(lon) and abs(lon) <= 90.0 < abs(lat) <= 360.0:
-                raise refuse("lat_deg", "config.latitude-longitude-exchanged")
-        return data
