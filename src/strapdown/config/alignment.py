@@ -266,15 +266,15 @@ class AlignmentSpec(FileSpec):
             longest = self.simulation.duration_s
             count = self.simulation.rate_hz * longest
             if count > MOST_SAMPLES:
-                data = {"count": count, "most": MOST_SAMPLES}
+                data: dict[str, Any] = {"count": count, "most": MOST_SAMPLES}
                 yield Fault(("simulation", "duration_s"), "config.samples-too-many", data)
         if longest is not None and (self.coarse.duration_s or 0.0) > longest:
             data = {"longest": longest}
             yield Fault(("coarse", "duration_s"), "config.longer-than-record", data)
         kind = self.coarse.kind
         if self.gnss is not None and kind not in NEEDS_GNSS:
-            data = {"kind": kind, "other": NEEDS_GNSS[0]}
-            yield Fault(("gnss", "path"), "config.coarse-takes-no-fixes", data)
+            known = {"kind": kind, "other": NEEDS_GNSS[0]}
+            yield Fault(("gnss", "path"), "config.coarse-takes-no-fixes", known)
         found = list(coarse_faults(self.coarse, self.fine, fixes=self.gnss is not None))
         yield from found
         if self.fine.kind != NONE and not found:

@@ -153,10 +153,9 @@ def _field(option: Option) -> tuple[Any, Any]:
     if option.group is not None:
         form = form_of(option.group, option.group.__name__, _Made)
         return form, pydantic.Field(default_factory=form)
-    described = {"description": _MEANINGS.get(option.key)}
     if option.slot is None:
-        default = ... if option.default is MISSING else option.default
-        return _strict(option.hint), pydantic.Field(default, **described)
+        default: Any = ... if option.default is MISSING else option.default
+        return _strict(option.hint), pydantic.Field(default, description=_MEANINGS.get(option.key))
     kind = option.default if isinstance(option.default, str) else ""
     kinds = Kinds(option.slot.name, kind, empty=option.default is None)
     hint = BeforeValidator(kinds)

@@ -23,8 +23,7 @@ fault = Fault.of
 
 def case_faults(spec: CaseSpec) -> Iterator[Fault]:
     """Yield the faults of a case, whose files are named by absolute paths."""
-    yield from _vehicle(spec.vehicle)
-    yield from _positions(spec)
+    yield from list(_vehicle(spec.vehicle)) or _positions(spec)
     yield from _entry(spec)
     yield from _names("units", [unit.name for unit in spec.units])
     yield from _triggers(spec)
@@ -98,11 +97,12 @@ def _positions(spec: CaseSpec) -> Iterator[Fault]:
     places += [(("entry", "antenna_m"), spec.entry.antenna_m)]
     vehicle = spec.vehicle
     length, width, front = vehicle.length_m, vehicle.width_m, vehicle.front_m
-    corners = list(vehicle.outline_m)
-    if not corners and front is None:
+    if vehicle.outline_m:
+        corners = list(vehicle.outline_m)
+    elif front is None:
         # With the origin anywhere in the vehicle, all positions that it may then cover.
         corners = _rectangle(-length, length, width)
-    elif not corners:
+    else:
         corners = _rectangle(front - length, front, 0.5 * width)
     for path, place in places:
         if place is None:
@@ -196,8 +196,9 @@ def _entry(spec: CaseSpec) -> Iterator[Fault]:
             yield missing(CaseSpec, ("entry", name), code)
     if entry.kind == "speed" and entry.speed_sd_m_per_s == 0.0:
         yield fault(("entry", "speed_sd_m_per_s"), "config.entry-speed-sd-zero")
-    in_order = window is not None and window[0] < window[1]
-    if entry.kind != "standstill" and in_order and not window[0] <= entry.time_s <= window[1]:
+    start, end = window or (-math.inf, math.inf)
+    outside = start < end and not start <= entry.time_s <= end
+    if entry.kind != "standstill" and outside:
         first, second = ("entry", "time_s"), ("options", "window_s")
         if "time_s" not in entry.model_fields_set:
             first, second = second, first

@@ -443,8 +443,8 @@ class NavigationSpec(FileSpec):
                 yield Fault(("withhold", "aid"), "config.unknown-aid-to-withhold", data)
         for form in self.output.files:
             if form not in TRAJECTORY_WRITERS:
-                data = {"form": form, "known": TRAJECTORY_WRITERS}
-                yield Fault(("output", "files"), "config.unknown-trajectory-form", data)
+                known = {"form": form, "known": TRAJECTORY_WRITERS}
+                yield Fault(("output", "files"), "config.unknown-trajectory-form", known)
         yield from self._filter_faults()
 
     def _begin_faults(self) -> Iterator[Fault]:

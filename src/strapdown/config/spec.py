@@ -484,7 +484,7 @@ def written_path(table: Any, path: KeyPath) -> KeyPath:
             key = part
         if key is not None:
             table = table[key]
-        if key is not None or k == len(path) - 1:
+        if key is not None or (k == len(path) - 1 and [part] != kept[-1:]):
             kept.append(part if key is None else key)
     return tuple(kept)
 

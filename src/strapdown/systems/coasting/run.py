@@ -99,7 +99,7 @@ def run_coast(
             sensors,
             forecast_of_sensor(spec, sensors, progress),
             None,
-            tuple(type(spec.aiding).model_fields),
+            tuple(spec.aiding),
             sensor_file(spec.sensor),
             (),
         )
