@@ -9,10 +9,8 @@ import numpy as np
 import pandas as pd
 
 from strapdown import rotation
-from strapdown.config.choice import SLOTS, make_choice
-from strapdown.config.navigation import NavigationSpec
-from strapdown.config.navigation_file import navigation_spec
-from strapdown.config.navigation_modules import given_of, make_filter, sensors_of
+from strapdown.config.alignment import sensors_of
+from strapdown.config.navigation import NavigationSpec, make_filter
 from strapdown.navigation.integrity import assess_integrity
 from strapdown.navigation.measurements.heading import Heading
 from strapdown.navigation.navigator import with_states
@@ -102,7 +100,7 @@ def started(case: Case) -> dict[str, object]:
 
 def run(case: Case) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Light, error of the heading in deg, and bound of the run, second by second."""
-    spec: NavigationSpec = navigation_spec(started(case))
+    spec: NavigationSpec = NavigationSpec.checked(started(case))
     source: NavigationSource = read_navigation_source(spec)
     sensors = sensors_of(spec)
     imu = case.imu(source.imu)
@@ -112,7 +110,7 @@ def run(case: Case) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         table.attrs = dict(source.tables[name].attrs)
     tables |= case.extra(source.truth)
     chain = case.chain(make_chain(spec, sensors))
-    recorder = make_choice(spec.recorder, SLOTS["recorder"], given_of(spec))
+    recorder = spec.recorder.make(ellipsoid=spec.ellipsoid)
     ran = run_batch(chain, imu, tables, recorder)
     record = ran.record
     limits = (spec.trust.heading_limit_deg, spec.trust.heading_red_deg)

@@ -7,8 +7,8 @@ import pandas as pd
 
 from benchmarks.light_case import KNOWN, LIMIT, Case, add_antennas, started
 from strapdown import rotation
-from strapdown.config.navigation_file import navigation_spec
-from strapdown.config.navigation_modules import sensors_of
+from strapdown.config.alignment import sensors_of
+from strapdown.config.navigation import NavigationSpec
 from strapdown.tables import ACCEL, GYRO, POSITION_SD, VELOCITY_SD
 
 SENSORS = ("adis16495-1", "adis16470", "stim300", "hg1700")
@@ -96,7 +96,7 @@ def outliers(seed: int) -> Case:
 def biased_sensor(seed: int) -> Case:
     """Gyros and accelerometers off by ten times what is stated."""
     case = nominal(seed)
-    sensors = sensors_of(navigation_spec(started(case)))
+    sensors = sensors_of(NavigationSpec.checked(started(case)))
     gyro = 10.0 * np.asarray(sensors.gyro.axis("bias")) * case.rng.standard_normal(3)
     accel = 5.0 * np.asarray(sensors.accel.axis("bias")) * case.rng.standard_normal(3)
 

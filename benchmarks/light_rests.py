@@ -9,8 +9,8 @@ import pandas as pd
 
 from benchmarks.light_case import KNOWN, Case, add_antennas
 from benchmarks.light_sway import pushed_body, rocking_body, swayed
-from strapdown.config.navigation_file import navigation_spec
-from strapdown.config.navigation_modules import sensors_of
+from strapdown.config.alignment import sensors_of
+from strapdown.config.navigation import NavigationSpec
 from strapdown.tables import GYRO
 
 SENSORS = ("fog-1000", "hg9900")
@@ -102,7 +102,7 @@ def with_steps(
 
 
 def bias_of(case: Case) -> float:
-    sensors = sensors_of(navigation_spec(case.table))
+    sensors = sensors_of(NavigationSpec.checked(case.table))
     return float(np.max(sensors.gyro.axis("bias")))
 
 

@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 
 from strapdown import errors
-from strapdown.config.alignment_file import alignment_spec
-from strapdown.config.navigation_file import navigation_spec
+from strapdown.config.alignment import AlignmentSpec
+from strapdown.config.navigation import NavigationSpec
 from strapdown.errors import Finding
 from strapdown.report.alignment import alignment_json
 from strapdown.report.alignment_trust import trust as alignment_trust
@@ -74,7 +74,7 @@ def aligned():
     """A body that rocks by more than an alignment with a stated heading wants."""
     wave = {"amplitude_deg": 1.0, "period_s": 6.0}
     rocks = {"duration_s": 120.0, "heading_deg": 40.0, "roll_waves": [wave]}
-    spec = alignment_spec(
+    spec = AlignmentSpec.checked(
         {
             "site": PLACE,
             "sensors": {"sensor": "fog-1000"},
@@ -111,7 +111,7 @@ def navigated():
     ]
     receiver = {"rate_hz": 1.0, "position_noise_m": 0.5, "velocity_noise_m_per_s": 0.05}
     motion = {"kind": "car", **PLACE, "heading_deg": 0.0, "speed_m_per_s": 12.0}
-    spec = navigation_spec(
+    spec = NavigationSpec.checked(
         {
             "simulation": {
                 "rate_hz": 20.0,

@@ -39,13 +39,13 @@ def test_it_writes_a_case_and_says_what_is_missing(run_cli, record, tmp_path):
 
 
 def test_an_open_case_is_refused_with_the_same_lines(run_cli, record, tmp_path):
-    from strapdown.config.crash_case_file import read_case_spec
+    from strapdown.config.crash_case import CaseSpec
     from strapdown.errors import ConfigError
 
     out = tmp_path / "case.toml"
     done = run_cli("init", "crash", record, "--out", out)
     with pytest.raises(ConfigError) as caught:
-        read_case_spec(out)
+        CaseSpec.read(out)
     asked = done.out.partition("Is this so?")[0]
     told = [line.split()[1] for line in asked.splitlines() if line.startswith("  line ")]
     for line in told:

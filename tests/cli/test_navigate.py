@@ -17,7 +17,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from bad_navigate import FILE, NAVIGATE_CASES, drive, navigate_said, undrawn, write_drive
 
-from strapdown.config.navigation_file import read_navigation_spec
+from strapdown.config.navigation import NavigationSpec
 from strapdown.evaluation.trajectory_differences import trajectory_differences
 from strapdown.formats import read_raw
 from strapdown.formats.trajectory_readers import read_trajectory
@@ -237,7 +237,7 @@ def test_a_draft_of_foreign_columns_and_of_fixes_without_standard_deviations(run
     )  # fmt: skip
     assert done.code == 0, done.err
     assert "position_sd_m: how well each fix knows its place" in done.out
-    assert read_navigation_spec(path).log.columns["gyro_z"] == "c3"
+    assert NavigationSpec.read(path).log.columns["gyro_z"] == "c3"
     assert "\nposition_sd_m = 5.0\n" in path.read_text()
     flags = ("navigate", tmp_path / "odd.csv", "--gnss", fixes, "--columns", columns, *units)
     refused = run_cli(*flags, "--sensor", "mpu-6050", "--out", tmp_path / "out")

@@ -15,9 +15,9 @@ import pytest
 
 from strapdown import simulate
 from strapdown.api.attitude import compare_attitude
-from strapdown.config import read_trajectory_spec
+from strapdown.config import TrajectorySpec
 from strapdown.config.alignment import LogTable
-from strapdown.config.navigation_file import read_navigation_spec
+from strapdown.config.navigation import NavigationSpec
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.report.attitude_charts import charts
 from strapdown.report.document_files import drawings
@@ -39,7 +39,7 @@ EXAMPLES, IMAGES = ROOT / "docs" / "examples", ROOT / "docs" / "images"
 
 def redraw(name, path):
     """The picture without the log, which takes seconds to make."""
-    spec = read_trajectory_spec(EXAMPLES / f"{name}.toml")
+    spec = TrajectorySpec.read(EXAMPLES / f"{name}.toml")
     motion = make_motion(spec.motion, find_ellipsoid(spec.ellipsoid))
     time = np.arange(int(motion.duration * spec.rate_hz + 1e-6) + 1) / spec.rate_hz
     draw(simulation_chart(spec, motion.trajectory(time)), path, caption=True)
@@ -63,13 +63,13 @@ def drawn_of(spec):
 @pytest.fixture(scope="module")
 def navigated():
     """The report of the drive of the manual."""
-    return drawn_of(read_navigation_spec(EXAMPLES / "navigate_car.toml"))
+    return drawn_of(NavigationSpec.read(EXAMPLES / "navigate_car.toml"))
 
 
 @pytest.fixture(scope="module")
 def driven():
     """The drive through a tunnel, of the README and of the page of the verdict."""
-    return run_navigation(read_navigation_spec(EXAMPLES / "navigate_drive.toml"))
+    return run_navigation(NavigationSpec.read(EXAMPLES / "navigate_drive.toml"))
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +78,7 @@ def smoothed(tmp_path_factory):
     file = tmp_path_factory.mktemp("smoothed") / "smoothed.toml"
     drive = (EXAMPLES / "navigate_drive.toml").read_text(encoding="utf-8")
     file.write_text(f'{drive}\n[smoother]\nkind = "rts"\n', encoding="utf-8")
-    return drawn_of(read_navigation_spec(file))
+    return drawn_of(NavigationSpec.read(file))
 
 
 @pytest.mark.skipif(not PINNED, reason="another matplotlib than that of constraints.txt")
@@ -143,7 +143,7 @@ def test_the_walk_of_the_manual_is_what_is_drawn_now(recordings, tmp_path):
     draft = draft_navigation(LogTable(path=str(path)), folder=tmp_path, foot=True)
     text = draft.text.replace('lat_deg = "?"', "lat_deg = 41.0")
     (tmp_path / "foot.toml").write_text(f"{text}\n[control_points]\npath = '{path}'\n")
-    drawn = drawn_of(read_navigation_spec(tmp_path / "foot.toml"))
+    drawn = drawn_of(NavigationSpec.read(tmp_path / "foot.toml"))
     (chart,) = [d.chart for d in drawn if d.chart.slug == "plan"]
     compare_chart(chart, "walking_plan.svg", tmp_path)
 

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from strapdown import read_log, simulate, verify
-from strapdown.config import read_trajectory_spec
+from strapdown.config import TrajectorySpec
 from strapdown.config.motions import KINDS
 from strapdown.ellipsoids import ELLIPSOIDS
 from strapdown.simulation import ImuErrors, Origin, StationaryMotion, simulate_imu
@@ -59,7 +59,7 @@ def truth(folder):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_an_example_is_simulated_and_its_truth_agrees_with_itself(name):
-    spec = read_trajectory_spec(EXAMPLES / f"{name}.toml")
+    spec = TrajectorySpec.read(EXAMPLES / f"{name}.toml")
     motion, _, imu, attitude, trajectory = simulate_trajectory(spec)
     assert len(imu) == len(attitude) == len(trajectory)
     assert trajectory.index[-1] == pytest.approx(motion.duration, abs=1.0 / spec.rate_hz)
@@ -73,7 +73,7 @@ def test_an_example_is_simulated_and_its_truth_agrees_with_itself(name):
 
 
 def test_the_examples_show_the_kinds_that_need_more_than_a_line():
-    kinds = {read_trajectory_spec(EXAMPLES / f"{name}.toml").motion.kind for name in NAMES}
+    kinds = {TrajectorySpec.read(EXAMPLES / f"{name}.toml").motion.kind for name in NAMES}
     assert kinds == set(KINDS) - {"stationary", "sine_velocity"}
 
 

@@ -17,7 +17,7 @@ from one_file.cauchy import Cauchy
 from one_file.half_steps import HalfSteps
 from one_file.staff import Staff
 
-from strapdown.config.navigation_file import read_navigation_spec
+from strapdown.config.navigation import NavigationSpec
 from strapdown.errors import ConfigError
 from strapdown.estimation.robust import INFLUENCES
 from strapdown.mechanization import MECHANIZATIONS
@@ -65,7 +65,7 @@ def added(monkeypatch):
 
 def navigated(folder, text):
     (folder / "run.toml").write_text(text)
-    return run_navigation(read_navigation_spec(folder / "run.toml"))
+    return run_navigation(NavigationSpec.read(folder / "run.toml"))
 
 
 def test_a_mechanization(added, tmp_path):

@@ -302,14 +302,14 @@ class TestHeads:
 
 
 def test_a_case_that_names_the_header_is_the_same_from_its_sealed_copy(recordings, tmp_path):
-    from strapdown.config.crash_case_file import read_case_spec
+    from strapdown.config.crash_case import CaseSpec
     from strapdown.crash.case import whole_records
 
     folder = recordings("crash_nhtsa_10146")
     text = (Path(__file__).parent / "cases" / "nhtsa_10146.toml").read_text(encoding="utf-8")
     case = tmp_path / "case.toml"
     case.write_text(text.replace("STRAPDOWN_DATA", folder.parent.as_posix()), encoding="utf-8")
-    records, spec = whole_records(read_case_spec(case))
+    records, spec = whole_records(CaseSpec.read(case))
     again, same = whole_records(spec)
     assert list(records) == list(again) == [str(folder)]
     assert [r.path for r in records.values()] == [r.path for r in again.values()] == [folder]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from strapdown.config.alignment import LogTable
-from strapdown.config.navigation_file import navigation_spec
+from strapdown.config.navigation import NavigationSpec
 from strapdown.frames import place_difference
 from strapdown.navigation.truth_comparison import smoother_consistency
 from strapdown.systems.navigation_proposal import propose
@@ -35,7 +35,7 @@ def result(request, recordings):
     )
     table = {"name": "drive", **made.table, "smoother": "rts"}
     table["aiding"]["wheels"] = {"kind": "no_slip", "mounting_sd_deg": (6.0, 6.0)}
-    return made, run_navigation(navigation_spec(table))
+    return made, run_navigation(NavigationSpec.checked(table))
 
 
 def slopes(fixes):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from strapdown.config.navigation_file import read_navigation_spec
+from strapdown.config.navigation import NavigationSpec
 from strapdown.systems.navigation_run import run_navigation
 
 TEXT = """
@@ -66,7 +66,7 @@ def test_the_attitude_of_the_first_minute_is_within_its_bound(first, tmp_path):
         file = tmp_path / f"{seed}.toml"
         heading = 37.0 * seed % 360.0
         file.write_text(TEXT.format(seed=seed, heading=heading, first=FIRST[first]))
-        result = run_navigation(read_navigation_spec(file), file)
+        result = run_navigation(NavigationSpec.read(file), file)
         off, sd = result.differences, result.record.sd
         at = np.clip(np.searchsorted(sd.index, off.index - 1e-3), 0, len(sd) - 1)
         same = np.abs(sd.index[at].to_numpy() - off.index.to_numpy()) < 1e-3

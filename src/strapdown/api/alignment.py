@@ -10,16 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from pydantic import ValidationError
 
-from strapdown.api.navigation import NavigationRun, refused_value
+from strapdown.api.navigation import NavigationRun
 from strapdown.api.reading import GnssFile, ImuFile, imu_input, table_input
 from strapdown.bundle.seal import Seal, check_destination
-from strapdown.config.alignment import AlignmentSpec, LogTable
-from strapdown.config.alignment_file import NOT_BEFORE_FINE, alignment_spec, read_alignment_spec
-from strapdown.config.coast import CoastSpec, coast_spec
+from strapdown.config.alignment import NOT_BEFORE_FINE, AlignmentSpec, LogTable
+from strapdown.config.coast import CoastSpec
 from strapdown.config.navigation import NavigationSpec
-from strapdown.config.navigation_file import navigation_spec
 from strapdown.config.spec import specify
 from strapdown.errors import ConfigError
 from strapdown.formats import read_raw
@@ -141,7 +138,7 @@ def _moved(run: AlignmentRun, old: Path, new: Path) -> AlignmentRun:
         return run
     return replace(
         run,
-        spec=alignment_spec(moved_paths(run.spec.plain(), old, new)),
+        spec=AlignmentSpec.checked(moved_paths(run.spec.plain(), old, new)),
         inputs=moved_inputs(run.inputs, old, new, copied=True),
     )
 
@@ -201,7 +198,7 @@ def align(
                 file=Path(imu).name,
                 quantity="site, sensor, gnss",
             )
-        return run_specified(read_alignment_spec(imu), Path(imu), progress)
+        return run_specified(AlignmentSpec.read(imu), Path(imu), progress)
     given = imu_input(imu)
     fixes = None if gnss is None else table_input(gnss, "gnss")
     tables = {"imu.npz": given} if isinstance(given, pd.DataFrame) else {}
@@ -218,18 +215,15 @@ def align(
         else:
             path = fixes.path if isinstance(fixes, GnssFile) else fixes
         place = site if site is None or isinstance(site, Mapping) else _named(site)
-        try:
-            spec = specify_alignment(
-                log,
-                site=place,
-                sensor=sensor,
-                coarse={"kind": method} if isinstance(method, str) else method,
-                fine=fine,
-                gnss=path,
-                prefilter={"kind": prefilter} if isinstance(prefilter, str) else prefilter,
-            )
-        except ValidationError as error:
-            raise refused_value(error) from None
+        spec = specify_alignment(
+            log,
+            site=place,
+            sensor=sensor,
+            coarse={"kind": method} if isinstance(method, str) else method,
+            fine=fine,
+            gnss=path,
+            prefilter={"kind": prefilter} if isinstance(prefilter, str) else prefilter,
+        )
         run = run_specified(spec, None, progress)
         return _moved(replace(run, memory=memory), folder, NOWHERE)
 
@@ -297,7 +291,7 @@ def specify_alignment(
     if sensor is None:
         raise ConfigError("api.no-sensor-for-alignment", quantity=called("sensor"))
     alone = not fine or coarse.get("kind") in NOT_BEFORE_FINE
-    return alignment_spec(
+    return AlignmentSpec.checked(
         {
             "name": Path(log.log.path).resolve().stem,
             "log": log.log.model_dump(exclude_none=True),
@@ -419,7 +413,7 @@ def _moved_outage(run: OutageRun, old: Path, new: Path) -> OutageRun:
         return run
     return replace(
         run,
-        navigation=navigation_spec(moved_paths(run.navigation.plain(), old, new)),
+        navigation=NavigationSpec.checked(moved_paths(run.navigation.plain(), old, new)),
         inputs=moved_inputs(run.inputs, old, new, copied=True),
     )
 
@@ -459,10 +453,7 @@ def coast(
     """
     with _run_of(source) as (navigation, file, memory, folder):
         sensor = None if navigation is not None else str(source)
-        try:
-            spec = coast_spec({"outage_s": float(outage_s), "sensor": sensor, **options})
-        except ValidationError as error:
-            raise refused_value(error) from None
+        spec = specify(CoastSpec, outage_s=float(outage_s), sensor=sensor, **options)
         run = run_outage(spec, navigation, file, progress)
         return _moved_outage(replace(run, memory=memory), folder, NOWHERE)
 
@@ -477,7 +468,7 @@ def _run_of(
         return
     with source.memory.as_files() if source.memory.tables else nullcontext(NOWHERE) as folder:
         table = moved_paths(source.spec.plain(), NOWHERE, folder)
-        yield navigation_spec(table), None, source.memory, folder
+        yield NavigationSpec.checked(table), None, source.memory, folder
 
 
 def run_outage(

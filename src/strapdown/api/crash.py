@@ -13,7 +13,6 @@ import pandas as pd
 
 from strapdown.bundle.seal import Seal, check_destination
 from strapdown.config.crash_case import CaseSpec
-from strapdown.config.crash_case_file import read_case_spec
 from strapdown.crash.case import CaseResult, run_case
 from strapdown.crash.reconstruction import UnitReconstruction
 from strapdown.errors import ConfigError
@@ -198,7 +197,7 @@ def reconstruct(
         given = cases[number]
         if isinstance(given, CaseSpec):
             return run_case(given, None, part)
-        return run_case(read_case_spec(Path(given)), Path(given), part)
+        return run_case(CaseSpec.read(Path(given)), Path(given), part)
 
     own = {f.name for f in fields(CaseResult)}
     results = [run(number) for number in range(len(cases))]

@@ -9,13 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from pydantic import ValidationError
 
 from strapdown.api.reading import GnssFile, ImuFile, imu_input, table_input
 from strapdown.config.alignment import LogTable
 from strapdown.config.navigation import NavigationSpec
-from strapdown.config.navigation_file import navigation_spec, read_navigation_spec
-from strapdown.config.spec import misfit, specify
+from strapdown.config.spec import specify
 from strapdown.errors import ConfigError
 from strapdown.formats.clocks import on_clock_of
 from strapdown.progress import Progress, silent
@@ -217,7 +215,7 @@ def navigate(
                 file=Path(imu).name,
                 quantity="measurements, sensor, start, reference, options",
             )
-        spec = read_navigation_spec(imu)
+        spec = NavigationSpec.read(imu)
         return run_navigation(smoothed_too(spec) if smooth else spec, Path(imu), progress)
     memory = _memory(imu, measurements, reference)
     with memory.as_files() if memory.tables else nullcontext(NOWHERE) as folder:
@@ -230,10 +228,7 @@ def navigate(
             extra["truth"] = {"path": _path_in(reference, "reference", memory, folder)}
         if smooth:
             extra["smoother"] = {"kind": "rts"}
-        try:
-            spec = specify_navigation(log, aids, sensor=sensor, start=start, options=extra)
-        except ValidationError as error:
-            raise refused_value(error) from None
+        spec = specify_navigation(log, aids, sensor=sensor, start=start, options=extra)
         run = run_navigation(spec, None, progress)
         return replace(run, memory=memory).in_folder(folder, NOWHERE)
 
@@ -247,7 +242,7 @@ def smoothed_too(spec: NavigationSpec) -> NavigationSpec:
     """
     if spec.smoother.kind != "none":
         return spec
-    return navigation_spec({**spec.plain(), "smoother": {"kind": "rts"}})
+    return NavigationSpec.checked({**spec.plain(), "smoother": {"kind": "rts"}})
 
 
 def specify_navigation(
@@ -332,7 +327,7 @@ def specify_navigation(
         whole["aiding"] = {
             name: {**(proposed if name == receiver else {}), **aid} for name, aid in aids.items()
         }
-    return navigation_spec({**whole, **(options or {})})
+    return NavigationSpec.checked({**whole, **(options or {})})
 
 
 def _site(
@@ -410,11 +405,3 @@ def _aid_in(one: Measurement, memory: Memory, folder: Path) -> dict[str, Any]:
 
 def _path_in(data: Any, name: str, memory: Memory, folder: Path) -> str:
     return str(folder / f"{name}.csv") if f"{name}.csv" in memory.tables else str(data)
-
-
-def refused_value(error: ValidationError) -> ConfigError:
-    """Convert a pydantic error in the arguments of a run."""
-    first = error.errors()[0]
-    context = first.get("ctx", {})
-    place = [str(p) for p in first["loc"]] + ([context["key"]] if context.get("key") else [])
-    return ConfigError(misfit(first), quantity=", ".join(place))

@@ -17,7 +17,6 @@ from strapdown.config import (
     ScenarioSpec,
     SimulateSpec,
     TrajectorySpec,
-    read_trajectory_spec,
     specify,
 )
 from strapdown.errors import ConfigError
@@ -183,7 +182,7 @@ def simulate(
         "sensor": sensor,
     }
     if name.lower().endswith(".toml"):
-        return _trajectory(read_trajectory_spec(Path(name), **told), receiver)
+        return _trajectory(TrajectorySpec.read(Path(name), **told), receiver)
     packaged = files("strapdown").joinpath("simulation", "trajectories")
     trajectories = {
         entry.name.removesuffix(".toml"): entry
@@ -192,7 +191,7 @@ def simulate(
     }
     if name.lower() in trajectories:
         with as_file(trajectories[name.lower()]) as path:
-            return _trajectory(read_trajectory_spec(path, **told), receiver)
+            return _trajectory(TrajectorySpec.read(path, **told), receiver)
     if name.lower() not in SCENARIOS:
         raise ConfigError(
             "report.no-scenario-no-crash",

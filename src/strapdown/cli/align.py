@@ -116,7 +116,7 @@ def align(
     from strapdown.cli.align_tables import print_alignment
     from strapdown.cli.console import WORDS, Stopwatch, print_findings, print_seal, progress
     from strapdown.cli.result_folder import default_folder, refuse_result, source_name
-    from strapdown.config.alignment_file import read_alignment_spec
+    from strapdown.config.alignment import AlignmentSpec
 
     given: dict[str, Any] = {
         **asdict(flags),
@@ -130,7 +130,7 @@ def align(
     if own:
         refuse_beside_file(source, given)
         WORDS.set("file")
-    asked = read_alignment_spec(source) if own else None
+    asked = AlignmentSpec.read(source) if own else None
     folder = out or default_folder(source, "align", None if asked is None else source_name(asked))
     check_destination(folder, write.force)
     with progress(write.quiet or write.json) as show:

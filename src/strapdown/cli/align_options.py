@@ -6,13 +6,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
+from strapdown.api.alignment import specify_alignment
 from strapdown.api.reading import ImuFile
 from strapdown.cli.shared_options import log_keys
 from strapdown.config.alignment import AlignmentSpec, LogTable
-from strapdown.config.spec import misfit
-from strapdown.errors import ConfigError, Finding
+from strapdown.config.spec import specify
+from strapdown.errors import ConfigError
 
 __all__ = [
     "LOG_FLAGS",
@@ -20,7 +19,6 @@ __all__ = [
     "flag_of",
     "module_of_flag",
     "refuse_beside_file",
-    "refused_flag",
     "spec_of_flags",
 ]
 
@@ -110,15 +108,9 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
     DataError
         The log cannot be read.
     """
-    from strapdown.api.alignment import specify_alignment
-
-    try:
-        table = LogTable(path=str(log), **log_keys(given))
-    except ValidationError as error:
-        first = error.errors()[0]
-        raise refused_flag({**first, "loc": ("log", *first["loc"])}) from None
     site = {"lat_deg": given["lat"], "lon_deg": given["lon"], "alt_m": given["alt"]}
     try:
+        table = specify(LogTable, path=str(log), **log_keys(given))
         return specify_alignment(
             ImuFile(table, given["axes"]),
             site={key: float(value) for key, value in site.items() if value is not None},
@@ -129,39 +121,29 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
             prefilter=module_of_flag(given["prefilter"] or "none"),
             called=lambda argument: f"--{argument}",
         )
-    except ValidationError as error:
-        raise refused_flag(error.errors()[0]) from None
     except ConfigError as error:
         raise as_flag(error) from None
 
 
-def refused_flag(error: Any, flag: Callable[[str], str] | None = None) -> ConfigError:
-    """Convert a pydantic error to one that names the option.
+def as_flag(error: ConfigError, flag: Callable[[str], str] | None = None) -> ConfigError:
+    """Return the error, or each of several, with the option instead of the key path.
 
     Parameters
     ----------
-    error : dict
-        One of `ValidationError.errors`.
+    error : ConfigError
     flag : callable, optional
         Flag of a key path of a specification; those of ``strapdown align``, if not given.
     """
-    path = [str(p) for p in error["loc"]]
-    finding = misfit(error)
-    if error["type"] == "missing":
-        finding = Finding("cli.module-option-missing", key=path[-1])
-    elif error["type"] == "refused" and error["ctx"]["key"]:
-        path.append(error["ctx"]["key"])
-    return ConfigError(finding, quantity=(flag or _flag)(", ".join(path)))
-
-
-def as_flag(error: ConfigError, flag: Callable[[str], str] | None = None) -> ConfigError:
-    """Return the error with the option instead of the key path of a specification."""
-    return error.replaced(quantity=(flag or _flag)(error.finding.quantity or ""))
+    flag = flag or _flag
+    if error.finding.code == "config.several":
+        faults = [f.replace(quantity=flag(f.quantity or "")) for f in error.finding.data["faults"]]
+        return error.replaced(faults=faults)
+    return error.replaced(quantity=flag(error.finding.quantity or ""))
 
 
 def _flag(place: str) -> str:
-    if place in FLAGS:
-        return FLAGS[place]
+    if flag := FLAGS.get(place) or FLAGS.get(f"log, {place}"):
+        return flag
     # A path that names a flag already is kept.
     said = [part for part in place.split(", ") if part.startswith("--")]
     if said:

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from strapdown.cli.align_options import as_flag, module_of_flag
-from strapdown.config.coast import CoastSpec, coast_spec
+from strapdown.config.coast import CoastSpec
+from strapdown.config.spec import specify
 from strapdown.errors import ConfigError
 
 __all__ = ["coast_of_flags"]
@@ -91,7 +92,7 @@ def coast_of_flags(
         **run,
     }
     try:
-        return coast_spec(table)
+        return specify(CoastSpec, **table)
     except ConfigError as error:
         raise as_flag(error, _flag) from None
 

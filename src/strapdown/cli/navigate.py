@@ -158,7 +158,8 @@ def navigate(
     from strapdown.cli.navigate_options import FLAGS, navigation_of_flags
     from strapdown.cli.navigate_tables import print_navigation
     from strapdown.cli.result_folder import default_folder, refuse_result, source_name
-    from strapdown.config.navigation_file import read_navigation_spec
+    from strapdown.config.navigation import NavigationSpec
+    from strapdown.live.replay import Replay, parse_pace
     from strapdown.systems.navigation_run import run_navigation
 
     refuse_result(source, "log")
@@ -175,7 +176,7 @@ def navigate(
         refuse_beside_file(source, {**given, "smooth": None}, FLAGS)
     if own:
         WORDS.set("file")
-    asked = read_navigation_spec(source) if own else None
+    asked = NavigationSpec.read(source) if own else None
     if asked is not None and flags.smooth:
         asked = smoothed_too(asked)
     folder = out or default_folder(

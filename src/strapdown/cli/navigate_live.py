@@ -17,7 +17,7 @@ from strapdown.bundle.seal import Seal, write_latency, write_timing
 from strapdown.cli.console import WORDS, Stopwatch, print_seal, progress
 from strapdown.cli.latency_table import print_latency
 from strapdown.cli.navigate_tables import print_navigation
-from strapdown.config.navigation_file import read_navigation_spec
+from strapdown.config.navigation import NavigationSpec
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
 from strapdown.live.clock import MachineClock
 from strapdown.live.run import LiveRun, live_spec, receive, result_of
@@ -74,7 +74,7 @@ def navigate_live(
     if received.exists():
         raise ConfigError("cli.received-before", file=str(received), quantity="--out")
     clock = MachineClock()
-    spec = live_spec(read_navigation_spec(file))
+    spec = live_spec(NavigationSpec.read(file))
     live = receive(
         spec,
         open_source(where, clock, sys.stdin.buffer),

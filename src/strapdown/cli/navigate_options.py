@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from strapdown.api.navigation import specify_navigation
 from strapdown.api.reading import ImuFile
-from strapdown.cli.align_options import LOG_FLAGS, as_flag, refused_flag
+from strapdown.cli.align_options import LOG_FLAGS, as_flag
 from strapdown.cli.shared_options import log_keys
 from strapdown.config.alignment import LogTable
 from strapdown.config.navigation import NavigationSpec
+from strapdown.config.spec import specify
 from strapdown.errors import ConfigError
 
 __all__ = ["FLAGS", "navigation_of_flags"]
@@ -54,14 +53,6 @@ def navigation_of_flags(log: Path, given: Mapping[str, Any]) -> NavigationSpec:
     DataError
         A file cannot be read.
     """
-    try:
-        table = LogTable(
-            path=str(log),
-            **log_keys(given),
-        )
-    except ValidationError as error:
-        first = error.errors()[0]
-        raise refused_flag({**first, "loc": ("log", *first["loc"])}, _flag) from None
     aids: dict[str, dict[str, Any]] = {}
     if given["gnss"] is not None:
         arm = given["lever_arm"]
@@ -81,6 +72,7 @@ def navigation_of_flags(log: Path, given: Mapping[str, Any]) -> NavigationSpec:
         "smoother": given["smooth"] and {"kind": "rts"},
     }
     try:
+        table = specify(LogTable, path=str(log), **log_keys(given))
         return specify_navigation(
             ImuFile(table, given["axes"]),
             aids,
@@ -89,14 +81,12 @@ def navigation_of_flags(log: Path, given: Mapping[str, Any]) -> NavigationSpec:
             options={name: table for name, table in further.items() if table},
             called=lambda argument: f"--{argument}",
         )
-    except ValidationError as error:
-        raise refused_flag(error.errors()[0], _flag) from None
     except ConfigError as error:
         raise as_flag(error, _flag) from None
 
 
 def _flag(place: str) -> str:
-    return FLAGS.get(place, place)
+    return FLAGS.get(place) or FLAGS.get(f"log, {place}", place)
 
 
 def _arm(text: str) -> tuple[float, float, float]:

@@ -11,9 +11,7 @@ from strapdown.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
     from strapdown.config.crash_case import CaseSpec
-    from strapdown.config.crash_case_file import read_case_spec
-    from strapdown.config.crash_simulation import CrashSimulationSpec
-    from strapdown.config.trajectory import TrajectorySpec, read_trajectory_spec
+    from strapdown.config.motions import TrajectorySpec
 
 __all__ = [
     "CaseSpec",
@@ -22,8 +20,6 @@ __all__ = [
     "ScenarioSpec",
     "SimulateSpec",
     "TrajectorySpec",
-    "read_case_spec",
-    "read_trajectory_spec",
     "specify",
 ]
 
@@ -31,9 +27,7 @@ load_on_first_use(
     __name__,
     {
         "crash_case": "CaseSpec",
-        "crash_case_file": "read_case_spec",
-        "crash_simulation": "CrashSimulationSpec",
-        "trajectory": "TrajectorySpec read_trajectory_spec",
+        "motions": "TrajectorySpec",
     },
 )
 
@@ -68,4 +62,15 @@ class SimulateSpec(Spec):
     """One run of the simulator."""
 
     scenario: ScenarioSpec
+    formats: tuple[str, ...] = ("csv",)
+
+
+class CrashSimulationSpec(Spec):
+    """One crash and its recorders; without a rate each recorder uses its own."""
+
+    name: str
+    units: tuple[str, ...] = ()
+    rate_hz: FiniteFloat | None = Field(default=None, gt=0.0)
+    sampling: Literal["instantaneous", "mean"] = "instantaneous"
+    seed: int = Field(default=0, ge=0)
     formats: tuple[str, ...] = ("csv",)

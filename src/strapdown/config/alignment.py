@@ -1,51 +1,92 @@
-"""Configuration of an alignment: every key with its unit."""
+"""Configuration of an alignment, and the tables that it shares with navigation."""
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, StrictBool, StrictInt, model_validator
+import numpy as np
+from pydantic import BeforeValidator, Field, StrictBool, StrictInt, model_validator
 
-from strapdown.config.choice import ChoiceSpec
-from strapdown.config.crash_case import (
+from strapdown.alignment.alignment import Site
+from strapdown.alignment.fine import FineAlignment
+from strapdown.alignment.stationary import home_of
+from strapdown.config.choice import NONE, ChoiceSpec, Kinds
+from strapdown.config.motions import AngleWaveSpec
+from strapdown.config.reading import FileSpec
+from strapdown.config.spec import (
+    Fault,
     FileName,
     NotNegative,
     Number,
     OneOrThree,
+    Position,
     Positive,
+    Spec,
     Triple,
     Word,
     Words,
+    accepted_by,
+    refuse,
+    refused,
 )
-from strapdown.config.motions import AngleWaveSpec
-from strapdown.config.spec import TableSpec, refuse
+from strapdown.ellipsoids import find_ellipsoid
+from strapdown.estimation.error_filter import ErrorFilter
+from strapdown.formats.columns import parse_axes, parse_unit
+from strapdown.sensors.catalogue import load_sensor
+from strapdown.sensors.triad_errors import NAMED_AXES, check_axes_matrix
+from strapdown.sensors.uncertainty import ImuUncertainty, stated_imu
 
 __all__ = [
+    "MOST_SAMPLES",
+    "NOT_BEFORE_FINE",
+    "STAGES",
     "AlignmentSpec",
     "AxesTable",
     "CoarseSpec",
+    "EllipsoidName",
     "FineSpec",
     "GnssTable",
     "LogTable",
     "OutputTable",
     "PrefilterSpec",
     "ReferenceTable",
+    "SensorName",
     "SensorsTable",
     "SimulationTable",
     "SiteTable",
+    "coarse_faults",
+    "sensor_faults",
+    "sensors_of",
+    "slot",
+    "source_faults",
 ]
 
 Matrix = tuple[Triple, Triple, Triple]
+#: An hour at 4 kHz.
+MOST_SAMPLES = 1.5e7
+#: Coarse alignments that need GNSS fixes.
+NEEDS_GNSS = ("gnss_course",)
+#: Coarse alignments that cannot start a stationary fine filter, and the code of the reason.
+NOT_BEFORE_FINE = {
+    "gnss_course": "config.course-before-fine",
+    "levelling": "config.levelling-before-fine",
+}
 
 
-class LogTable(TableSpec):
+#: A sensor of the catalogue, or a file.
+SensorName = Annotated[FileName, accepted_by(load_sensor)]
+EllipsoidName = Annotated[Word, accepted_by(find_ellipsoid)]
+
+
+class LogTable(Spec):
     """A recorded log, how to read it, and the part to use."""
 
-    path: FileName
+    path: FileName = Field(description="the log, from the folder of this file")
     columns: dict[Word, Word] = Field(default_factory=dict)
-    gyro_unit: Word | None = None
-    accel_unit: Word | None = None
-    time_unit: Word | None = None
+    gyro_unit: Annotated[Word, accepted_by(parse_unit, "gyro")] | None = None
+    accel_unit: Annotated[Word, accepted_by(parse_unit, "accel")] | None = None
+    time_unit: Annotated[Word, accepted_by(parse_unit, "time")] | None = None
     sampling: Literal["instantaneous", "mean"] | None = None
     rate_hz: Positive | None = None
     repair: StrictBool = False
@@ -54,17 +95,32 @@ class LogTable(TableSpec):
     #: From `from_s`, or from the first stamp.
     duration_s: Positive | None = None
 
+    @model_validator(mode="after")
+    def _one_span(self) -> LogTable:
+        if self.to_s is not None and self.duration_s is not None:
+            raise refuse("duration_s", "config.span-stated-twice")
+        if self.from_s is not None and self.to_s is not None and not self.from_s < self.to_s:
+            raise refuse("to_s", "config.end-before-begin", begin=self.from_s)
+        return self
 
-class GnssTable(TableSpec):
+    @property
+    def length_s(self) -> float | None:
+        """Length of the used part; None if it is not stated."""
+        if self.from_s is not None and self.to_s is not None:
+            return self.to_s - self.from_s
+        return self.duration_s
+
+
+class GnssTable(Spec):
     """GNSS fixes for an alignment in motion."""
 
     path: FileName
 
 
-class SimulationTable(TableSpec):
+class SimulationTable(Spec):
     """A simulated record at the site: stationary, or rocking about it."""
 
-    duration_s: Positive
+    duration_s: Positive = Field(description="how long to simulate")
     rate_hz: Positive = 100.0
     seed: StrictInt = Field(default=0, ge=0)
     sampling: Literal["instantaneous", "mean"] = "mean"
@@ -75,10 +131,10 @@ class SimulationTable(TableSpec):
     pitch_waves: tuple[AngleWaveSpec, ...] = ()
     heading_waves: tuple[AngleWaveSpec, ...] = ()
     #: Catalogue name or file; by default that of [sensors].
-    sensor: FileName | None = None
+    sensor: SensorName | None = None
 
 
-class AxesTable(TableSpec):
+class AxesTable(Spec):
     """Sensor axes relative to the body: as letters or words, by a name, or as matrices."""
 
     axes: Word | None = None
@@ -99,20 +155,31 @@ class AxesTable(TableSpec):
             raise refuse(apart[0], "config.matrix-missing", other=other)
         return self
 
+    def faults(self) -> Iterator[Fault]:
+        """Yield what makes it no axes of sensors."""
+        if self.axes is not None:
+            yield from refused(("axes", "axes"), parse_axes, self.axes)
+        if self.design is not None and self.design not in NAMED_AXES:
+            data = {"word": self.design, "known": NAMED_AXES}
+            yield Fault(("axes", "design"), "config.unknown-axes", data)
+        for name in ("matrix", "gyro_matrix", "accel_matrix"):
+            if getattr(self, name) is not None:
+                yield from refused(("axes", name), check_axes_matrix, getattr(self, name), name)
 
-class SiteTable(TableSpec):
+
+class SiteTable(Position):
     """Position of the body."""
 
-    lat_deg: Number
-    lon_deg: Number
-    alt_m: Number = 0.0
-    ellipsoid: Word = "wgs84"
+    ellipsoid: EllipsoidName = "wgs84"
 
 
-class SensorsTable(TableSpec):
+class SensorsTable(Spec):
     """Sensor uncertainty: a data sheet, and values that replace it."""
 
-    sensor: FileName | None = None
+    sensor: SensorName | None = Field(
+        default=None,
+        description="a sensor of the catalogue (strapdown modules), or a .toml file of your own",
+    )
     gyro: dict[Word, OneOrThree] = Field(default_factory=dict)
     accel: dict[Word, OneOrThree] = Field(default_factory=dict)
 
@@ -120,45 +187,59 @@ class SensorsTable(TableSpec):
 class CoarseSpec(ChoiceSpec):
     """Coarse alignment over the first part of the record, or over all of it."""
 
-    kind: str = "inertial_frame"
     duration_s: Positive | None = None
 
 
 class PrefilterSpec(ChoiceSpec):
     """Filter applied to the samples before the alignment."""
 
-    kind: str = "none"
-
 
 class FineSpec(ChoiceSpec):
     """Fine alignment: after the coarse alignment if that ends by itself, else over the record."""
 
-    kind: str = "filter"
     duration_s: Positive | None = None
 
 
-class ReferenceTable(TableSpec):
+class ReferenceTable(Spec):
     """Independent reference attitude to compare the result with."""
 
     source: Words = ""
     roll_deg: Number | None = None
     pitch_deg: Number | None = None
-    heading_deg: Number | None = None
+    heading_deg: Number | None = Field(
+        default=None, description="heading that is known from elsewhere"
+    )
     sd_deg: NotNegative = 0.0
     at: Literal["start", "end"] = "end"
 
 
-class OutputTable(TableSpec):
+class OutputTable(Spec):
     """Output files."""
 
     #: Rate of attitude.csv; by default every sample.
     rate_hz: Positive | None = 10.0
 
 
-class AlignmentSpec(TableSpec):
+def slot(kind: str) -> Any:
+    """Default of a slot."""
+    return Field(default={"kind": kind}, validate_default=True)
+
+
+#: Stages that a module fills, each with the validator of its table.
+STAGES: dict[str, Kinds] = {
+    one.slot: one
+    for one in (
+        Kinds("prefilter", NONE, True, PrefilterSpec),
+        Kinds("coarse", "inertial_frame", False, CoarseSpec),
+        Kinds("fine", "filter", True, FineSpec),
+    )
+}
+
+
+class AlignmentSpec(FileSpec):
     """One alignment; `prefilter`, `coarse` and `fine` are of the kinds that they name."""
 
-    unwritten: ClassVar[tuple[str, ...]] = ("name",)
+    called = "alignment"
 
     name: str = "alignment"
     title: Words = ""
@@ -166,21 +247,87 @@ class AlignmentSpec(TableSpec):
     simulation: SimulationTable | None = None
     gnss: GnssTable | None = None
     axes: AxesTable = AxesTable()
-    site: SiteTable
+    site: SiteTable = Field(description="where the body stands")
     sensors: SensorsTable = SensorsTable()
-    prefilter: PrefilterSpec = PrefilterSpec()
-    coarse: CoarseSpec = CoarseSpec()
-    fine: FineSpec = FineSpec()
+    prefilter: Annotated[PrefilterSpec, BeforeValidator(STAGES["prefilter"])] = slot(NONE)
+    coarse: Annotated[CoarseSpec, BeforeValidator(STAGES["coarse"])] = slot("inertial_frame")
+    fine: Annotated[FineSpec, BeforeValidator(STAGES["fine"])] = slot("filter")
     reference: ReferenceTable | None = None
     output: OutputTable = OutputTable()
 
-    @model_validator(mode="before")
-    @classmethod
-    def _source(cls, data: Any) -> Any:
-        if isinstance(data, dict):
-            there = [n for n in ("log", "simulation") if data.get(n) is not None]
-            if len(there) == 2:
-                raise refuse("simulation", "config.log-and-simulation")
-            if not there:
-                raise refuse("log", "config.log-missing-in-alignment")
-        return data
+    def faults(self) -> Iterator[Fault]:
+        """Yield inconsistent positions, axes, sensors, times and stages."""
+        yield from source_faults(self, "[simulation] and duration_s = …")
+        yield from self.axes.faults()
+        yield from sensor_faults(self)
+        longest = self.log.length_s if self.log is not None else None
+        if self.simulation is not None:
+            longest = self.simulation.duration_s
+            count = self.simulation.rate_hz * longest
+            if count > MOST_SAMPLES:
+                data: dict[str, Any] = {"count": count, "most": MOST_SAMPLES}
+                yield Fault(("simulation", "duration_s"), "config.samples-too-many", data)
+        if longest is not None and (self.coarse.duration_s or 0.0) > longest:
+            data = {"longest": longest}
+            yield Fault(("coarse", "duration_s"), "config.longer-than-record", data)
+        kind = self.coarse.kind
+        if self.gnss is not None and kind not in NEEDS_GNSS:
+            known = {"kind": kind, "other": NEEDS_GNSS[0]}
+            yield Fault(("gnss", "path"), "config.coarse-takes-no-fixes", known)
+        found = list(coarse_faults(self.coarse, self.fine, fixes=self.gnss is not None))
+        yield from found
+        if self.fine.kind != NONE and not found:
+            yield from refused(("fine",), self._begin_filter)
+
+    def _begin_filter(self) -> None:
+        """Initialize the filter of the fine alignment, which refuses incompatible parts."""
+        ellipsoid = find_ellipsoid(self.site.ellipsoid)
+        site = Site(self.site.lat_deg, self.site.lon_deg, self.site.alt_m, ellipsoid)
+        way: FineAlignment = self.fine.make(ellipsoid=self.site.ellipsoid)
+        # Near a pole the alignments themselves report whether north can be found.
+        if abs(self.site.lat_deg) <= way.mechanization.latitude_limit_deg:
+            filter_ = ErrorFilter(way.mechanization, way.model(), way.form, way.rule)
+            filter_.begin(home_of(site, 0.0), np.zeros((filter_.model.physical_size,) * 2))
+
+
+# --- shared by alignment and navigation ---------------------------------------------------
+
+
+def sensors_of(spec: Any) -> ImuUncertainty:
+    """Sensor uncertainty of the specification of an alignment or a navigation run.
+
+    Raises
+    ------
+    ConfigError
+        The sensor is unknown or incomplete.
+    """
+    stated: SensorsTable = spec.sensors
+    sensor = None if stated.sensor is None else load_sensor(stated.sensor)
+    return stated_imu(sensor, stated.gyro, stated.accel)
+
+
+def source_faults(spec: Any, others: str) -> Iterator[Fault]:
+    """Yield a log beside a simulation, and neither."""
+    if spec.log is not None and spec.simulation is not None:
+        yield Fault(("simulation",), "config.log-and-simulation")
+    if spec.log is None and spec.simulation is None and getattr(spec, "live", None) is None:
+        yield Fault(("log",), "config.log-missing", {"others": others})
+
+
+def sensor_faults(spec: Any) -> Iterator[Fault]:
+    """Yield what is not stated of the sensors, and of those of a simulation."""
+    stated, simulation = spec.sensors, spec.simulation
+    if stated.sensor is None and not stated.gyro and not stated.accel:
+        yield Fault(("sensors", "sensor"), "config.no-sensor")
+        return
+    yield from refused(("sensors",), sensors_of, spec)
+    if simulation is not None and simulation.sensor is None and stated.sensor is None:
+        yield Fault(("simulation", "sensor"), "config.no-sensor-to-simulate")
+
+
+def coarse_faults(coarse: ChoiceSpec, fine: ChoiceSpec, *, fixes: bool) -> Iterator[Fault]:
+    """Yield what a coarse alignment lacks, and whether a fine one can follow."""
+    if coarse.kind in NEEDS_GNSS and not fixes:
+        yield Fault(("coarse", "kind"), "config.course-without-fixes")
+    if coarse.kind in NOT_BEFORE_FINE and fine.kind != NONE:
+        yield Fault(("coarse", "kind"), NOT_BEFORE_FINE[coarse.kind])

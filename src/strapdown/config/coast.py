@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import Field, StrictInt, ValidationError, create_model
+from pydantic import BeforeValidator, Field, StrictInt, model_validator
 
-from strapdown.config.choice import SLOTS, ChoiceSpec, choice_form
-from strapdown.config.crash_case import FileName, NotNegative, Number, Positive
-from strapdown.config.spec import TableSpec, misfit
-from strapdown.errors import ConfigError
+from strapdown.config.choice import ChoiceSpec, Kinds
+from strapdown.config.spec import FileName, NotNegative, Number, Positive, Spec, refuse
 
-__all__ = ["CoastMotionTable", "CoastSpec", "CoastStartTable", "coast_spec"]
+__all__ = ["CoastMotionTable", "CoastSpec", "CoastStartTable"]
 
 #: Longest outage, s: predictions beyond a day are not meaningful.
 LONGEST = 86_400.0
+#: Measurements that can remain along a stated motion: each is evaluated at the true state.
+KEPT = ("no_slip", "odometer", "zero_velocity", "zero_rate")
 
 
-class CoastStartTable(TableSpec):
+class CoastStartTable(Spec):
     """State at the start of the outage: after a drive with fixes, or as stated."""
 
     #: Length of the preceding drive with fixes; 0 starts from the end of an alignment.
-    aided_s: float = Field(default=600.0, ge=0.0, le=36_000.0, strict=True)
+    aided_s: Annotated[Number, Field(ge=0.0, le=36_000.0)] = 600.0
     #: Of the fixes, one per second.
     fix_position_sd_m: Positive = 1.5
     fix_velocity_sd_m_per_s: Positive = 0.05
@@ -36,7 +36,7 @@ class CoastStartTable(TableSpec):
     accel_bias_sd_ug: NotNegative | None = None
 
 
-class CoastMotionTable(TableSpec):
+class CoastMotionTable(Spec):
     """Level motion during the outage, and its position."""
 
     #: Stationary if zero.
@@ -46,19 +46,21 @@ class CoastMotionTable(TableSpec):
     #: Positive to the right.
     turn_rate_deg_per_s: Number = 0.0
     heading_deg: Number = 45.0
-    lat_deg: float = Field(default=45.0, ge=-85.0, le=85.0, strict=True)
+    lat_deg: Annotated[Number, Field(ge=-85.0, le=85.0)] = 45.0
 
 
-class CoastSpec(TableSpec):
+class CoastSpec(Spec):
     """Predicted outage drift of a sensor along a stated motion, or of a navigation run."""
 
-    outage_s: float = Field(gt=0.0, le=LONGEST, strict=True)
+    outage_s: Annotated[Number, Field(gt=0.0, le=LONGEST)]
     #: Catalogue name or file; omitted if a navigation run states it.
     sensor: FileName | None = None
     start: CoastStartTable = CoastStartTable()
     motion: CoastMotionTable = CoastMotionTable()
     #: Measurements that remain available, by kind.
-    aiding: TableSpec = TableSpec()
+    aiding: dict[str, Annotated[ChoiceSpec, BeforeValidator(Kinds("aiding"))]] = Field(
+        default_factory=dict
+    )
     #: For a navigation run: start of the outage; by default at evenly spaced instants.
     at_s: Number | None = None
     #: Alternatively the part of the log that contains them; by default all of it.
@@ -67,45 +69,13 @@ class CoastSpec(TableSpec):
     duration_s: Positive | None = None
     places: StrictInt = Field(default=10, ge=1, le=100)
 
-
-#: Measurements that can remain along a stated motion: each is evaluated at the true state.
-KEPT = ("no_slip", "odometer", "zero_velocity", "zero_rate")
-
-
-def coast_spec(table: Mapping[str, Any]) -> CoastSpec:
-    """Create a specification from plain data, as from a command or a sealed folder.
-
-    Parameters
-    ----------
-    table : mapping
-
-    Returns
-    -------
-    CoastSpec
-
-    Raises
-    ------
-    ConfigError
-        A measurement cannot remain, or a value does not fit; the quantity names table and key.
-    """
-    aiding = table.get("aiding") or {}
-    forms: dict[str, Any] = {}
-    for kind, given in aiding.items():
-        if kind not in KEPT:
-            raise ConfigError("config.aid-not-kept", quantity="aiding", kind=kind, kept=KEPT)
-        form = choice_form(SLOTS["aiding"], {"kind": kind, **given}, ChoiceSpec, path=(kind,))
-        forms[kind] = (form, ...)
-    kept = create_model("Kept", __base__=TableSpec, **forms)
-    whole = create_model("Coast", __base__=CoastSpec, aiding=(kept, ... if forms else kept()))
-    try:
-        return whole.model_validate({k: v for k, v in table.items() if v is not None})
-    except ValidationError as error:
-        raise _refused(error.errors()[0]) from None
-
-
-def _refused(error: Any) -> ConfigError:
-    """Return a pydantic error as an error at the table and key."""
-    place = [str(part) for part in error["loc"]]
-    if error["type"] == "refused":
-        place += [error["ctx"]["key"]]
-    return ConfigError(misfit(error), quantity=", ".join(place))
+    @model_validator(mode="before")
+    @classmethod
+    def _kept(cls, data: Any) -> Any:
+        """Name each measurement by its kind; None leaves a default."""
+        given = {key: value for key, value in dict(data).items() if value is not None}
+        aiding: Mapping[str, Any] = given.get("aiding", {})
+        for kind in aiding:
+            if kind not in KEPT:
+                raise refuse("aiding", "config.aid-not-kept", kind=kind, kept=KEPT)
+        return {**given, "aiding": {kind: {"kind": kind, **one} for kind, one in aiding.items()}}

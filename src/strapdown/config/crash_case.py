@@ -1,73 +1,73 @@
-"""Configuration of a crash case: every key with its unit."""
+"""Configuration of a crash case: every key with its unit, and what it means."""
 
 from __future__ import annotations
 
-import math
+from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, StrictBool, StrictInt
+from pydantic import BeforeValidator, Field, StrictBool, StrictInt
 
-from strapdown.config.spec import TableSpec, file_name, refuse, word, words
+from strapdown.config.reading import FileSpec
+from strapdown.config.spec import (
+    Angle,
+    Channel,
+    Fault,
+    FileName,
+    NotNegative,
+    Number,
+    OneOrThree,
+    Pair,
+    Positive,
+    Several,
+    Sizes,
+    Spec,
+    Triple,
+    Word,
+    Words,
+    is_number,
+    one_line,
+    refuse,
+)
 from strapdown.config.toml_file import shown
 
-# A number in quotation marks, or true for 1, is rejected.
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Positive = Annotated[Number, Field(gt=0.0)]
-NotNegative = Annotated[Number, Field(ge=0.0)]
-Pair = tuple[Number, Number]
-Triple = tuple[Number, Number, Number]
-#: One line of text, suitable for titles, tables and file names.
-Words = Annotated[str, AfterValidator(words)]
-Word = Annotated[str, AfterValidator(word)]
-FileName = Annotated[str, AfterValidator(file_name)]
-
-
-def _listed(value: Any) -> Any:
-    return [value] if isinstance(value, str) else value
-
-
-def _text(value: Any) -> Any:
-    # Channels of some records are numbered.
-    return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
-
-
-def _one_or_three(value: Any) -> Any:
-    several = value if isinstance(value, list | tuple) and len(value) == 3 else [value]
-    if not all(_is_number(part) for part in several):
-        raise refuse("", "config.not-one-or-three-numbers", given=shown(value))
-    return tuple(float(v) for v in several) if len(several) == 3 else float(several[0])
-
-
-def _sizes(value: float | Triple) -> float | Triple:
-    if min(value if isinstance(value, tuple) else (value,)) < 0.0:
-        raise refuse("", "config.negative-size", given=shown(value))
-    return value
+__all__ = [
+    "AssumedSpec",
+    "CaseSpec",
+    "EntrySpec",
+    "OptionsSpec",
+    "PointSpec",
+    "ReferenceSpec",
+    "TriadSpec",
+    "UnitSpec",
+    "VehicleSpec",
+]
 
 
 def _number_or_words(value: Any) -> Any:
     if isinstance(value, str):
-        return words(value)
-    if not _is_number(value):
+        return one_line(value)
+    if not is_number(value):
         raise refuse("", "config.not-number-or-text", given=shown(value))
     return float(value)
 
 
-def _is_number(value: Any) -> bool:
-    try:
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        return number and math.isfinite(float(value))
-    except OverflowError:
-        return False
-
-
 #: Of an injury-risk model.
 Input = Annotated[float | str, BeforeValidator(_number_or_words)]
-OneOrThree = Annotated[float | Triple, BeforeValidator(_one_or_three)]
-Listed = BeforeValidator(_listed)
-Channel = Annotated[Word, BeforeValidator(_text)]
+#: Above any car's speed on a road, and below most speeds in km/h entered as m/s.
+FASTEST = 90.0
+Speed = Annotated[Number, Field(ge=-FASTEST, le=FASTEST)]
+#: Two of three such measurements lie within it.
+AngleSd = Annotated[Number, Field(ge=0.0, le=180.0)]
+Tilt = Annotated[Number, Field(ge=-90.0, le=90.0)]
+TiltSd = Annotated[Number, Field(ge=0.0, le=90.0)]
+#: Of a measured position: a larger one is probably in another unit.
+PositionSd = Annotated[Number, Field(ge=0.0, le=2.0)]
+#: Of a vehicle on a road.
+Size = Annotated[Number, Field(ge=0.3, le=30.0)]
+_FROM = "from the origin that all positions share"
 
 
-class VehicleSpec(TableSpec):
+class VehicleSpec(Spec):
     """The vehicle, as a report draws and describes it.
 
     Its front is `front_m` ahead of the origin of all positions; by default the origin is in the
@@ -75,134 +75,227 @@ class VehicleSpec(TableSpec):
     right, in order around it.
     """
 
-    name: Words = ""
-    mass_kg: Positive | None = None
-    length_m: Positive = 4.5
-    width_m: Positive = 1.8
-    front_m: Number | None = None
-    outline_m: tuple[Pair, ...] = ()
+    name: Words = Field(default="", description="make, model and year of the vehicle")
+    mass_kg: Annotated[Number, Field(ge=20.0, le=100_000.0)] | None = Field(
+        default=None, description="mass of the vehicle with its load"
+    )
+    length_m: Size = Field(default=4.5, description="overall length of the vehicle")
+    width_m: Size = Field(default=1.8, description="width of the vehicle without mirrors")
+    front_m: Number | None = Field(
+        default=None,
+        description="how far the front of the vehicle is ahead of the origin of positions",
+    )
+    outline_m: tuple[Pair, ...] = Field(
+        default=(),
+        description="corners of the vehicle from above: forward, right of each, around it",
+    )
 
 
-class PointSpec(TableSpec):
+class PointSpec(Spec):
     """The point whose motion is reconstructed."""
 
-    name: Words = "reference point"
-    position_m: Triple = (0.0, 0.0, 0.0)
+    name: Words = Field(default="reference point", description="what the reference point is")
+    position_m: Triple = Field(
+        default=(0.0, 0.0, 0.0), description=f"forward, right, down of the reference point {_FROM}"
+    )
 
 
-class EntrySpec(TableSpec):
+class EntrySpec(Spec):
     """Motion of the vehicle at one instant, and its uncertainty."""
 
-    kind: Literal["speed", "standstill", "gnss"] = "speed"
-    source: str = ""
-    speed_m_per_s: Number | None = None
-    speed_sd_m_per_s: NotNegative | None = None
-    time_s: Number = 0.0
-    heading_deg: Number = 0.0
-    heading_sd_deg: NotNegative = 0.0
-    slip_deg: Number = 0.0
-    slip_sd_deg: NotNegative = 0.0
+    kind: Literal["speed", "standstill", "gnss"] = Field(
+        default="speed", description="speed, standstill or gnss"
+    )
+    source: str = Field(
+        default="",
+        description="where the speed is from: a test's speed trap, a tachograph, skid marks",
+    )
+    speed_m_per_s: Speed | None = Field(
+        default=None, description="speed of the vehicle at the entry"
+    )
+    speed_sd_m_per_s: Annotated[Number, Field(ge=0.0, le=FASTEST / 3.0)] | None = Field(
+        default=None, description="standard deviation of that speed"
+    )
+    time_s: Annotated[Number, Field(ge=-600.0, le=600.0)] = Field(
+        default=0.0, description="instant of the entry, from the trigger"
+    )
+    heading_deg: Angle = Field(
+        default=0.0, description="heading of the vehicle at the entry, clockwise from north"
+    )
+    heading_sd_deg: AngleSd = 0.0
+    slip_deg: Angle = Field(default=0.0, description="direction of travel less heading, clockwise")
+    slip_sd_deg: AngleSd = 0.0
     climb_sd_m_per_s: NotNegative = 0.0
-    path: FileName | None = None
-    antenna_m: Triple | None = None
-    antenna_sd_m: NotNegative = 0.0
+    path: FileName | None = Field(default=None, description="file of the satellite fixes")
+    antenna_m: Triple | None = Field(
+        default=None, description=f"forward, right, down of the antenna {_FROM}"
+    )
+    antenna_sd_m: PositionSd = 0.0
 
 
-class TriadSpec(TableSpec):
+class TriadSpec(Spec):
     """One triad of sensors: its channels and their uncertainty.
 
     A channel is the name of a column or channel of the record, with a minus sign if it points
     the other way; an omitted axis is missing.
     """
 
-    name: Words = ""
-    path: FileName
-    channels: dict[Literal["x", "y", "z"], Channel] = Field(default_factory=dict)
-    time: Channel | None = None
-    time_unit: Word | None = None
-    rate_hz: Positive | None = None
-    unit: Word | None = None
-    sampling: Literal["instantaneous", "mean"] | None = None
-    sensor: FileName | None = None
+    name: Words = Field(default="", description="a name, to be told apart by")
+    path: FileName = Field(description="the file, from the folder of this one")
+    channels: dict[Literal["x", "y", "z"], Channel] = Field(
+        default_factory=dict,
+        description="the column or channel of each axis: x forward, y right, z down",
+    )
+    time: Channel | None = Field(default=None, description="column of the time")
+    time_unit: Word | None = Field(default=None, description="unit of the time: s, ms or us")
+    rate_hz: Positive | None = Field(default=None, description="samples in a second")
+    unit: Word | None = Field(
+        default=None, description="unit of the record: g or m/s2, deg/s or rad/s"
+    )
+    sampling: Literal["instantaneous", "mean"] | None = Field(
+        default=None, description="instantaneous or mean"
+    )
+    sensor: FileName | None = Field(
+        default=None, description="a sensor of the catalogue, or a .toml file of your own"
+    )
     #: Replaces the sensor's: keys of the sensor catalogue, each with its unit.
-    uncertainty: dict[Word, OneOrThree] = Field(default_factory=dict)
+    uncertainty: dict[Word, OneOrThree] = Field(
+        default_factory=dict,
+        description="what is not known of the sensor, from its data sheet",
+    )
 
 
-class AssumedSpec(TableSpec):
+class AssumedSpec(Spec):
     """Assumed values for missing axes and gyros, with standard deviations."""
 
-    turn_sd_deg: Annotated[OneOrThree, AfterValidator(_sizes)] | None = None
-    delta_v_sd_m_per_s: Annotated[OneOrThree, AfterValidator(_sizes)] | None = None
+    turn_sd_deg: Sizes | None = Field(
+        default=None,
+        description="by how much the vehicle may have turned, as a standard deviation",
+    )
+    delta_v_sd_m_per_s: Sizes | None = Field(
+        default=None,
+        description="how large delta-V along the missing axis may be, as a standard deviation",
+    )
     over_s: Pair = (0.0, 0.15)
-    because: str = ""
+    because: str = Field(default="", description="why that may be taken")
 
 
-class UnitSpec(TableSpec):
+class UnitSpec(Spec):
     """A recorder on the vehicle."""
 
-    name: Word
-    position_m: Triple = (0.0, 0.0, 0.0)
-    position_sd_m: NotNegative = 0.0
-    angles_deg: Triple = (0.0, 0.0, 0.0)
-    angles_sd_deg: NotNegative = 0.0
-    trigger_s: Number | None = None
-    trigger_sd_s: NotNegative = 0.0
-    accelerometers: tuple[TriadSpec, ...] = Field(min_length=1)
+    name: Word = Field(description="a name, to be told apart by")
+    position_m: Triple = Field(
+        default=(0.0, 0.0, 0.0),
+        description=f"forward, right, down of the recorder {_FROM}; delta-V and the direction of "
+        "force move with it",
+    )
+    position_sd_m: PositionSd = Field(
+        default=0.0,
+        description="standard deviation of each of these coordinates: how well it was measured",
+    )
+    angles_deg: tuple[Angle, Angle, Angle] = Field(
+        default=(0.0, 0.0, 0.0),
+        description="roll, pitch, heading that turn vehicle axes into the recorder's",
+    )
+    angles_sd_deg: TiltSd = Field(default=0.0, description="standard deviation of these angles")
+    trigger_s: Number | None = Field(
+        default=None, description="instant of the trigger on the recorder's clock"
+    )
+    trigger_sd_s: NotNegative = Field(default=0.0, description="standard deviation of that instant")
+    accelerometers: tuple[TriadSpec, ...] = Field(
+        min_length=1, description="one for each range, the lowest first"
+    )
     gyro: TriadSpec | None = None
-    gyro_from: Word | None = None
-    assumed: AssumedSpec | None = None
-    rest_s: Pair | None = None
-    levelling_deg: Pair | None = None
-    levelling_sd_deg: NotNegative | None = None
+    gyro_from: Word | None = Field(
+        default=None, description="name of the unit whose gyro turns with this one"
+    )
+    assumed: AssumedSpec | None = Field(
+        default=None, description="what is taken for axes and gyros that are not there"
+    )
+    rest_s: Pair | None = Field(
+        default=None,
+        description="start and end of the time in which the vehicle stood, from the trigger",
+    )
+    levelling_deg: tuple[Tilt, Tilt] | None = Field(
+        default=None, description="roll and pitch of the vehicle before the crash"
+    )
+    levelling_sd_deg: TiltSd | None = Field(
+        default=None, description="standard deviation of these angles"
+    )
 
 
-class ReferenceSpec(TableSpec):
+class ReferenceSpec(Spec):
     """Other known data of the crash, for comparison with the results."""
 
-    kind: Literal["path", "delta_v"]
-    name: Word
-    source: str = ""
-    #: Of a path: time, north, east, down of the reference point, with or without sd.
-    path: FileName | None = None
-    #: Of a change of velocity: along the axis, over the span; by default over the event.
-    delta_v_m_per_s: Number | None = None
+    kind: Literal["path", "delta_v"] = Field(description="path or delta_v")
+    name: Word = Field(description="what it is: a video, a barrier's force, another recorder")
+    source: str = Field(default="", description="where it is from")
+    path: FileName | None = Field(
+        default=None,
+        description="file of the path of the reference point: time, north, east, down",
+    )
+    delta_v_m_per_s: Speed | None = Field(
+        default=None, description="change of velocity along the axis, from time zero"
+    )
     delta_v_sd_m_per_s: NotNegative = 0.0
     axis: Literal["forward", "right", "resultant"] = "forward"
+    #: By default over the event.
     over_s: Pair | None = None
 
 
-class OptionsSpec(TableSpec):
+class OptionsSpec(Spec):
     """Options of the computation."""
 
-    window_s: Pair | None = None
+    window_s: Pair | None = Field(
+        default=None, description="start and end of the path, from the trigger"
+    )
     rate_hz: Positive = 200.0
     sampling: Literal["instantaneous", "mean"] = "instantaneous"
     clock: Literal["trigger", "correlation"] = "trigger"
     combine: StrictBool = True
-    peak_window_s: Positive = 0.030
-    gravity_m_per_s2: Positive = 9.80665
+    peak_window_s: Annotated[Positive, Field(le=1.0)] = 0.030
+    #: On the Earth, from the equator at altitude to the poles.
+    gravity_m_per_s2: Annotated[Number, Field(gt=9.7, lt=9.9)] = 9.80665
     zero_at: Literal["interval", "threshold"] = "interval"
     monte_carlo_runs: StrictInt = Field(default=2000, ge=0, le=100_000)
     seed: StrictInt = Field(default=0, ge=0)
-    #: Names of severity models; None selects those that apply to the crash type.
-    severity: Annotated[tuple[Word, ...] | None, Listed] = None
+    #: None selects those that apply to the crash type.
+    severity: Annotated[tuple[Word, ...] | None, Several] = Field(
+        default=None, description="names of models of injury risk"
+    )
     severity_inputs: dict[Word, Input] = Field(default_factory=dict)
-    formats: Annotated[tuple[Literal["csv", "mme"], ...], Listed] = ("csv",)
+    formats: Annotated[tuple[Literal["csv", "mme"], ...], Several] = ("csv",)
 
 
-class CaseSpec(TableSpec):
+class CaseSpec(FileSpec):
     """One crash case."""
 
-    unwritten: ClassVar[tuple[str, ...]] = ("name",)
+    called = "case"
+    looks_into_files: ClassVar[bool] = True
 
     name: str = "case"
-    title: Word
-    number: Words = ""
-    author: Words = ""
-    description: str = ""
+    title: Word = Field(description="what the case is called in the report")
+    number: Words = Field(default="", description="the number or sign of the case")
+    author: Words = Field(default="", description="who answers for the report")
+    description: str = Field(default="", description="what happened, in your words")
     vehicle: VehicleSpec = VehicleSpec()
-    point: PointSpec = PointSpec()
-    entry: EntrySpec
-    units: tuple[UnitSpec, ...] = Field(min_length=1)
-    references: tuple[ReferenceSpec, ...] = ()
+    point: PointSpec = Field(
+        default=PointSpec(), description="the point whose motion is reconstructed"
+    )
+    entry: EntrySpec = Field(
+        description="how the vehicle moved before the crash, and how that is known"
+    )
+    units: tuple[UnitSpec, ...] = Field(
+        min_length=1, description="one for each recorder on the vehicle"
+    )
+    references: tuple[ReferenceSpec, ...] = Field(
+        default=(), description="something else that is known of the crash"
+    )
     options: OptionsSpec = OptionsSpec()
+
+    def faults(self) -> Iterator[Fault]:
+        """Yield what is missing, implausible, or contradicts another value."""
+        # The checks need the sensor catalogue; a specification alone does not.
+        from strapdown.config.crash_checks import case_faults
+
+        return case_faults(self)

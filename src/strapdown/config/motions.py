@@ -1,45 +1,43 @@
-"""Configuration of motions on the Earth: every key with its unit."""
+"""Configuration of motions on the Earth and of simulated trajectories: every key with its unit."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
-from pydantic import Field, FiniteFloat, model_validator
+from pydantic import Field, StrictInt, model_validator
 
-from strapdown.config.spec import TableSpec, refuse
+from strapdown.config.reading import FileSpec
+from strapdown.config.spec import (
+    NotNegative,
+    Number,
+    Position,
+    Positive,
+    Several,
+    Spec,
+    Triple,
+    refuse,
+)
 
-__all__ = ["KINDS", "MANOEUVRES", "MotionSpec"]
-
-Positive = Annotated[FiniteFloat, Field(gt=0.0)]
-NotNegative = Annotated[FiniteFloat, Field(ge=0.0)]
-Triple = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
-
-
-class PlaceSpec(TableSpec):
-    """Initial position of a motion; the range of the angles is checked on use."""
-
-    lat_deg: FiniteFloat
-    lon_deg: FiniteFloat
-    alt_m: FiniteFloat = 0.0
+__all__ = ["KINDS", "MotionSpec", "TrajectorySpec"]
 
 
-class AngleWaveSpec(TableSpec):
+class AngleWaveSpec(Spec):
     """One sine component of an angle."""
 
-    amplitude_deg: FiniteFloat
+    amplitude_deg: Number
     period_s: Positive
-    phase_deg: FiniteFloat = 0.0
+    phase_deg: Number = 0.0
 
 
-class HeaveWaveSpec(TableSpec):
+class HeaveWaveSpec(Spec):
     """One sine component of the height, positive downward."""
 
-    amplitude_m: FiniteFloat
+    amplitude_m: Number
     period_s: Positive
-    phase_deg: FiniteFloat = 0.0
+    phase_deg: Number = 0.0
 
 
-class WavesSpec(TableSpec):
+class WavesSpec(Spec):
     """Sine components of the three angles."""
 
     roll_waves: tuple[AngleWaveSpec, ...] = ()
@@ -47,14 +45,20 @@ class WavesSpec(TableSpec):
     heading_waves: tuple[AngleWaveSpec, ...] = ()
 
 
+class PlaceSpec(Position):
+    """Initial position of a motion, whose heights are checked by the motion."""
+
+    alt_m: Number = 0.0
+
+
 class StationarySpec(PlaceSpec):
     """Stationary."""
 
     kind: Literal["stationary"]
     duration_s: Positive
-    roll_deg: FiniteFloat = 0.0
-    pitch_deg: FiniteFloat = 0.0
-    heading_deg: FiniteFloat = 0.0
+    roll_deg: Number = 0.0
+    pitch_deg: Number = 0.0
+    heading_deg: Number = 0.0
 
 
 class RockingStandSpec(PlaceSpec, WavesSpec):
@@ -62,9 +66,9 @@ class RockingStandSpec(PlaceSpec, WavesSpec):
 
     kind: Literal["rocking_stand"]
     duration_s: Positive
-    roll_deg: FiniteFloat = 0.0
-    pitch_deg: FiniteFloat = 0.0
-    heading_deg: FiniteFloat = 0.0
+    roll_deg: Number = 0.0
+    pitch_deg: Number = 0.0
+    heading_deg: Number = 0.0
 
 
 class SineVelocitySpec(PlaceSpec):
@@ -83,21 +87,21 @@ class WalkingSpec(PlaceSpec):
 
     kind: Literal["walking"]
     gait: Literal["walk", "run", "shuffle"] = "walk"
-    strides: int = Field(ge=1, le=100_000, strict=True)
+    strides: StrictInt = Field(ge=1, le=100_000)
     #: Number of strides between turns; zero for none.
-    corner_each: int = Field(default=10, ge=0, strict=True)
-    corner_deg: FiniteFloat = 90.0
+    corner_each: StrictInt = Field(default=10, ge=0)
+    corner_deg: Number = 90.0
     #: Strides that climb two stairs each, counted from zero.
-    stairs: tuple[Annotated[int, Field(ge=0, strict=True)], ...] = ()
-    stair_m: FiniteFloat = 0.17
-    heading_deg: FiniteFloat = 0.0
+    stairs: tuple[Annotated[StrictInt, Field(ge=0)], ...] = ()
+    stair_m: Number = 0.17
+    heading_deg: Number = 0.0
     #: At the beginning and at the end.
     stand_s: Positive = 5.0
-    roll_deg: FiniteFloat = 0.0
-    pitch_deg: FiniteFloat = 0.0
+    roll_deg: Number = 0.0
+    pitch_deg: Number = 0.0
 
 
-class SpeedSpec(TableSpec):
+class SpeedSpec(Spec):
     """Change to another speed."""
 
     do: Literal["accelerate", "brake"]
@@ -105,7 +109,7 @@ class SpeedSpec(TableSpec):
     duration_s: Positive
 
 
-class StopSpec(TableSpec):
+class StopSpec(Spec):
     """Brake to a stop, and remain stationary."""
 
     do: Literal["stop"]
@@ -113,7 +117,7 @@ class StopSpec(TableSpec):
     stay_s: NotNegative = 0.0
 
 
-class StraightSpec(TableSpec):
+class StraightSpec(Spec):
     """Continue straight, for a time or a distance."""
 
     do: Literal["straight"]
@@ -127,7 +131,7 @@ class StraightSpec(TableSpec):
         return self
 
 
-class TurnSpec(TableSpec):
+class TurnSpec(Spec):
     """Turn with a radius."""
 
     do: Literal["turn_left", "turn_right"]
@@ -136,7 +140,7 @@ class TurnSpec(TableSpec):
     ramp_s: Positive | None = None
 
 
-class BankedTurnSpec(TableSpec):
+class BankedTurnSpec(Spec):
     """Turn with a bank angle."""
 
     do: Literal["turn_left", "turn_right"]
@@ -145,15 +149,15 @@ class BankedTurnSpec(TableSpec):
     ramp_s: Positive | None = None
 
 
-class LaneChangeSpec(TableSpec):
+class LaneChangeSpec(Spec):
     """Change to the neighboring lane."""
 
     do: Literal["lane_change"]
-    offset_m: FiniteFloat
+    offset_m: Number
     duration_s: Positive
 
 
-class ClimbSpec(TableSpec):
+class ClimbSpec(Spec):
     """Climb or descend, to or by a height."""
 
     do: Literal["climb", "descend"]
@@ -162,77 +166,54 @@ class ClimbSpec(TableSpec):
     ramp_s: Positive | None = None
 
 
-class LevelSpec(TableSpec):
+class LevelSpec(Spec):
     """Level off after a climb."""
 
     do: Literal["level"]
     ramp_s: Positive | None = None
 
 
+_BY_DO = Field(discriminator="do")
+CarStep = SpeedSpec | StopSpec | StraightSpec | TurnSpec | LaneChangeSpec
+AircraftStep = SpeedSpec | StopSpec | StraightSpec | BankedTurnSpec | ClimbSpec | LevelSpec
+ShipStep = SpeedSpec | StopSpec | StraightSpec | TurnSpec
 #: Any of the maneuvers.
-Step = (
-    SpeedSpec
-    | StopSpec
-    | StraightSpec
-    | TurnSpec
-    | BankedTurnSpec
-    | LaneChangeSpec
-    | ClimbSpec
-    | LevelSpec
-)
+Step = CarStep | AircraftStep
 
 
-class VehicleSpec(PlaceSpec):
+class SteeredSpec(PlaceSpec):
     """Common part of all vehicles."""
 
-    heading_deg: FiniteFloat = 0.0
+    heading_deg: Number = 0.0
     speed_m_per_s: NotNegative = 0.0
     most_acceleration_m_per_s2: Positive | None = None
     most_lateral_m_per_s2: Positive | None = None
 
 
-class CarSpec(VehicleSpec):
+class CarSpec(SteeredSpec):
     """A car."""
 
     kind: Literal["car"]
-    roll_deg_per_m_per_s2: FiniteFloat = 0.0
-    pitch_deg_per_m_per_s2: FiniteFloat = 0.0
-    manoeuvres: tuple[
-        Annotated[
-            SpeedSpec | StopSpec | StraightSpec | TurnSpec | LaneChangeSpec,
-            Field(discriminator="do"),
-        ],
-        ...,
-    ]
+    roll_deg_per_m_per_s2: Number = 0.0
+    pitch_deg_per_m_per_s2: Number = 0.0
+    manoeuvres: tuple[Annotated[CarStep, _BY_DO], ...]
 
 
-class AircraftSpec(VehicleSpec):
+class AircraftSpec(SteeredSpec):
     """An aircraft."""
 
     kind: Literal["aircraft"]
-    angle_of_attack_deg: FiniteFloat = 0.0
+    angle_of_attack_deg: Number = 0.0
     most_bank_deg: Positive | None = None
-    manoeuvres: tuple[
-        Annotated[
-            SpeedSpec | StopSpec | StraightSpec | BankedTurnSpec | ClimbSpec | LevelSpec,
-            Field(discriminator="do"),
-        ],
-        ...,
-    ]
+    manoeuvres: tuple[Annotated[AircraftStep, _BY_DO], ...]
 
 
-class ShipSpec(VehicleSpec, WavesSpec):
+class ShipSpec(SteeredSpec, WavesSpec):
     """A ship."""
 
     kind: Literal["ship"]
     heave_waves: tuple[HeaveWaveSpec, ...] = ()
-    manoeuvres: tuple[
-        Annotated[
-            SpeedSpec | StopSpec | StraightSpec | TurnSpec,
-            Field(discriminator="do"),
-        ],
-        ...,
-    ]
+    manoeuvres: tuple[Annotated[ShipStep, _BY_DO], ...]
 
 
 class WaypointSpec(PlaceSpec):
@@ -242,7 +223,7 @@ class WaypointSpec(PlaceSpec):
     speed_m_per_s: Positive | None = None
 
 
-class WaypointsSpec(TableSpec):
+class WaypointsSpec(Spec):
     """A path through waypoints."""
 
     kind: Literal["waypoints"]
@@ -278,26 +259,23 @@ MotionSpec = Annotated[
 ]
 
 #: Values of `kind` of a motion.
-KINDS = (
-    "stationary",
-    "rocking_stand",
-    "sine_velocity",
-    "walking",
-    "car",
-    "aircraft",
-    "ship",
-    "waypoints",
+KINDS = tuple(
+    get_args(form.model_fields["kind"].annotation)[0] for form in get_args(get_args(MotionSpec)[0])
 )
-#: Values of `do` of a maneuver, for one vehicle or another.
-MANOEUVRES = (
-    "accelerate",
-    "brake",
-    "stop",
-    "straight",
-    "turn_left",
-    "turn_right",
-    "lane_change",
-    "climb",
-    "descend",
-    "level",
-)
+
+
+class TrajectorySpec(FileSpec):
+    """One run of the simulator over a motion on the Earth."""
+
+    called = "trajectory"
+
+    name: str = "trajectory"
+    title: str = ""
+    ellipsoid: str = "wgs84"
+    rate_hz: Positive = 100.0
+    sampling: str = "instantaneous"
+    seed: StrictInt = Field(default=0, ge=0)
+    sensor: str | None = None
+    formats: Annotated[tuple[str, ...], Several] = Field(default=("csv",), min_length=1)
+    trajectory_formats: Annotated[tuple[str, ...], Several] = ()
+    motion: MotionSpec

@@ -124,7 +124,7 @@ def draft_case(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> D
     Returns
     -------
     Draft
-        `read_case_spec` accepts its TOML text when every ``"?"`` is answered.
+        `CaseSpec.read` accepts its TOML text when every ``"?"`` is answered.
 
     Raises
     ------

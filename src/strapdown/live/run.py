@@ -15,10 +15,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.config.choice import SLOTS, make_choice
-from strapdown.config.navigation import CommandTable, LiveTable, NavigationSpec, aids_of
-from strapdown.config.navigation_file import navigation_spec
-from strapdown.config.navigation_modules import given_of, sensors_of
+from strapdown.config.alignment import sensors_of
+from strapdown.config.navigation import CommandTable, LiveTable, NavigationSpec
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
 from strapdown.formats.clocks import EPOCH
 from strapdown.formats.columns import parse_axes
@@ -125,7 +123,7 @@ def receive(
     """
     with closing(source):
         chain = make_chain(spec, sensors_of(spec))
-        recorder: Recorder = make_choice(spec.recorder, SLOTS["recorder"], given_of(spec))
+        recorder: Recorder = spec.recorder.make(ellipsoid=spec.ellipsoid)
         reader = _Reader(write)
         lines = StateLines(chain.navigator, reader.write, form, every)
         recording = Recording(chain, recorder)
@@ -235,7 +233,7 @@ SAMPLES = "received.csv"
 
 def _plain(spec: NavigationSpec) -> dict[str, Any]:
     whole = spec.plain()
-    for name in aids_of(spec):
+    for name in spec.aiding:
         aid = whole["aiding"][name]
         for key in ("path", "columns", "repair"):
             aid.pop(key, None)
@@ -259,7 +257,7 @@ def live_spec(spec: NavigationSpec) -> NavigationSpec:
     log = whole.pop("log", {})
     sampling = log.get("sampling")
     whole.setdefault("live", {} if sampling is None else {"sampling": sampling})
-    return navigation_spec(whole)
+    return NavigationSpec.checked(whole)
 
 
 def write_received(spec: NavigationSpec, got: Reception, folder: Path) -> NavigationSpec:
@@ -302,7 +300,7 @@ def write_received(spec: NavigationSpec, got: Reception, folder: Path) -> Naviga
         whole.pop("withhold", None)
     commands = [one.model_dump(mode="json") for one in got.commands]
     whole["commands"] = [*whole.get("commands", []), *commands]
-    return navigation_spec(whole)
+    return NavigationSpec.checked(whole)
 
 
 # From lines to the pipeline: timely, late and invalid lines.
@@ -363,7 +361,7 @@ class Reception:
         self._show, self._warn = show, warn
         self._gyro, self._accel = _turns(spec)
         self._state = chain.begin(self._live.sampling, "received.csv")
-        given = aids_of(spec)
+        given = spec.aiding
         self.rows = {
             aid.name: AidRows(aid, given[aid.name])
             for aid in chain.navigator.aids

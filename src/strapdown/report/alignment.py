@@ -12,7 +12,7 @@ import pandas as pd
 
 from strapdown.alignment.alignment import Alignment
 from strapdown.bundle.seal import Seal, to_json
-from strapdown.config.alignment_file import alignment_spec
+from strapdown.config.alignment import AlignmentSpec
 from strapdown.progress import Progress, silent
 from strapdown.report.alignment_document import CONVENTIONS, alignment_document, limits
 from strapdown.report.alignment_trust import answer_error, trust
@@ -30,7 +30,7 @@ __all__ = ["alignment_json", "rerun_alignment", "write_alignment"]
 
 def rerun_alignment(configuration: dict[str, Any], out: Path, *, report: bool = True) -> Seal:
     """Re-run a sealed alignment from its configuration, with or without its page."""
-    spec = alignment_spec(configuration["alignment"])
+    spec = AlignmentSpec.checked(configuration["alignment"])
     path = configuration.get("file_path")
     name = str(configuration["name"])
     return write_alignment(

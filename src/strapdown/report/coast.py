@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from strapdown.bundle.configuration_paths import resolved
 from strapdown.bundle.reading import read_manifest, unsealed_changes
 from strapdown.bundle.seal import Seal, to_json
-from strapdown.config.coast import coast_spec
+from strapdown.config.coast import CoastSpec
 from strapdown.config.navigation import NavigationSpec
-from strapdown.config.navigation_file import navigation_spec, read_navigation_spec
+from strapdown.config.spec import specify
 from strapdown.config.toml_file import read_toml
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import csv
@@ -61,7 +61,7 @@ def read_coasting_run(source: str | Path) -> tuple[NavigationSpec | None, Path |
     if path.suffix.lower() == ".toml" and path.is_file():
         table = read_toml(path).table
         if {"log", "simulation", "live"} & set(table):
-            return read_navigation_spec(path), path
+            return NavigationSpec.read(path), path
     elif path.is_file():
         raise ConfigError("report.log-not-run-navigation", file=path.name, quantity="SENSOR|BUNDLE")
     elif path.suffix.lower() != ".toml":
@@ -97,18 +97,17 @@ def _of_bundle(path: Path) -> tuple[NavigationSpec, Path | None]:
         raise DataError("report.made-changed-since", file=path.name, changed=changed[0])
     configuration = resolved(manifest["configuration"], root)
     file = configuration.get("file_path")
-    spec = navigation_spec(configuration["navigation"])
+    spec = NavigationSpec.checked(configuration["navigation"])
     return spec, None if file is None else Path(file)
 
 
 def rerun_coast(configuration: dict[str, Any], out: Path, *, report: bool = True) -> Seal:
     """Re-run a sealed outage prediction from its configuration, with or without its page."""
     table = configuration.get("navigation")
-    navigation = None if table is None else navigation_spec(table)
+    navigation = None if table is None else NavigationSpec.checked(table)
     path = configuration.get("file_path")
-    result = run_coast(
-        coast_spec(configuration["coast"]), navigation, None if path is None else Path(path)
-    )
+    spec = specify(CoastSpec, **configuration["coast"])
+    result = run_coast(spec, navigation, None if path is None else Path(path))
     return write_coast(result, out, name=str(configuration["name"]), report=report)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from strapdown.bundle.seal import Seal, to_json
-from strapdown.config.navigation_file import navigation_spec
+from strapdown.config.navigation import NavigationSpec
 from strapdown.progress import Progress, silent
 from strapdown.report.document_data import draw_stills, no_stills
 from strapdown.report.document_files import write_drawings, write_text
@@ -25,7 +25,7 @@ __all__ = ["rerun_navigation", "write_navigation"]
 
 def rerun_navigation(configuration: dict[str, Any], out: Path, *, report: bool = True) -> Seal:
     """Re-run a sealed navigation run from its configuration, with or without its page."""
-    spec = navigation_spec(configuration["navigation"])
+    spec = NavigationSpec.checked(configuration["navigation"])
     path = configuration.get("file_path")
     name = str(configuration["name"])
     return write_navigation(

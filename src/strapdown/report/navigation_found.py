@@ -12,8 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.config.choice import ChoiceSpec
-from strapdown.config.navigation import aids_of
-from strapdown.config.navigation_modules import make_aids
+from strapdown.config.navigation import make_aids
 from strapdown.constants import TWO_SIDED_95
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import Finding
@@ -577,7 +576,7 @@ def told_of(result: NavigationRun) -> NavigationTold:
         ("Error model", _kind(spec.filter, "error_model")),
         ("Update rule", _kind(spec.filter, "update_rule") or NO_RULE),
         ("Smoother", "" if result.forward is None else spec.smoother.kind),
-        *((f"Aid {name}", _of_aid(aid)) for name, aid in aids_of(spec).items()),
+        *((f"Aid {name}", _of_aid(aid)) for name, aid in spec.aiding.items()),
         ("States", ", ".join(dict.fromkeys(_block(c) for c in result.record.sensors.columns))),
     ]
     return NavigationTold(

@@ -13,7 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.alignment.alignment import Alignment
-from strapdown.config.navigation_file import STAGES
+from strapdown.config.navigation import STAGES
 from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.formats import csv
 from strapdown.formats.trajectory_options import TrajectoryFileOptions

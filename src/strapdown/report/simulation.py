@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 from strapdown.attitude_comparison.source import scenario_errors, simulate_scenario
 from strapdown.bundle.seal import Seal, check_destination, sensor_file, to_json
 from strapdown.bundle.writing import write_bundle
-from strapdown.config import SimulateSpec
+from strapdown.config import (
+    SimulateSpec,
+)
 from strapdown.formats.log_writers import LOG_WRITERS, log_formats, write_attitude_csv
 from strapdown.report.crash_simulation import stated_errors
 from strapdown.simulation import Motion, PulseMotion, TriadErrors, find_scenario

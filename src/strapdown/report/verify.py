@@ -23,7 +23,7 @@ from strapdown.bundle.seal import MANIFEST, Seal, sha256
 from strapdown.bundle.writing import machine, versions
 from strapdown.config import CrashSimulationSpec, SimulateSpec, TrajectorySpec
 from strapdown.config.changed_options import changed_options
-from strapdown.config.crash_case_file import read_case_spec
+from strapdown.config.crash_case import CaseSpec
 from strapdown.errors import DataError, StrapdownError
 from strapdown.formats import read_raw
 from strapdown.report.alignment import rerun_alignment
@@ -312,7 +312,7 @@ def changed_case(root: Path, manifest: dict[str, Any]) -> list[str]:
     if not path.is_file():
         return []
     try:
-        told = read_case_spec(path, files=False).model_dump(mode="json", exclude_none=True)
+        told = CaseSpec.read(path, files=False).model_dump(mode="json", exclude_none=True)
     except StrapdownError as error:
         return [f"{name}: it is no case any more: {error.finding.what}"]
     told.pop("name", None)

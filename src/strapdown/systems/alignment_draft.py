@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from strapdown.config.alignment import AxesTable, LogTable
-from strapdown.config.alignment_file import MAY_BE_EMPTY, STAGES
+from strapdown.config.alignment import STAGES, AxesTable, LogTable
 from strapdown.config.choice import SLOTS, Slot, options_of
 from strapdown.config.toml_text import ASK, Asked, Page, inline, string
 from strapdown.errors import Finding
@@ -78,8 +77,8 @@ def draft_alignment(log: LogTable, *, folder: Path, axes: str | None = None) -> 
     found += _site(page, recording)
     _axes(page, axes)
     _sensors(page)
-    for name, (_, default) in STAGES.items():
-        _stage(page, SLOTS[name], default, name in MAY_BE_EMPTY)
+    for name, one in STAGES.items():
+        _stage(page, SLOTS[name], one.default, one.empty)
     _rest(page)
     text = "\n".join(page.lines) + "\n"
     return AlignmentDraft(text, tuple(found), tuple(page.asked), findings)

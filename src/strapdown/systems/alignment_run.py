@@ -21,9 +21,7 @@ from strapdown.alignment.readiness import (
     manoeuvres_after,
 )
 from strapdown.bundle.seal import InputFiles, input_files
-from strapdown.config.alignment import AlignmentSpec, ReferenceTable
-from strapdown.config.choice import SLOTS, make_choice
-from strapdown.config.navigation_modules import sensors_of
+from strapdown.config.alignment import AlignmentSpec, ReferenceTable, sensors_of
 from strapdown.dsp.outliers import REPLACED, OutlierDesign
 from strapdown.dsp.samples import even_step
 from strapdown.ellipsoids import find_ellipsoid
@@ -135,13 +133,13 @@ def run_alignment(
     )
     sensors = sensors_of(spec)
     given = {"ellipsoid": spec.site.ellipsoid}
-    coarse_way: CoarseAlignment = make_choice(spec.coarse, SLOTS["coarse"], given)
-    fine_way: FineAlignment | None = make_choice(spec.fine, SLOTS["fine"], given)
+    coarse_way: CoarseAlignment = spec.coarse.make(**given)
+    fine_way: FineAlignment | None = spec.fine.make(**given)
     imu, report, increments = source.imu, None, None
     unread = channel_findings(imu, sensors) if source.truth is None else ()
     # Without a pre-filter, stamps need not be even.
     if spec.prefilter.kind != "none":
-        prefilter: Prefilter = make_choice(spec.prefilter, SLOTS["prefilter"], given)
+        prefilter: Prefilter = spec.prefilter.make(**given)
         progress("pre-filter", 0.08)
         filtered = prefilter.apply(imu)
         imu, report, increments = filtered.imu, filtered.report, filtered.increments

@@ -9,8 +9,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown import rotation
-from strapdown.config.navigation import NavigationSpec, StartTable, aids_of
-from strapdown.config.navigation_modules import make_aids
+from strapdown.config.navigation import NavigationSpec, StartTable, make_aids
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError, Finding
 from strapdown.estimation.error_model import ERROR_MODELS
@@ -146,7 +145,7 @@ def _height(spec: NavigationSpec, imu: pd.DataFrame) -> tuple[Finding, ...]:
                 times=times,
             ),
         )
-    if length <= LONG or any(aid.kind in HOLDS_HEIGHT for aid in aids_of(spec).values()):
+    if length <= LONG or any(aid.kind in HOLDS_HEIGHT for aid in spec.aiding.values()):
         return ()
     return (
         Finding(

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from strapdown.config.alignment import LogTable
 from strapdown.config.choice import SLOTS, Slot, options_of
-from strapdown.config.navigation_file import NAVIGATION_STAGES
+from strapdown.config.navigation import STAGES
 from strapdown.config.toml_text import ASK, Asked, Page, named_from, string
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError, Finding
@@ -244,7 +244,7 @@ def _whole() -> list[Any]:
 
 def _stage(page: Page, name: str, chosen: Mapping[str, Any]) -> None:
     slot = SLOTS[name]
-    default, empty = NAVIGATION_STAGES[name][1:]
+    default, empty = STAGES[name].default, STAGES[name].empty
     kind = chosen.get("kind", default)
     page.table(f"[{name}]", f"{slot.title}:", *listed_kinds(slot, empty))
     page.key("kind", string(kind))

@@ -17,17 +17,16 @@ import pandas as pd
 from strapdown.alignment.alignment import Alignment, Site
 from strapdown.alignment.fine import FineResult
 from strapdown.bundle.seal import InputFiles, Seal, check_destination, input_files
-from strapdown.config.choice import SLOTS, make_choice
+from strapdown.config.alignment import sensors_of
 from strapdown.config.navigation import (
     CoarseModeSpec,
     FineModeSpec,
     NavigationSpec,
     StartTable,
     WithholdTable,
-    aids_of,
+    make_aids,
+    make_filter,
 )
-from strapdown.config.navigation_file import navigation_spec
-from strapdown.config.navigation_modules import given_of, make_aids, make_filter, sensors_of
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
 from strapdown.errors import Finding
 from strapdown.evaluation.control_points import ControlPointScore, score_control_points
@@ -135,7 +134,7 @@ def run_navigation(
             channels = channel_findings(source.imu, sensors, spec.start)
     looked, channels = in_file(looked, *tables), in_file(channels, *tables)
     chain = make_chain(spec, sensors)
-    recorder: Recorder = make_choice(spec.recorder, SLOTS["recorder"], given_of(spec))
+    recorder: Recorder = spec.recorder.make(ellipsoid=spec.ellipsoid)
 
     def told(mode: str, share: float) -> None:
         progress(mode, BEGUN + (ENDED - BEGUN) * share)
@@ -214,7 +213,7 @@ def withheld_aid(spec: NavigationSpec) -> str:
     """Name of the measurement whose fixes a specification withholds."""
     assert spec.withhold is not None
     named = spec.withhold.aid
-    return named or next(name for name, aid in aids_of(spec).items() if aid.kind == "gnss")
+    return named or next(name for name, aid in spec.aiding.items() if aid.kind == "gnss")
 
 
 def _test_outages(asked: WithholdTable, begun: float, end: float) -> Sequence[Span]:
@@ -416,7 +415,7 @@ class NavigationRun:
             return self
         return replace(
             self,
-            spec=navigation_spec(moved_paths(self.spec.plain(), old, new)),
+            spec=NavigationSpec.checked(moved_paths(self.spec.plain(), old, new)),
             inputs=moved_inputs(self.inputs, old, new, copied=True),
         )
 
@@ -463,19 +462,19 @@ def make_chain(spec: NavigationSpec, sensors: ImuUncertainty) -> NavigationPipel
     ConfigError
         A module refuses an option, or parts are incompatible.
     """
-    given = given_of(spec)
+    given = {"ellipsoid": spec.ellipsoid}
     aids = make_aids(spec)
-    options = make_choice(spec.filter, SLOTS["filter"], given)
+    options = spec.filter.make(**given)
     navigator = Navigator(
         with_states(make_filter(spec, sensors), aids),
         aids,
         options.mark_interval,
-        make_choice(spec.damping, SLOTS["damping"], given),
-        make_choice(spec.smoother, SLOTS["smoother"], given),
+        spec.damping.make(**given),
+        spec.smoother.make(**given),
     )
     prefilter = None
     if spec.prefilter.kind != "none":
-        prefilter = make_choice(spec.prefilter, SLOTS["prefilter"], given)
+        prefilter = spec.prefilter.make(**given)
     gaps = spec.gaps
     site, site_sd, velocity_sd = None, (1.0, 1.0, 1.0), (0.1, 0.1, 0.1)
     if spec.site is not None:
@@ -502,13 +501,13 @@ def make_chain(spec: NavigationSpec, sensors: ImuUncertainty) -> NavigationPipel
 
 
 def _modes(spec: NavigationSpec) -> tuple[Mode, ...]:
-    given = given_of(spec)
+    given = {"ellipsoid": spec.ellipsoid}
     modes: list[Mode] = []
-    coarse = make_choice(spec.coarse, SLOTS["coarse"], given)
+    coarse = spec.coarse.make(**given)
     if coarse is not None:
         window = math.inf if spec.coarse.window_s is None else spec.coarse.window_s
         modes.append(CoarseMode("coarse", _until(spec.coarse), way=coarse, window=window))
-    fine = make_choice(spec.fine, SLOTS["fine"], given)
+    fine = spec.fine.make(**given)
     if fine is not None:
         modes.append(FineMode("fine", _until(spec.fine), fine))
     return (*modes, Navigation())

@@ -19,8 +19,6 @@ from strapdown.config.navigation import (
     AidSpec,
     NavigationSpec,
     ReceiverTable,
-    aids_of,
-    receivers_of,
 )
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import ConfigError, DataError, DivergenceError, Finding
@@ -120,7 +118,7 @@ def read_navigation_source(spec: NavigationSpec) -> NavigationSource:
     tables: dict[str, pd.DataFrame] = {}
     inputs: list[InputFiles] = []
     findings: list[Finding] = []
-    for name, aid in aids_of(spec).items():
+    for name, aid in spec.aiding.items():
         if aid.path is not None:
             tables[name] = read_aid(aid)
             findings += tables[name].attrs.get("findings", ())
@@ -194,7 +192,7 @@ def _simulated(
             name: simulated_fixes(
                 motion, one, child(asked.seed, _FIXES, zlib.crc32(name.encode())), name
             )
-            for name, one in receivers_of(spec).items()
+            for name, one in spec.receivers.items()
         }
     if asked.sensor != spec.sensors.sensor:
         inputs = [*inputs, *sensor_file(asked.sensor)]

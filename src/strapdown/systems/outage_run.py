@@ -11,10 +11,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.bundle.seal import InputFiles, input_files, sensor_file
-from strapdown.config.choice import SLOTS, make_choice
+from strapdown.config.alignment import sensors_of
 from strapdown.config.coast import CoastSpec, CoastStartTable
-from strapdown.config.navigation import NavigationSpec, aids_of
-from strapdown.config.navigation_modules import sensors_of
+from strapdown.config.navigation import NavigationSpec
 from strapdown.constants import DEG_PER_HOUR, MICRO_G
 from strapdown.errors import ConfigError, Finding
 from strapdown.estimation.covariance import Joseph
@@ -155,7 +154,7 @@ def run_coast(
             sensors,
             forecast_of_sensor(spec, sensors, progress),
             None,
-            tuple(type(spec.aiding).model_fields),
+            tuple(spec.aiding),
             sensor_file(spec.sensor),
             (),
         )
@@ -279,8 +278,8 @@ def coast_of_run(
     chain = make_chain(navigation, sensors_of(navigation))
     # Measurements after an outage do not affect the solution during it.
     chain = replace(chain, navigator=replace(chain.navigator, smoother=None))
-    receivers = [name for name, aid in aids_of(navigation).items() if aid.kind == "gnss"]
-    stays = tuple(name for name in aids_of(navigation) if name not in receivers)
+    receivers = [name for name, aid in navigation.aiding.items() if aid.kind == "gnss"]
+    stays = tuple(name for name in navigation.aiding if name not in receivers)
     time, values = index_of(source.imu), values_of(source.imu, [*GYRO, *ACCEL])
     state = chain.begin(source.imu.attrs["sampling"], source.name)
     for aid, table in source.tables.items():
@@ -516,12 +515,8 @@ def coast_navigator(spec: CoastSpec, sensors: ImuUncertainty, fixes: bool) -> Na
     -------
     Navigator
     """
-    names = type(spec.aiding).model_fields
     aids: tuple[Measurement, ...] = tuple(
-        make_choice(
-            getattr(spec.aiding, kind), SLOTS["aiding"], {"name": kind, "ellipsoid": "wgs84"}
-        )
-        for kind in names
+        aid.make(name=kind, ellipsoid="wgs84") for kind, aid in spec.aiding.items()
     )
     filter_ = ErrorFilter(
         NorthEastDown(),
@@ -642,10 +637,10 @@ def _tables(
         )
         fixes = simulate_gnss(motion, receiver)
         out[RECEIVER] = fixes[fixes.index <= begin + 1e-6]
-    if "odometer" in type(spec.aiding).model_fields:
-        asked = spec.aiding.odometer  # type: ignore[attr-defined]
+    if "odometer" in spec.aiding:
+        arm = spec.aiding["odometer"].make().lever_arm
         at = instants(motion, ODOMETER_RATE)[1:]
-        forward = velocity_of_point(motion, at, asked.lever_arm_m)[:, 0]
+        forward = velocity_of_point(motion, at, arm)[:, 0]
         out["odometer"] = odometer_table(at, forward, ODOMETER_SD)
     return out
 

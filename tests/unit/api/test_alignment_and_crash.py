@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 import strapdown as sd
-from strapdown.config.crash_case_file import read_case_spec
+from strapdown.config.crash_case import CaseSpec
 from strapdown.crash.case import run_case
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats.log_writers import LOG_WRITERS
@@ -83,7 +83,7 @@ def test_a_case_is_reconstructed_as_by_the_engine(tmp_path, run_cli):
     assert run_cli("simulate", "pole", "-q", "--out", tmp_path / "pole").code == 0
     path = tmp_path / "pole" / "case.toml"
     case = sd.reconstruct(path)
-    engine = run_case(read_case_spec(path), path)
+    engine = run_case(CaseSpec.read(path), path)
     change = case.vehicles["1"].delta_v
     assert change.resultant == engine.reconstruction.main.body[0].event.resultant > 1.0
     assert change.resultant_bound > 0.0
@@ -103,7 +103,7 @@ def test_a_case_is_reconstructed_as_by_the_engine(tmp_path, run_cli):
 def test_several_vehicles_are_numbered_in_the_order_of_their_cases(tmp_path, run_cli):
     assert run_cli("simulate", "pole", "-q", "--out", tmp_path / "pole").code == 0
     path = tmp_path / "pole" / "case.toml"
-    spec = read_case_spec(path)
+    spec = CaseSpec.read(path)
     # The other vehicle has one recorder, and no drawn paths.
     options = spec.options.model_copy(update={"monte_carlo_runs": 0})
     single = spec.model_copy(update={"units": spec.units[:1], "options": options})

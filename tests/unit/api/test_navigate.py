@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "cli"))
 from bad_navigate import write_drive
 
 import strapdown as sd
-from strapdown.config.navigation_file import read_navigation_spec
+from strapdown.config.navigation import NavigationSpec
 from strapdown.errors import ConfigError, DataError
 from strapdown.systems.inputs import NOWHERE
 from strapdown.systems.navigation_run import run_navigation
@@ -82,7 +82,7 @@ def test_a_configuration_is_run_as_before(folder):
     """The engine itself, asked by its own specification, gives the same bits."""
     path = folder / "navigate.toml"
     one = sd.navigate(path)
-    two = run_navigation(read_navigation_spec(path), path)
+    two = run_navigation(NavigationSpec.read(path), path)
     pd.testing.assert_frame_equal(one.trajectory, two.record.trajectory, check_exact=True)
     pd.testing.assert_frame_equal(one.sd, two.record.sd, check_exact=True)
     with pytest.raises(ConfigError, match="configuration"):

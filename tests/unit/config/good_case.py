@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from strapdown.config import CaseSpec, read_case_spec
+from strapdown.config import CaseSpec
 
 TEXT = """\
 title = "Impact on a pole"
@@ -99,4 +99,4 @@ def write(folder: Path, *changes: tuple[str, str], text: str = TEXT) -> Path:
 
 
 def read(folder: Path, *changes: tuple[str, str]) -> CaseSpec:
-    return read_case_spec(write(folder, *changes))
+    return CaseSpec.read(write(folder, *changes))

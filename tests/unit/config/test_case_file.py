@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from good_case import TEXT, read, write
 
 from strapdown.bundle.configuration_paths import names_file
-from strapdown.config import CaseSpec, read_case_spec
+from strapdown.config import CaseSpec
 from strapdown.errors import ConfigError
 
 
@@ -60,7 +60,7 @@ def test_gravity_in_g_and_speed_in_mph(tmp_path):
 def test_files_are_found_from_the_folder_of_the_case(tmp_path, monkeypatch):
     write(tmp_path)
     monkeypatch.chdir(tmp_path.parent)
-    spec = read_case_spec(f"{tmp_path.name}/case.toml")
+    spec = CaseSpec.read(f"{tmp_path.name}/case.toml")
     paths = [spec.units[0].gyro.path, spec.units[1].accelerometers[0].path, spec.references[0].path]
     assert paths == [str(tmp_path / n) for n in ("imu1.csv", "imu2.csv", "cameras.csv")]
     assert spec.name == "case"
@@ -84,7 +84,7 @@ def test_what_was_sealed_is_the_same_case_again(tmp_path):
 
 def test_the_smallest_case_takes_the_rest_as_it_is_usual(tmp_path):
     text = TEXT[: TEXT.index("[[references]]")].replace("[vehicle]", "[vehicle]\n#", 1)
-    spec = read_case_spec(write(tmp_path, text=text))
+    spec = CaseSpec.read(write(tmp_path, text=text))
     assert spec.references == ()
     assert spec.options.window_s is None
     assert spec.options.peak_window_s == 0.030
@@ -102,12 +102,12 @@ def test_one_name_may_stand_where_several_could(tmp_path):
 
 def test_the_mark_of_windows_and_its_ends_of_lines_change_nothing(tmp_path):
     path = write(tmp_path)
-    spec = read_case_spec(path)
+    spec = CaseSpec.read(path)
     path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes().replace(b"\n", b"\r\n"))
-    assert read_case_spec(path) == spec
+    assert CaseSpec.read(path) == spec
     path.write_bytes(path.read_bytes().replace(b"width_m", b"wide_m"))
     with pytest.raises(ConfigError, match="line 8, vehicle, wide_m"):
-        read_case_spec(path)
+        CaseSpec.read(path)
 
 
 def test_all_that_is_still_open_is_named_at_once(tmp_path):
@@ -127,10 +127,10 @@ def test_all_that_is_still_open_is_named_at_once(tmp_path):
         "  line 18, entry, speed_km_per_h: speed of the vehicle at the entry\n"
         "  line 24, unit 1, position_mm: forward, right, down of the recorder from the origin that "
         "all positions share; delta-V and the direction of force move with it\n"
-        "  line 34, unit 1, accelerometer 1, channels, y: column or channel of the axis to the "
-        "right\n"
-        '  Remedy: replace each "?" by its value, numbers without quotation marks; optional keys '
-        "may be deleted"
+        "  line 34, unit 1, accelerometer 1, channels, y: the column or channel of each axis: x "
+        "forward, y right, z down\n"
+        '  Remedy: put what you know in place of each "?", numbers without quotation marks; a key '
+        "that may be left out may be deleted"
     )
 
 
@@ -139,6 +139,6 @@ def test_text_of_any_kind_is_taken_where_text_is_wanted(tmp_path):
     text = TEXT.replace('title = "Impact', "description = '''D'''\ntitle = \"Impact", 1)
     escaped = hostile.replace("\x00", "\\u0000").replace("\x1b", "\\u001b")
     path = write(tmp_path, text=text.replace("'''D'''", f'"{escaped}"'))
-    assert read_case_spec(path).description == hostile
+    assert CaseSpec.read(path).description == hostile
     markup = "<b onclick='x'>&amp;</b>"
     assert read(tmp_path, ("Impact on a pole", markup)).title == markup

@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from good_case import TEXT, write
 
-from strapdown.config import CaseSpec, read_case_spec
+from strapdown.config import CaseSpec
 from strapdown.errors import ConfigError, StrapdownError
 
 #: Longer messages would fill a screen.
@@ -56,7 +56,7 @@ def read_whatever(folder: Path, content: bytes | str) -> None:
     path = write(folder)
     path.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8", "replace"))
     try:
-        spec = read_case_spec(path)
+        spec = CaseSpec.read(path)
     except StrapdownError as error:
         assert len(str(error)) < LONGEST
         assert error.finding.remedy
@@ -143,7 +143,7 @@ def test_files_that_are_no_case_say_so_at_once(folder, content, words):
     path.write_bytes(content)
     begin = time.perf_counter()
     with pytest.raises(ConfigError) as caught:
-        read_case_spec(path)
+        CaseSpec.read(path)
     # They take tenths of a second; what grows with the square of its length would take minutes.
     assert time.perf_counter() - begin < 10.0
     assert words in str(caught.value)
@@ -158,7 +158,7 @@ def test_what_is_no_file_is_named(folder):
         (folder / ("x" * 300 + ".toml"), "does not exist|cannot be read"),
     ):
         with pytest.raises(ConfigError, match=words):
-            read_case_spec(path)
+            CaseSpec.read(path)
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root reads all")
@@ -166,7 +166,7 @@ def test_a_file_that_may_not_be_read_says_so(folder):
     path = write(folder)
     path.chmod(0)
     with pytest.raises(ConfigError, match="check its permissions"):
-        read_case_spec(path)
+        CaseSpec.read(path)
 
 
 def test_a_sensor_s_file_of_any_content_is_refused(folder):
@@ -180,5 +180,5 @@ def test_a_sensor_s_file_of_any_content_is_refused(folder):
         (folder / "own.toml").write_bytes(content)
         path = write(folder, ('"mpu-6050"', '"own.toml"'))
         with pytest.raises(ConfigError) as caught:
-            read_case_spec(path)
+            CaseSpec.read(path)
         assert "line 48, unit 1, gyro, sensor: 'own.toml'" in str(caught.value)

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from strapdown.config.case_paths import beside_sealed_case
+from strapdown.config.reading import beside_sealed_case
 
 KEY = ("units", 0, "accelerometers", 0, "path")
 

@@ -9,12 +9,8 @@ import pytest
 
 from strapdown.config import navigation as tables
 from strapdown.config.choice import SLOTS, options_of
-from strapdown.config.navigation_file import (
-    NAVIGATION_STAGES,
-    navigation_spec,
-    read_navigation_spec,
-)
-from strapdown.config.spec import TableSpec
+from strapdown.config.navigation import STAGES, NavigationSpec
+from strapdown.config.spec import Spec
 from strapdown.errors import ConfigError
 
 ROOT = Path(__file__).parents[3]
@@ -36,13 +32,13 @@ sensor = "stim300"
 def read(folder, text):
     path = folder / "run.toml"
     path.write_text(text)
-    return read_navigation_spec(path, files=False)
+    return NavigationSpec.read(path, files=False)
 
 
 def test_what_is_sealed_is_read_again_alike(tmp_path):
     spec = read(tmp_path, FILE + '\n[aiding.rtk]\nkind = "gnss"\npath = "fixes.csv"\n')
     sealed = spec.model_dump(mode="json", exclude_none=True, serialize_as_any=True)
-    again = navigation_spec(sealed)
+    again = NavigationSpec.checked(sealed)
     assert again.model_dump(serialize_as_any=True) == spec.model_dump(serialize_as_any=True)
 
 
@@ -53,17 +49,17 @@ def test_a_known_start_leaves_alignment_out(tmp_path):
 
 @pytest.mark.parametrize("name", ["drive", "paper"])
 def test_examples_of_the_manual_are_read(name):
-    spec = read_navigation_spec(ROOT / "docs" / "examples" / f"navigate_{name}.toml")
+    spec = NavigationSpec.read(ROOT / "docs" / "examples" / f"navigate_{name}.toml")
     assert spec.simulation is not None
 
 
 def test_an_aid_is_of_the_kind_that_it_is_named_after(tmp_path):
     spec = read(tmp_path, FILE + "\n[aiding.no_slip]\nlever_arm_cm = [10.0, 0.0, 0.0]\n")
-    wheels = tables.aids_of(spec)["no_slip"]
+    wheels = spec.aiding["no_slip"]
     assert wheels.kind == "no_slip" and wheels.lever_arm_m == (0.1, 0.0, 0.0)
 
 
-@pytest.mark.parametrize("name", ["copy", "_x", "a-b", "9a"])
+@pytest.mark.parametrize("name", ["_x", "a-b", "9a"])
 def test_names_that_an_aid_cannot_have(tmp_path, name):
     with pytest.raises(ConfigError, match="line 13, aiding"):
         read(tmp_path, FILE + f'\n[aiding.{name}]\nkind = "no_slip"\n')
@@ -106,16 +102,16 @@ def test_fixes_that_cannot_be_kept_back(tmp_path, text, said):
 def test_every_slot_is_a_table_or_a_key(tmp_path):
     """Of those that a chain has, none is left out."""
     spec = read(tmp_path, FILE)
-    keys = {*NAVIGATION_STAGES, "aiding"}
+    keys = {*STAGES, "aiding"}
     for kind in (spec.filter, spec.coarse, spec.fine):
         keys |= set(type(kind).model_fields)
-    assert {"error_model", "covariance", "update_rule", *NAVIGATION_STAGES, "aiding"} <= keys
+    assert {"error_model", "covariance", "update_rule", *STAGES, "aiding"} <= keys
     assert set(SLOTS) - keys == {"influence"}
 
 
 def test_the_manual_has_every_key():
     page = (ROOT / "docs" / "navigate.md").read_text()
-    forms = [f for f in vars(tables).values() if isinstance(f, type) and issubclass(f, TableSpec)]
+    forms = [f for f in vars(tables).values() if isinstance(f, type) and issubclass(f, Spec)]
     for form in forms:
         if form.__module__ != tables.__name__ and form.__name__ not in ("LogTable", "AxesTable"):
             continue

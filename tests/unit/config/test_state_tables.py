@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from strapdown.config.navigation_file import read_navigation_spec
-from strapdown.config.navigation_modules import make_filter, sensors_of
+from strapdown.config.alignment import sensors_of
+from strapdown.config.navigation import NavigationSpec, make_filter
 from strapdown.errors import ConfigError
 
 FILE = """[log]
@@ -33,7 +33,7 @@ bias_sd_ug = 100.0
 def states_of(folder, text):
     path = folder / "run.toml"
     path.write_text(FILE + text)
-    spec = read_navigation_spec(path, files=False)
+    spec = NavigationSpec.read(path, files=False)
     made = make_filter(spec, sensors_of(spec))
     return {one.block.name: one for one in made.model.sensors}
 

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from strapdown import rotation
-from strapdown.config.crash_case_file import read_case_spec
+from strapdown.config.crash_case import CaseSpec
 from strapdown.crash.template import draft_case, read_records
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
@@ -82,7 +82,7 @@ def filled(draft, folder):
             lines[k] = line.partition("  #")[0].replace('"?"', answer)
     path = folder / "case.toml"
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return read_case_spec(path)
+    return CaseSpec.read(path)
 
 
 def triad(spec, quantity):

@@ -11,8 +11,8 @@ import pytest
 from tests.contracts.test_chain_cuts import LENGTH, assert_same, drive
 from tests.town_drive import ARM, fixes, motion
 
-from strapdown.config.navigation_file import navigation_spec
-from strapdown.config.navigation_modules import sensors_of
+from strapdown.config.alignment import sensors_of
+from strapdown.config.navigation import NavigationSpec
 from strapdown.errors import ConfigError
 from strapdown.formats.log_writers import LOG_WRITERS
 from strapdown.live.clock import MachineClock
@@ -69,7 +69,7 @@ def received(texts, spec=None, clock=None, **more):
     source = LineSource("test", lambda: next(data), clock or MachineClock(), lambda: None)
     shown, told = [], []
     live = receive(
-        spec or navigation_spec(table()),
+        spec or NavigationSpec.checked(table()),
         source,
         clock or MachineClock(),
         shown.append,
@@ -176,7 +176,7 @@ def test_a_gap_that_is_not_bridged_ends_it_before_the_gap():
 
 
 def test_before_navigation_began_there_is_no_run():
-    live, _, _ = received(lines(length=0.0), navigation_spec(table()))
+    live, _, _ = received(lines(length=0.0), NavigationSpec.checked(table()))
     assert live.run is None
     assert live.error is not None
 
@@ -188,7 +188,7 @@ def test_a_commanded_mode_begins_where_it_did_when_it_runs_again(tmp_path, sketc
         "coarse": {"kind": "known_heading", "heading_deg": 0.0, "sd_deg": 1.0},
         "fine": {"kind": "none"},
     }
-    spec = navigation_spec({k: v for k, v in table(**more).items() if v is not None})
+    spec = NavigationSpec.checked({k: v for k, v in table(**more).items() if v is not None})
     good = lines()
     live, _, told = received([*good[:100], "command,navigation", *good[100:]], spec)
     assert told == []
@@ -209,7 +209,7 @@ def test_axes_that_are_stated_turn_the_samples(tmp_path):
     values = imu.to_numpy()
     own = np.column_stack([values[:, [1, 0]], -values[:, 2], values[:, [4, 3]], -values[:, 5]])
     texts = [sample(t, row) for t, row in zip(imu.index, own, strict=True)]
-    spec = navigation_spec(table(axes={"axes": "right-forward-up"}))
+    spec = NavigationSpec.checked(table(axes={"axes": "right-forward-up"}))
     live, _, _ = received(texts, spec)
     np.testing.assert_array_equal(live.got.samples[:, 1:], values)
     assert write_received(spec, live.got, tmp_path).axes.axes is None
@@ -249,7 +249,7 @@ def test_whoever_read_the_lines_has_gone():
 
     data = iter([("\n".join(lines()) + "\n").encode(), b""])
     source = LineSource("test", lambda: next(data), MachineClock(), lambda: None)
-    live = receive(navigation_spec(table()), source, MachineClock(), gone, lambda text: None)
+    live = receive(NavigationSpec.checked(table()), source, MachineClock(), gone, lambda text: None)
     assert live.got.lines < len(lines())
     assert live.run is not None
 
@@ -261,7 +261,7 @@ def test_of_a_record_the_same_with_lines(tmp_path):
     whole["live"] = None
     whole["log"] = {"path": str(tmp_path / "log.csv"), "sampling": "mean"}
     whole["aiding"]["gnss"]["path"] = str(tmp_path / "fix.csv")
-    spec = live_spec(navigation_spec({k: v for k, v in whole.items() if v is not None}))
+    spec = live_spec(NavigationSpec.checked({k: v for k, v in whole.items() if v is not None}))
     assert spec.log is None
     assert spec.aiding.gnss.path is None
     assert spec.live.sampling == "mean"
@@ -281,7 +281,7 @@ def test_datagrams_to_a_commanded_end_are_the_batch_run():
                 data = "\n".join(texts[first : first + 10]).encode()
                 sender.sendto(data, (address.hostname, address.port))
 
-    live = receive(navigation_spec(table()), source, clock, lambda text: None, send)
+    live = receive(NavigationSpec.checked(table()), source, clock, lambda text: None, send)
     assert live.got.lines == len(texts)
     assert_same(live.run, at_once(live.spec))
     assert live.latency.samples <= len(drive())

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from strapdown.config.navigation_file import navigation_spec
+from strapdown.config.navigation import NavigationSpec
 from strapdown.ellipsoids import WGS84
 from strapdown.navigation.gyrocompass import STUDENT, north_within
 from strapdown.navigation.heading_integrity import SURE
@@ -65,7 +65,7 @@ def spec_of(*, sensor="fog-1000", latitude=None, stated=None, heading=None, bias
             "heading_sd_deg": 1.0,
             "position_sd_m": 1.0,
         }
-    return navigation_spec(table)
+    return NavigationSpec.checked(table)
 
 
 def errors(result):

@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from strapdown.config.navigation_file import navigation_spec
-from strapdown.config.navigation_modules import make_filter, sensors_of
+from strapdown.config.alignment import sensors_of
+from strapdown.config.navigation import NavigationSpec, make_filter
 from strapdown.navigation.heading_integrity import SURE
 from strapdown.navigation.heading_witness import hear_witnesses, witnesses_of
 from strapdown.report.navigation import write_navigation
@@ -65,7 +65,7 @@ def drive(
     if compass is not None:
         table["aiding"]["compass"] = {"kind": "heading", "path": str(compass)}
     table["start"]["v_ned_m_per_s"] = [float(v) for v in table["start"]["v_ned_m_per_s"]]
-    return navigation_spec(table)
+    return NavigationSpec.checked(table)
 
 
 def errors(result):

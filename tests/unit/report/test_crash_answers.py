@@ -12,8 +12,7 @@ import pytest
 
 from strapdown import simulate
 from strapdown.bundle.seal import to_json
-from strapdown.config.crash_case import AssumedSpec, ReferenceSpec
-from strapdown.config.crash_case_file import read_case_spec
+from strapdown.config.crash_case import AssumedSpec, CaseSpec, ReferenceSpec
 from strapdown.crash.case import case_severity, compare_reference, main_event, run_case
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import read_raw
@@ -37,7 +36,7 @@ def case_file(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def result(case_file):
-    return run_case(read_case_spec(case_file), case_file)
+    return run_case(CaseSpec.read(case_file), case_file)
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import re
 import numpy as np
 import pytest
 
-from strapdown.config.navigation_file import read_navigation_spec
+from strapdown.config.navigation import NavigationSpec
 from strapdown.errors import Finding
 from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.report.document_data import draw_stills
@@ -55,7 +55,7 @@ kind = "gnss"
 def result(tmp_path_factory):
     path = tmp_path_factory.mktemp("navigate") / "drive.toml"
     path.write_text(FILE, encoding="utf-8")
-    return run_navigation(read_navigation_spec(path), path)
+    return run_navigation(NavigationSpec.read(path), path)
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from strapdown import rotation
 from strapdown.alignment.alignment import Site
 from strapdown.alignment.coarse_alignments import COARSE_ALIGNMENTS
 from strapdown.alignment.readiness import carried_attitude, carry
-from strapdown.config.alignment_file import alignment_spec
+from strapdown.config.alignment import AlignmentSpec
 from strapdown.errors import ConfigError
 from strapdown.report.alignment_trust import answer_error, trust
 from strapdown.sensors.catalogue import load_sensor
@@ -44,7 +44,7 @@ def spec_of(path, **tables):
         "sensors": {"sensor": "fog-1000"},
         "fine": {"kind": "none"},
     }
-    return alignment_spec(table | tables)
+    return AlignmentSpec.checked(table | tables)
 
 
 def sensed(imu, gyro, accel):
@@ -99,7 +99,7 @@ def simulated(**tables):
         "site": SITE,
         "sensors": {"sensor": "fog-1000"},
     }
-    return run_alignment(alignment_spec(table | tables))
+    return run_alignment(AlignmentSpec.checked(table | tables))
 
 
 def test_stages_follow_each_other():

@@ -10,9 +10,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from strapdown.config.alignment import LogTable
-from strapdown.config.navigation_file import navigation_spec, read_navigation_spec
-from strapdown.config.navigation_modules import sensors_of
+from strapdown.config.alignment import LogTable, sensors_of
+from strapdown.config.navigation import NavigationSpec
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import WGS84
 from strapdown.errors import ConfigError, DataError
@@ -45,7 +44,7 @@ def walked(gait="walk", sensor="xsens-mti-1", seed=1, detector="shoe", rule="ots
     """A walk through the chain that `init navigate --foot` writes."""
     known = ImuUncertainty.of_sensor(load_sensor(sensor))
     motion = {"kind": "walking", "gait": gait, "strides": strides, "corner_each": 8, "stand_s": 6.0}
-    spec = navigation_spec(
+    spec = NavigationSpec.checked(
         {
             "name": "walk",
             "simulation": {
@@ -220,11 +219,11 @@ def test_the_file_that_is_written_asks_for_the_latitude_alone(tmp_path):
     assert [one.key for one in draft.asked] == ["lat_deg"]
     file = tmp_path / "foot.toml"
     file.write_text(draft.text)
-    with pytest.raises(ConfigError, match="is missing") as refused:
-        read_navigation_spec(file)
+    with pytest.raises(ConfigError, match="still open") as refused:
+        NavigationSpec.read(file)
     assert "latitude" in str(refused.value)
     file.write_text(draft.text.replace('lat_deg = "?"', "lat_deg = 48.0"))
-    spec = read_navigation_spec(file)
+    spec = NavigationSpec.read(file)
     assert spec.aiding.stance.detector == "shoe"
     assert spec.aiding.standing.kind == "zero_rate"
     assert "g_sensitivity" in spec.sensors.states
@@ -240,7 +239,7 @@ def test_a_start_by_bad_accelerometers_drifts_by_the_square_of_its_tilt(tmp_path
     draft = draft_navigation(log, folder=tmp_path, sensor=sensor, foot=True)
     file = tmp_path / "foot.toml"
     file.write_text(draft.text.replace('lat_deg = "?"', "lat_deg = 48.0"))
-    stated = read_navigation_spec(file).states.accel_drift
+    stated = NavigationSpec.read(file).states.accel_drift
     assert (stated and stated.sd_ug) == written
 
 
@@ -285,7 +284,7 @@ def proposed(recordings, tmp_path_factory):
     file = folder / "foot.toml"
     text = draft.text.replace('lat_deg = "?"', "lat_deg = 41.0")
     file.write_text(f'{text}\n[control_points]\npath = "{path}"\n')
-    return read_navigation_spec(file)
+    return NavigationSpec.read(file)
 
 
 @pytest.mark.parametrize(

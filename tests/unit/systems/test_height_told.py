@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from strapdown.config.navigation_file import navigation_spec
+from strapdown.config.navigation import NavigationSpec
 from strapdown.systems.navigation_checks import look_through
 from strapdown.tables import imu_table
 
@@ -15,7 +15,7 @@ BAROMETER = {"baro": {"kind": "barometer"}}
 
 
 def said(seconds, **tables):
-    spec = navigation_spec(
+    spec = NavigationSpec.checked(
         {
             "live": {"sampling": "mean"},
             "start": {"lat_deg": 50.0, "lon_deg": 30.0, "alt_m": 0.0, "roll_deg": 0.0}

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
-from strapdown.config.coast import coast_spec
+from strapdown.config.coast import CoastSpec
+from strapdown.config.spec import specify
 from strapdown.constants import DEG_PER_HOUR, MICRO_G
 from strapdown.errors import ConfigError
 from strapdown.evaluation.plane_bound import PLANE_95
@@ -38,7 +39,7 @@ SMALL = {**START, "gyro_bias_sd_deg_per_h": 30.0, "accel_bias_sd_ug": 500.0}
 
 
 def foretold(sensor, outage=10.0, **tables):
-    spec = coast_spec({"outage_s": outage, "sensor": sensor, **tables})
+    spec = specify(CoastSpec, **{"outage_s": outage, "sensor": sensor, **tables})
     return forecast_of_sensor(spec, sensor_of(sensor))
 
 
@@ -141,7 +142,7 @@ def test_with_aids_the_budget_has_what_their_noise_adds(monkeypatch):
 @pytest.mark.parametrize("sensor", ["mpu-6050", "adis16495-1"])
 def test_drifts_that_are_drawn_are_as_foretold(sensor, motion):
     """Errors are drawn by the simulation of sensors, and navigated by the mechanization alone."""
-    spec = coast_spec({"outage_s": 30.0, "sensor": sensor, "start": SMALL, "motion": motion})
+    spec = specify(CoastSpec, outage_s=30.0, sensor=sensor, start=SMALL, motion=motion)
     known = sensor_of(sensor)
     found = forecast_of_sensor(spec, known)
     drifts = drawn(spec, known, 150)
@@ -233,7 +234,7 @@ def wrong_start(truth, spec, draws):
 )
 def test_a_motion_that_cannot_be_is_refused(motion, quantity, says):
     with pytest.raises(ConfigError) as told:
-        stated_motion(coast_spec({"outage_s": 10.0, "sensor": "hg9900", "motion": motion}))
+        stated_motion(specify(CoastSpec, outage_s=10.0, sensor="hg9900", motion=motion))
     assert told.value.finding.quantity == quantity
     assert says in told.value.finding.what
 
@@ -251,13 +252,13 @@ def test_a_motion_that_cannot_be_is_refused(motion, quantity, says):
 )
 def test_a_number_that_cannot_be_is_refused(table, quantity):
     with pytest.raises(ConfigError) as told:
-        coast_spec(table)
+        specify(CoastSpec, **table)
     assert told.value.finding.quantity == quantity
     assert told.value.finding.remedy
 
 
 def test_the_drive_before_ends_as_the_outage_begins():
-    spec = coast_spec({"outage_s": 20.0, "motion": {"speed_m_per_s": 20.0, "heading_deg": 70.0}})
+    spec = specify(CoastSpec, outage_s=20.0, motion={"speed_m_per_s": 20.0, "heading_deg": 70.0})
     motion, begin = stated_motion(spec)
     # Rounds are whole: the drive is as long as was asked for but for half of one.
     assert abs(begin - 600.0) < 100.0

@@ -1,0 +1,243 @@
+"""Configuration files: read, resolve the files that they name, check, and report all faults."""
+
+from __future__ import annotations
+
+import difflib
+import json
+from collections.abc import Iterator, Mapping
+from itertools import islice
+from pathlib import Path, PurePosixPath
+from typing import Any, ClassVar, Self
+
+from pydantic import ValidationError
+
+from strapdown.config.spec import Fault, Spec, faults_of, fields_at, refusal
+from strapdown.config.toml_file import KeyPath, TomlFile, place_of, read_toml, shown
+from strapdown.errors import ConfigError, Finding
+
+__all__ = ["PLACEHOLDER", "FileSpec", "beside_sealed_case"]
+
+#: Value that only the user knows.
+PLACEHOLDER = "?"
+#: Above this number of open values they are counted, not listed.
+MOST_OPEN = 60
+
+
+class FileSpec(Spec):
+    """Specification of a run, from a file or from plain data."""
+
+    unwritten: ClassVar[tuple[str, ...]] = ("name",)
+    #: What it is called in messages.
+    called: ClassVar[str] = "run"
+    #: Whether `faults` looks into files.
+    looks_into_files: ClassVar[bool] = False
+
+    name: str
+
+    def faults(self) -> Iterator[Fault]:
+        """Yield what its values contradict, beyond their form."""
+        yield from ()
+
+    @classmethod
+    def checked(cls, table: Mapping[str, Any], file: TomlFile | None = None) -> Self:
+        """Create a specification from plain data, as from a command or a sealed folder.
+
+        Parameters
+        ----------
+        table : mapping
+        file : TomlFile, optional
+            The file that it was read from, for the lines of messages.
+
+        Raises
+        ------
+        ConfigError
+            Keys are unknown or missing, values do not fit, or contradict each other: all of them,
+            each with its key and a remedy.
+        """
+        return cls._checked(table, table if file is None else file.table, file)
+
+    @classmethod
+    def read(cls, path: str | Path, *, files: bool = True, **instead: Any) -> Self:
+        """Read a configuration file; the specification is named after it.
+
+        Parameters
+        ----------
+        path : str or Path
+        files : bool
+            Whether the files that it names must exist and become absolute paths.
+        **instead
+            Values that replace those of the file; None keeps them.
+
+        Raises
+        ------
+        ConfigError
+            The file is missing or not TOML, a value is still ``"?"``, or as `checked`; the message
+            names the lines.
+        """
+        file = read_toml(Path(path))
+        if "name" in file.table:
+            raise file.refuse(("name",), "config.named-after-file", kind=cls.called)
+        _refuse_placeholders(file, cls)
+        table, faults = _with_absolute_paths(file) if files else (file.table, [])
+        given = {key: value for key, value in instead.items() if value is not None}
+        named = {**table, **given, "name": file.path.stem}
+        return cls._checked(named, {**file.table, **given}, file, faults, files)
+
+    @classmethod
+    def _checked(
+        cls,
+        table: Mapping[str, Any],
+        written: Mapping[str, Any],
+        file: TomlFile | None,
+        faults: list[Fault] | None = None,
+        files: bool = True,
+    ) -> Self:
+        found = list(faults or ())
+        there = {one.path for one in found}
+        try:
+            spec = cls.model_validate(table)
+        except ValidationError as error:
+            more = faults_of(error, cls, written)
+        else:
+            more = list(spec.faults()) if files or not cls.looks_into_files else []
+        found += [one for one in more if one.path not in there]
+        if found:
+            raise refusal(found, written, file)
+        return spec
+
+
+# --- open values: known only to the user, written as a question mark ----------------------
+
+
+def _refuse_placeholders(file: TomlFile, form: type[Spec]) -> None:
+    # A vector with all components open counts as one.
+    open_keys = list(dict.fromkeys(_open(file.table, ())))
+    if not open_keys:
+        return
+    values = []
+    for path in open_keys[:MOST_OPEN]:
+        fields = fields_at(form, path)
+        meaning = (fields[0].description if fields else None) or ""
+        line, place = file.line(path), place_of(path)
+        values.append(Finding("config.open-value", wanted=meaning, line=line, quantity=place))
+    count = len(open_keys)
+    code = "config.open-values" if count > 1 else "config.one-open-value"
+    raise ConfigError(
+        "config.many-open-values" if count > MOST_OPEN else code,
+        file=file.path.name,
+        count=count,
+        more=count - len(values),
+        values=values,
+        placeholder=PLACEHOLDER,
+    )
+
+
+def _open(node: Any, path: KeyPath) -> Iterator[KeyPath]:
+    if isinstance(node, dict):
+        for key, value in node.items():
+            yield from _open(value, (*path, key))
+    elif isinstance(node, list):
+        for k, value in enumerate(node):
+            if isinstance(value, dict):
+                yield from _open(value, (*path, k))
+            else:
+                yield from (path for _ in _open(value, path))
+    elif isinstance(node, str) and node.strip() == PLACEHOLDER:
+        yield path
+
+
+# --- files that a configuration names, from its folder ------------------------------------
+
+#: Largest number of names in a folder that are searched for a similar one.
+MOST_NAMES = 10_000
+
+
+def _with_absolute_paths(file: TomlFile) -> tuple[dict[str, Any], list[Fault]]:
+    """The table with every ``path``, and every ``sensor`` that is a file, as an absolute path."""
+    faults: list[Fault] = []
+
+    def resolved(node: Any, path: KeyPath) -> Any:
+        if isinstance(node, dict):
+            return {key: resolved(value, (*path, key)) for key, value in node.items()}
+        if isinstance(node, list):
+            return [resolved(value, (*path, k)) for k, value in enumerate(node)]
+        # What cannot name a file is refused by the form.
+        if not isinstance(node, str) or not node.isprintable() or not node.strip():
+            return node
+        if path[-1] != "path" and not (path[-1] == "sensor" and node.lower().endswith(".toml")):
+            return node
+        found = _find(file.path, path, node)
+        if isinstance(found, str):
+            return found
+        faults.append(found)
+        return node
+
+    return {key: resolved(value, (key,)) for key, value in file.table.items()}, faults
+
+
+def _find(file: Path, path: KeyPath, given: str) -> str | Fault:
+    wanted = file.parent.absolute() / given
+    try:
+        if wanted.exists():
+            return str(wanted)
+        kept = beside_sealed_case(file, path, given)
+        if kept is not None:
+            return str(kept)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        data = {"given": shown(given), "reason": reason}
+        return Fault(path, "config.named-file-unreadable", data)
+    try:
+        names = [p.name for p in islice(wanted.parent.iterdir(), MOST_NAMES)]
+    except (OSError, ValueError):
+        names = []
+    close = difflib.get_close_matches(wanted.name[:255], sorted(names), n=1)
+    if close and close[0].isprintable():
+        data = {"given": shown(given), "near": close[0]}
+        return Fault(path, "config.named-file-missing-near", data)
+    return Fault(path, "config.named-file-missing", {"given": shown(given)})
+
+
+# Upper limit of the manifest size, bytes: one with hundreds of records is smaller.
+LARGEST = 50_000_000
+
+
+def beside_sealed_case(case: Path, key: KeyPath, given: str) -> Path | None:
+    """Find the copy of a file that a case names, where the case is itself a copy.
+
+    Parameters
+    ----------
+    case : Path
+        As ``FOLDER/inputs/case/case.toml``.
+    key : tuple
+        Of the value in the case.
+    given : str
+        The value.
+
+    Returns
+    -------
+    Path or None
+        None if the case is not in a sealed folder, or the folder has no copy for this key with
+        this file name.
+    """
+    home = case.absolute().parent
+    if home.parent.name != "inputs":
+        return None
+    root = home.parent.parent
+    manifest = root / "manifest.json"
+    try:
+        if not manifest.is_file() or manifest.stat().st_size > LARGEST:
+            return None
+        node: Any = json.loads(manifest.read_text(encoding="utf-8"))["configuration"]["case"]
+        for step in key:
+            node = node[step]
+        if not isinstance(node, str):
+            return None
+        kept = (root / node).resolve()
+        if not kept.is_relative_to((root / "inputs").resolve()) or not kept.exists():
+            return None
+    except (OSError, ValueError, KeyError, IndexError, TypeError, RecursionError):
+        return None
+    # An edited case may name another record under this key.
+    named = PurePosixPath(given.replace("\\", "/")).name
+    return kept if kept.name in (named, PurePosixPath(given).parent.name) else None
