@@ -15,8 +15,6 @@ from strapdown.report.attitude import write_attitude
 from strapdown.results import InputFiles
 from strapdown.systems.attitude_bench import bench_attitude
 
-pytestmark = pytest.mark.usefixtures("sketched_module")
-
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory):
@@ -27,7 +25,7 @@ def log(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def sealed(log, tmp_path_factory, sketched_module):
+def sealed(log, tmp_path_factory):
     bench = bench_attitude(
         log, reference=["end same as 4.5", str(log.with_name("truth.csv"))], gyro_bias=str(log)
     )

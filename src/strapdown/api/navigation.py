@@ -37,7 +37,7 @@ from strapdown.systems.sins.trust import IntegrityReport
 from strapdown.tables import EULER, GEODETIC, VELOCITY
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from strapdown.report.chart_figure import ChartFigure
 
 __all__ = [
     "Barometer",
@@ -226,7 +226,7 @@ class NavigationRun(NavigationResult):
         """
         return self.trajectory.join(self.sd.add_suffix("_sd"), how="inner")
 
-    def plot(self, kind: str = "plan") -> Figure:
+    def plot(self, kind: str = "plan") -> ChartFigure:
         """Draw one chart of the report.
 
         Parameters
@@ -237,8 +237,8 @@ class NavigationRun(NavigationResult):
 
         Returns
         -------
-        matplotlib.figure.Figure
-            Its ``axes`` are the panels. Independent of windows and global state.
+        ChartFigure
+            Displays itself in a notebook; `save` writes it as SVG, PNG or PDF.
 
         Raises
         ------

@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from rich.console import Console
 
-    from strapdown.report.attitude_tables import TextTable
+    from strapdown.report.document import TableBlock
     from strapdown.results.attitude_bench import AttitudeBench
 
 
@@ -87,10 +87,10 @@ def print_speed(taken: pd.DataFrame) -> None:
     )
 
 
-def _print(table: TextTable, page: Console) -> None:
+def _print(table: TableBlock, page: Console) -> None:
     from strapdown.cli.console import print_table
 
     page.print(f"\n{table.title}", style="bold")
     print_table(table.columns, table.rows, text=table.text, strong=table.strong)
-    if table.note:
-        page.print(table.note, style="dim")
+    if table.caption:
+        page.print(table.caption, style="dim")

@@ -20,8 +20,7 @@ def keep_interrupts() -> None:
     -----
     A signal handler runs between any two steps of the program, and so at times within a callback
     of a weak reference or a finalizer, whose exceptions Python reports and ignores: the program
-    would continue to its end. While matplotlib draws, one interrupt of twelve is lost in this way.
-    It is sent again until it is raised elsewhere.
+    would continue to its end. It is sent again until it is raised elsewhere.
     """
     before = sys.unraisablehook
 

@@ -16,6 +16,7 @@ from strapdown.config.alignment_file import alignment_spec
 from strapdown.report.alignment_document import CONVENTIONS, alignment_document, limits
 from strapdown.report.alignment_trust import answer_error, trust
 from strapdown.report.crash_json import write_table
+from strapdown.report.document import finding_json
 from strapdown.report.document_data import draw_stills
 from strapdown.report.document_files import write_drawings, write_text
 from strapdown.report.document_html import document_page
@@ -156,8 +157,8 @@ def alignment_json(result: AlignmentResult) -> dict[str, Any]:
         "end": _attitude_alignment_json(result.end),
         "trust": {
             "verdict": found.verdict,
-            "for": [f.plain() for f in found.supporting],
-            "against": [f.plain() for f in found.against],
+            "for": [finding_json(f) for f in found.supporting],
+            "against": [finding_json(f) for f in found.against],
         },
         "limits": [f"{head}: {text}" for head, text in limits(result)],
         "coarse": {"method": result.coarse.method, **_attitude_alignment_json(result.coarse)},
@@ -174,7 +175,9 @@ def alignment_json(result: AlignmentResult) -> dict[str, Any]:
             "against": result.readiness.against,
             "coarse": _rows(result.readiness.coarse),
             "fine": _rows(_thinned(result.readiness.fine)),
-            "refused": [{"time_s": t, "finding": f.plain()} for t, f in result.readiness.refused],
+            "refused": [
+                {"time_s": t, "finding": finding_json(f)} for t, f in result.readiness.refused
+            ],
         },
         "what_a_turn_would_tell": [
             {
@@ -190,7 +193,7 @@ def alignment_json(result: AlignmentResult) -> dict[str, Any]:
         "method": spec.model_dump(
             mode="json", include={"prefilter", "coarse", "fine"}, serialize_as_any=True
         ),
-        "findings": [f.plain() for f in result.findings],
+        "findings": [finding_json(f) for f in result.findings],
     }
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
 from strapdown.attitude import ALGORITHMS
@@ -16,10 +16,10 @@ from strapdown.report.attitude_numbers import (
     sweep_grid,
 )
 from strapdown.report.attitude_words import condition, degrees
+from strapdown.report.document import TableBlock
 from strapdown.results.attitude_bench import AttitudeBench, AttitudeRun, PeerRun, Score, SecondLog
 
 __all__ = [
-    "TextTable",
     "condition_table",
     "cost_table",
     "difference_table",
@@ -38,38 +38,10 @@ _MOST_POINTS = 7
 _NONE = "–"
 
 
-@dataclass(frozen=True)
-class TextTable:
-    """A table in words.
-
-    Attributes
-    ----------
-    title : str
-    columns : tuple of str
-    rows : tuple of tuple of str
-    text : tuple of int
-        Left-aligned text columns; the others hold right-aligned numbers.
-    note : str
-        Remark for the reader.
-    passed : frozenset of (int, int)
-        Row and column of cells within the tolerance; these also get a tick.
-    strong : frozenset of int
-        Rows of the recommended algorithms.
-    """
-
-    title: str
-    columns: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    text: tuple[int, ...] = (0,)
-    note: str = ""
-    passed: frozenset[tuple[int, int]] = frozenset()
-    strong: frozenset[int] = frozenset()
-
-
-def _named(bench: AttitudeBench) -> frozenset[int]:
+def _named(bench: AttitudeBench) -> tuple[int, ...]:
     names = [run.algorithm for run in bench.runs]
     answer = bench.answer.algorithm
-    return frozenset({names.index(answer)} if answer in names else ())
+    return (names.index(answer),) if answer in names else ()
 
 
 def number(value: float) -> str:
@@ -77,7 +49,7 @@ def number(value: float) -> str:
     return f"{value:.3g}" if value < 100 else f"{value:.0f}"
 
 
-def result_tables(bench: AttitudeBench) -> list[TextTable]:
+def result_tables(bench: AttitudeBench) -> list[TableBlock]:
     """Return the errors of each algorithm with their contributions; two tables if wide.
 
     Parameters
@@ -86,7 +58,7 @@ def result_tables(bench: AttitudeBench) -> list[TextTable]:
 
     Returns
     -------
-    list of TextTable
+    list of TableBlock
     """
     truth = any(s.against == "truth" for s in bench.scores)
     points = len(bench.references)
@@ -116,11 +88,11 @@ def _table(
     columns: list[str],
     names: list[str],
     rows: list[list[str]],
-    strong: frozenset[int],
+    strong: tuple[int, ...],
     note: str,
-) -> TextTable:
+) -> TableBlock:
     named = tuple((name, *row) for name, row in zip(names, rows, strict=True))
-    return TextTable(title, tuple(columns), named, note=note, strong=strong)
+    return TableBlock(tuple(columns), named, caption=note, strong=strong, title=title)
 
 
 def _compared(scores: list[Score], count: int) -> list[str]:
@@ -184,14 +156,14 @@ def source_of(run: AttitudeRun) -> str:
     return f"{source} Eq. {run.equations}".strip() if run.equations else source
 
 
-def condition_table(bench: AttitudeBench) -> TextTable:
+def condition_table(bench: AttitudeBench) -> TableBlock:
     """Return the source and the diagnostics of each algorithm."""
     rows = tuple((r.algorithm, source_of(r), condition(r.diagnostics)) for r in bench.runs)
     columns = ("algorithm", "source", "own condition")
-    return TextTable("The algorithms", columns, rows, text=(0, 1, 2), strong=_named(bench))
+    return TableBlock(columns, rows, (0, 1, 2), strong=_named(bench), title="The algorithms")
 
 
-def cost_table(bench: AttitudeBench) -> TextTable | None:
+def cost_table(bench: AttitudeBench) -> TableBlock | None:
     """Return the operations per sample of each algorithm; None if none were counted."""
     if not bench.costs:
         return None
@@ -203,18 +175,18 @@ def cost_table(bench: AttitudeBench) -> TextTable | None:
         )
         for c in bench.costs
     )
-    return TextTable(
-        "What a sample costs",
+    return TableBlock(
         ("algorithm", "add", "multiply", "divide", "root", "sin, cos", "cycles", "memory"),
         rows,
-        note="Operations counted on the kernel itself, in steps of 0.01 rad; cycles: the "
+        caption="Operations counted on the kernel itself, in steps of 0.01 rad; cycles: the "
         "same weighed as a Cortex-M4F's floating-point unit takes them, for ranking; memory: "
         "numbers kept between samples.",
         strong=_named(bench),
+        title="What a sample costs",
     )
 
 
-def sweep_tables(bench: AttitudeBench) -> list[TextTable]:
+def sweep_tables(bench: AttitudeBench) -> list[TableBlock]:
     """Return the errors at every rate, one table per method of lowering it."""
     tables = []
     answer = bench.answer
@@ -241,21 +213,21 @@ def sweep_tables(bench: AttitudeBench) -> list[TextTable]:
             for i, name in enumerate(grid.index)
         )
         tables.append(
-            TextTable(
-                f"Error by rate, {words}",
+            TableBlock(
                 ("algorithm", *(f"{number(float(rate))} Hz" for rate in grid.columns)),
                 rows,
-                note=f"✓: within the tolerance of {degrees(answer.tolerance_deg)}."
+                caption=f"✓: within the tolerance of {degrees(answer.tolerance_deg)}."
                 if passed
                 else f"None is within the tolerance of {degrees(answer.tolerance_deg)}.",
                 passed=frozenset(passed),
                 strong=_named(bench),
+                title=f"Error by rate, {words}",
             )
         )
     return tables
 
 
-def difference_table(bench: AttitudeBench) -> TextTable | None:
+def difference_table(bench: AttitudeBench) -> TableBlock | None:
     """Return the largest difference of each pair of algorithms; None for a single one."""
     names = [run.algorithm for run in bench.runs]
     if len(names) < 2:
@@ -266,7 +238,8 @@ def difference_table(bench: AttitudeBench) -> TextTable | None:
             zip(names, bench.differences_deg.to_numpy(), strict=True)
         )
     )
-    return TextTable("Largest difference between the algorithms", ("", *names), rows)
+    title = "Largest difference between the algorithms"
+    return TableBlock(("", *names), rows, title=title)
 
 
 def luck_words(luck: float) -> str:
@@ -278,7 +251,7 @@ def luck_words(luck: float) -> str:
     return f"may be luck ({luck:.2g})"
 
 
-def trial_table(bench: AttitudeBench) -> TextTable | None:
+def trial_table(bench: AttitudeBench) -> TableBlock | None:
     """Return the ranking over several trials; None for a single trial."""
     if bench.trials is None:
         return None
@@ -293,13 +266,14 @@ def trial_table(bench: AttitudeBench) -> TextTable | None:
     )
     names = [row[0] for row in rows]
     answer = bench.answer.algorithm
-    return TextTable(
-        f"Over {len(bench.trials.names)} trials",
+    return TableBlock(
         ("algorithm", "mean error", "95 % interval", "its rank above the next is"),
         rows,
         text=(0, 3),
-        note="In brackets: the probability that the next one is no worse, from paired differences.",
-        strong=frozenset({names.index(answer)} if answer in names else ()),
+        caption="In brackets: the probability that the next one is no worse, from paired "
+        "differences.",
+        strong=(names.index(answer),) if answer in names else (),
+        title=f"Over {len(bench.trials.names)} trials",
     )
 
 
@@ -309,7 +283,7 @@ def _interval(low: float, high: float) -> str:
     return f"{degrees(max(low, 0.0))} to {degrees(high)}"
 
 
-def peer_table(bench: AttitudeBench) -> TextTable | None:
+def peer_table(bench: AttitudeBench) -> TableBlock | None:
     """Return the errors of other libraries, gyro-only ones separate from aided ones.
 
     Parameters
@@ -318,7 +292,7 @@ def peer_table(bench: AttitudeBench) -> TextTable | None:
 
     Returns
     -------
-    TextTable or None
+    TableBlock or None
         None if no other library ran.
     """
     if not bench.peers:
@@ -331,15 +305,15 @@ def peer_table(bench: AttitudeBench) -> TextTable | None:
     ]
     rows += [(p.peer, _peer_error(p), "", p.aiding) for p in alone]
     rows += [(p.peer, "", _peer_error(p), p.aiding) for p in aided]
-    return TextTable(
-        "Other libraries on the same log",
+    return TableBlock(
         ("who", "gyro alone", "aided", "uses"),
         tuple(rows),
         text=(0, 3),
-        note="Largest error against what is known. An aided filter corrects what gyros alone "
+        caption="Largest error against what is known. An aided filter corrects what gyros alone "
         "cannot: its column is not to be compared with the other. These libraries take each "
         "row for the mean of its step; ours for the rate at its stamp, unless --sampling mean.",
         strong=_named(bench),
+        title="Other libraries on the same log",
     )
 
 
@@ -351,7 +325,7 @@ def _peer_error(peer: PeerRun) -> str:
 # Dead-reckoned positions and the second log.
 
 
-def place_table(bench: AttitudeBench) -> TextTable | None:
+def place_table(bench: AttitudeBench) -> TableBlock | None:
     """Return the errors of dead-reckoned positions against known positions.
 
     Parameters
@@ -360,7 +334,7 @@ def place_table(bench: AttitudeBench) -> TextTable | None:
 
     Returns
     -------
-    TextTable or None
+    TableBlock or None
         None if no position was given.
     """
     if not bench.places:
@@ -378,17 +352,17 @@ def place_table(bench: AttitudeBench) -> TextTable | None:
         for place in bench.places
     )
     legs = max(place.legs for place in bench.places)
-    return TextTable(
-        "Places, dead-reckoned between rests",
+    return TableBlock(
         (
             *("algorithm", "known", "error, m", "1σ, m", "stopped, m", "1σ, m"),
             "left at the rest, m/s",
         ),
         rows,
         text=(0, 1),
-        note=f"Over at most {legs} stretch{'es' if legs > 1 else ''} between rests. Stopped: with "
-        "the velocity at the end of each brought to zero. The 1σ is what assumed biases, tilt and "
-        "noise of a consumer sensor lead to; scale factors are not in it.",
+        caption=f"Over at most {legs} stretch{'es' if legs > 1 else ''} between rests. Stopped: "
+        "with the velocity at the end of each brought to zero. The 1σ is what assumed biases, tilt "
+        "and noise of a consumer sensor lead to; scale factors are not in it.",
+        title="Places, dead-reckoned between rests",
     )
 
 

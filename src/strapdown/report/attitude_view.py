@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from html import escape
-from typing import TYPE_CHECKING
 
 from strapdown.errors import ConfigError
 from strapdown.report import attitude_words as words
 from strapdown.report.attitude_charts import charts
-from strapdown.report.attitude_tables import TextTable, result_tables
-from strapdown.report.svg_chart import notebook_figure
+from strapdown.report.attitude_tables import result_tables
+from strapdown.report.chart_figure import ChartFigure
+from strapdown.report.document import TableBlock
 from strapdown.results.attitude_bench import AttitudeBench
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 __all__ = ["KINDS", "plot", "short_html"]
 
@@ -32,7 +29,7 @@ KINDS = {
 }
 
 
-def plot(bench: AttitudeBench, kind: str = "cost") -> Figure:
+def plot(bench: AttitudeBench, kind: str = "cost") -> ChartFigure:
     """Draw one chart of a bench, as the page shows it.
 
     Parameters
@@ -43,8 +40,8 @@ def plot(bench: AttitudeBench, kind: str = "cost") -> Figure:
 
     Returns
     -------
-    matplotlib.figure.Figure
-        Belongs to no window or global state; displays itself in a notebook.
+    ChartFigure
+        Displays itself in a notebook; `save` writes it as SVG, PNG or PDF.
 
     Raises
     ------
@@ -60,7 +57,7 @@ def plot(bench: AttitudeBench, kind: str = "cost") -> Figure:
         raise ConfigError(
             "report.nothing-draw-needs", quantity=f"kind '{kind}'", kinds=KINDS[kind], drawn=drawn
         )
-    return notebook_figure(drawn[kind])
+    return ChartFigure(drawn[kind])
 
 
 def short_html(bench: AttitudeBench) -> str:
@@ -84,7 +81,7 @@ def short_html(bench: AttitudeBench) -> str:
     return "<div>" + "".join(parts) + "</div>"
 
 
-def _table(table: TextTable) -> str:
+def _table(table: TableBlock) -> str:
     def row(cells: tuple[str, ...], tag: str, bold: bool) -> str:
         weight = ";font-weight:bold" if bold else ""
         return (
@@ -98,6 +95,6 @@ def _table(table: TextTable) -> str:
         )
 
     rows = "".join(row(r, "td", k in table.strong) for k, r in enumerate(table.rows))
-    note = f"<div><small>{escape(table.note)}</small></div>" if table.note else ""
+    note = f"<div><small>{escape(table.caption)}</small></div>" if table.caption else ""
     head = row(table.columns, "th", False)
     return f"<table><thead>{head}</thead><tbody>{rows}</tbody></table>{note}"

@@ -20,6 +20,7 @@ from strapdown.errors import ConfigError, DataError
 from strapdown.formats import csv
 from strapdown.report.coast_document import coast_document
 from strapdown.report.coast_words import end_bound, headline, inside_words, remedy, start_words
+from strapdown.report.document import finding_json
 from strapdown.report.document_data import draw_stills
 from strapdown.report.document_files import write_drawings, write_text
 from strapdown.report.document_html import document_page
@@ -253,7 +254,7 @@ def coast_json(result: CoastResult) -> dict[str, Any]:
             for d in (() if recorded is None else recorded.drifts)
             if d.time.size
         ],
-        "findings": [spaced(str(f)) for f in result.findings],
+        "findings": [finding_json(f) for f in result.findings],
     }
 
 

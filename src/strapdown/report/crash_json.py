@@ -21,10 +21,10 @@ from strapdown.crash.events import CrashEvent
 from strapdown.crash.path import CrashPath
 from strapdown.crash.pdof import NedPdof
 from strapdown.crash.unit_reconstruction import UnitReconstruction
-from strapdown.errors import Finding
 from strapdown.formats import csv
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.report import crash_limits, crash_words
+from strapdown.report.document import finding_json
 from strapdown.report.values import spaced
 from strapdown.systems.crash_case import CaseResult, ReferenceAnswer, SeverityAnswer, main_event
 from strapdown.tables import ACCEL, EULER, GYRO, NED, VELOCITY
@@ -62,7 +62,7 @@ def crash_json(result: CaseResult) -> dict[str, Any]:
         "references": [_reference(r) for r in result.references],
         "assumptions": _pairs(crash_limits.assumptions(result)),
         "limitations": _pairs(crash_limits.limitations(result)),
-        "findings": [_finding(f) for f in result.findings],
+        "findings": [finding_json(f) for f in result.findings],
         "case": _named(result.spec.model_dump(mode="json", exclude_none=True)),
     }
     return {key: _numbers(value) for key, value in found.items()}
@@ -202,12 +202,6 @@ def _comparison(comparison: UnitComparison) -> dict[str, Any]:
             for pair in comparison.pairs
         ],
     }
-
-
-def _finding(finding: Finding) -> dict[str, Any]:
-    """The finding as data, with its sentence and remedy."""
-    said = {"what": finding.sentence("file"), "remedy": finding.advice("file")}
-    return {**finding.plain(), **said}
 
 
 def _severity(answer: SeverityAnswer) -> dict[str, Any]:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any, TypeVar
 
+from strapdown.errors import Finding, Words
 from strapdown.report.chart import Chart
+from strapdown.report.scene import Scene
 
 __all__ = [
     "Animation",
@@ -19,10 +21,13 @@ __all__ = [
     "Items",
     "KeyFigure",
     "KeyFigures",
+    "Links",
     "Paragraph",
     "Picture",
     "Section",
     "TableBlock",
+    "finding_json",
+    "findings_list",
     "plain_document",
     "plain_text",
 ]
@@ -52,6 +57,13 @@ class Items:
 
 
 @dataclass(frozen=True)
+class Links:
+    """Files beside the page, each with its description; in the page only."""
+
+    rows: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
 class Facts:
     """Names and values in two columns without a header."""
 
@@ -69,9 +81,11 @@ class TableBlock:
     rows : tuple of tuple of str
     text : tuple of int
         Left-aligned text columns; the others are right-aligned numbers.
-    caption : str
+    caption, title : str
     strong : tuple of int
         Emphasized rows, such as a sum.
+    passed : frozenset of (int, int)
+        Row and column of cells within a tolerance; these also have a tick.
     """
 
     columns: tuple[str, ...]
@@ -79,11 +93,13 @@ class TableBlock:
     text: tuple[int, ...] = (0,)
     caption: str = ""
     strong: tuple[int, ...] = ()
+    title: str = ""
+    passed: frozenset[tuple[int, int]] = frozenset()
 
 
 @dataclass(frozen=True)
 class ChartBlock:
-    """A chart: interactive in the page, drawn as SVG in the PDF and among the figures."""
+    """A chart: interactive in the page, a still in the PDF and among the figures."""
 
     chart: Chart
 
@@ -115,24 +131,16 @@ class Picture:
 
 @dataclass(frozen=True)
 class Animation:
-    """A plotly figure with frames in the page; stills in the PDF.
+    """A scene that the page plays and turns; stills without scripts and on paper.
 
-    Attributes
-    ----------
-    slug : str
-    figure : mapping
-        Plain data: ``data``, ``layout``, ``frames``, each named by its time, and ``interval_ms``
-        between them, if not 60. The page has the button and the slider.
-    stills : Picture
-    live_caption : str
-        Caption that applies to the page only.
+    `live_caption` applies to the page's scene only.
     """
 
     slug: str
     title: str
     caption: str
-    figure: Mapping[str, Any] = field(repr=False)
-    stills: Picture = field(repr=False)
+    scene: Scene = field(repr=False)
+    stills: Picture | None = field(default=None, repr=False)
     live_caption: str = ""
 
 
@@ -154,7 +162,9 @@ class KeyFigures:
     pictures: tuple[Picture, ...] = ()
 
 
-Block = Paragraph | Items | Facts | TableBlock | ChartBlock | Picture | Animation | KeyFigures
+Block = (
+    Paragraph | Items | Links | Facts | TableBlock | ChartBlock | Picture | Animation | KeyFigures
+)
 
 
 @dataclass(frozen=True)
@@ -193,6 +203,22 @@ class Document:
     links: tuple[tuple[str, str], ...] = ()
 
 
+def findings_list(findings: Iterable[Finding]) -> Items | Paragraph:
+    """Return findings with their locations and remedies."""
+    rows = []
+    for finding in findings:
+        parts = (finding.file, finding.quantity, finding.row and f"row {finding.row}")
+        text = finding.what if not finding.remedy else f"{finding.what}. {finding.remedy}."
+        rows.append((", ".join(str(p) for p in parts if p), text))
+    return Items(tuple(rows)) if rows else Paragraph("None.")
+
+
+def finding_json(finding: Finding, words: Words = "file") -> dict[str, Any]:
+    """Return a finding for programs, with its sentence and remedy for people."""
+    said = {"sentence": finding.sentence(words), "remedy": finding.advice(words)}
+    return {**finding.plain(), **said}
+
+
 # Conversion of every text in a document to plain text.
 
 
@@ -211,8 +237,6 @@ _LIMITS: dict[type, dict[str, int]] = {
     Animation: {"caption": _WORDS, "live_caption": _TITLE, "title": _TITLE},
 }
 _MARKED = len("[U+10FFFF]")
-# Markup that plotly may interpret, for example as links.
-_MARKUP = re.compile(r"<(?!/?(?:b|i|br|sub|sup)\s*/?>)", re.IGNORECASE)
 _SLUG = re.compile(r"[^A-Za-z0-9_-]+")
 
 T = TypeVar("T")
@@ -255,23 +279,9 @@ def _field(owner: Any, name: str) -> Any:
         return _SLUG.sub("-", value)[:80].strip("-") or "part"
     if isinstance(owner, Picture) and name == "svg":
         return plain_text(value, _MARKED * len(value) + 1, lines=True)
-    if isinstance(owner, Animation) and name == "figure":
-        return _plain_figure(value)
     if isinstance(owner, Paragraph) and owner.kind == "mono" and name == "text":
         return plain_text(value, limit, lines=True)
     return _plain(value, limit)
-
-
-def _plain_figure(value: Any) -> Any:
-    """Copy of plotly's plain data whose texts cannot contain links."""
-    if isinstance(value, str):
-        # Numbers may be packed into long texts, which must not be cut.
-        return _MARKUP.sub("&lt;", plain_text(value, _MARKED * len(value) + 1))
-    if isinstance(value, Mapping):
-        return {str(key): _plain_figure(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain_figure(item) for item in value]
-    return value
 
 
 # Sanitizing of external text: no control characters, no invisible characters.

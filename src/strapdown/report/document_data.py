@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 
 from strapdown.errors import DataError
 from strapdown.report.chart import Chart
+from strapdown.report.chart_svg import still
 from strapdown.report.document import (
     Animation,
     Block,
@@ -17,17 +18,16 @@ from strapdown.report.document import (
     Facts,
     Items,
     KeyFigures,
+    Links,
     Paragraph,
     Picture,
     TableBlock,
     plain_document,
 )
-from strapdown.report.still_chart import still
 
-__all__ = ["document_data", "draw_stills", "no_stills"]
+__all__ = ["document_data", "draw_stills"]
 
 Place = Callable[[str], str]
-_INTERVAL_MS = 60  # between frames, if an animation does not state it
 
 
 def draw_stills(document: Document) -> tuple[str, ...]:
@@ -43,11 +43,6 @@ def draw_stills(document: Document) -> tuple[str, ...]:
         One SVG per chart, in document order.
     """
     return tuple(still(chart) for chart in _charts(plain_document(document)))
-
-
-def no_stills(document: Document) -> tuple[str, ...]:
-    """Return as many empty drawings as `draw_stills`: for a page with interactive charts only."""
-    return tuple("" for _ in _charts(document))
 
 
 def _charts(document: Document) -> list[Chart]:
@@ -72,12 +67,12 @@ def document_data(
     place : callable
         Takes a whole SVG and returns the template's reference to it.
     alive : bool
-        Whether to include plotly's data of the charts.
+        For the page: a chart has its drawing under ``svg``, an animation its scene.
 
     Returns
     -------
     dict
-        Strings, numbers, lists and dicts; charts under ``figure`` if alive.
+        Strings, numbers, lists and dicts.
 
     Raises
     ------
@@ -124,6 +119,8 @@ class _Writer:
             return {"kind": "paragraph", "style": block.kind, "text": block.text}
         if isinstance(block, Items):
             return {"kind": "items", "rows": _pairs(block.rows), "numbered": block.numbered}
+        if isinstance(block, Links):
+            return {"kind": "links", "rows": _pairs(block.rows)}
         if isinstance(block, Facts):
             return {"kind": "facts", "rows": _pairs(block.rows)}
         if isinstance(block, TableBlock):
@@ -143,13 +140,17 @@ class _Writer:
             )
         return {
             "kind": "table",
-            "title": "",
-            "number": next(self._tables) if table.caption else 0,
+            "title": table.title,
+            "number": next(self._tables) if table.caption or table.title else 0,
             "columns": list(table.columns),
             "rows": [list(row) for row in table.rows],
             "words": [index in table.text for index in range(len(table.columns))],
             "caption": table.caption,
             "strong": [index in table.strong for index in range(len(table.rows))],
+            "passed": [
+                [(row, column) in table.passed for column in range(len(table.columns))]
+                for row in range(len(table.rows))
+            ],
         }
 
     def _chart(self, chart: Chart) -> dict[str, Any]:
@@ -157,20 +158,17 @@ class _Writer:
         data: dict[str, Any] = {
             "kind": "chart",
             "number": number,
-            "id": f"figure-{number}",
             "title": chart.title,
             "caption": chart.caption,
             "alt": f"{chart.title}. {chart.caption}".strip(),
-            "still": self._place(next(self._stills)),
             "width_mm": 170.0,
             "still_caption": "",
             "live_caption": "",
         }
+        drawn = next(self._stills)
         if self._alive:
-            from strapdown.report.plotly_chart import figure
-
-            data["figure"] = figure(chart)
-        return data
+            return data | {"svg": drawn, "x_label": chart.x_label}
+        return data | {"still": self._place(drawn)}
 
     def _picture(self, picture: Picture) -> dict[str, Any]:
         try:
@@ -195,23 +193,19 @@ class _Writer:
 
     def _animation(self, animation: Animation) -> dict[str, Any]:
         number = next(self._figures)
+        still: dict[str, Any] = {"still": "", "still_caption": "", "alt": animation.title}
+        if animation.stills is not None:
+            still = self._picture(animation.stills)
+            still["still_caption"] = animation.stills.caption
         data: dict[str, Any] = {
-            **self._picture(animation.stills),
+            **still,
             "kind": "animation",
             "number": number,
-            "id": f"figure-{number}",
             "title": animation.title,
             "caption": animation.caption,
             "live_caption": animation.live_caption,
-            "still_caption": animation.stills.caption,
         }
-        if self._alive:
-            from strapdown.report.plotly_chart import LOOK
-
-            layout = LOOK | dict(animation.figure["layout"])
-            data["figure"] = dict(animation.figure) | {"layout": layout}
-            data["interval_ms"] = int(animation.figure.get("interval_ms", _INTERVAL_MS))
-        return data
+        return data | {"scene": animation.scene} if self._alive else data
 
     def _key_figures(self, block: KeyFigures) -> dict[str, Any]:
         return {

@@ -39,7 +39,7 @@ def write_drawings(document: Document, stills: Sequence[str], folder: Path) -> N
                 write_text(folder / f"{chart.slug}.svg", next(drawn))
             case Picture() as picture:
                 write_text(folder / f"{picture.slug}.svg", picture.svg)
-            case Animation(stills=picture):
+            case Animation(stills=Picture() as picture):
                 write_text(folder / f"{picture.slug}.svg", picture.svg)
 
 

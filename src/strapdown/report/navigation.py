@@ -7,7 +7,7 @@ from typing import Any
 
 from strapdown.bundle.seal import Seal, to_json
 from strapdown.config.navigation_file import navigation_spec
-from strapdown.report.document_data import draw_stills, no_stills
+from strapdown.report.document_data import draw_stills
 from strapdown.report.document_files import write_drawings, write_text
 from strapdown.report.document_html import document_page
 from strapdown.report.navigation_document import navigation_document
@@ -87,11 +87,9 @@ def write_navigation(
             write_verdict(result, name, folder)
             progress("drawing the figures", 0.86)
             document = navigation_document(found.told, name, found, light_section(result))
+            stills = draw_stills(document)
             if result.spec.output.figures:
-                stills = draw_stills(document)
                 write_drawings(document, stills, folder / "figures")
-            else:
-                stills = no_stills(document)
             progress("writing the page", 0.95)
             write_text(folder / "report.html", document_page(document, stills=stills))
         progress("sealing", 0.97)

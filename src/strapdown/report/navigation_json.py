@@ -19,6 +19,7 @@ from strapdown.formats import csv
 from strapdown.formats.trajectory_options import TrajectoryFileOptions
 from strapdown.formats.trajectory_writers import write_trajectory
 from strapdown.navigation.record import NavigationRecord
+from strapdown.report.document import finding_json
 from strapdown.report.navigation_document import CONVENTIONS
 from strapdown.report.navigation_found import Agreement, NavigationFound, Score, examine, told_of
 from strapdown.report.navigation_trust import trust
@@ -60,8 +61,8 @@ def navigation_json(
         "answer": _plain(headline(found)),
         "trust": {
             "verdict": verdict.verdict,
-            "for": [f.plain() for f in verdict.supporting],
-            "against": [f.plain() for f in verdict.against],
+            "for": [finding_json(f) for f in verdict.supporting],
+            "against": [finding_json(f) for f in verdict.against],
         },
         "cautions": [_plain(f"{head}: {text}") for head, text in cautions(found)],
         "record": {
@@ -115,7 +116,7 @@ def navigation_json(
         "against": _against(found),
         "control_points": _points(found),
         "method": _method(result),
-        "findings": [f.plain() for f in result.findings],
+        "findings": [finding_json(f) for f in result.findings],
     }
 
 

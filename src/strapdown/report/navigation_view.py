@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from strapdown.errors import ConfigError
 from strapdown.report import navigation_charts as charts
 from strapdown.report.chart import Chart
+from strapdown.report.chart_figure import ChartFigure
 from strapdown.report.navigation_charts import innovation_chart
 from strapdown.report.navigation_found import NavigationTold, agreements, told_of
 from strapdown.report.navigation_plan import plan_chart
-from strapdown.report.svg_chart import notebook_figure
 from strapdown.systems.sins.run import NavigationResult
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 __all__ = ["plot"]
 
@@ -28,7 +24,7 @@ KINDS: dict[str, Callable[[NavigationTold], Chart | None]] = {
 }
 
 
-def plot(result: NavigationResult, kind: str) -> Figure:
+def plot(result: NavigationResult, kind: str) -> ChartFigure:
     """Draw one chart of a run, as its report shows it.
 
     Parameters
@@ -39,8 +35,7 @@ def plot(result: NavigationResult, kind: str) -> Figure:
 
     Returns
     -------
-    matplotlib.figure.Figure
-        Belongs to no window or global state.
+    ChartFigure
 
     Raises
     ------
@@ -50,7 +45,7 @@ def plot(result: NavigationResult, kind: str) -> Figure:
     observed = result.filtered.innovations
     if kind in observed:
         found = {one.name: one for one in agreements(result.filtered)}
-        return notebook_figure(innovation_chart(result.filtered, found[kind]))
+        return ChartFigure(innovation_chart(result.filtered, found[kind]))
     if kind not in KINDS:
         raise ConfigError(
             "report.unknown-chart", quantity="kind", word=kind, known=[*KINDS, *observed]
@@ -58,4 +53,4 @@ def plot(result: NavigationResult, kind: str) -> Figure:
     chart = KINDS[kind](told_of(result))
     if chart is None:
         raise ConfigError("report.no-path-to-draw", quantity=f"kind '{kind}'")
-    return notebook_figure(chart)
+    return ChartFigure(chart)

@@ -20,9 +20,9 @@ from strapdown.formats.trajectory_thinning import thin
 from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS, TrajectoryFileOptions
 from strapdown.frames import ned_from_geodetic
 from strapdown.report.chart import BLUE, ORANGE, Array, Chart, Line, Panel, break_jumps, curve
+from strapdown.report.chart_figure import ChartFigure
 from strapdown.report.crash_simulation import stated_errors
 from strapdown.report.path_marks import View, path_marks
-from strapdown.report.svg_chart import draw
 from strapdown.simulation import TriadErrors
 from strapdown.systems.attitude_source import sensor_file
 from strapdown.systems.trajectory_source import simulate_trajectory
@@ -97,7 +97,9 @@ def write_trajectory_simulation(spec: TrajectorySpec, out: Path, *, force: bool 
         for name in dict.fromkeys(("csv", *spec.trajectory_formats)):
             path = folder / f"trajectory.{name}"
             TRAJECTORY_WRITERS[name](path, trajectory, name=spec.name, options=options)
-        draw(simulation_chart(spec, trajectory), folder / "trajectory.svg", caption=True)
+        ChartFigure(simulation_chart(spec, trajectory)).save(
+            folder / "trajectory.svg", caption=True
+        )
         shape = motion.ellipsoid
         sensor = spec.sensor and Path(spec.sensor).name
         description: dict[str, Any] = {

@@ -13,6 +13,7 @@ from strapdown.evaluation.heading_light import COLOURS, REASONS
 from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.formats import csv
 from strapdown.navigation.consistency import Inconsistency
+from strapdown.report.document import finding_json
 from strapdown.report.document_files import write_text
 from strapdown.report.document_html import document_page
 from strapdown.report.verdict_document import verdict_document
@@ -82,7 +83,7 @@ def verdict_json(result: NavigationResult) -> dict[str, Any]:
             "green_below_deg": light.green,
             "red_beyond_deg": light.red,
             "borne_out": not trust.unwitnessed,
-            "why_not": [f.plain() for f in trust.unwitnessed],
+            "why_not": [finding_json(f) for f in trust.unwitnessed],
             "borne_out_by": witness_words(trust) or None,
             "share": {c: light.share(c) for c in COLOURS},
             "at_end": spans[-1].colour if spans else None,
@@ -126,7 +127,7 @@ def _repeated(repeated: Repeated, result: NavigationResult) -> dict[str, Any]:
     out: dict[str, Any] = {
         "without": repeated.without,
         "answer": _plain(repeated_words(result)),
-        "failed": None if repeated.failed is None else repeated.failed.plain(),
+        "failed": None if repeated.failed is None else finding_json(repeated.failed),
         "left": [_doubt(i) for i in repeated.left],
     }
     if repeated.differences is not None:

@@ -13,7 +13,7 @@ from strapdown.results.inputs import InputFiles, Reading
 from strapdown.results.rests import RestStretch, SamePose
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from strapdown.report.chart_figure import ChartFigure
 
 __all__ = [
     "Answer",
@@ -143,7 +143,7 @@ class AttitudeBench:
         table = table.merge(shares, on="algorithm", how="left")
         return table.merge(costs, on="algorithm", how="left")
 
-    def plot(self, kind: str = "cost") -> Figure:
+    def plot(self, kind: str = "cost") -> ChartFigure:
         """Draw one chart of the report.
 
         Parameters
@@ -154,8 +154,8 @@ class AttitudeBench:
 
         Returns
         -------
-        matplotlib.figure.Figure
-            Independent of windows and global state; displayed by a notebook.
+        ChartFigure
+            Displays itself in a notebook; `save` writes it as SVG, PNG or PDF.
 
         Raises
         ------

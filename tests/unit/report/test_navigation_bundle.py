@@ -120,7 +120,7 @@ def test_the_json_states_its_conventions_and_no_clock(result, found):
     assert "\u00a0" not in json.dumps(told, ensure_ascii=False)
 
 
-def test_each_drawing_is_a_file(result, found, sketched, tmp_path):
+def test_each_drawing_is_a_file(result, found, tmp_path):
     document = navigation_document(found.told, "out", found)
     write_drawings(document, draw_stills(document), tmp_path / "figures")
     names = sorted(p.stem for p in (tmp_path / "figures").iterdir())

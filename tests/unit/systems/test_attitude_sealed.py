@@ -12,8 +12,6 @@ from strapdown.peers import available_peers
 from strapdown.report.attitude import write_attitude
 from strapdown.systems.attitude_bench import bench_attitude
 
-pytestmark = pytest.mark.usefixtures("sketched")
-
 ASKED = {"algorithms": ["naive", "quaternion"], "rates": [50, 25]}
 SENSOR = (
     'title = "x"\nclass = "phone"\nsummary = "x"\n[gyro]\n'
