@@ -20,10 +20,10 @@ from strapdown.config.navigation_file import read_navigation_spec
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.report.attitude_charts import charts
 from strapdown.report.chart_figure import ChartFigure
-from strapdown.report.document_files import drawings
+from strapdown.report.document import drawings
 from strapdown.report.navigation_document import navigation_document
 from strapdown.report.navigation_found import told_of
-from strapdown.report.trajectory_simulation import simulation_chart
+from strapdown.report.simulation import simulation_chart
 from strapdown.report.verdict_document import light_picture
 from strapdown.systems.attitude_bench import bench_attitude
 from strapdown.systems.sins.draft import draft_navigation

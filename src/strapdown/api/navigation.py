@@ -245,7 +245,7 @@ class NavigationRun(NavigationResult):
         ConfigError
             The chart does not exist for this run.
         """
-        from strapdown.report.navigation_view import plot
+        from strapdown.report.navigation import plot
 
         return plot(self, kind)
 

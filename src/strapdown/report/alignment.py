@@ -15,18 +15,13 @@ from strapdown.bundle.seal import Seal, to_json
 from strapdown.config.alignment_file import alignment_spec
 from strapdown.report.alignment_document import CONVENTIONS, alignment_document, limits
 from strapdown.report.alignment_trust import answer_error, trust
-from strapdown.report.crash_json import write_table
-from strapdown.report.document import finding_json
-from strapdown.report.document_data import draw_stills
-from strapdown.report.document_files import write_drawings, write_text
+from strapdown.report.document import draw_stills, finding_json, write_drawings, write_text
 from strapdown.report.document_html import document_page
-from strapdown.report.report_bundle import report_bundle
+from strapdown.report.report_bundle import report_bundle, write_table
 from strapdown.systems.alignment_run import AlignmentResult, run_alignment
 from strapdown.systems.one_thread import one_thread
 from strapdown.systems.progress import Progress, silent
 from strapdown.tables import EULER
-
-__all__ = ["alignment_json", "rerun_alignment", "write_alignment"]
 
 
 def rerun_alignment(configuration: dict[str, Any], out: Path, *, report: bool = True) -> Seal:
@@ -63,10 +58,6 @@ def write_alignment(
     force : bool
         Overwrite an existing bundle.
     progress : callable, optional
-
-    Returns
-    -------
-    Seal
 
     Raises
     ------
@@ -125,10 +116,6 @@ def _history(history: pd.DataFrame) -> pd.DataFrame:
 
 def alignment_json(result: AlignmentResult) -> dict[str, Any]:
     """Return an alignment as plain data for programs.
-
-    Parameters
-    ----------
-    result : AlignmentResult
 
     Returns
     -------

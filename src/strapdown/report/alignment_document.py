@@ -43,21 +43,6 @@ from strapdown.systems.alignment_run import AlignmentResult
 from strapdown.tables import ACCEL, EULER, GYRO, QUATERNION
 from strapdown.tables.checks import values_of
 
-__all__ = [
-    "CONVENTIONS",
-    "alignment_document",
-    "answer_table",
-    "bias_table",
-    "headline",
-    "key_figures",
-    "limits",
-    "method_rows",
-    "prior_sd",
-    "readiness_table",
-    "turn_table",
-]
-
-
 CONVENTIONS = (
     ("Body axes", "forward, right, down; local level: north, east, down"),
     ("Attitude", "roll, pitch, heading (3-2-1): right side down, nose up, clockwise are positive"),
@@ -81,10 +66,6 @@ def alignment_document(result: AlignmentResult, name: str) -> Document:
     result : AlignmentResult
     name : str
         Folder name, for the verification command.
-
-    Returns
-    -------
-    Document
     """
     found = trust(result)
     site = result.site

@@ -20,14 +20,10 @@ from strapdown.report.attitude_charts import charts, share_basis
 from strapdown.report.attitude_document import attitude_document
 from strapdown.report.attitude_tables import places_json, source_of
 from strapdown.report.chart_figure import ChartFigure
-from strapdown.report.document import finding_json
-from strapdown.report.document_data import draw_stills
-from strapdown.report.document_files import write_drawings, write_text
+from strapdown.report.document import draw_stills, finding_json, write_drawings, write_text
 from strapdown.report.document_html import document_page
 from strapdown.results.attitude_bench import AttitudeBench, Cost, Score, Share
 from strapdown.tables import EULER, GYRO, QUATERNION
-
-__all__ = ["attitude_json", "write_attitude"]
 
 
 def write_attitude(
@@ -51,10 +47,6 @@ def write_attitude(
         Overwrite an existing bundle.
     png : bool
         Also write each figure as PNG.
-
-    Returns
-    -------
-    Seal
 
     Raises
     ------
@@ -130,16 +122,7 @@ def _write_sweep(bench: AttitudeBench, path: Path) -> None:
 
 
 def attitude_json(bench: AttitudeBench) -> dict[str, Any]:
-    """Return a bench as plain data; every key carries its unit.
-
-    Parameters
-    ----------
-    bench : AttitudeBench
-
-    Returns
-    -------
-    dict
-    """
+    """Return a bench as plain data; every key carries its unit."""
     costs = {cost.algorithm: _cost(cost) for cost in bench.costs}
     shares = {share.algorithm: _share(share) for share in bench.shares}
     return {

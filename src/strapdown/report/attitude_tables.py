@@ -8,28 +8,17 @@ from typing import Any
 
 from strapdown.attitude import ALGORITHMS
 from strapdown.report.attitude_charts import share_basis
-from strapdown.report.attitude_numbers import (
+from strapdown.report.attitude_words import (
     MEANINGS,
+    condition,
+    degrees,
     full_rate_errors,
     largest_known,
     like_with_like,
     sweep_grid,
 )
-from strapdown.report.attitude_words import condition, degrees
 from strapdown.report.document import TableBlock
 from strapdown.results.attitude_bench import AttitudeBench, AttitudeRun, PeerRun, Score, SecondLog
-
-__all__ = [
-    "condition_table",
-    "cost_table",
-    "difference_table",
-    "peer_table",
-    "result_tables",
-    "source_of",
-    "sweep_tables",
-    "trial_table",
-]
-
 
 # With more comparisons the error contributions no longer fit in a terminal.
 _MOST_BESIDE = 4
@@ -50,16 +39,7 @@ def number(value: float) -> str:
 
 
 def result_tables(bench: AttitudeBench) -> list[TableBlock]:
-    """Return the errors of each algorithm with their contributions; two tables if wide.
-
-    Parameters
-    ----------
-    bench : AttitudeBench
-
-    Returns
-    -------
-    list of TableBlock
-    """
+    """Return the errors of each algorithm with their contributions; two tables if wide."""
     truth = any(s.against == "truth" for s in bench.scores)
     points = len(bench.references)
     at = [f"at R{k}" for k in range(1, points + 1)]
@@ -286,10 +266,6 @@ def _interval(low: float, high: float) -> str:
 def peer_table(bench: AttitudeBench) -> TableBlock | None:
     """Return the errors of other libraries, gyro-only ones separate from aided ones.
 
-    Parameters
-    ----------
-    bench : AttitudeBench
-
     Returns
     -------
     TableBlock or None
@@ -327,10 +303,6 @@ def _peer_error(peer: PeerRun) -> str:
 
 def place_table(bench: AttitudeBench) -> TableBlock | None:
     """Return the errors of dead-reckoned positions against known positions.
-
-    Parameters
-    ----------
-    bench : AttitudeBench
 
     Returns
     -------

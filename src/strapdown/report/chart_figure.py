@@ -10,8 +10,6 @@ from strapdown.errors import ConfigError
 from strapdown.report.chart import Chart, Panel
 from strapdown.report.chart_svg import still
 
-__all__ = ["ChartFigure"]
-
 _PPI = 200
 _TYPST = '#set page(width: auto, height: auto, margin: 4pt)\n#image("chart.svg")\n'
 

@@ -29,26 +29,6 @@ from strapdown.report.path_marks import LONGEST_BESIDE, label_rows, label_side
 from strapdown.report.plan_view import nice_step, tick_words
 from strapdown.report.svg_drawing import INK, Box, Drawing, number, overlap, text_width
 
-__all__ = [
-    "AXIS",
-    "LEVEL",
-    "LONG",
-    "RED",
-    "TICK",
-    "Frame",
-    "Scale",
-    "Tick",
-    "draw_pattern",
-    "draw_points",
-    "entries",
-    "fitted",
-    "legend_height",
-    "still",
-    "ticks",
-    "write_legend",
-]
-
-
 # Points, legend samples and patterns of a static chart.
 
 
@@ -766,10 +746,6 @@ def fitted(values: Sequence[ArrayLike], log: bool = False, margin: float = 0.05)
     log : bool
     margin : float
         As a share of the span of the values.
-
-    Returns
-    -------
-    Scale
     """
     v = np.concatenate([np.empty(0), *(np.asarray(x, dtype=np.float64).ravel() for x in values)])
     v = v[np.isfinite(v) & ((v > 0.0) if log else True)]
@@ -797,10 +773,6 @@ def ticks(scale: Scale, most: int, *, step: float = 0.0, between: float = 30.0) 
         Requested step, if any; not for a logarithmic axis.
     between : float
         A logarithmic axis of a smaller ratio also has labels at 2 and 5 times powers of ten.
-
-    Returns
-    -------
-    list of Tick
     """
     if not scale.log:
         return _even(scale, step or nice_step((scale.high - scale.low) / max(most, 1)))

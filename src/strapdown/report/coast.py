@@ -20,9 +20,7 @@ from strapdown.errors import ConfigError, DataError
 from strapdown.formats import csv
 from strapdown.report.coast_document import coast_document
 from strapdown.report.coast_words import end_bound, headline, inside_words, remedy, start_words
-from strapdown.report.document import finding_json
-from strapdown.report.document_data import draw_stills
-from strapdown.report.document_files import write_drawings, write_text
+from strapdown.report.document import draw_stills, finding_json, write_drawings, write_text
 from strapdown.report.document_html import document_page
 from strapdown.report.report_bundle import report_bundle
 from strapdown.report.values import spaced
@@ -31,8 +29,6 @@ from strapdown.systems.coasting.forecast import QUANTITIES
 from strapdown.systems.coasting.run import CoastResult, run_coast
 from strapdown.systems.one_thread import one_thread
 from strapdown.systems.progress import Progress, silent
-
-__all__ = ["coast_json", "read_coasting_run", "rerun_coast", "write_coast", "write_coast_tables"]
 
 
 def read_coasting_run(source: str | Path) -> tuple[NavigationSpec | None, Path | None]:
@@ -138,10 +134,6 @@ def write_coast(
         Overwrite an existing bundle.
     progress : callable, optional
 
-    Returns
-    -------
-    Seal
-
     Raises
     ------
     ConfigError
@@ -192,10 +184,6 @@ SHOWN = {
 
 def coast_json(result: CoastResult) -> dict[str, Any]:
     """Return an outage prediction as plain data for programs.
-
-    Parameters
-    ----------
-    result : CoastResult
 
     Returns
     -------

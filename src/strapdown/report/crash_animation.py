@@ -15,18 +15,13 @@ from strapdown import rotation
 from strapdown.crash.events import CrashEvent
 from strapdown.crash.path import CrashPath
 from strapdown.report.chart import BLUE, GREY, VERMILLION
-from strapdown.report.crash_moments import path_moments
-from strapdown.report.crash_outline import Outline
+from strapdown.report.crash_outline import Outline, path_moments
 from strapdown.report.document import Animation, Picture
-from strapdown.report.error_envelope import hull
-from strapdown.report.plan_view import nice_step, tick_words
+from strapdown.report.plan_view import hull, nice_step, tick_words
 from strapdown.report.scene import Scene, SceneBody, SceneLine, SceneWord
 from strapdown.report.svg_drawing import INK, SMALL, Drawing
 from strapdown.report.values import plain
 from strapdown.tables import NED
-
-__all__ = ["MOST_FRAMES", "VehicleBody", "crash_stills", "path_animation", "vehicle_body"]
-
 
 Array = NDArray[np.float64]
 

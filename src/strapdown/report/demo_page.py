@@ -10,19 +10,9 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from strapdown.report.document import (
-    Block,
-    Document,
-    Items,
-    Links,
-    Paragraph,
-    Picture,
-    Section,
-)
+from strapdown.report.document import Block, Document, Items, Links, Paragraph, Picture, Section
 from strapdown.report.document_html import document_page
 from strapdown.report.values import plain
-
-__all__ = ["Shown", "demo_page", "shown_answer", "shown_truth"]
 
 _MS_TO_KMH = 3.6
 _SMALL_DEG = 1e-3
@@ -72,10 +62,6 @@ def shown_answer(bundle: Path) -> str:
     ----------
     bundle : Path
         From `attitude`, `crash`, `navigate` or `coast`.
-
-    Returns
-    -------
-    str
     """
     kind, told = _told(bundle)
     if kind == "attitude":

@@ -10,11 +10,7 @@ from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from typing import Any
 
-from strapdown.report.document import Document
-from strapdown.report.document_data import document_data, draw_stills
-
-__all__ = ["document_page"]
-
+from strapdown.report.document import Document, document_data, draw_stills
 
 _TITLE = re.compile("<title>.*?</title>", re.DOTALL)
 

@@ -12,11 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from strapdown.errors import ConfigError, DataError
-from strapdown.report.document import Document
-from strapdown.report.document_data import document_data, draw_stills
-
-__all__ = ["shown", "write_pdf"]
-
+from strapdown.report.document import Document, document_data, draw_stills
 
 _TEMPLATE = "document.typ"
 

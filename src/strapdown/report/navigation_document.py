@@ -32,8 +32,6 @@ from strapdown.report.navigation_words import (
     smoothing_words,
 )
 
-__all__ = ["CONVENTIONS", "navigation_document"]
-
 
 def navigation_document(
     told: NavigationTold,
@@ -52,10 +50,6 @@ def navigation_document(
         From `examine`, if already computed.
     light : Section, optional
         Integrity section, for a run whose verdict is on a separate page.
-
-    Returns
-    -------
-    Document
     """
     found = examine(told) if found is None else found
     verdict = trust(found)

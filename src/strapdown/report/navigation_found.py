@@ -38,21 +38,6 @@ from strapdown.systems.sins.withholding import Withheld as WithheldScores
 from strapdown.systems.sins.withholding import withheld_aid
 from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
 
-__all__ = [
-    "Agreement",
-    "NavigationErrors",
-    "NavigationFound",
-    "NavigationTold",
-    "Score",
-    "Withheld",
-    "agreements",
-    "chi_square_far",
-    "examine",
-    "navigation_errors",
-    "told_of",
-    "withheld_of",
-]
-
 
 @dataclass(frozen=True, eq=False)
 class NavigationFound:
@@ -94,14 +79,6 @@ class NavigationFound:
 
 def examine(told: NavigationTold) -> NavigationFound:
     """Evaluate a run for its report.
-
-    Parameters
-    ----------
-    told : NavigationTold
-
-    Returns
-    -------
-    NavigationFound
 
     Raises
     ------
@@ -448,10 +425,6 @@ class NavigationErrors:
 def navigation_errors(told: NavigationTold) -> NavigationErrors | None:
     """Compare a run with its truth.
 
-    Parameters
-    ----------
-    told : NavigationTold
-
     Returns
     -------
     NavigationErrors or None
@@ -557,16 +530,7 @@ NO_RULE = "none: every observation counts in full, however far off it is"
 
 
 def told_of(result: NavigationResult) -> NavigationTold:
-    """Return the report input of a navigation result.
-
-    Parameters
-    ----------
-    result : NavigationResult
-
-    Returns
-    -------
-    NavigationTold
-    """
+    """Return the report input of a navigation result."""
     spec, source = result.spec, result.source
     chain = [
         ("Record", f"{source.name}: {source.what}"),
@@ -610,11 +574,6 @@ def _of_aid(aid: ChoiceSpec) -> str:
 
 def withheld_of(aid: str, scores: Sequence[WithheldScores]) -> tuple[Withheld, ...]:
     """Return the GNSS outage tests of a measurement source as a report shows them.
-
-    Parameters
-    ----------
-    aid : str
-    scores : sequence of Withheld
 
     Returns
     -------

@@ -7,12 +7,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Protocol
 
+import pandas as pd
+
 from strapdown.bundle.seal import Seal
 from strapdown.bundle.writing import write_bundle
 from strapdown.config.spec import Spec
+from strapdown.formats import csv
 from strapdown.results.inputs import InputFiles
-
-__all__ = ["report_bundle"]
 
 
 class Ran(Protocol):
@@ -93,3 +94,16 @@ def report_bundle(
         seals=seals,
     ) as folder:
         yield folder
+
+
+def write_table(table: pd.DataFrame, path: Path, comments: dict[str, str]) -> None:
+    """Write a table as CSV with shortest round-trip numbers.
+
+    Parameters
+    ----------
+    table : DataFrame
+    path : Path
+    comments : dict of str to str
+        Written at the top.
+    """
+    csv.write(path, {str(c): table[c].to_numpy() for c in table.columns}, comments)

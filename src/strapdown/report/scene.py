@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Scene", "SceneBody", "SceneLine", "SceneWord"]
-
 Array = NDArray[np.float64]
 _DIGITS = 4  # a tenth of a millimeter
 

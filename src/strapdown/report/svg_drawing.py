@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 Box = tuple[float, float, float, float]
 
-__all__ = ["INK", "SMALL", "Box", "Drawing", "number", "overlap", "shortened", "text_width"]
 
 INK = "#1b1f24"
 #: Smallest font size, in pixels of a picture at its size on paper.

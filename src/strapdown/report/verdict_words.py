@@ -14,21 +14,6 @@ from strapdown.report.values import alignment_values_instant as instant
 from strapdown.systems.sins.run import NavigationResult
 from strapdown.systems.sins.trust import NO_NORTH, Advice, IntegrityReport, Repeated
 
-__all__ = [
-    "advice_words",
-    "answer",
-    "degrees_words",
-    "first_words",
-    "heading_words",
-    "kind_words",
-    "place_words",
-    "promise",
-    "repeated_words",
-    "span_words",
-    "terminal_lines",
-    "witness_words",
-]
-
 _KINDS = {
     "change": "changes within the run",
     "understated": "scatters more than stated",

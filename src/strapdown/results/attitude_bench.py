@@ -162,13 +162,13 @@ class AttitudeBench:
         ConfigError
             The chart does not exist or has no data.
         """
-        from strapdown.report.attitude_view import plot
+        from strapdown.report.attitude_document import plot
 
         return plot(self, kind)
 
     def _repr_html_(self) -> str:
         """Answer and table of results, for a notebook."""
-        from strapdown.report.attitude_view import short_html
+        from strapdown.report.attitude_document import short_html
 
         return short_html(self)
 

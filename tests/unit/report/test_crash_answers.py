@@ -15,8 +15,13 @@ from strapdown.config.crash_case import AssumedSpec, ReferenceSpec
 from strapdown.config.crash_case_file import read_case_spec
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import read_raw
-from strapdown.report.crash_case import file_name
-from strapdown.report.crash_json import crash_json, signals_table, trajectory_table, write_table
+from strapdown.report.crash_case import (
+    crash_json,
+    file_name,
+    signals_table,
+    trajectory_table,
+    write_table,
+)
 from strapdown.report.crash_limits import limitations
 from strapdown.report.simulation import simulate
 from strapdown.report.values import spaced

@@ -20,7 +20,7 @@ from strapdown.report.crash_charts import (
     delta_v_half_widths,
     risk_chart,
 )
-from strapdown.report.crash_moments import event_marks, marks_apart, path_moments
+from strapdown.report.crash_outline import event_marks, marks_apart, path_moments
 from strapdown.report.crash_signals import flags_in_vehicle_axes, in_vehicle_axes
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.systems.crash_case import main_event

@@ -18,14 +18,16 @@ from strapdown import rotation
 from strapdown.config.crash_case import PointSpec, VehicleSpec
 from strapdown.crash.pdof import AngleInterval
 from strapdown.report.crash_animation import MOST_FRAMES, path_animation, vehicle_body
-from strapdown.report.crash_conventions import MountingPoint, conventions_picture
-from strapdown.report.crash_dial import Direction, pdof_dial
 from strapdown.report.crash_figures import crash_figures, reference_in_path_axes
-from strapdown.report.crash_moments import angle_words, interval_words, path_moments
-from strapdown.report.crash_outline import vehicle_outline
+from strapdown.report.crash_outline import (
+    angle_words,
+    interval_words,
+    path_moments,
+    vehicle_outline,
+)
+from strapdown.report.crash_pictures import Direction, MountingPoint, conventions_picture, pdof_dial
 from strapdown.report.crash_plan import path_plan
-from strapdown.report.error_envelope import ellipse, envelope, hull
-from strapdown.report.plan_view import PlanView, nice_step, tick_words
+from strapdown.report.plan_view import PlanView, ellipse, envelope, hull, nice_step, tick_words
 from strapdown.report.svg_drawing import SMALL, Drawing, overlap, shortened, text_width
 from strapdown.report.values import plain
 from strapdown.tables import NED

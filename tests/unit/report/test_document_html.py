@@ -19,9 +19,9 @@ from strapdown.report.document import (
     KeyFigure,
     KeyFigures,
     Picture,
+    draw_stills,
     plain_document,
 )
-from strapdown.report.document_data import draw_stills
 from strapdown.report.document_html import document_page
 
 sys.path.insert(0, str(Path(__file__).parent))

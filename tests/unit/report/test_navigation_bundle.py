@@ -11,11 +11,10 @@ import pytest
 
 from strapdown.config.navigation_file import read_navigation_spec
 from strapdown.evaluation.plane_bound import plane_bound
-from strapdown.report.document_data import draw_stills
-from strapdown.report.document_files import drawings, write_drawings
+from strapdown.report.document import draw_stills, drawings, write_drawings
+from strapdown.report.navigation import navigation_json
 from strapdown.report.navigation_document import navigation_document
 from strapdown.report.navigation_found import examine, told_of, withheld_of
-from strapdown.report.navigation_json import navigation_json
 from strapdown.systems.sins.run import run_navigation
 
 FILE = """

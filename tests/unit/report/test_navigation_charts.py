@@ -20,7 +20,7 @@ from strapdown.evaluation.plane_bound import PLANE_95, plane_bound
 from strapdown.frames import ned_from_geodetic
 from strapdown.navigation.record import Span
 from strapdown.report import navigation_charts as charts
-from strapdown.report.chart import strip_range
+from strapdown.report.chart import broken, kept_rows, strip_range, thin_fill
 from strapdown.report.chart_svg import still
 from strapdown.report.navigation_charts import (
     error_charts,
@@ -31,7 +31,6 @@ from strapdown.report.navigation_charts import (
 )
 from strapdown.report.navigation_found import agreements, navigation_errors
 from strapdown.report.navigation_plan import ellipse_rows, plan_chart
-from strapdown.report.navigation_thinning import broken, kept_rows, thin_fill
 from strapdown.report.values import heading_shown, unwrapped
 
 

@@ -16,8 +16,7 @@ from strapdown.errors import ConfigError
 from strapdown.formats import read_raw
 from strapdown.report import attitude_tables as tables
 from strapdown.report.attitude import attitude_json, write_attitude
-from strapdown.report.attitude_document import attitude_document
-from strapdown.report.attitude_view import KINDS
+from strapdown.report.attitude_document import KINDS, attitude_document
 from strapdown.report.attitude_words import headline
 from strapdown.report.document_html import document_page
 from strapdown.report.verify import _difference

@@ -13,7 +13,7 @@ from strapdown.frames import geodetic_from_ned
 from strapdown.report.chart import steady_range
 from strapdown.report.chart_figure import ChartFigure
 from strapdown.report.path_marks import View
-from strapdown.report.trajectory_simulation import MOST_POINTS, trajectory_chart
+from strapdown.report.simulation import MOST_POINTS, trajectory_chart
 from strapdown.tables import trajectory_table
 
 PLACE = (55.75, 37.62, 150.0)
