@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from html import escape
 
@@ -16,7 +17,7 @@ from strapdown.report import attitude_tables as tables
 from strapdown.report import attitude_words as words
 from strapdown.report.attitude_charts import charts
 from strapdown.report.attitude_tables import result_tables
-from strapdown.report.attitude_words import chosen_run
+from strapdown.report.attitude_words import MEANINGS, chosen_run, full_rate_errors, sweep_grid
 from strapdown.report.chart import AXIS_COLOURS, BLACK, GREY, Chart
 from strapdown.report.chart_figure import ChartFigure
 from strapdown.report.document import (
@@ -26,6 +27,8 @@ from strapdown.report.document import (
     Document,
     Facts,
     Items,
+    KeyFigure,
+    KeyFigures,
     Paragraph,
     Section,
     TableBlock,
@@ -49,6 +52,7 @@ def attitude_document(bench: AttitudeBench, drawn: Sequence[Chart] | None = None
 
     answer = bench.answer
     front = kept(
+        _key_figures(bench),
         Paragraph(answer.sentence, "lead"),
         Paragraph(words.standing(bench)),
         *_named_items("Why:", answer.why),
@@ -113,6 +117,28 @@ def attitude_document(bench: AttitudeBench, drawn: Sequence[Chart] | None = None
         tuple(Section(slug, title, tuple(blocks)) for slug, title, blocks in sections if blocks),
         bench.source,
     )
+
+
+def _key_figures(bench: AttitudeBench) -> KeyFigures | None:
+    """Algorithm, rate and error of the answer, if it names an algorithm."""
+    answer = bench.answer
+    if answer.algorithm is None:
+        return None
+    figures = [KeyFigure("Simplest sufficient algorithm", answer.algorithm, "")]
+    rate, meaning, error = answer.rate_hz, answer.meaning, math.nan
+    if rate is not None:
+        figures.append(
+            KeyFigure("Lowest sufficient rate", f"{rate:.4g} Hz", MEANINGS.get(meaning or "", ""))
+        )
+        grid = sweep_grid(bench, meaning or "drop")
+        if rate in grid.columns and answer.algorithm in grid.index:
+            error = float(grid.loc[answer.algorithm, rate])
+    if math.isnan(error):
+        error = full_rate_errors(bench).get(answer.algorithm, math.nan)
+    whose = "its own error, without a reference" if answer.verdict == "own" else "largest error"
+    bound = f"tolerance {answer.tolerance_deg:g}°"
+    figures.append(KeyFigure(whose.capitalize(), words.degrees(error), bound))
+    return KeyFigures(tuple(figures))
 
 
 def _named_items(title: str, lines: Sequence[str]) -> list[Block]:

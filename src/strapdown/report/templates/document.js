@@ -195,19 +195,20 @@
       panel.grid.textContent = "";
       var keep = panel.kind === "categories";
       if (!keep) { panel.ticks.textContent = ""; } else { panel.ticks.innerHTML = panel.kept.ticks; }
-      if (!keep || panel.named.indexOf("x") >= 0) {
-        if (keep) {
-          panel.ticks.querySelectorAll("[text-anchor='middle']").forEach(function (n) { n.remove(); });
-        }
-        ticks(panel.x, panel.vx, Math.max(2, b.w / 70)).forEach(function (tick) {
-          var x = b.x + b.w * (panel.x.share(tick.at) - panel.vx[0]) / (panel.vx[1] - panel.vx[0]);
-          element("line", {x1: x, x2: x, y1: b.y, y2: b.y + b.h, stroke: "#e6e9ed", "stroke-width": 0.8}, panel.grid);
-          element("line", {x1: x, x2: x, y1: b.y + b.h, y2: b.y + b.h + 3.5, stroke: "#1b1f24", "stroke-width": 0.8}, panel.ticks);
-          if (panel.named.indexOf("x") >= 0) {
-            element("text", {x: x, y: b.y + b.h + 15, "font-size": 10, "text-anchor": "middle", fill: "#1b1f24"}, panel.ticks).textContent = tick.text;
-          }
+      if (keep) {
+        panel.ticks.querySelectorAll("text[text-anchor='middle']").forEach(function (n) { n.remove(); });
+        panel.ticks.querySelectorAll("line").forEach(function (n) {
+          if (n.getAttribute("x1") === n.getAttribute("x2")) { n.remove(); }
         });
       }
+      ticks(panel.x, panel.vx, Math.max(2, b.w / 70)).forEach(function (tick) {
+        var x = b.x + b.w * (panel.x.share(tick.at) - panel.vx[0]) / (panel.vx[1] - panel.vx[0]);
+        element("line", {x1: x, x2: x, y1: b.y, y2: b.y + b.h, stroke: "#e6e9ed", "stroke-width": 0.8}, panel.grid);
+        element("line", {x1: x, x2: x, y1: b.y + b.h, y2: b.y + b.h + 3.5, stroke: "#1b1f24", "stroke-width": 0.8}, panel.ticks);
+        if (panel.named.indexOf("x") >= 0) {
+          element("text", {x: x, y: b.y + b.h + 15, "font-size": 10, "text-anchor": "middle", fill: "#1b1f24"}, panel.ticks).textContent = tick.text;
+        }
+      });
       if (keep) { return; }
       ticks(panel.y, panel.vy, Math.max(2, Math.min(8, b.h / 16))).forEach(function (tick) {
         var y = b.y + b.h * (1 - (panel.y.share(tick.at) - panel.vy[0]) / (panel.vy[1] - panel.vy[0]));
@@ -292,6 +293,7 @@
         line.appendChild(dot);
         line.appendChild(document.createTextNode(series + " " + text));
         tip.appendChild(line);
+        if (to[0] < b.x - 1 || to[0] > b.x + b.w + 1 || to[1] < b.y - 1 || to[1] > b.y + b.h + 1) { return; }
         element("circle", {cx: to[0], cy: to[1], r: 3, fill: "#fff", stroke: row.colour, "stroke-width": 1.6}, cross);
       });
       tip.hidden = false;
