@@ -62,7 +62,7 @@ def attitude_document(bench: AttitudeBench, drawn: Sequence[Chart] | None = None
             "These rests look alike, and could be reference points:", tables.offer_lines(bench)
         ),
     )
-    sections = (
+    sections: tuple[tuple[str, str, list[Block]], ...] = (
         ("rates", "Cost, rate and error", [*shown("cost", "sweep"), *tables.sweep_tables(bench)]),
         (
             "results",

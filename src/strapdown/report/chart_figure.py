@@ -65,15 +65,13 @@ class ChartFigure:
 
 def _typeset(svg: str, ending: str) -> bytes:
     """Draw an SVG with the fonts inside typst: the same bytes on every machine."""
-    import typst
-
-    from strapdown.report.document_pdf import shown
+    from strapdown.report.document_pdf import shown, typst_library
 
     with tempfile.TemporaryDirectory(prefix="strapdown-") as name:
         folder = Path(name)
         (folder / "chart.svg").write_text(shown(svg), encoding="utf-8", newline="\n")
         (folder / "chart.typ").write_text(_TYPST, encoding="utf-8", newline="\n")
-        made: bytes = typst.compile(
+        made: bytes = typst_library().compile(
             str(folder / "chart.typ"),
             root=str(folder),
             font_paths=[],

@@ -125,7 +125,8 @@ class CrashFigures:
     @property
     def pictures(self) -> tuple[Picture, ...]:
         """All pictures, including those of the animation on paper."""
-        return (*self.front, self.path, self.motion.stills, self.conventions)
+        stills = () if self.motion.stills is None else (self.motion.stills,)
+        return (*self.front, self.path, *stills, self.conventions)
 
 
 def crash_figures(result: CaseResult) -> CrashFigures:

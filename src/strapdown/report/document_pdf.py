@@ -45,7 +45,7 @@ def write_pdf(document: Document, path: Path, *, stills: Sequence[str] | None = 
 
 
 def _pdf(document: Document, stills: Sequence[str]) -> bytes:
-    typst = _typst()
+    typst = typst_library()
     with tempfile.TemporaryDirectory(prefix="strapdown-") as name:
         folder = Path(name)
         count = 0
@@ -98,7 +98,14 @@ def _compiled(typst: Any, folder: Path) -> bytes:
         return compiled()
 
 
-def _typst() -> Any:
+def typst_library() -> Any:
+    """Return typst, which lays out PDF and PNG.
+
+    Raises
+    ------
+    ConfigError
+        It is not installed.
+    """
     try:
         import typst
     except ImportError as error:

@@ -143,7 +143,8 @@
       panel.kept = {grid: panel.grid.innerHTML, ticks: panel.ticks.innerHTML};
       panel.shapes = [];
       panel.node.querySelectorAll("line,polyline,polygon,path").forEach(function (node) {
-        if (node.closest(".grid")) { return; }
+        // The pattern of a bar is cut to the bar as it was drawn: it is there at full view alone.
+        if (node.closest(".grid") || node.closest("svg") !== panel.node) { return; }
         var made = shape(node), owner = node.closest("[data-line]");
         made.series = owner ? owner.dataset.series : null;
         made.colour = node.getAttribute("stroke") || node.getAttribute("fill");
@@ -171,6 +172,7 @@
       prepare(panel);
       var b = panel.box, whole = panel.vx[1] - panel.vx[0] === 1 && panel.vy[1] - panel.vy[0] === 1;
       panel.shapes.forEach(function (s) { s.put(moved(panel, s.points)); });
+      panel.node.querySelectorAll("svg").forEach(function (n) { n.style.display = whole ? "" : "none"; });
       panel.names.querySelectorAll("[data-at]").forEach(function (node) {
         var at = node.dataset.at.split(" ").map(function (v, k) { return v === "-" ? [b.x, b.y][k] : +v; });
         var free = node.dataset.at.split(" ").map(function (v) { return v === "-"; });
