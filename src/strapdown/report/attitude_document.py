@@ -131,8 +131,9 @@ def _key_figures(bench: AttitudeBench) -> KeyFigures | None:
             KeyFigure("Lowest sufficient rate", f"{rate:.4g} Hz", MEANINGS.get(meaning or "", ""))
         )
         grid = sweep_grid(bench, meaning or "drop")
-        if rate in grid.columns and answer.algorithm in grid.index:
-            error = float(grid.loc[answer.algorithm, rate])
+        if rate in grid.columns:
+            errors = grid[rate].to_dict()
+            error = float(errors.get(answer.algorithm, math.nan))
     if math.isnan(error):
         error = full_rate_errors(bench).get(answer.algorithm, math.nan)
     whose = "its own error, without a reference" if answer.verdict == "own" else "largest error"

@@ -124,7 +124,8 @@ def _space(points: Sequence[Array], ground: float) -> tuple[Array, Array]:
 
 
 def _few(points: Array) -> Array:
-    return points[np.unique(np.linspace(0, len(points) - 1, min(len(points), 300)).astype(int))]
+    rows = np.unique(np.linspace(0, len(points) - 1, min(len(points), 300)).astype(int))
+    return np.asarray(points[rows])
 
 
 def _ground(

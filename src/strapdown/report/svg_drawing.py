@@ -339,9 +339,10 @@ def _hundredths(points: Array) -> str:
 def _steps(points: Array) -> str:
     """Format a curve as its start and its steps, which are shorter than its points."""
     rounded = np.rint(100.0 * points).astype(np.int64)
+    start = np.asarray(0.01 * rounded[:1], dtype=np.float64)
     steps = [_short(v) for v in np.diff(rounded, axis=0).ravel().tolist()]
     pairs = " ".join(f"{x},{y}" for x, y in zip(steps[::2], steps[1::2], strict=True))
-    return f"M{_hundredths(0.01 * rounded[:1])}l{pairs}"
+    return f"M{_hundredths(start)}l{pairs}"
 
 
 def _short(hundredths: int) -> str:
