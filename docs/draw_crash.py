@@ -23,7 +23,7 @@ from strapdown.report.chart import (
     Mark,
     Panel,
 )
-from strapdown.report.svg_chart import draw
+from strapdown.report.chart_figure import ChartFigure
 from strapdown.simulation import point_kinematics
 from strapdown.simulation.crash_motion import find_crash
 from strapdown.simulation.crash_recording import paper_units, record_crash
@@ -88,4 +88,4 @@ def chart() -> Chart:
 
 
 if __name__ == "__main__":
-    draw(chart(), Path(__file__).parent / "images" / "crash.svg")
+    ChartFigure(chart()).save(Path(__file__).parent / "images" / "crash.svg")

@@ -11,7 +11,7 @@ import numpy as np
 
 from strapdown.estimation.robust import INFLUENCES, RobustUpdate
 from strapdown.report.chart import BLACK, BLUE, GREEN, ORANGE, VERMILLION, Chart, Line, Panel
-from strapdown.report.svg_chart import draw
+from strapdown.report.chart_figure import ChartFigure
 
 LOOKS = {
     "none": (BLACK, "dot"),
@@ -62,4 +62,4 @@ def chart() -> Chart:
 
 
 if __name__ == "__main__":
-    draw(chart(), Path(__file__).parent / "images" / "influence.svg")
+    ChartFigure(chart()).save(Path(__file__).parent / "images" / "influence.svg")

@@ -12,7 +12,7 @@ import pandas as pd
 
 from strapdown.prefilter import RobustFir
 from strapdown.report.chart import BLACK, Chart, Panel, curve
-from strapdown.report.svg_chart import draw
+from strapdown.report.chart_figure import ChartFigure
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.simulation import Origin, StationaryMotion
 from strapdown.simulation.imu import simulate_imu
@@ -74,4 +74,4 @@ def chart() -> Chart:
 
 
 if __name__ == "__main__":
-    draw(chart(), Path(__file__).parent / "images" / "prefilter.svg")
+    ChartFigure(chart()).save(Path(__file__).parent / "images" / "prefilter.svg")

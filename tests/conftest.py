@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import io
 import sys
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
-from hashlib import sha256
-from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -25,44 +23,6 @@ def recordings():
         return path
 
     return find
-
-
-@contextmanager
-def _sketching():
-    """Charts are written as the digest of what is to be drawn, and not drawn.
-
-    Drawing is most of the time of a report. A chart with another number is another sketch, so that
-    what is sealed and made again is compared as ever.
-    """
-    from strapdown.report.plotly_chart import figure
-
-    def sketch(chart, path, *, caption=False, paper=False):
-        told = repr((figure(chart), path.suffix, caption, paper))
-        digest = sha256(told.encode()).hexdigest()
-        path.write_text(
-            f'<svg xmlns="http://www.w3.org/2000/svg" width="90pt" height="50pt" '
-            f'viewBox="0 0 90 50"><desc>{digest}</desc></svg>\n',
-            encoding="utf-8",
-        )
-
-    with pytest.MonkeyPatch.context() as patch:
-        for name in ("svg_chart", "attitude", "trajectory_simulation"):
-            patch.setattr(import_module(f"strapdown.report.{name}"), "draw", sketch)
-        yield
-
-
-@pytest.fixture
-def sketched():
-    """No chart is drawn in a test that looks at no picture."""
-    with _sketching():
-        yield
-
-
-@pytest.fixture(scope="module")
-def sketched_module():
-    """As `sketched`, for a module whose own fixtures write reports; none of the session may."""
-    with _sketching():
-        yield
 
 
 @dataclass(frozen=True)

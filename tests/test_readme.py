@@ -17,7 +17,7 @@ def test_there_are_runs_to_hold():
 
 
 @pytest.mark.parametrize(("command", "shown"), RUNS, ids=["attitude", "crash", "navigate"])
-def test_the_output_shown_is_the_output(command, shown, run_cli, tmp_path, monkeypatch, sketched):
+def test_the_output_shown_is_the_output(command, shown, run_cli, tmp_path, monkeypatch):
     words = shlex.split(command.replace("\\\n", " "))
     (tmp_path / "docs").symlink_to(Path(__file__).parent.parent / "docs")
     monkeypatch.chdir(tmp_path)

@@ -11,7 +11,7 @@ from types import ModuleType
 import pytest
 
 # Typer itself loads pydantic where a command has options.
-HEAVY = ("numba", "pandas", "plotly", "matplotlib", "scipy", "h5py", "pyarrow")
+HEAVY = ("numba", "pandas", "typst", "jinja2", "scipy", "h5py", "pyarrow")
 
 
 def loaded_after(code: str) -> set[str]:

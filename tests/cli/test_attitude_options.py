@@ -11,8 +11,6 @@ from strapdown.formats.log_writers import LOG_WRITERS
 from strapdown.simulation import ImuErrors, simulate_imu
 from strapdown.simulation.attitude_motions import Handling
 
-pytestmark = pytest.mark.usefixtures("sketched")
-
 FEW = ["--algorithms", "naive quaternion", "--rates", "50,25"]
 
 

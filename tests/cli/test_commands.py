@@ -14,8 +14,6 @@ import pytest
 
 from strapdown.cli.main import EXIT_CODES
 
-pytestmark = pytest.mark.usefixtures("sketched")
-
 COMMANDS = ["attitude", "simulate", "verify", "modules", "demo"]
 
 

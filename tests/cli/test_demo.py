@@ -27,7 +27,7 @@ REAL = {"turn": "mpu6050_turns", "car": "car_rtk", "walk": "foot"}
 
 
 @pytest.fixture(scope="module")
-def shown(tmp_path_factory, run_cli, sketched_module):
+def shown(tmp_path_factory, run_cli):
     """The demonstration of somebody who has nothing but the package."""
     root = tmp_path_factory.mktemp("demo")
     with pytest.MonkeyPatch.context() as patch:
@@ -41,7 +41,7 @@ def shown(tmp_path_factory, run_cli, sketched_module):
 def test_three_systems_on_one_page_each_with_its_bound_and_the_truth(shown):
     folder, found = shown
     page = unescape((folder / "index.html").read_text(encoding="utf-8"))
-    assert re.findall(r'<article id="(\w+)">', page) == BUILT_IN
+    assert re.findall(r'<h2 id="\d-(\w+)">', page) == BUILT_IN
     assert page.count("The truth beside it") == len(BUILT_IN)
     assert "its largest error is 0.729°" in page
     crash = re.search(r"Delta-V ([\d.]+) ± ([\d.]+) km/h", page)
@@ -230,7 +230,7 @@ def test_the_packaged_recording_is_that_of_its_source(recordings):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("slug", REAL)
-def test_a_recording_is_shown_with_what_is_known_of_it(slug, recordings, tmp_path, sketched):
+def test_a_recording_is_shown_with_what_is_known_of_it(slug, recordings, tmp_path):
     data = recordings(REAL[slug]).parent
     (run,) = [r for r in command.demo_runs(tmp_path, data) if r.shown.slug == slug]
     run.make(tmp_path, False, lambda stage, share: None)
@@ -244,4 +244,4 @@ def test_a_recording_is_shown_with_what_is_known_of_it(slug, recordings, tmp_pat
         share = re.search(r": ([\d.]+) %\.$", truth)
         # A walk on foot is known to two percent of the way at the least.
         assert share is not None and float(share[1]) < 2.0
-    assert f'id="{slug}"' in demo_page([run.shown], tmp_path)
+    assert f'id="1-{slug}"' in demo_page([run.shown], tmp_path)

@@ -283,8 +283,8 @@ def test_bad_input_leaves_nothing_and_says_why(case, run_cli, tmp_path, undrawn_
         assert "note: " in said or "warning: " in said
 
 
-# The signal comes while the callback of a weak reference runs, as they do in numbers when pictures
-# are drawn by matplotlib: what is raised there, Python drops.
+# The signal comes while the callback of a weak reference runs, as they do in numbers in a long run:
+# what is raised there, Python drops.
 DROPPED = """
 import os, signal, time, weakref
 from strapdown.cli import main

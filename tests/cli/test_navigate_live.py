@@ -181,7 +181,7 @@ def test_what_cannot_be_asked(live, run_cli, options, what):
     assert not (live / "out").exists()
 
 
-def test_a_pace_writes_what_each_sample_took_outside_the_seal(tmp_path, run_cli, sketched):
+def test_a_pace_writes_what_each_sample_took_outside_the_seal(tmp_path, run_cli):
     LOG_WRITERS["csv"](tmp_path / "log.csv", drive(), None)
     path = written(tmp_path, '[log]\npath = "log.csv"\n').rename(tmp_path / "run.toml")
     text = path.read_text().replace("[aiding.gnss]\nlever_arm_m = [1.0, -0.4, -1.2]\n", "")

@@ -14,8 +14,6 @@ from strapdown.cli.main import app
 from strapdown.cli.result_folder import default_folder
 from strapdown.cli.shared_options import LOG_PANEL, OUT_PANEL, LogFlags
 
-pytestmark = pytest.mark.usefixtures("sketched")
-
 ROOT = get_command(app)
 COMMANDS = {
     **{name: one for name, one in ROOT.commands.items() if not hasattr(one, "commands")},
@@ -176,7 +174,7 @@ def test_a_folder_keeps_its_whole_name_and_a_result_of_a_result_has_one_ending(t
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory, run_cli, sketched_module):
+def results(tmp_path_factory, run_cli):
     """Results of two commands, by their names."""
     root = tmp_path_factory.mktemp("results")
     assert run_cli("attitude", log(root / "log.csv"), "-q", "--out", root / "rest").code == 0

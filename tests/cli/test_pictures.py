@@ -20,18 +20,18 @@ from strapdown.config.alignment import LogTable
 from strapdown.config.navigation import NavigationSpec
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.report.attitude_charts import charts
-from strapdown.report.document_files import drawings
+from strapdown.report.chart_figure import ChartFigure
+from strapdown.report.document import drawings
 from strapdown.report.navigation_document import navigation_document
 from strapdown.report.navigation_found import told_of
-from strapdown.report.svg_chart import draw
-from strapdown.report.trajectory_simulation import simulation_chart
+from strapdown.report.simulation import simulation_chart
 from strapdown.report.verdict_document import light_picture
 from strapdown.systems.navigation_draft import draft_navigation
 from strapdown.systems.navigation_run import run_navigation
 from strapdown.systems.trajectory_source import make_motion
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from same_picture import PINNED, same_picture
+from same_picture import same_picture
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES, IMAGES = ROOT / "docs" / "examples", ROOT / "docs" / "images"
@@ -42,10 +42,9 @@ def redraw(name, path):
     spec = TrajectorySpec.read(EXAMPLES / f"{name}.toml")
     motion = make_motion(spec.motion, find_ellipsoid(spec.ellipsoid))
     time = np.arange(int(motion.duration * spec.rate_hz + 1e-6) + 1) / spec.rate_hz
-    draw(simulation_chart(spec, motion.trajectory(time)), path, caption=True)
+    ChartFigure(simulation_chart(spec, motion.trajectory(time))).save(path, caption=True)
 
 
-@pytest.mark.skipif(not PINNED, reason="another matplotlib than that of constraints.txt")
 @pytest.mark.parametrize("name", ["car", "aircraft"])
 def test_a_picture_of_the_manual_is_what_is_drawn_now(name, tmp_path):
     shown = IMAGES / f"trajectory_{name}.svg"
@@ -81,13 +80,11 @@ def smoothed(tmp_path_factory):
     return drawn_of(NavigationSpec.read(file))
 
 
-@pytest.mark.skipif(not PINNED, reason="another matplotlib than that of constraints.txt")
 @pytest.mark.parametrize("name", ["plan", "bounds"])
 def test_a_picture_of_a_run_is_what_is_drawn_now(name, navigated, tmp_path):
     compare(navigated, name, tmp_path)
 
 
-@pytest.mark.skipif(not PINNED, reason="another matplotlib than that of constraints.txt")
 def test_the_picture_of_a_smoothed_run_is_what_is_drawn_now(smoothed, tmp_path):
     compare(smoothed, "smoothing", tmp_path)
 
@@ -99,7 +96,7 @@ def compare(drawings_of_run, name, folder):
 
 def compare_chart(chart, name, folder):
     """Draw a chart, and hold the picture of that name to it."""
-    draw(chart, folder / "now.svg")
+    ChartFigure(chart).save(folder / "now.svg")
     compare_picture(folder / "now.svg", name)
 
 
@@ -111,7 +108,6 @@ def compare_picture(now, name):
     assert same_picture(shown, now), "make pictures, and look at them"
 
 
-@pytest.mark.skipif(not PINNED, reason="another matplotlib than that of constraints.txt")
 def test_the_rates_of_the_readme_are_what_is_drawn_now(tmp_path):
     (chart,) = [
         c for c in charts(compare_attitude("alexiev-fig6", rate_hz=200)) if c.slug == "sweep"
@@ -123,7 +119,6 @@ def test_the_crash_of_the_readme_is_what_is_drawn_now(sealed_crash):
     compare_picture(sealed_crash.folder / "figures" / "path.svg", "crash_path.svg")
 
 
-@pytest.mark.skipif(not PINNED, reason="another matplotlib than that of constraints.txt")
 def test_the_drive_of_the_readme_is_what_is_drawn_now(driven, tmp_path):
     drawn = drawings(navigation_document(told_of(driven), ""))
     (chart,) = [d.chart for d in drawn if d.chart.slug == "plan"]
@@ -136,7 +131,6 @@ def test_the_light_of_the_manual_is_what_is_drawn_now(driven, tmp_path):
     compare_picture(now, "trust_light.svg")
 
 
-@pytest.mark.skipif(not PINNED, reason="another matplotlib than that of constraints.txt")
 def test_the_walk_of_the_manual_is_what_is_drawn_now(recordings, tmp_path):
     """As its page does it: the file that is drafted, the latitude, the control points."""
     path = recordings("foot/SensorConnectData_32_LLIO.mat")

@@ -14,8 +14,6 @@ from strapdown.bundle.seal import MANIFEST, InputFiles
 from strapdown.errors import ConfigError, DataError
 from strapdown.report.attitude import write_attitude
 
-pytestmark = pytest.mark.usefixtures("sketched_module")
-
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory):
@@ -26,7 +24,7 @@ def log(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def sealed(log, tmp_path_factory, sketched_module):
+def sealed(log, tmp_path_factory):
     bench = compare_attitude(
         log, reference=["end same as 4.5", str(log.with_name("truth.csv"))], gyro_bias=str(log)
     )

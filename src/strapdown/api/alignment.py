@@ -7,7 +7,7 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, fields, replace
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
@@ -27,6 +27,9 @@ from strapdown.systems.alignment_run import AlignmentResult, run_alignment
 from strapdown.systems.inputs import NOWHERE, Memory, moved_inputs, moved_paths
 from strapdown.systems.outage_run import CoastResult, run_coast
 from strapdown.tables import EULER
+
+if TYPE_CHECKING:
+    from strapdown.report.chart_figure import ChartFigure
 
 __all__ = [
     "AlignmentRun",
@@ -53,7 +56,7 @@ class AlignmentRun(AlignmentResult):
         """Attitude table over the record by time in s: quaternion, and angles in deg."""
         return self.attitude.copy()
 
-    def plot(self, kind: str = "attitude") -> Any:
+    def plot(self, kind: str = "attitude") -> ChartFigure:
         """Draw roll, pitch and heading over time.
 
         Parameters
@@ -62,26 +65,23 @@ class AlignmentRun(AlignmentResult):
 
         Returns
         -------
-        matplotlib.figure.Figure
-            Its ``axes`` are the panels. Independent of windows and global state.
+        ChartFigure
+            Displays itself in a notebook; `save` writes it as SVG, PNG or PDF.
 
         Raises
         ------
         ConfigError
             The chart does not exist.
         """
-        from matplotlib.figure import Figure
+        from strapdown.report.alignment_charts import attitude_chart
+        from strapdown.report.chart_figure import ChartFigure
 
         if kind not in ("attitude", *EULER):
             raise ConfigError("api.unknown-chart", quantity="kind", kind=kind)
-        names = EULER if kind == "attitude" else [kind]
-        figure = Figure(figsize=(9.0, 2.4 * len(names)), layout="constrained")
-        panels = figure.subplots(len(names), sharex=True, squeeze=False)
-        for panel, name in zip(panels[:, 0], names, strict=True):
-            panel.plot(self.attitude.index.to_numpy(), self.attitude[name].to_numpy())
-            panel.set_ylabel(f"{name}, deg")
-        panels[-1, 0].set_xlabel("time, s")
-        return figure
+        chart = attitude_chart(self)
+        if kind != "attitude":
+            chart = replace(chart, panels=(chart.panels[EULER.index(kind)],))
+        return ChartFigure(chart)
 
     def save(
         self,
@@ -349,22 +349,18 @@ class OutageRun(CoastResult):
         table = self.bound_m.to_frame()
         return table.join(self.forecast.trajectory)
 
-    def plot(self) -> Any:
+    def plot(self) -> ChartFigure:
         """Draw the 95 % bound over the outage.
 
         Returns
         -------
-        matplotlib.figure.Figure
-            Independent of windows and global state.
+        ChartFigure
+            Displays itself in a notebook; `save` writes it as SVG, PNG or PDF.
         """
-        from matplotlib.figure import Figure
+        from strapdown.report.chart_figure import ChartFigure
+        from strapdown.report.coast_document import cone_chart
 
-        figure = Figure(figsize=(9.0, 4.0), layout="constrained")
-        panel = figure.subplots()
-        panel.plot(self.forecast.time, self.forecast.bound)
-        panel.set_xlabel("time since the outage began, s")
-        panel.set_ylabel("95 % bound of the horizontal position, m")
-        return figure
+        return ChartFigure(cone_chart(self))
 
     def save(
         self,

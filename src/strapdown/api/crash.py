@@ -20,7 +20,7 @@ from strapdown.progress import Progress, silent
 from strapdown.report.crash_case import write_crash
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from strapdown.report.chart_figure import ChartFigure
 
 __all__ = ["CrashRun", "reconstruct"]
 
@@ -74,7 +74,7 @@ class CrashRun(CaseResult):
         tables = {k: run.reconstruction.summary() for k, run in self.runs.items()}
         return pd.concat(tables, names=["vehicle"])
 
-    def plot(self, kind: str = "delta-v") -> Figure:
+    def plot(self, kind: str = "delta-v") -> ChartFigure:
         """Draw one chart of the report.
 
         Parameters
@@ -84,18 +84,18 @@ class CrashRun(CaseResult):
 
         Returns
         -------
-        matplotlib.figure.Figure
-            Its ``axes`` are the panels. Independent of windows and global state.
+        ChartFigure
+            Displays itself in a notebook; `save` writes it as SVG, PNG or PDF.
 
         Raises
         ------
         ConfigError
             The chart does not exist for this case.
         """
+        from strapdown.report.chart_figure import ChartFigure
         from strapdown.report.crash_document import crash_document
         from strapdown.report.crash_figures import crash_figures
         from strapdown.report.document import ChartBlock
-        from strapdown.report.svg_chart import notebook_figure
 
         document = crash_document(self, crash_figures(self), "")
         blocks = [*document.front, *(b for s in document.sections for b in s.blocks)]
@@ -104,7 +104,7 @@ class CrashRun(CaseResult):
             raise ConfigError(
                 "api.unknown-case-chart", quantity="kind", kind=kind, word=kind, known=charts
             )
-        return notebook_figure(charts[kind])
+        return ChartFigure(charts[kind])
 
     def save(
         self,

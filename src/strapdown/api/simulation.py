@@ -93,8 +93,7 @@ class Simulation:
             A format is unknown, or `out` may not be written.
         """
         from strapdown.report.crash_simulation import write_crash_simulation
-        from strapdown.report.simulation import write_simulation
-        from strapdown.report.trajectory_simulation import write_trajectory_simulation
+        from strapdown.report.simulation import write_simulation, write_trajectory_simulation
 
         wanted = [formats] if isinstance(formats, str) else formats
         if wanted is not None and not wanted:

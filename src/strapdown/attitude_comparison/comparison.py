@@ -77,10 +77,9 @@ from strapdown.systems.inputs import part_of_log
 from strapdown.tables import GYRO
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from strapdown.evaluation.position_references import PositionScore
     from strapdown.evaluation.second_log import SecondLog
+    from strapdown.report.chart_figure import ChartFigure
 
 __all__ = ["AttitudeComparison", "run_comparison"]
 
@@ -242,7 +241,7 @@ class AttitudeComparison:
         with self.on_disk(self) if self.on_disk else nullcontext(self) as there:
             return write_attitude(there, out, report=report, force=force, png=png)
 
-    def plot(self, kind: str = "cost") -> Figure:
+    def plot(self, kind: str = "cost") -> ChartFigure:
         """Draw one chart of the report.
 
         Parameters
@@ -253,21 +252,21 @@ class AttitudeComparison:
 
         Returns
         -------
-        matplotlib.figure.Figure
-            Independent of windows and global state; displayed by a notebook.
+        ChartFigure
+            Displays itself in a notebook; `save` writes it as SVG, PNG or PDF.
 
         Raises
         ------
         ConfigError
             The chart does not exist or has no data.
         """
-        from strapdown.report.attitude_view import plot
+        from strapdown.report.attitude_document import plot
 
         return plot(self, kind)
 
     def _repr_html_(self) -> str:
         """Answer and table of results, for a notebook."""
-        from strapdown.report.attitude_view import short_html
+        from strapdown.report.attitude_document import short_html
 
         return short_html(self)
 

@@ -225,8 +225,8 @@ PACKAGES = (
     "pandas",
     "pyarrow",
     "h5py",
-    "matplotlib",
-    "plotly",
+    "jinja2",
+    "typst",
 )
 
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from strapdown.attitude_comparison.comparison import AttitudeComparison
     from strapdown.attitude_comparison.options import AttitudeOptions
-    from strapdown.report.attitude_tables import TextTable
+    from strapdown.report.document import TableBlock
 
 EPILOG = (
     "Example: strapdown attitude alexiev-fig4 --rate 100\n\n"
@@ -344,10 +344,10 @@ def _print_speed(taken: pd.DataFrame) -> None:
     )
 
 
-def _print_table(table: TextTable, page: Console) -> None:
+def _print_table(table: TableBlock, page: Console) -> None:
     from strapdown.cli.console import print_table
 
     page.print(f"\n{table.title}", style="bold")
     print_table(table.columns, table.rows, text=table.text, strong=table.strong)
-    if table.note:
-        page.print(table.note, style="dim")
+    if table.caption:
+        page.print(table.caption, style="dim")

@@ -16,16 +16,12 @@ from strapdown.config.alignment import AlignmentSpec
 from strapdown.progress import Progress, silent
 from strapdown.report.alignment_document import CONVENTIONS, alignment_document, limits
 from strapdown.report.alignment_trust import answer_error, trust
-from strapdown.report.crash_json import write_table
-from strapdown.report.document_data import draw_stills
-from strapdown.report.document_files import write_drawings, write_text
+from strapdown.report.document import draw_stills, finding_json, write_drawings, write_text
 from strapdown.report.document_html import document_page
-from strapdown.report.report_bundle import report_bundle
+from strapdown.report.report_bundle import report_bundle, write_table
 from strapdown.systems.alignment_run import AlignmentResult, run_alignment
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import EULER
-
-__all__ = ["alignment_json", "rerun_alignment", "write_alignment"]
 
 
 def rerun_alignment(configuration: dict[str, Any], out: Path, *, report: bool = True) -> Seal:
@@ -62,10 +58,6 @@ def write_alignment(
     force : bool
         Overwrite an existing bundle.
     progress : callable, optional
-
-    Returns
-    -------
-    Seal
 
     Raises
     ------
@@ -125,10 +117,6 @@ def _history(history: pd.DataFrame) -> pd.DataFrame:
 def alignment_json(result: AlignmentResult) -> dict[str, Any]:
     """Return an alignment as plain data for programs.
 
-    Parameters
-    ----------
-    result : AlignmentResult
-
     Returns
     -------
     dict
@@ -156,8 +144,8 @@ def alignment_json(result: AlignmentResult) -> dict[str, Any]:
         "end": _attitude_alignment_json(result.end),
         "trust": {
             "verdict": found.verdict,
-            "for": [f.plain() for f in found.supporting],
-            "against": [f.plain() for f in found.against],
+            "for": [finding_json(f) for f in found.supporting],
+            "against": [finding_json(f) for f in found.against],
         },
         "limits": [f"{head}: {text}" for head, text in limits(result)],
         "coarse": {"method": result.coarse.method, **_attitude_alignment_json(result.coarse)},
@@ -174,7 +162,9 @@ def alignment_json(result: AlignmentResult) -> dict[str, Any]:
             "against": result.readiness.against,
             "coarse": _rows(result.readiness.coarse),
             "fine": _rows(_thinned(result.readiness.fine)),
-            "refused": [{"time_s": t, "finding": f.plain()} for t, f in result.readiness.refused],
+            "refused": [
+                {"time_s": t, "finding": finding_json(f)} for t, f in result.readiness.refused
+            ],
         },
         "what_a_turn_would_tell": [
             {
@@ -190,7 +180,7 @@ def alignment_json(result: AlignmentResult) -> dict[str, Any]:
         "method": spec.model_dump(
             mode="json", include={"prefilter", "coarse", "fine"}, serialize_as_any=True
         ),
-        "findings": [f.plain() for f in result.findings],
+        "findings": [finding_json(f) for f in result.findings],
     }
 
 

@@ -28,8 +28,6 @@ from strapdown.systems.alignment_run import AlignmentResult
 from strapdown.tables import ACCEL, EULER, GYRO
 from strapdown.tables.checks import values_of
 
-__all__ = ["attitude_chart", "bias_charts", "innovation_chart", "readiness_chart", "signal_chart"]
-
 Array = NDArray[np.float64]
 
 _TIME = "time, s"

@@ -24,6 +24,7 @@ from strapdown.report.document import (
     Paragraph,
     Section,
     TableBlock,
+    findings_list,
 )
 from strapdown.report.values import (
     GAP,
@@ -41,21 +42,6 @@ from strapdown.report.values import (
 from strapdown.systems.alignment_run import AlignmentResult
 from strapdown.tables import ACCEL, EULER, GYRO, QUATERNION
 from strapdown.tables.checks import values_of
-
-__all__ = [
-    "CONVENTIONS",
-    "alignment_document",
-    "answer_table",
-    "bias_table",
-    "headline",
-    "key_figures",
-    "limits",
-    "method_rows",
-    "prior_sd",
-    "readiness_table",
-    "turn_table",
-]
-
 
 CONVENTIONS = (
     ("Body axes", "forward, right, down; local level: north, east, down"),
@@ -80,10 +66,6 @@ def alignment_document(result: AlignmentResult, name: str) -> Document:
     result : AlignmentResult
     name : str
         Folder name, for the verification command.
-
-    Returns
-    -------
-    Document
     """
     found = trust(result)
     site = result.site
@@ -159,23 +141,15 @@ def _biases(result: AlignmentResult) -> tuple[Section, ...]:
 
 
 def _findings(result: AlignmentResult) -> tuple[Block, ...]:
-    if not result.findings:
-        return (Paragraph("None."),)
-    rows = []
-    for finding in result.findings:
-        head = ", ".join(p for p in (finding.quantity, finding.row and f"row {finding.row}") if p)
-        text = finding.what if not finding.remedy else f"{finding.what}. {finding.remedy}."
-        rows.append((str(head), text))
+    blocks: list[Block] = [findings_list(result.findings)]
     refused = result.readiness.refused
     if refused:
-        rows.append(
-            (
-                "readiness",
-                f"{len(refused)} shorter lengths, up to {max(r[0] for r in refused):.3g} s, gave "
-                f"no attitude: {refused[-1][1].sentence()}.",
-            )
+        text = (
+            f"{len(refused)} shorter lengths, up to {max(r[0] for r in refused):.3g} s, gave "
+            f"no attitude: {refused[-1][1].sentence()}."
         )
-    return (Items(tuple(rows)),)
+        blocks.append(Items((("readiness", text),)))
+    return tuple(blocks)
 
 
 def _method(result: AlignmentResult, name: str) -> tuple[Block, ...]:

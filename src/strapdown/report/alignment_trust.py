@@ -17,8 +17,6 @@ from strapdown.systems.alignment_run import AlignmentResult, reference_offset
 from strapdown.tables import EULER
 from strapdown.tables.checks import values_of
 
-__all__ = ["ORDER", "Trust", "answer_error", "bounds_hold", "reason", "trust"]
-
 Array = NDArray[np.float64]
 
 ORDER = (2, 1, 0)  # heading first: it is the hardest to determine

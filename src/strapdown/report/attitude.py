@@ -20,12 +20,12 @@ from strapdown.evaluation.reference_points import Score
 from strapdown.formats import csv
 from strapdown.report import attitude_words as words
 from strapdown.report.attitude_charts import charts, share_basis
-from strapdown.report.attitude_page import attitude_page
+from strapdown.report.attitude_document import attitude_document
 from strapdown.report.attitude_tables import places_json, source_of
-from strapdown.report.svg_chart import draw
+from strapdown.report.chart_figure import ChartFigure
+from strapdown.report.document import draw_stills, finding_json, write_drawings, write_text
+from strapdown.report.document_html import document_page
 from strapdown.tables import EULER, GYRO, QUATERNION
-
-__all__ = ["attitude_json", "attitude_page", "write_attitude"]
 
 
 def write_attitude(
@@ -50,10 +50,6 @@ def write_attitude(
     png : bool
         Also write each figure as PNG.
 
-    Returns
-    -------
-    Seal
-
     Raises
     ------
     ConfigError
@@ -77,14 +73,13 @@ def write_attitude(
         if len(bench.sweep):
             _write_sweep(bench, folder / "sweep.csv")
         if report:
-            (folder / "figures").mkdir()
             drawn = charts(bench)
-            for chart in drawn:
-                for ending in ("svg", "png") if png else ("svg",):
-                    draw(chart, folder / "figures" / f"{chart.slug}.{ending}")
-            (folder / "report.html").write_text(
-                attitude_page(bench, drawn), encoding="utf-8", newline="\n"
-            )
+            document = attitude_document(bench, drawn)
+            stills = draw_stills(document)
+            write_drawings(document, stills, folder / "figures")
+            for chart in drawn if png else ():
+                ChartFigure(chart).save(folder / "figures" / f"{chart.slug}.png")
+            write_text(folder / "report.html", document_page(document, stills=stills))
     return seals[0]
 
 
@@ -129,16 +124,7 @@ def _write_sweep(bench: AttitudeComparison, path: Path) -> None:
 
 
 def attitude_json(bench: AttitudeComparison) -> dict[str, Any]:
-    """Return a bench as plain data; every key carries its unit.
-
-    Parameters
-    ----------
-    bench : AttitudeComparison
-
-    Returns
-    -------
-    dict
-    """
+    """Return a bench as plain data; every key carries its unit."""
     costs = {cost.algorithm: _cost(cost) for cost in bench.costs}
     shares = {share.algorithm: _share(share) for share in bench.shares}
     return {
@@ -192,7 +178,7 @@ def attitude_json(bench: AttitudeComparison) -> dict[str, Any]:
             for r in bench.rests
         ],
         "readings": [vars(r) for r in bench.readings],
-        "findings": [{**f.plain(), "what": f.what, "remedy": f.remedy} for f in bench.findings],
+        "findings": [finding_json(f, "python") for f in bench.findings],
     }
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from strapdown.attitude_comparison.comparison import AttitudeComparison
 from strapdown.attitude_comparison.references import PeerRun
 from strapdown.evaluation.differences import error_angles
-from strapdown.report.attitude_numbers import (
+from strapdown.report.attitude_words import (
     MEANINGS,
     full_rate_errors,
     largest_known,
@@ -39,16 +39,7 @@ _TIME = "time, s"
 
 
 def charts(bench: AttitudeComparison) -> list[Chart]:
-    """Return the charts for which this bench has data, in page order.
-
-    Parameters
-    ----------
-    bench : AttitudeComparison
-
-    Returns
-    -------
-    list of Chart
-    """
+    """Return the charts for which this bench has data, in page order."""
     return [
         *answer_charts(bench),
         *log_charts(bench),
@@ -242,31 +233,13 @@ _FAINT = "#c3c9d0"
 
 
 def answer_charts(bench: AttitudeComparison) -> list[Chart]:
-    """Return the charts for the top of the page: error against cost, and against rate.
-
-    Parameters
-    ----------
-    bench : AttitudeComparison
-
-    Returns
-    -------
-    list of Chart
-    """
+    """Return the charts for the top of the page: error against cost, and against rate."""
     found = [_cost(bench)] if bench.costs else []
     return [*found, _sweep(bench)] if len(bench.sweep) else found
 
 
 def judgement_charts(bench: AttitudeComparison) -> list[Chart]:
-    """Return the charts for the end of the page: error shares, trials and other libraries.
-
-    Parameters
-    ----------
-    bench : AttitudeComparison
-
-    Returns
-    -------
-    list of Chart
-    """
+    """Return the charts for the end of the page: error shares, trials and other libraries."""
     found = [_share(bench)] if bench.shares else []
     if bench.trials is not None:
         found.append(_trials(bench))

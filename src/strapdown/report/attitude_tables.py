@@ -3,39 +3,26 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import asdict
+from typing import Any
 
 from strapdown.attitude_algorithms import ALGORITHMS
 from strapdown.attitude_algorithms.algorithm import AttitudeRun
 from strapdown.attitude_comparison.comparison import AttitudeComparison
 from strapdown.attitude_comparison.references import PeerRun
 from strapdown.evaluation.reference_points import Score
+from strapdown.evaluation.second_log import SecondLog
 from strapdown.report.attitude_charts import share_basis
-from strapdown.report.attitude_numbers import (
+from strapdown.report.attitude_words import (
     MEANINGS,
+    condition,
+    degrees,
     full_rate_errors,
     largest_known,
     like_with_like,
     sweep_grid,
 )
-from strapdown.report.attitude_words import condition, degrees
-
-if TYPE_CHECKING:
-    from strapdown.evaluation.second_log import SecondLog
-
-__all__ = [
-    "TextTable",
-    "condition_table",
-    "cost_table",
-    "difference_table",
-    "peer_table",
-    "result_tables",
-    "source_of",
-    "sweep_tables",
-    "trial_table",
-]
-
+from strapdown.report.document import TableBlock
 
 # With more comparisons the error contributions no longer fit in a terminal.
 _MOST_BESIDE = 4
@@ -44,38 +31,10 @@ _MOST_POINTS = 7
 _NONE = "–"
 
 
-@dataclass(frozen=True)
-class TextTable:
-    """A table in words.
-
-    Attributes
-    ----------
-    title : str
-    columns : tuple of str
-    rows : tuple of tuple of str
-    text : tuple of int
-        Left-aligned text columns; the others hold right-aligned numbers.
-    note : str
-        Remark for the reader.
-    passed : frozenset of (int, int)
-        Row and column of cells within the tolerance; these also get a tick.
-    strong : frozenset of int
-        Rows of the recommended algorithms.
-    """
-
-    title: str
-    columns: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    text: tuple[int, ...] = (0,)
-    note: str = ""
-    passed: frozenset[tuple[int, int]] = frozenset()
-    strong: frozenset[int] = frozenset()
-
-
-def _named(bench: AttitudeComparison) -> frozenset[int]:
+def _named(bench: AttitudeComparison) -> tuple[int, ...]:
     names = [run.algorithm for run in bench.runs]
     answer = bench.answer.algorithm
-    return frozenset({names.index(answer)} if answer in names else ())
+    return (names.index(answer),) if answer in names else ()
 
 
 def number(value: float) -> str:
@@ -83,17 +42,8 @@ def number(value: float) -> str:
     return f"{value:.3g}" if value < 100 else f"{value:.0f}"
 
 
-def result_tables(bench: AttitudeComparison) -> list[TextTable]:
-    """Return the errors of each algorithm with their contributions; two tables if wide.
-
-    Parameters
-    ----------
-    bench : AttitudeComparison
-
-    Returns
-    -------
-    list of TextTable
-    """
+def result_tables(bench: AttitudeComparison) -> list[TableBlock]:
+    """Return the errors of each algorithm with their contributions; two tables if wide."""
     truth = any(s.against == "truth" for s in bench.scores)
     points = len(bench.references)
     at = [f"at R{k}" for k in range(1, points + 1)]
@@ -122,11 +72,11 @@ def _table(
     columns: list[str],
     names: list[str],
     rows: list[list[str]],
-    strong: frozenset[int],
+    strong: tuple[int, ...],
     note: str,
-) -> TextTable:
+) -> TableBlock:
     named = tuple((name, *row) for name, row in zip(names, rows, strict=True))
-    return TextTable(title, tuple(columns), named, note=note, strong=strong)
+    return TableBlock(tuple(columns), named, caption=note, strong=strong, title=title)
 
 
 def _compared(scores: list[Score], count: int) -> list[str]:
@@ -190,14 +140,14 @@ def source_of(run: AttitudeRun) -> str:
     return f"{source} Eq. {run.equations}".strip() if run.equations else source
 
 
-def condition_table(bench: AttitudeComparison) -> TextTable:
+def condition_table(bench: AttitudeComparison) -> TableBlock:
     """Return the source and the diagnostics of each algorithm."""
     rows = tuple((r.algorithm, source_of(r), condition(r.diagnostics)) for r in bench.runs)
     columns = ("algorithm", "source", "own condition")
-    return TextTable("The algorithms", columns, rows, text=(0, 1, 2), strong=_named(bench))
+    return TableBlock(columns, rows, (0, 1, 2), strong=_named(bench), title="The algorithms")
 
 
-def cost_table(bench: AttitudeComparison) -> TextTable | None:
+def cost_table(bench: AttitudeComparison) -> TableBlock | None:
     """Return the operations per sample of each algorithm; None if none were counted."""
     if not bench.costs:
         return None
@@ -209,18 +159,18 @@ def cost_table(bench: AttitudeComparison) -> TextTable | None:
         )
         for c in bench.costs
     )
-    return TextTable(
-        "What a sample costs",
+    return TableBlock(
         ("algorithm", "add", "multiply", "divide", "root", "sin, cos", "cycles", "memory"),
         rows,
-        note="Operations counted on the kernel itself, in steps of 0.01 rad; cycles: the "
+        caption="Operations counted on the kernel itself, in steps of 0.01 rad; cycles: the "
         "same weighed as a Cortex-M4F's floating-point unit takes them, for ranking; memory: "
         "numbers kept between samples.",
         strong=_named(bench),
+        title="What a sample costs",
     )
 
 
-def sweep_tables(bench: AttitudeComparison) -> list[TextTable]:
+def sweep_tables(bench: AttitudeComparison) -> list[TableBlock]:
     """Return the errors at every rate, one table per method of lowering it."""
     tables = []
     answer = bench.answer
@@ -247,21 +197,21 @@ def sweep_tables(bench: AttitudeComparison) -> list[TextTable]:
             for i, name in enumerate(grid.index)
         )
         tables.append(
-            TextTable(
-                f"Error by rate, {words}",
+            TableBlock(
                 ("algorithm", *(f"{number(float(rate))} Hz" for rate in grid.columns)),
                 rows,
-                note=f"✓: within the tolerance of {degrees(answer.tolerance_deg)}."
+                caption=f"✓: within the tolerance of {degrees(answer.tolerance_deg)}."
                 if passed
                 else f"None is within the tolerance of {degrees(answer.tolerance_deg)}.",
                 passed=frozenset(passed),
                 strong=_named(bench),
+                title=f"Error by rate, {words}",
             )
         )
     return tables
 
 
-def difference_table(bench: AttitudeComparison) -> TextTable | None:
+def difference_table(bench: AttitudeComparison) -> TableBlock | None:
     """Return the largest difference of each pair of algorithms; None for a single one."""
     names = [run.algorithm for run in bench.runs]
     if len(names) < 2:
@@ -272,7 +222,8 @@ def difference_table(bench: AttitudeComparison) -> TextTable | None:
             zip(names, bench.differences_deg.to_numpy(), strict=True)
         )
     )
-    return TextTable("Largest difference between the algorithms", ("", *names), rows)
+    title = "Largest difference between the algorithms"
+    return TableBlock(("", *names), rows, title=title)
 
 
 def luck_words(luck: float) -> str:
@@ -284,7 +235,7 @@ def luck_words(luck: float) -> str:
     return f"may be luck ({luck:.2g})"
 
 
-def trial_table(bench: AttitudeComparison) -> TextTable | None:
+def trial_table(bench: AttitudeComparison) -> TableBlock | None:
     """Return the ranking over several trials; None for a single trial."""
     if bench.trials is None:
         return None
@@ -299,13 +250,14 @@ def trial_table(bench: AttitudeComparison) -> TextTable | None:
     )
     names = [row[0] for row in rows]
     answer = bench.answer.algorithm
-    return TextTable(
-        f"Over {len(bench.trials.names)} trials",
+    return TableBlock(
         ("algorithm", "mean error", "95 % interval", "its rank above the next is"),
         rows,
         text=(0, 3),
-        note="In brackets: the probability that the next one is no worse, from paired differences.",
-        strong=frozenset({names.index(answer)} if answer in names else ()),
+        caption="In brackets: the probability that the next one is no worse, from paired "
+        "differences.",
+        strong=(names.index(answer),) if answer in names else (),
+        title=f"Over {len(bench.trials.names)} trials",
     )
 
 
@@ -315,16 +267,12 @@ def _interval(low: float, high: float) -> str:
     return f"{degrees(max(low, 0.0))} to {degrees(high)}"
 
 
-def peer_table(bench: AttitudeComparison) -> TextTable | None:
+def peer_table(bench: AttitudeComparison) -> TableBlock | None:
     """Return the errors of other libraries, gyro-only ones separate from aided ones.
-
-    Parameters
-    ----------
-    bench : AttitudeComparison
 
     Returns
     -------
-    TextTable or None
+    TableBlock or None
         None if no other library ran.
     """
     if not bench.peers:
@@ -337,15 +285,15 @@ def peer_table(bench: AttitudeComparison) -> TextTable | None:
     ]
     rows += [(p.peer, _peer_error(p), "", p.aiding) for p in alone]
     rows += [(p.peer, "", _peer_error(p), p.aiding) for p in aided]
-    return TextTable(
-        "Other libraries on the same log",
+    return TableBlock(
         ("who", "gyro alone", "aided", "uses"),
         tuple(rows),
         text=(0, 3),
-        note="Largest error against what is known. An aided filter corrects what gyros alone "
+        caption="Largest error against what is known. An aided filter corrects what gyros alone "
         "cannot: its column is not to be compared with the other. These libraries take each "
         "row for the mean of its step; ours for the rate at its stamp, unless --sampling mean.",
         strong=_named(bench),
+        title="Other libraries on the same log",
     )
 
 
@@ -357,16 +305,12 @@ def _peer_error(peer: PeerRun) -> str:
 # Dead-reckoned positions and the second log.
 
 
-def place_table(bench: AttitudeComparison) -> TextTable | None:
+def place_table(bench: AttitudeComparison) -> TableBlock | None:
     """Return the errors of dead-reckoned positions against known positions.
-
-    Parameters
-    ----------
-    bench : AttitudeComparison
 
     Returns
     -------
-    TextTable or None
+    TableBlock or None
         None if no position was given.
     """
     if not bench.places:
@@ -384,17 +328,17 @@ def place_table(bench: AttitudeComparison) -> TextTable | None:
         for place in bench.places
     )
     legs = max(place.legs for place in bench.places)
-    return TextTable(
-        "Places, dead-reckoned between rests",
+    return TableBlock(
         (
             *("algorithm", "known", "error, m", "1σ, m", "stopped, m", "1σ, m"),
             "left at the rest, m/s",
         ),
         rows,
         text=(0, 1),
-        note=f"Over at most {legs} stretch{'es' if legs > 1 else ''} between rests. Stopped: with "
-        "the velocity at the end of each brought to zero. The 1σ is what assumed biases, tilt and "
-        "noise of a consumer sensor lead to; scale factors are not in it.",
+        caption=f"Over at most {legs} stretch{'es' if legs > 1 else ''} between rests. Stopped: "
+        "with the velocity at the end of each brought to zero. The 1σ is what assumed biases, tilt "
+        "and noise of a consumer sensor lead to; scale factors are not in it.",
+        title="Places, dead-reckoned between rests",
     )
 
 

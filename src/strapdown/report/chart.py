@@ -31,6 +31,8 @@ SYMBOLS = (
 
 # Points that a screen can resolve; more only enlarge the file.
 BUCKETS = 1500
+#: For a curve over time: one point per two pixels of a page.
+BUCKETS_OVER_TIME = 350
 
 
 @dataclass(frozen=True)
@@ -293,13 +295,6 @@ def look(k: int) -> dict[str, str]:
     }
 
 
-def short_span(values: ArrayLike, most: float = 30.0) -> bool:
-    """Whether positive numbers span too little to be labeled by powers of ten."""
-    v = np.asarray(values, dtype=np.float64)
-    v = v[np.isfinite(v) & (v > 0.0)]
-    return not v.size or float(v.max() / v.min()) < most
-
-
 def curve(
     name: str,
     x: ArrayLike,
@@ -328,21 +323,8 @@ def thin(x: ArrayLike, y: ArrayLike, buckets: int = BUCKETS) -> tuple[Array, Arr
         The minimum and maximum of each of `buckets` equal runs of samples, in time order.
     """
     xs, ys = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-    if xs.size <= 2 * buckets:
-        return xs, ys
-    width = -(-xs.size // buckets)
-    first = np.arange(0, xs.size, width)
-    # The last run is padded with its own last value, which adds no peak and no break.
-    body = np.pad(ys, (0, first.size * width - xs.size), mode="edge").reshape(-1, width)
-    gap = np.isnan(body)
-    keep = [
-        first + np.argmin(np.where(gap, np.inf, body), axis=1),
-        first + np.argmax(np.where(gap, -np.inf, body), axis=1),
-        (first + np.argmax(gap, axis=1))[gap.any(axis=1)],
-        np.array([xs.size - 1]),
-    ]
-    chosen = np.unique(np.concatenate([[0], *keep]))
-    return xs[chosen], ys[chosen]
+    rows = kept_rows((ys,), buckets)
+    return xs[rows], ys[rows]
 
 
 def break_jumps(angle_deg: ArrayLike) -> Array:
@@ -351,3 +333,77 @@ def break_jumps(angle_deg: ArrayLike) -> Array:
     jumps = np.flatnonzero(np.abs(np.diff(out)) > 180.0)
     out[jumps + 1] = np.nan
     return out
+
+
+def kept_rows(columns: tuple[Array, ...], buckets: int = BUCKETS_OVER_TIME) -> NDArray[np.intp]:
+    """Rows of the minimum and maximum of each column in each of equal runs.
+
+    Parameters
+    ----------
+    columns : tuple of ndarray, (n,)
+        NaN is skipped, except the first of each run of samples, which breaks a curve.
+    buckets : int
+
+    Returns
+    -------
+    ndarray of int
+        In order, including both ends; all rows if there are few.
+    """
+    n = columns[0].size
+    if n <= 2 * buckets:
+        return np.arange(n)
+    width = -(-n // buckets)
+    first = np.arange(0, n, width)
+    keep = [np.array([0, n - 1])]
+    for column in columns:
+        # The last run is padded with its own last value, which adds no peak and no break.
+        body = np.pad(column, (0, first.size * width - n), mode="edge").reshape(-1, width)
+        gap = np.isnan(body)
+        keep += [
+            first + np.argmin(np.where(gap, np.inf, body), axis=1),
+            first + np.argmax(np.where(gap, -np.inf, body), axis=1),
+            (first + np.argmax(gap, axis=1))[gap.any(axis=1)],
+        ]
+    rows = np.unique(np.concatenate(keep))
+    return rows[rows < n]
+
+
+def thin_fill(
+    name: str,
+    x: Array,
+    low: Array,
+    high: Array,
+    colour: str,
+    *,
+    opacity: float = 0.18,
+    legend: bool = True,
+    buckets: int = BUCKETS_OVER_TIME // 2,
+) -> Fill:
+    """Make a band of few points that keeps the lowest and highest values."""
+    rows = kept_rows((low, high), buckets)
+    return Fill(name, x[rows], low[rows], high[rows], colour, opacity, legend)
+
+
+def broken(time: Array, *columns: Array, longest: float = 5.0) -> tuple[Array, ...]:
+    """Insert a row of NaN in each gap, so that no curve bridges it.
+
+    Parameters
+    ----------
+    time : ndarray, (n,), s
+    *columns : ndarray, (n,)
+    longest : float
+        Longest step without a gap, in usual steps.
+
+    Returns
+    -------
+    tuple of ndarray
+        Time and the columns.
+    """
+    if time.size < 3:
+        return (time, *columns)
+    steps = np.diff(time)
+    positive = steps[steps > 0.0]
+    usual = float(np.median(positive)) if positive.size else 1.0
+    at = np.flatnonzero(steps > longest * usual) + 1
+    filled = [np.insert(column, at, np.nan) for column in columns]
+    return (np.insert(time, at, 0.5 * (time[at - 1] + time[at])), *filled)

@@ -22,16 +22,13 @@ from strapdown.navigation.outage import QUANTITIES
 from strapdown.progress import Progress, silent
 from strapdown.report.coast_document import coast_document
 from strapdown.report.coast_words import end_bound, headline, inside_words, remedy, start_words
-from strapdown.report.document_data import draw_stills
-from strapdown.report.document_files import write_drawings, write_text
+from strapdown.report.document import draw_stills, finding_json, write_drawings, write_text
 from strapdown.report.document_html import document_page
 from strapdown.report.report_bundle import report_bundle
 from strapdown.report.values import spaced
 from strapdown.sensors.catalogue import SENSORS
 from strapdown.systems.one_thread import one_thread
 from strapdown.systems.outage_run import CoastResult, run_coast
-
-__all__ = ["coast_json", "read_coasting_run", "rerun_coast", "write_coast", "write_coast_tables"]
 
 
 def read_coasting_run(source: str | Path) -> tuple[NavigationSpec | None, Path | None]:
@@ -136,10 +133,6 @@ def write_coast(
         Overwrite an existing bundle.
     progress : callable, optional
 
-    Returns
-    -------
-    Seal
-
     Raises
     ------
     ConfigError
@@ -190,10 +183,6 @@ SHOWN = {
 
 def coast_json(result: CoastResult) -> dict[str, Any]:
     """Return an outage prediction as plain data for programs.
-
-    Parameters
-    ----------
-    result : CoastResult
 
     Returns
     -------
@@ -252,7 +241,7 @@ def coast_json(result: CoastResult) -> dict[str, Any]:
             for d in (() if recorded is None else recorded.drifts)
             if d.time.size
         ],
-        "findings": [spaced(str(f)) for f in result.findings],
+        "findings": [finding_json(f) for f in result.findings],
     }
 
 

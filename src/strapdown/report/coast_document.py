@@ -46,20 +46,9 @@ from strapdown.report.document import (
     Section,
     TableBlock,
 )
-from strapdown.report.error_envelope import ellipse
+from strapdown.report.plan_view import ellipse
 from strapdown.report.values import GAP, duration_words, half, length_words, plain, share_words
 from strapdown.systems.outage_run import CoastResult, Drift
-
-__all__ = [
-    "budget_chart",
-    "budget_table",
-    "coast_document",
-    "cone_chart",
-    "drift_table",
-    "parts_chart",
-    "plane_chart",
-    "time_table",
-]
 
 
 def coast_document(result: CoastResult, name: str) -> Document:
@@ -70,10 +59,6 @@ def coast_document(result: CoastResult, name: str) -> Document:
     result : CoastResult
     name : str
         Folder name, for the verification command.
-
-    Returns
-    -------
-    Document
     """
     came = inside_words(result)
     front: tuple[Block | None, ...] = (

@@ -21,20 +21,6 @@ from strapdown.report.values import (
 )
 from strapdown.systems.outage_run import CoastResult
 
-__all__ = [
-    "aids_name",
-    "at_start",
-    "end_bound",
-    "headline",
-    "inside_words",
-    "key_figures",
-    "motion_words",
-    "outage_words",
-    "remedy",
-    "source_words",
-    "start_words",
-]
-
 _WORDS = {
     "position": "position at the start",
     "velocity": "velocity at the start",

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import html
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -16,28 +14,21 @@ from numpy.typing import ArrayLike, NDArray
 from strapdown import rotation
 from strapdown.crash.events import CrashEvent
 from strapdown.crash.path import CrashPath
-from strapdown.report.chart import BLACK, BLUE, GREY, VERMILLION
-from strapdown.report.crash_moments import path_moments
-from strapdown.report.crash_outline import Outline
+from strapdown.report.chart import BLUE, GREY, VERMILLION
+from strapdown.report.crash_outline import Outline, path_moments
 from strapdown.report.document import Animation, Picture
-from strapdown.report.error_envelope import hull
-from strapdown.report.plan_view import nice_step, tick_words
-from strapdown.report.plotly_chart import FONT
+from strapdown.report.plan_view import hull, nice_step, tick_words
+from strapdown.report.scene import Scene, SceneBody, SceneLine, SceneWord
 from strapdown.report.svg_drawing import INK, SMALL, Drawing
 from strapdown.report.values import plain
 from strapdown.tables import NED
-
-__all__ = ["MOST_FRAMES", "VehicleBody", "crash_stills", "path_animation", "vehicle_body"]
-
 
 Array = NDArray[np.float64]
 
 #: A slider on a page cannot resolve more frames.
 MOST_FRAMES = 120
-_FRAME = 60  # ms
-_DIGITS = 4  # a tenth of a millimeter
-_TICKS = 5
-_PAPER = {"showbackground": False, "gridcolor": "#e6e9ed", "zeroline": False}
+_FRAME = 60.0  # ms
+_SOFT = "#4a525c"
 
 
 def path_animation(
@@ -80,25 +71,29 @@ def path_animation(
     given = None if reference is None else reference[NED].to_numpy(dtype=np.float64)
     ground = body.bottom - float(point[2]) + places[path.anchor, 2]
     low, high = _space([*corners, places, *([] if given is None else [given])], ground)
-    still = [
-        *_ground(low, high, ground),
-        _line(places, "path of the reference point", GREY, 3),
-        *([] if given is None else [_line(given, reference_name, VERMILLION, 4, "dash")]),
-    ]
-    moving = range(len(still), len(still) + 3)
-    frames = [
-        {
-            "name": f"{1e3 * path.time[row]:.1f}",
-            "data": [
-                _xyz(corners[k]),
-                _xyz(_wire(body, corners[k])),
-                _xyz(places[rows[: k + 1]]),
-            ],
-            "traces": list(moving),
-        }
-        for k, row in enumerate(rows.tolist())
-    ]
-    first = _moving(body, corners[0], places[rows[:1]])
+    lines, words = _ground(low, high, ground, names)
+    lines.append(SceneLine("path of the reference point", _few(places), GREY, 1.5))
+    if given is not None:
+        lines.append(SceneLine(reference_name, _few(given), VERMILLION, 2.0, True))
+    scene = Scene(
+        (
+            SceneBody(
+                body.corners - np.asarray(point, dtype=np.float64),
+                body.faces,
+                body.colours,
+                path.q_nb[rows],
+                places[rows],
+            ),
+        ),
+        tuple(lines),
+        tuple(words),
+        tuple(f"{1e3 * path.time[row]:.0f} ms".replace("-", "−") for row in rows.tolist()),
+        low,
+        high,
+        _FRAME,
+        (path.entry.heading_deg + 90.0 - _AHEAD, _ABOVE),
+        ("up to now", BLUE),
+    )
     slower = 1e-3 * _FRAME * len(rows) / max(float(path.time[-1] - path.time[0]), 1e-3)
     caption = (
         f"The vehicle on its path, seen in space; {names[0]}, {names[1]} and down in m from the "
@@ -106,14 +101,12 @@ def path_animation(
         "length and width are the vehicle's, its height is for the eye alone; the ground is drawn "
         "half a metre below the vehicle's origin at the entry."
     )
-    stills = crash_stills(path, body, events=events, point=point, ground=ground)
-    layout = _layout((low, high), names, [str(f["name"]) for f in frames])
     return Animation(
         "motion",
         "The motion in space",
         caption,
-        {"data": [*still, *first], "layout": layout, "frames": frames},
-        stills,
+        scene,
+        crash_stills(path, body, events=events, point=point, ground=ground),
         f"Played {slower:.2g} times slower than it was; drag to look from elsewhere.",
     )
 
@@ -130,178 +123,38 @@ def _space(points: Sequence[Array], ground: float) -> tuple[Array, Array]:
     return low, high
 
 
-def _drawn(points: Array) -> Array:
-    """Drawing axes: x east, y north, z up."""
-    return points[:, [1, 0, 2]] * [1.0, 1.0, -1.0]
+def _few(points: Array) -> Array:
+    rows = np.unique(np.linspace(0, len(points) - 1, min(len(points), 300)).astype(int))
+    return np.asarray(points[rows])
 
 
-def _xyz(points: Array) -> dict[str, list[float | None]]:
-    return {
-        axis: [None if math.isnan(v) else round(v, _DIGITS) + 0.0 for v in column]
-        for axis, column in zip("xyz", _drawn(points).T.tolist(), strict=True)
-    }
-
-
-def _line(
-    points: Array, name: str, colour: str, width: float, dash: str = "solid"
-) -> dict[str, Any]:
-    keep = np.unique(np.linspace(0, len(points) - 1, min(len(points), 300)).astype(int))
-    return {
-        "type": "scatter3d",
-        "mode": "lines",
-        "name": html.escape(name),
-        **_xyz(points[keep]),
-        "line": {"color": colour, "width": width, "dash": dash},
-        "hoverinfo": "skip",
-    }
-
-
-def _ground(low: Array, high: Array, down: float) -> list[dict[str, Any]]:
+def _ground(
+    low: Array, high: Array, down: float, names: tuple[str, str]
+) -> tuple[list[SceneLine], list[SceneWord]]:
+    """Grid on the ground, with the names and numbers of its axes along two edges."""
     step = nice_step(float((high - low)[:2].max()) / 16.0)
     rows: list[list[float]] = []
+    words = []
     gap = [math.nan] * 3
     for axis in (0, 1):
         other = 1 - axis
-        for k in range(math.ceil(low[axis] / step), math.floor(high[axis] / step) + 1):
+        edge = float(low[other] if axis else high[other]) + (-0.6 if axis else 0.6) * step
+        first, last = math.ceil(low[axis] / step), math.floor(high[axis] / step)
+        for k in range(first, last + 1):
+            at = [0.0, 0.0, down]
+            at[axis] = k * step
             for end in (low[other], high[other]):
-                at = [0.0, 0.0, down]
-                at[axis], at[other] = k * step, float(end)
-                rows.append(at)
+                at[other] = float(end)
+                rows.append(list(at))
             rows.append(gap)
-    trace = _line(np.zeros((1, 3)), f"ground, {step:g} m", "#c3cad2", 1)
-    return [{**trace, **_xyz(np.array(rows, dtype=np.float64).reshape(-1, 3))}]
-
-
-def _wire(body: VehicleBody, corners: Array) -> Array:
-    """Edges as one broken line."""
-    gap = np.full(3, np.nan)
-    return np.array([row for a, b in body.edges for row in (corners[a], corners[b], gap)])
-
-
-def _moving(body: VehicleBody, corners: Array, trace: Array) -> list[dict[str, Any]]:
-    triangles, colours = body.triangles
-    return [
-        {
-            "type": "mesh3d",
-            "name": "vehicle",
-            **_xyz(corners),
-            **{key: triangles[:, k].astype(int).tolist() for k, key in enumerate("ijk")},
-            "facecolor": list(colours),
-            "flatshading": True,
-            "lighting": {"ambient": 0.8, "diffuse": 0.4, "specular": 0.05},
-            "hoverinfo": "skip",
-            "showscale": False,
-        },
-        {
-            "type": "scatter3d",
-            "mode": "lines",
-            "name": "edges",
-            **_xyz(_wire(body, corners)),
-            "line": {"color": BLACK, "width": 1.5},
-            "hoverinfo": "skip",
-            "showlegend": False,
-        },
-        {
-            "type": "scatter3d",
-            "mode": "lines",
-            "name": "up to now",
-            **_xyz(trace),
-            "line": {"color": BLUE, "width": 7},
-            "hoverinfo": "skip",
-        },
-    ]
-
-
-def _axis(
-    name: str, low: float, high: float, ticks: int = _TICKS, upside_down: bool = False
-) -> dict[str, Any]:
-    axis: dict[str, Any] = {"title": {"text": f"{name}, m"}, "range": [low, high], **_PAPER}
-    step = nice_step((high - low) / ticks)
-    values = [step * k for k in range(math.ceil(low / step), math.floor(high / step) + 1)]
-    words = [tick_words(-v if upside_down else v, step) for v in values]
-    return axis | {"tickvals": [round(v, 6) for v in values], "ticktext": words}
-
-
-def _layout(
-    space: tuple[Array, Array], names: tuple[str, str], frames: Sequence[str]
-) -> dict[str, Any]:
-    low, high = space
-    size = (high - low)[[1, 0, 2]]
-    # The longest side fills the scene, so that a long path is drawn as large as possible.
-    share = size / float(np.sqrt((size**2).sum())) * 2.1
-    steps = [
-        {
-            "label": f"{float(name):.0f} ms".replace("-", "−"),
-            "method": "animate",
-            "args": [
-                [name],
-                {
-                    "mode": "immediate",
-                    "frame": {"duration": 0, "redraw": True},
-                    "transition": {"duration": 0},
-                },
-            ],
-        }
-        for name in frames
-    ]
-    play = {
-        "frame": {"duration": _FRAME, "redraw": True},
-        "fromcurrent": True,
-        "transition": {"duration": 0},
-    }
-    stop = {"mode": "immediate", "frame": {"duration": 0, "redraw": False}}
-    return {
-        "font": FONT,
-        "paper_bgcolor": "#ffffff",
-        "height": 560,
-        "margin": {"l": 0, "r": 0, "t": 10, "b": 10},
-        "legend": {"orientation": "h", "y": 1.0, "x": 0},
-        "scene": {
-            "domain": {"x": [0, 1], "y": [0.1, 1]},
-            "xaxis": _axis(names[1], float(low[1]), float(high[1])),
-            "yaxis": _axis(names[0], float(low[0]), float(high[0])),
-            "zaxis": _axis("down", -float(high[2]), -float(low[2]), 2, upside_down=True),
-            "aspectmode": "manual",
-            "aspectratio": {k: round(v, 4) for k, v in zip("xyz", share.tolist(), strict=True)},
-            "camera": {
-                "eye": {"x": 1.15, "y": 0.65, "z": 0.75},
-                "center": {"x": 0.0, "y": 0.0, "z": -0.1},
-                "projection": {"type": "orthographic"},
-            },
-        },
-        "updatemenus": [
-            {
-                "type": "buttons",
-                "direction": "left",
-                "x": 0.02,
-                "y": 0.02,
-                "xanchor": "left",
-                "yanchor": "bottom",
-                "pad": {"t": 0, "r": 8},
-                "buttons": [
-                    {"label": "Play", "method": "animate", "args": [None, play]},
-                    {"label": "Pause", "method": "animate", "args": [[None], stop]},
-                ],
-            }
-        ],
-        "sliders": [
-            {
-                "x": 0.22,
-                "len": 0.76,
-                "y": 0.02,
-                "yanchor": "bottom",
-                "pad": {"t": 0, "b": 0},
-                "currentvalue": {
-                    "prefix": "time from the trigger: ",
-                    "xanchor": "left",
-                    "font": {"size": 13, "color": BLACK},
-                },
-                "ticklen": 3,
-                "font": {"size": 10, "color": "rgba(0,0,0,0)"},
-                "steps": steps,
-            }
-        ],
-    }
+            if k % 2 == 0:
+                at[other] = edge
+                words.append(SceneWord(tick_words(k * step, step), (at[0], at[1], down), _SOFT))
+        at = [0.0, 0.0, down]
+        at[axis] = 0.5 * float(low[axis] + high[axis])
+        at[other] = edge + (-1.2 if axis else 1.2) * step
+        words.append(SceneWord(f"{names[axis]}, m", (at[0], at[1], down), INK))
+    return [SceneLine(f"ground, {step:g} m", np.array(rows), "#c3cad2", 0.8)], words
 
 
 # Still instants of the motion in 3D, in parallel projection from right, ahead and above.
@@ -505,25 +358,6 @@ class VehicleBody:
     def bottom(self) -> float:
         """Down coordinate of the lowest corner, from the origin, m."""
         return float(self.corners[:, 2].max())
-
-    @property
-    def triangles(self) -> tuple[Array, tuple[str, ...]]:
-        """Corners of the triangles of all faces, (k, 3), and the color of each."""
-        rows, colours = [], []
-        for face, colour in zip(self.faces, self.colours, strict=True):
-            for j in range(1, len(face) - 1):
-                rows.append([face[0], face[j], face[j + 1]])
-                colours.append(colour)
-        return np.array(rows, dtype=np.float64), tuple(colours)
-
-    @property
-    def edges(self) -> tuple[tuple[int, int], ...]:
-        """Pairs of corners, each once."""
-        found: dict[tuple[int, int], None] = {}
-        for face in self.faces:
-            for a, b in zip(face, (*face[1:], face[0]), strict=True):
-                found[(min(a, b), max(a, b))] = None
-        return tuple(found)
 
     def seen(self, corners: Array, away: Array) -> list[int]:
         """Visible faces, farthest first, for any attitude of the body.

@@ -2,32 +2,42 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown import __version__
+from strapdown.bundle.configuration_paths import names_file
 from strapdown.bundle.seal import Seal, to_json
 from strapdown.config.crash_case import CaseSpec
-from strapdown.crash.case import CaseResult, run_case
+from strapdown.constants import TWO_SIDED_95
+from strapdown.crash.case import CaseResult, ReferenceAnswer, SeverityAnswer, main_event, run_case
+from strapdown.crash.consistency import UnitComparison
+from strapdown.crash.crash_type import CrashType
+from strapdown.crash.delta_v_bound import EventChanges, VelocityChange
+from strapdown.crash.events import CrashEvent
+from strapdown.crash.path import CrashPath
+from strapdown.crash.pdof import NedPdof
+from strapdown.crash.reconstruction import UnitReconstruction
+from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.formats.crash_writers import write_mme
 from strapdown.progress import Progress, silent
+from strapdown.report import crash_limits, crash_words
 from strapdown.report.crash_document import crash_document
 from strapdown.report.crash_figures import crash_figures
-from strapdown.report.crash_json import (
-    crash_json,
-    signal_record,
-    signals_table,
-    trajectory_table,
-    write_table,
-)
 from strapdown.report.crash_limits import CONVENTIONS
-from strapdown.report.document_data import draw_stills
-from strapdown.report.document_files import write_drawings, write_text
+from strapdown.report.document import draw_stills, finding_json, write_drawings, write_text
 from strapdown.report.document_html import document_page
 from strapdown.report.document_pdf import write_pdf
-from strapdown.report.report_bundle import report_bundle
+from strapdown.report.report_bundle import report_bundle, write_table
+from strapdown.report.values import spaced
 from strapdown.systems.one_thread import one_thread
-
-__all__ = ["file_name", "rerun_crash", "write_crash"]
+from strapdown.tables import ACCEL, EULER, GYRO, NED, VELOCITY
 
 
 def rerun_crash(configuration: dict[str, Any], out: Path, *, report: bool = True) -> Seal:
@@ -63,10 +73,6 @@ def write_crash(
     force : bool
         Overwrite an existing bundle.
     progress : callable, optional
-
-    Returns
-    -------
-    Seal
 
     Raises
     ------
@@ -133,3 +139,304 @@ def file_name(name: str, made: set[str]) -> str:
         own, number = f"{plain}-{number}", number + 1
     made.add(own)
     return own
+
+
+# A crash case as plain data; every key carries its unit.
+
+
+AXES = ("forward", "right", "down")
+
+
+def crash_json(result: CaseResult) -> dict[str, Any]:
+    """Return a case as plain data.
+
+    Returns
+    -------
+    dict
+        Bounds are 95 % bounds. NaN and infinity are null.
+    """
+    made = result.reconstruction
+    found: dict[str, Any] = {
+        "schema": "strapdown crash 1",
+        "strapdown": __version__,
+        "title": result.spec.title,
+        "number": result.spec.number,
+        "conventions": dict(crash_limits.CONVENTIONS),
+        "headline": spaced(crash_words.headline(result)),
+        "main": made.main.name,
+        "answers": [_unit(unit) for unit in made.answers],
+        "comparison": None if made.comparison is None else _comparison(made.comparison),
+        "severity": [_severity(s) for s in result.severity],
+        "references": [_reference(r) for r in result.references],
+        "assumptions": _pairs(crash_limits.assumptions(result)),
+        "limitations": _pairs(crash_limits.limitations(result)),
+        "findings": [finding_json(f) for f in result.findings],
+        "case": _named(result.spec.model_dump(mode="json", exclude_none=True)),
+    }
+    return {key: _numbers(value) for key, value in found.items()}
+
+
+def _numbers(value: Any) -> Any:
+    """Replace NaN and infinity by null."""
+    if isinstance(value, dict):
+        return {key: _numbers(v) for key, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_numbers(v) for v in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def _named(value: Any, key: str = "") -> Any:
+    """The case specification with file names instead of paths."""
+    if isinstance(value, dict):
+        return {k: _named(v, k) for k, v in value.items()}
+    if isinstance(value, list):
+        return [_named(v) for v in value]
+    if names_file(key, value):
+        return str(value).replace("\\", "/").rstrip("/").rsplit("/", 1)[-1]
+    return value
+
+
+def _pairs(rows: tuple[tuple[str, str], ...]) -> list[dict[str, str]]:
+    return [{"what": spaced(head), "text": spaced(text)} for head, text in rows]
+
+
+def _about(value: float, half: float) -> dict[str, float]:
+    return {"value": value, "low": value - half, "high": value + half}
+
+
+def _unit(unit: UnitReconstruction) -> dict[str, Any]:
+    number = main_event(unit)
+    path = unit.path
+    table, sd = path.table.iloc[-1], path.sd.iloc[-1]
+    return {
+        "recorder": unit.name,
+        "main_event": None if number is None else number + 1,
+        "events": [
+            _event(unit, k, event, changes, kind)
+            for k, (event, changes, kind) in enumerate(
+                zip(unit.events.events, unit.body, unit.types, strict=True)
+            )
+        ],
+        "largest_change_without_event_m_per_s": unit.events.largest_change,
+        "path": {
+            "start_s": float(path.time[0]),
+            "end_s": float(path.time[-1]),
+            "entry_s": path.entry.time,
+            "entry_velocity_north_east_down_m_per_s": list(path.entry.velocity),
+            "end": {
+                **{f"{a}_m": _about(float(table[a]), TWO_SIDED_95 * float(sd[a])) for a in NED},
+                **{
+                    f"{a}_m_per_s": _about(float(table[a]), TWO_SIDED_95 * float(sd[a]))
+                    for a in VELOCITY
+                },
+                **{f"{a}_deg": _about(float(table[a]), TWO_SIDED_95 * float(sd[a])) for a in EULER},
+            },
+            "variances_at_the_end_m2": {
+                str(name): {a: float(row[a]) for a in NED}
+                for name, row in path.variances()[NED].iterrows()
+            },
+        },
+    }
+
+
+def _event(
+    unit: UnitReconstruction, k: int, event: CrashEvent, changes: EventChanges, kind: CrashType
+) -> dict[str, Any]:
+    ned = unit.ned[k]
+    return {
+        "event": k + 1,
+        "type": kind.name,
+        "because": kind.reason,
+        "time_zero_s": event.time_zero,
+        "time_zero_sd_s": event.time_zero_sd,
+        "time_zero_by": event.basis,
+        "end_s": event.end,
+        "lasts_beyond_record": event.lasts_beyond_record,
+        "starts_before_record": event.starts_before_record,
+        "peak_m_per_s2": event.peak,
+        "peak_time_s": event.peak_time,
+        "body": {"event": _change(changes.event), "peak": _change(changes.peak)},
+        "over_ground": None
+        if ned is None
+        else {"event": _change(ned.event), "peak": _change(ned.peak)},
+    }
+
+
+def _change(change: VelocityChange) -> dict[str, Any]:
+    axes = NED if change.delta_v.frame == "ned" else AXES
+    across, angle = change.interval.horizontal, change.pdof
+    return {
+        "start_s": change.delta_v.start,
+        "end_s": change.delta_v.end,
+        **{
+            f"{axis}_m_per_s": _about(float(v), h)
+            for axis, v, h in zip(axes, change.delta_v.vector, change.bound.half_width, strict=True)
+        },
+        "resultant_m_per_s": _about(change.resultant, change.resultant_bound),
+        "direction_of_force": {
+            **(
+                {"azimuth_deg": angle.azimuth_deg, "relative_deg": angle.relative_deg}
+                if isinstance(angle, NedPdof)
+                else {"horizontal_deg": angle.horizontal_deg}
+            ),
+            "low_deg": across.low_deg,
+            "high_deg": across.high_deg,
+            "undetermined": across.undetermined,
+            "vertical_deg": angle.vertical_deg,
+            "clock": angle.clock,
+        },
+    }
+
+
+def _comparison(comparison: UnitComparison) -> dict[str, Any]:
+    return {
+        "agree": comparison.agree,
+        "probability": comparison.probability,
+        "chi_square": comparison.chi_square,
+        "freedom": comparison.freedom,
+        "pairs": [
+            {
+                "first": pair.first,
+                "second": pair.second,
+                "difference_m_per_s": pair.difference[-1].tolist(),
+                "sd_m_per_s": pair.sd[-1].tolist(),
+                "chi_square": pair.chi_square,
+                "freedom": pair.freedom,
+                "probability": pair.probability,
+                "agree": pair.agree,
+            }
+            for pair in comparison.pairs
+        ],
+    }
+
+
+def _severity(answer: SeverityAnswer) -> dict[str, Any]:
+    risk = answer.risk
+    return {
+        "model": answer.model.name,
+        "outcome": answer.model.outcome,
+        "source": answer.model.source,
+        "probability": None if risk is None else risk.probability,
+        "low": None if risk is None else risk.low,
+        "high": None if risk is None else risk.high,
+        "because": "" if answer.because is None else answer.because.sentence("file"),
+    }
+
+
+def _reference(answer: ReferenceAnswer) -> dict[str, Any]:
+    found, spec = answer.path, answer.spec
+    return {
+        "reference": spec.name,
+        "kind": spec.kind,
+        "source": spec.source,
+        "recorder": answer.unit,
+        "start_s": answer.span[0],
+        "end_s": answer.span[1],
+        "delta_v_m_per_s": answer.delta_v,
+        "sd_m_per_s": answer.sd,
+        "reference_delta_v_m_per_s": spec.delta_v_m_per_s,
+        "rms_m": None if found is None else list(found.rms),
+        "largest_m": None if found is None else list(found.largest),
+        "consistent": answer.consistent,
+    }
+
+
+# CSV tables of a crash case: the path, and the signals at the reference point.
+
+
+UNITS = dict.fromkeys(NED, "m") | dict.fromkeys(VELOCITY, "m_per_s") | dict.fromkeys(EULER, "deg")
+
+
+def trajectory_table(path: CrashPath) -> pd.DataFrame:
+    """Return the path with its standard deviations; column names carry units.
+
+    Returns
+    -------
+    DataFrame
+        ``time_s``, position, velocity, attitude, then their standard deviations.
+    """
+    values = path.table.rename(columns={c: f"{c}_{u}" for c, u in UNITS.items()})
+    sd = path.sd.rename(columns={c: f"{c}_sd_{u}" for c, u in UNITS.items()})
+    table = pd.concat([values, sd], axis=1)
+    table.insert(0, "time_s", path.time)
+    return table.reset_index(drop=True)
+
+
+def signals_table(unit: UnitReconstruction) -> pd.DataFrame:
+    """Return the signals of one recorder at the reference point, including gravity.
+
+    Returns
+    -------
+    DataFrame
+        Specific force forward, right, down in m/s² and rates in deg/s at the common stamps; for a
+        recorder of several ranges also the selected range (0 the lowest) and the samples at the end
+        of its range, by sensor axis.
+    """
+    imu = unit.at_point.imu
+    table = pd.DataFrame({"time_s": imu.index.to_numpy()})
+    for axis, column in zip(("forward", "right", "down"), ACCEL, strict=True):
+        table[f"force_{axis}_m_per_s2"] = imu[column].to_numpy()
+    for axis, column in zip(("roll", "pitch", "yaw"), GYRO, strict=True):
+        table[f"rate_{axis}_deg_per_s"] = np.degrees(imu[column].to_numpy())
+    prepared = unit.at_point.prepared
+    if prepared is not None:
+        for k, axis in enumerate("xyz"):
+            table[f"range_{axis}"] = prepared.range_spoken[:, k].astype(np.int64)
+            table[f"at_end_{axis}"] = prepared.clipped[:, k].astype(np.int64)
+    return table
+
+
+# Signals of the recorders at the reference point, as one crash record for ISO MME.
+
+
+Array = NDArray[np.float64]
+
+
+def signal_record(
+    title: str, point: str, answers: Sequence[UnitReconstruction], rate_hz: float
+) -> CrashRecord:
+    """Return the signals of all answers at the reference point.
+
+    Parameters
+    ----------
+    title : str
+        Of the case.
+    point : str
+        Name of the reference point.
+    answers : sequence of UnitReconstruction
+    rate_hz : float, Hz
+        Sample rate of the common stamps.
+
+    Returns
+    -------
+    CrashRecord
+        Specific force (including gravity) and rates of each recorder and of their mean, along
+        the vehicle's axes.
+    """
+    channels = []
+    for unit in answers:
+        imu = unit.at_point.imu
+        time = imu.index.to_numpy(dtype=np.float64)
+        for columns, quantity, symbol in ((ACCEL, "acceleration", "m/s2"), (GYRO, "rate", "rad/s")):
+            for column, axis in zip(columns, "xyz", strict=True):
+                channels.append(
+                    CrashChannel(
+                        f"{unit.name} {column}",
+                        quantity,
+                        axis,
+                        symbol,
+                        _load(time, imu[column].to_numpy(dtype=np.float64)),
+                        sampling=str(imu.attrs["sampling"]),
+                        place=f"{point}, by {unit.name}",
+                        low_pass=f"brought to {rate_hz:g} Hz",
+                    )
+                )
+    return CrashRecord(
+        Path("signals"), "mme", title, {"reference point": point}, tuple(channels), ()
+    )
+
+
+def _load(time: Array, values: Array) -> Callable[[], tuple[Array, Array]]:
+    return lambda: (time, values)

@@ -38,26 +38,10 @@ from strapdown.report.chart import (
     curve,
     look,
 )
-from strapdown.report.crash_moments import AROUND, crash_span, event_marks, unit_look
+from strapdown.report.crash_outline import AROUND, crash_span, event_marks, unit_look
 from strapdown.report.values import MEAN, plain
 from strapdown.rotation import within_half_turn
 from strapdown.tables import NED
-
-__all__ = [
-    "StatedDeltaV",
-    "accelerations_chart",
-    "delta_v_budget",
-    "delta_v_budget_chart",
-    "delta_v_chart",
-    "delta_v_course",
-    "delta_v_half_widths",
-    "differences_chart",
-    "pdof_by_shift_chart",
-    "pdof_by_window_chart",
-    "place_budget_chart",
-    "risk_chart",
-]
-
 
 Array = NDArray[np.float64]
 
@@ -614,12 +598,6 @@ def accelerations_chart(
     events: Sequence[CrashEvent] = (),
 ) -> Chart:
     """Chart the acceleration of the reference point from every unit.
-
-    Parameters
-    ----------
-    units : sequence of UnitReconstruction
-    combined : UnitReconstruction or None
-    events : sequence of CrashEvent
 
     Returns
     -------

@@ -29,8 +29,6 @@ from strapdown.report.document import (
 )
 from strapdown.report.values import GAP, plain
 
-__all__ = ["crash_document"]
-
 SIGNALS = (
     "Specific force is what an accelerometer feels: −1 g downward at rest, 1 g = 9.80665 m/s². It "
     "is drawn along the axes of the vehicle (forward, right, down), and rates about them; as "
@@ -49,10 +47,6 @@ def crash_document(result: CaseResult, figures: CrashFigures, name: str) -> Docu
     figures : CrashFigures
     name : str
         Folder name, for the verification command.
-
-    Returns
-    -------
-    Document
     """
     spec = result.spec
     facts = [

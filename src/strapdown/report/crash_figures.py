@@ -25,22 +25,20 @@ from strapdown.report.crash_charts import (
     place_budget_chart,
     risk_chart,
 )
-from strapdown.report.crash_conventions import MountingPoint, conventions_picture
-from strapdown.report.crash_dial import Direction, pdof_dial
-from strapdown.report.crash_motion import (
+from strapdown.report.crash_outline import vehicle_outline
+from strapdown.report.crash_pictures import Direction, MountingPoint, conventions_picture, pdof_dial
+from strapdown.report.crash_plan import path_plan
+from strapdown.report.crash_signals import (
+    UnitSignals,
     attitude_chart,
     place_chart,
     reference_chart,
+    unit_signals,
     velocity_chart,
 )
-from strapdown.report.crash_outline import vehicle_outline
-from strapdown.report.crash_plan import path_plan
-from strapdown.report.crash_signals import UnitSignals, unit_signals
 from strapdown.report.document import Animation, Picture
 from strapdown.report.values import axis_names
 from strapdown.tables import NED
-
-__all__ = ["CrashFigures", "crash_figures", "reference_in_path_axes"]
 
 
 @dataclass(frozen=True)
@@ -127,15 +125,12 @@ class CrashFigures:
     @property
     def pictures(self) -> tuple[Picture, ...]:
         """All pictures, including those of the animation on paper."""
-        return (*self.front, self.path, self.motion.stills, self.conventions)
+        stills = () if self.motion.stills is None else (self.motion.stills,)
+        return (*self.front, self.path, *stills, self.conventions)
 
 
 def crash_figures(result: CaseResult) -> CrashFigures:
     """Draw all charts and pictures of the report of a case.
-
-    Parameters
-    ----------
-    result : CaseResult
 
     Returns
     -------

@@ -12,21 +12,6 @@ from strapdown.crash.reconstruction import UnitReconstruction
 from strapdown.report.values import about, instant, plain, speed
 from strapdown.sensors.pre_crash import PreparedUnit
 
-__all__ = [
-    "CONVENTIONS",
-    "assumed",
-    "assumptions",
-    "borrowed",
-    "clipping",
-    "grave_limitations",
-    "how_to_verify",
-    "limitations",
-    "method",
-    "rest",
-    "ringing",
-]
-
-
 #: Limitations that make an answer wrong, not only less precise.
 GRAVE = frozenset(
     (
@@ -42,10 +27,6 @@ GRAVE = frozenset(
 
 def limitations(result: CaseResult) -> tuple[tuple[str, str], ...]:
     """Return the limitations that a reader must know before relying on the answers.
-
-    Parameters
-    ----------
-    result : CaseResult
 
     Returns
     -------
@@ -404,12 +385,7 @@ CONVENTIONS = (
 
 
 def assumptions(result: CaseResult) -> tuple[tuple[str, str], ...]:
-    """Return the assumptions of this case.
-
-    Returns
-    -------
-    tuple of (head, text)
-    """
+    """Return the assumptions of this case."""
     spec = result.spec
     options, entry = spec.options, spec.entry
     found = [

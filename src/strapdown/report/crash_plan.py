@@ -13,18 +13,15 @@ from numpy.typing import NDArray
 from strapdown.crash.events import CrashEvent
 from strapdown.crash.path import PLACE, CrashPath
 from strapdown.report.chart import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
-from strapdown.report.crash_moments import path_moments
-from strapdown.report.crash_outline import Outline, draw_outline
+from strapdown.report.crash_outline import Outline, draw_outline, path_moments
 from strapdown.report.document import Picture
-from strapdown.report.error_envelope import envelope
-from strapdown.report.plan_view import PlanView
+from strapdown.report.plan_view import PlanView, envelope
 from strapdown.report.svg_drawing import INK, SMALL, Box, Drawing, text_width
 from strapdown.report.values import plain
 from strapdown.tables import NED
 
 Array = NDArray[np.float64]
 
-__all__ = ["path_plan"]
 
 _WIDTH, _SMALL_WIDTH, _LEFT, _TOP = 640.0, 370.0, 58.0, 12.0
 _HEIGHTS = (170.0, 380.0)

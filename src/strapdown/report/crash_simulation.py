@@ -41,16 +41,6 @@ from strapdown.simulation.crash_recording import TriadDesign
 from strapdown.simulation.mounted_motion import ExactAnswers
 from strapdown.tables import ACCEL, GYRO
 
-__all__ = [
-    "PartPlace",
-    "case_text",
-    "part_file",
-    "part_name",
-    "stated_errors",
-    "write_crash_simulation",
-]
-
-
 # Interval in which 49 CFR 563 seeks the delta-V of an event; all pulses here end within it.
 SPAN = 0.15  # s
 

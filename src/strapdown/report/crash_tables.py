@@ -28,21 +28,6 @@ from strapdown.rotation import within_half_turn
 from strapdown.sensors.crash_unit import RecordedTriad
 from strapdown.tables import NED
 
-__all__ = [
-    "answers_table",
-    "budget_table",
-    "comparison_table",
-    "direction_table",
-    "inputs_table",
-    "path_table",
-    "records_table",
-    "reference_tables",
-    "sensors_table",
-    "severity_table",
-    "units_table",
-]
-
-
 ANGLES = ("roll, deg", "pitch, deg", "heading, deg")
 OVER_GROUND = "Axes: over ground."
 FROM_THE_ENTRY = (

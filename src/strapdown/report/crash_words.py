@@ -32,22 +32,6 @@ from strapdown.report.values import (
 )
 from strapdown.tables import NED
 
-__all__ = [
-    "apart",
-    "apart_figures",
-    "apart_headline",
-    "direction",
-    "entry_words",
-    "headline",
-    "key_figures",
-    "lead",
-    "notes",
-    "path_words",
-    "record_facts",
-    "units_words",
-]
-
-
 TYPES = {
     "front": "an impact from the front",
     "right": "an impact from the right",
@@ -417,10 +401,6 @@ def _sentence(text: str) -> str:
 
 def record_facts(record: CrashRecord) -> tuple[tuple[str, str], ...]:
     """Return the test metadata of a record, with units.
-
-    Parameters
-    ----------
-    record : CrashRecord
 
     Returns
     -------

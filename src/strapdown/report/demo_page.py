@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import math
-import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from strapdown.report.document_html import render
+from strapdown.report.document import Block, Document, Items, Links, Paragraph, Picture, Section
+from strapdown.report.document_html import document_page
 from strapdown.report.values import plain
-
-__all__ = ["Shown", "demo_page", "shown_answer", "shown_truth"]
 
 _MS_TO_KMH = 3.6
 _SMALL_DEG = 1e-3
-# Smallest width, as a share of the picture's own units, with readable letters.
-_LEAST_SHARE = 0.55
-_SIZE = re.compile(r"<svg[^>]*?viewBox=\"[\d.\-]+ [\d.\-]+ ([\d.]+) [\d.]+\"", re.S)
+_PARTS = (
+    ("A", "Navigation", "Where was it, and how well is that known?"),
+    ("B", "Attitude", "Which algorithm, at what rate?"),
+    ("C", "Crash", "What happened in this crash?"),
+)
 
 
 @dataclass(frozen=True)
@@ -63,10 +62,6 @@ def shown_answer(bundle: Path) -> str:
     ----------
     bundle : Path
         From `attitude`, `crash`, `navigate` or `coast`.
-
-    Returns
-    -------
-    str
     """
     kind, told = _told(bundle)
     if kind == "attitude":
@@ -119,23 +114,39 @@ def demo_page(shown: Sequence[Shown], folder: Path, missing: str | None = None) 
     str
         HTML that needs no network; identical for the same bundles.
     """
-    runs = [
-        {
-            "part": run.part,
-            "slug": run.slug,
-            "title": run.title,
-            "question": run.question,
-            "command": run.command,
-            "answer": shown_answer(folder / run.slug),
-            "truth": shown_truth(
-                folder / run.slug, None if run.records is None else folder / run.records
-            ),
-            "pictures": [_picture(folder / run.slug / "figures" / f"{f}.svg") for f in run.figures],
-            "links": [(f"{quote(run.slug)}/{page}", words) for page, words in run.pages],
-        }
-        for run in shown
-    ]
-    return render("demo.html", {"runs": runs, "missing": missing})
+    document = Document(
+        "Inertial sensors, and answers that you can check",
+        "Three questions, each answered with its bound, and the truth beside it where it is known.",
+        (),
+        (
+            Items(tuple((f"{part} · {system}", text) for part, system, text in _PARTS)),
+            *(() if missing is None else (Paragraph(missing, "note"),)),
+        ),
+        tuple(
+            Section(run.slug, f"{run.part} · {run.title}", tuple(_blocks(run, folder)))
+            for run in shown
+        ),
+        "Written by strapdown demo from what the runs wrote. Every folder is sealed: strapdown "
+        "verify FOLDER runs it again, to the last bit.",
+    )
+    return document_page(document)
+
+
+def _blocks(run: Shown, folder: Path) -> Iterator[Block]:
+    bundle = folder / run.slug
+    yield Paragraph(run.question, "note")
+    yield Paragraph(shown_answer(bundle), "lead")
+    truth = shown_truth(bundle, None if run.records is None else folder / run.records)
+    if truth:
+        yield Items((("The truth beside it", truth),))
+    yield Links(tuple((f"{quote(run.slug)}/{page}", words) for page, words in run.pages))
+    for figure in run.figures:
+        drawn = (bundle / "figures" / f"{figure}.svg").read_text(encoding="utf-8")
+        name = figure.replace("-", " ")
+        yield Picture(
+            figure, drawn, f"{name.capitalize()} of the report", alt=f"{run.title}: {name}"
+        )
+    yield Paragraph(run.command, "mono")
 
 
 def _attitude_truth(told: dict[str, Any]) -> str | None:
@@ -220,14 +231,3 @@ def _told(bundle: Path) -> tuple[str, dict[str, Any]]:
 
 def _json(path: Path) -> Any:
     return json.loads(path.read_text(encoding="utf-8"))
-
-
-def _picture(path: Path) -> dict[str, Any]:
-    drawn = path.read_bytes()
-    size = _SIZE.search(drawn.decode("utf-8"))
-    width = float(size.group(1)) if size else 640.0
-    return {
-        "data": f"data:image/svg+xml;base64,{base64.b64encode(drawn).decode('ascii')}",
-        "least": round(_LEAST_SHARE * width),
-        "alt": path.stem.replace("-", " "),
-    }

@@ -5,17 +5,14 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import re
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from typing import Any
 
-from strapdown.report.document import Document
-from strapdown.report.document_data import document_data, draw_stills
+from strapdown.report.document import Document, document_data, draw_stills
 
-__all__ = ["document_page"]
-
-
-_HEIGHT = 420  # pixels, of a figure without a stated height
+_TITLE = re.compile("<title>.*?</title>", re.DOTALL)
 
 
 def document_page(document: Document, *, stills: Sequence[str] | None = None) -> str:
@@ -31,36 +28,41 @@ def document_page(document: Document, *, stills: Sequence[str] | None = None) ->
     Returns
     -------
     str
-        HTML, the same for the same document. Pictures are embedded as images, which cannot run
-        scripts or fetch resources; a content policy in the page forbids both to everything else.
+        HTML, the same for the same document, whole without scripts but for scenes that move.
+        Charts are SVG of `chart_svg`, with every text escaped; pictures are embedded as images,
+        which cannot run scripts or fetch resources. A content policy in the page allows its own
+        script and no other.
     """
+    from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
-    from plotly.offline import get_plotlyjs
 
     drawn = draw_stills(document) if stills is None else stills
     data = document_data(document, drawn, _image, alive=True)
     sections = (block for section in data["sections"] for block in section["blocks"])
-    alive = [block for block in (*data["front"], *sections) if "figure" in block]
-    for block in alive:
-        block["json"] = embedded(_without_controls(block["figure"]))
-        block["height"] = int(block["figure"]["layout"].get("height", _HEIGHT))
+    alive = False
+    for block in (*data["front"], *sections):
+        if "svg" in block:
+            # The browser would show a title wherever the pointer rests on the chart.
+            drawn_svg = _TITLE.sub("", block["svg"], count=1)
+            block["svg"] = Markup(drawn_svg.replace(' xmlns="http://www.w3.org/2000/svg"', "", 1))
+        elif "scene" in block:
+            block["json"] = _embedded(block["scene"].data())
+        else:
+            continue
+        alive = True
     script = files("strapdown.report").joinpath("templates", "document.js").read_text("utf-8")
-    scripts = [get_plotlyjs(), script] if alive else []
-    return render(
-        "document.html",
-        {
-            "document": data,
-            "alive": bool(alive),
-            "script": Markup(script),
-            "policy": " ".join(map(_digest, scripts)) or "'none'",
-        },
+    environment = Environment(
+        loader=PackageLoader("strapdown.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
-
-
-def _without_controls(figure: dict[str, Any]) -> dict[str, Any]:
-    """Remove plotly's own buttons and sliders: the page has keyboard-accessible ones."""
-    layout = {k: v for k, v in figure["layout"].items() if k not in ("updatemenus", "sliders")}
-    return figure | {"layout": layout}
+    return environment.get_template("document.html").render(
+        document=data,
+        script=Markup(script) if alive else "",
+        policy=_digest(script) if alive else "'none'",
+    )
 
 
 def _image(svg: str) -> str:
@@ -75,52 +77,8 @@ def _digest(script: str) -> str:
     return f"'sha256-{whole}'"
 
 
-# Pages: one offline file, every external text escaped.
-
-
-def render(template: str, context: Mapping[str, Any]) -> str:
-    """Render a template into a self-contained page.
-
-    Parameters
-    ----------
-    template : str
-        File in ``templates``.
-    context : mapping
-        Strings are escaped by the template; charts come from `embedded`.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-    from markupsafe import Markup
-    from plotly.offline import get_plotlyjs
-
-    environment = Environment(
-        loader=PackageLoader("strapdown.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    # The only text that is code: plotly's own.
-    return environment.get_template(template).render(plotly_js=Markup(get_plotlyjs()), **context)
-
-
-def embedded(figure: Mapping[str, Any]) -> Any:
-    """Encode JSON safely for a script element, whatever text it holds.
-
-    Parameters
-    ----------
-    figure : mapping
-
-    Returns
-    -------
-    markupsafe.Markup
-        With ``<``, ``>`` and ``&`` written as escapes of JSON, so that no ``</script>`` and no
-        ``<!--`` can end or open anything.
-    """
+def _embedded(figure: Mapping[str, Any]) -> Any:
+    """Encode JSON for a script element; no text in it can end the element or begin another."""
     from markupsafe import Markup
 
     text = json.dumps(figure, ensure_ascii=True, allow_nan=False, separators=(",", ":"))

@@ -12,11 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from strapdown.errors import ConfigError, DataError
-from strapdown.report.document import Document
-from strapdown.report.document_data import document_data, draw_stills
-
-__all__ = ["shown", "write_pdf"]
-
+from strapdown.report.document import Document, document_data, draw_stills
 
 _TEMPLATE = "document.typ"
 
@@ -49,7 +45,7 @@ def write_pdf(document: Document, path: Path, *, stills: Sequence[str] | None = 
 
 
 def _pdf(document: Document, stills: Sequence[str]) -> bytes:
-    typst = _typst()
+    typst = typst_library()
     with tempfile.TemporaryDirectory(prefix="strapdown-") as name:
         folder = Path(name)
         count = 0
@@ -102,7 +98,14 @@ def _compiled(typst: Any, folder: Path) -> bytes:
         return compiled()
 
 
-def _typst() -> Any:
+def typst_library() -> Any:
+    """Return typst, which lays out PDF and PNG.
+
+    Raises
+    ------
+    ConfigError
+        It is not installed.
+    """
     try:
         import typst
     except ImportError as error:

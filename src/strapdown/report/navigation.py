@@ -2,25 +2,62 @@
 
 from __future__ import annotations
 
+import math
+import re
+from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.alignment.alignment import Alignment
 from strapdown.bundle.seal import Seal, to_json
-from strapdown.config.navigation import NavigationSpec
+from strapdown.config.navigation import STAGES, NavigationSpec
+from strapdown.errors import ConfigError
+from strapdown.evaluation.plane_bound import plane_bound
+from strapdown.formats import csv
+from strapdown.formats.trajectory_options import TrajectoryFileOptions
+from strapdown.formats.trajectory_writers import write_trajectory
+from strapdown.navigation.consistency import Inconsistency
+from strapdown.navigation.heading_integrity import COLOURS, REASONS
+from strapdown.navigation.integrity import Repeated
+from strapdown.navigation.record import NavigationRecord
 from strapdown.progress import Progress, silent
-from strapdown.report.document_data import draw_stills, no_stills
-from strapdown.report.document_files import write_drawings, write_text
+from strapdown.report import navigation_charts as charts
+from strapdown.report.chart import Chart
+from strapdown.report.chart_figure import ChartFigure
+from strapdown.report.document import draw_stills, finding_json, write_drawings, write_text
 from strapdown.report.document_html import document_page
-from strapdown.report.navigation_document import navigation_document
-from strapdown.report.navigation_found import examine, told_of
-from strapdown.report.navigation_json import navigation_json, write_navigation_files
+from strapdown.report.navigation_charts import innovation_chart
+from strapdown.report.navigation_document import CONVENTIONS, navigation_document
+from strapdown.report.navigation_found import (
+    Agreement,
+    NavigationFound,
+    NavigationTold,
+    Score,
+    agreements,
+    examine,
+    told_of,
+)
+from strapdown.report.navigation_plan import plan_chart
+from strapdown.report.navigation_trust import trust
+from strapdown.report.navigation_words import cautions, headline
 from strapdown.report.report_bundle import report_bundle
-from strapdown.report.verdict_document import light_section
-from strapdown.report.verdict_files import write_verdict
+from strapdown.report.values import distance_over_ground, worst_within
+from strapdown.report.verdict_document import light_section, verdict_document
+from strapdown.report.verdict_words import (
+    answer,
+    first_words,
+    promise,
+    repeated_words,
+    witness_words,
+)
 from strapdown.systems.navigation_run import NavigationRun, run_navigation
 from strapdown.systems.one_thread import one_thread
-
-__all__ = ["rerun_navigation", "write_navigation"]
+from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
 
 
 def rerun_navigation(configuration: dict[str, Any], out: Path, *, report: bool = True) -> Seal:
@@ -58,10 +95,6 @@ def write_navigation(
         Overwrite an existing bundle.
     progress : callable, optional
 
-    Returns
-    -------
-    Seal
-
     Raises
     ------
     ConfigError
@@ -87,12 +120,518 @@ def write_navigation(
             write_verdict(result, name, folder)
             progress("drawing the figures", 0.86)
             document = navigation_document(found.told, name, found, light_section(result))
+            stills = draw_stills(document)
             if result.spec.output.figures:
-                stills = draw_stills(document)
                 write_drawings(document, stills, folder / "figures")
-            else:
-                stills = no_stills(document)
             progress("writing the page", 0.95)
             write_text(folder / "report.html", document_page(document, stills=stills))
         progress("sealing", 0.97)
     return seals[0]
+
+
+# Charts of a navigation run as figures for a notebook.
+
+
+KINDS: dict[str, Callable[[NavigationTold], Chart | None]] = {
+    "plan": plan_chart,
+    "bound": charts.bound_chart,
+    "height": charts.height_chart,
+    "velocity": charts.velocity_chart,
+    "attitude": charts.attitude_chart,
+}
+
+
+def plot(result: NavigationRun, kind: str) -> ChartFigure:
+    """Draw one chart of a run, as its report shows it.
+
+    Parameters
+    ----------
+    result : NavigationRun
+    kind : str
+        One of `KINDS`, or the name of an observation.
+
+    Raises
+    ------
+    ConfigError
+        The chart does not exist.
+    """
+    observed = result.filtered.innovations
+    if kind in observed:
+        found = {one.name: one for one in agreements(result.filtered)}
+        return ChartFigure(innovation_chart(result.filtered, found[kind]))
+    if kind not in KINDS:
+        raise ConfigError(
+            "report.unknown-chart", quantity="kind", word=kind, known=[*KINDS, *observed]
+        )
+    chart = KINDS[kind](told_of(result))
+    if chart is None:
+        raise ConfigError("report.no-path-to-draw", quantity=f"kind '{kind}'")
+    return ChartFigure(chart)
+
+
+# A navigation run as JSON: final state, bounds, estimated errors, and method.
+
+
+MODULES = (*STAGES, "aiding")
+
+Array = NDArray[np.float64]
+
+
+def navigation_json(result: NavigationRun, found: NavigationFound | None = None) -> dict[str, Any]:
+    """Return a navigation run as plain data for programs.
+
+    Parameters
+    ----------
+    result : NavigationRun
+    found : NavigationFound, optional
+        From `examine`, if already computed.
+
+    Returns
+    -------
+    dict
+        Angles and their standard deviations in degrees; estimated sensor errors in SI.
+    """
+    record, source = result.record, result.source
+    time = record.trajectory.index
+    found = examine(told_of(result)) if found is None else found
+    verdict = trust(found)
+    return {
+        "conventions": {key.lower().replace(" ", "_"): text for key, text in CONVENTIONS},
+        "answer": _plain(headline(found)),
+        "trust": {
+            "verdict": verdict.verdict,
+            "for": [finding_json(f) for f in verdict.supporting],
+            "against": [finding_json(f) for f in verdict.against],
+        },
+        "cautions": [_plain(f"{head}: {text}") for head, text in cautions(found)],
+        "record": {
+            "name": source.name,
+            "what": source.what,
+            "samples": len(source.imu),
+            "from_s": float(source.imu.index[0]),
+            "to_s": float(source.imu.index[-1]),
+            "read_as": [asdict(reading) for reading in source.readings],
+        },
+        "ellipsoid": result.ellipsoid.name,
+        "trajectory": {
+            "rows": len(time),
+            "from_s": float(time[0]),
+            "to_s": float(time[-1]),
+            "travelled_m": distance_over_ground(record.trajectory),
+        },
+        "alignment": {
+            "coarse": _alignment(result.coarse),
+            "fine": None if result.fine is None else _alignment(result.fine.alignment),
+        },
+        "start": _state(found, 0),
+        "end": _state(found, -1),
+        "sensors": {
+            str(name): {
+                "unit": record.units.get(str(name), ""),
+                "estimate": _number(record.sensors[name].iloc[-1]),
+                "sd": _number(record.sensors_sd[name].iloc[-1]),
+            }
+            for name in record.sensors.columns
+        },
+        "smoothing": _smoothing(found),
+        "observations": {one.name: _innovations(one) for one in found.agreements},
+        "outages": _outages(record),
+        "withheld": [
+            {
+                "aid": w.aid,
+                "from_s": w.begin,
+                "to_s": w.end,
+                "largest_horizontal_error_m": _number(w.error_m),
+                "bound_95_m": _number(w.bound_m),
+                "inside": w.inside,
+                "largest_horizontal_error_forward_m": (
+                    None if w.forward_m is None else _number(w.forward_m)
+                ),
+            }
+            for w in found.told.withheld
+        ],
+        "modes": [{"mode": s.name, "from_s": s.begin, "to_s": s.end} for s in record.modes],
+        "events": [
+            {"time_s": e.time, "kind": e.kind, "what": e.finding.what} for e in record.events
+        ],
+        "against": _against(found),
+        "control_points": _points(found),
+        "method": _method(result),
+        "findings": [finding_json(f) for f in result.findings],
+    }
+
+
+def _smoothing(found: NavigationFound) -> dict[str, Any] | None:
+    """Agreement of filter and smoother; None for a run without smoothing."""
+    one = found.smoother
+    if one is None:
+        return None
+    return {
+        name: {
+            "instants": int(one.instants[k]),
+            "share_within_3_sd": _number(one.share[k]),
+            "rms_in_sd": _number(one.rms[k]),
+        }
+        for k, name in enumerate(one.columns)
+    }
+
+
+def _method(result: NavigationRun) -> dict[str, Any]:
+    """The modules and their options, without file paths."""
+    chosen: dict[str, Any] = result.spec.model_dump(
+        mode="json",
+        include=set(MODULES),
+        exclude_none=True,
+        serialize_as_any=True,
+    )
+    for aid in chosen["aiding"].values():
+        aid.pop("path", None)
+    return chosen
+
+
+def _against(found: NavigationFound) -> dict[str, Any] | None:
+    """Errors against the truth, at the samples after the covariance marks."""
+    errors = found.errors
+    if errors is None:
+        return None
+    return {
+        "name": found.told.truth_name,
+        "instants": len(errors.time),
+        "from_s": float(errors.time[0]),
+        "to_s": float(errors.time[-1]),
+        "mean_nees": _number(errors.nees.mean()) if errors.freedom else None,
+        "nees_of": errors.freedom,
+        "errors": {score.quantity: _score(score) for score in errors.scores},
+    }
+
+
+def _points(found: NavigationFound) -> dict[str, Any] | None:
+    """Errors at the control points, after the best fit of origin and heading."""
+    score = found.told.points
+    if score is None:
+        return None
+    return {
+        "points": len(score.time),
+        "points_given": score.given,
+        "way_m": score.way,
+        "rms_m": score.rms,
+        "median_m": score.median,
+        "largest_m": score.largest,
+        "largest_at_s": score.largest_at,
+        "turn_deg": score.turn_deg,
+    }
+
+
+def _outages(record: NavigationRecord) -> list[dict[str, Any]]:
+    """Outages, each with the largest bound at a mark in it; None without a mark."""
+    out = []
+    for aid, spans in record.outages.items():
+        for span in spans:
+            worst = worst_within(record, span)
+            bound = None if worst is None else _number(worst[0])
+            out.append(
+                {
+                    "aid": aid,
+                    "from_s": span.begin,
+                    "to_s": span.end,
+                    "largest_horizontal_bound_95_m": bound,
+                }
+            )
+    return out
+
+
+def _score(score: Score) -> dict[str, Any]:
+    unit = {"m": "m", "m/s": "m_per_s", "deg": "deg"}[score.unit]
+    return {
+        f"rms_{unit}": _number(score.rms),
+        f"largest_{unit}": _number(score.largest),
+        "largest_at_s": score.largest_at,
+        f"bound_95_rms_{unit}": _number(score.bound),
+        "share_within_bound": score.share,
+    }
+
+
+def _state(found: NavigationFound, row: int) -> dict[str, Any]:
+    """Position, velocity and attitude with the standard deviations of the nearest mark."""
+    record = found.record
+    at, how = record.trajectory.iloc[row], record.sd.iloc[row]
+    units = dict.fromkeys(VELOCITY, "m_per_s") | dict.fromkeys(EULER, "deg")
+    units |= {"lat": "deg", "lon": "deg", "alt": "m"} | dict.fromkeys(NED, "m")
+    names = [*GEODETIC, *VELOCITY, *EULER]
+    return {
+        "time_s": float(record.trajectory.index[row]),
+        **{f"{n}_{units[n]}": _number(at[n]) for n in names},
+        "sd_at_s": float(record.sd.index[row]),
+        **{f"{n}_sd_{units[n]}": _number(how[n]) for n in [*NED, *VELOCITY, *EULER]},
+        "horizontal_bound_95_m": _number(plane_bound(record.covariance)[row]),
+    }
+
+
+def _alignment(one: Alignment | None) -> dict[str, Any] | None:
+    if one is None:
+        return None
+    angles, sd = one.roll_pitch_heading, one.sd_deg
+    return {
+        "method": one.method,
+        "time_s": one.time,
+        **{f"{a}_deg": float(angles[k]) for k, a in enumerate(EULER)},
+        **{f"{a}_sd_deg": float(sd[k]) for k, a in enumerate(EULER)},
+    }
+
+
+def _innovations(one: Agreement) -> dict[str, Any]:
+    """Counts of used and rejected epochs, and innovation statistics, of one observation."""
+    return {
+        "components": list(one.labels),
+        "epochs": one.epochs,
+        "rejected": one.rejected,
+        "weakened": one.weakened,
+        "rms_in_sd": _number(one.ratio),
+        "mean_nis": _number(one.mean_nis),
+        "mean_nis_expected_95": [_number(x) for x in one.band],
+        "correlation_next_epoch": _number(one.correlation),
+        "correlation_by_chance_95": _number(one.correlation_bound),
+        "verdicts": [
+            {"kind": v.kind, "component": v.component, "since_s": v.since, "what": v.finding.what}
+            for v in one.consistency.verdicts
+        ],
+        "rms": {label: _number(_rms(one.nu[one.used, k])) for k, label in enumerate(one.labels)},
+    }
+
+
+def _rms(values: Array) -> float:
+    return math.sqrt(float(np.square(values).mean())) if values.size else math.nan
+
+
+def _plain(text: str) -> str:
+    return text.replace("\u00a0", " ")
+
+
+def _number(value: Any) -> float | None:
+    number = float(value)
+    return number if math.isfinite(number) else None
+
+
+# Files of a navigation run beside its report: tables over time, and paths for maps.
+
+
+UNITS = {"lat": "deg", "lon": "deg", "alt": "m"}
+UNITS |= dict.fromkeys(NED, "m") | dict.fromkeys(VELOCITY, "m_s") | dict.fromkeys(EULER, "deg")
+#: Units in column names.
+_WORDS = {"rad/s": "rad_s", "m/s²": "m_s2", "1": "", "(rad/s)/(m/s²)": "rad_s_per_m_s2"}
+#: Largest number of points of a map path.
+MOST_POINTS = 10_000
+
+
+def write_navigation_files(result: NavigationRun, folder: Path) -> None:
+    """Write the tables of a run.
+
+    Parameters
+    ----------
+    result : NavigationRun
+    folder : Path
+        ``trajectory.*`` in the requested formats, ``sd.csv``, ``sensor_errors.csv``,
+        ``innovations/NAME.csv``, ``events.csv``, and ``errors.csv`` if the truth is known; for a
+        smoothed run also the first three from the filter alone, in ``forward``.
+    """
+    record = result.record
+    told = {"run": result.source.name, "ellipsoid": result.ellipsoid.name}
+    _write_states(result, record, folder, told)
+    if result.forward is not None:
+        (folder / "forward").mkdir()
+        _write_states(result, result.forward, folder / "forward", {**told, "by": "filter alone"})
+    if record.innovations:
+        (folder / "innovations").mkdir()
+        for name, table in record.innovations.items():
+            renamed = table.rename(columns={c: _column(str(c)) for c in table.columns})
+            _write(folder / "innovations" / f"{name}.csv", renamed, {**told, "of": name})
+    events = record.events
+    csv.write(
+        folder / "events.csv",
+        {
+            "time_s": np.array([e.time for e in events], dtype=np.float64),
+            "kind": np.array([e.kind for e in events], dtype=np.str_),
+            "what": np.array([e.finding.what for e in events], dtype=np.str_),
+        },
+        told,
+    )
+    if result.points is not None:
+        score = result.points
+        columns = {
+            "time_s": score.time,
+            "north_m": score.points[:, 0],
+            "east_m": score.points[:, 1],
+            "north_error_m": score.error[:, 0],
+            "east_error_m": score.error[:, 1],
+        }
+        told_points = {**told, "sign": "computed less the point, turned and shifted onto the path"}
+        csv.write(folder / "control_points.csv", columns, told_points)
+    if result.differences is not None:
+        errors = result.differences.rename(
+            columns={c: f"{c}_{UNITS.get(str(c), 'deg')}" for c in result.differences.columns}
+        )
+        against = {**told, "against": result.source.truth_name, "sign": "computed less truth"}
+        _write(folder / "errors.csv", errors, against)
+
+
+def _write_states(
+    result: NavigationRun, record: NavigationRecord, folder: Path, told: dict[str, str]
+) -> None:
+    """Write a trajectory, its standard deviations, and the estimated sensor errors."""
+    options = TrajectoryFileOptions(ellipsoid=result.ellipsoid, most_points=MOST_POINTS)
+    for form in result.spec.output.files:
+        path = folder / f"trajectory.{form}"
+        write_trajectory(path, record.trajectory, name=result.source.name, options=options)
+    sd = record.sd.rename(columns={c: f"{c}_sd_{UNITS[str(c)]}" for c in record.sd.columns})
+    _write(folder / "sd.csv", sd, told)
+    _write(folder / "sensor_errors.csv", _sensors(record), told)
+
+
+def _sensors(record: NavigationRecord) -> pd.DataFrame:
+    """Estimates with their standard deviations and units."""
+    units = {n: _WORDS.get(u, u.replace("/", "_per_")) for n, u in record.units.items()}
+    ends = {n: f"_{u}" if u else "" for n, u in units.items()}
+    estimates = record.sensors.rename(columns={n: f"{n}{e}" for n, e in ends.items()})
+    sd = record.sensors_sd.rename(columns={n: f"{n}_sd{e}" for n, e in ends.items()})
+    return pd.concat([estimates, sd], axis=1)
+
+
+def _column(name: str) -> str:
+    """Convert ``nu north, m`` to ``nu_north_m``."""
+    return re.sub(r"\W+", "_", name.replace("²", "2")).strip("_")
+
+
+def _write(path: Path, table: pd.DataFrame, told: dict[str, str]) -> None:
+    named = {"time_s": table.index.to_numpy(dtype=np.float64)}
+    named |= {str(c): table[c].to_numpy(dtype=np.float64) for c in table.columns}
+    csv.write(path, named, told)
+
+
+# Write a verdict as files: the page, its values for programs, and heading integrity over time.
+
+
+def write_verdict(result: NavigationRun, name: str, folder: Path) -> None:
+    """Write ``verdict.html``, ``verdict.json`` and ``heading_light.csv``.
+
+    Parameters
+    ----------
+    result : NavigationRun
+    name : str
+        Folder name shown on the page.
+    folder : Path
+    """
+    write_text(folder / "verdict.html", document_page(verdict_document(result, name)))
+    write_text(folder / "verdict.json", to_json(verdict_json(result)))
+    table = result.trust.light.table
+    light = table["light"].to_numpy(dtype=np.int64)
+    csv.write(
+        folder / "heading_light.csv",
+        {
+            "time_s": table.index.to_numpy(dtype=np.float64),
+            "light": np.array([COLOURS[k] for k in light], dtype=np.str_),
+            "reason": np.array([str(r) for r in table["reason"]], dtype=np.str_),
+            "bound_95_deg": table["bound"].to_numpy(dtype=np.float64),
+            "borne_out_99_deg": table["carried"].to_numpy(dtype=np.float64),
+            "witness": np.array([str(w) for w in table["witness"]], dtype=np.str_),
+            "witness_difference_deg": table["difference"].to_numpy(dtype=np.float64),
+            "witness_sd_deg": table["witness_sd"].to_numpy(dtype=np.float64),
+            "witness_since_s": table["witness_since"].to_numpy(dtype=np.float64),
+            "innovation_scatter": table["scatter"].to_numpy(dtype=np.float64),
+        },
+        {
+            "run": result.source.name,
+            "green_below_deg": f"{result.trust.light.green:g}",
+            "red_beyond_deg": f"{result.trust.light.red:g}",
+        },
+    )
+
+
+def verdict_json(result: NavigationRun) -> dict[str, Any]:
+    """Return a verdict for programs; angles in degrees, lengths in meters, times in s."""
+    trust, light = result.trust, result.trust.light
+    bounds = plane_bound(result.record.covariance)
+    spans = light.spans
+    return {
+        "answer": _plain(answer(result)),
+        "place": {
+            "bound_95_at_end_m": _number(bounds[-1]),
+            "largest_bound_95_m": _number(bounds.max()),
+            "borne_out": bool(trust.consistency) and trust.against_bounds is None,
+        },
+        "heading": {
+            "meaning": {k.lower(): _plain(v) for k, v in promise(trust)},
+            "green_below_deg": light.green,
+            "red_beyond_deg": light.red,
+            "borne_out": not trust.unwitnessed,
+            "why_not": [finding_json(f) for f in trust.unwitnessed],
+            "borne_out_by": witness_words(trust) or None,
+            "share": {c: light.share(c) for c in COLOURS},
+            "at_end": spans[-1].colour if spans else None,
+            "spans": [
+                {
+                    "from_s": s.begin,
+                    "to_s": s.end,
+                    "light": s.colour,
+                    "reason": s.reason,
+                    "why": REASONS[s.reason],
+                }
+                for s in spans
+            ],
+            "advice": [
+                {
+                    "time_s": a.time,
+                    "light": a.span.colour,
+                    "sd_deg": _number(a.sd),
+                    "manoeuvres": [
+                        {
+                            "what": m.what,
+                            "forward_m_per_s2": m.forward,
+                            "aside_m_per_s2": m.aside,
+                            "duration_s": m.duration,
+                            "sd_after_deg": _number(sd),
+                        }
+                        for m, sd in a.options
+                    ],
+                }
+                for a in trust.advice
+            ],
+        },
+        "innovations": {name: one.consistent for name, one in trust.consistency.items()},
+        "inconsistencies": [_doubt(i) for i in trust.inconsistencies],
+        "first": _plain(first_words(trust)),
+        "repeated": None if trust.repeated is None else _repeated(trust.repeated, result),
+    }
+
+
+def _repeated(repeated: Repeated, result: NavigationRun) -> dict[str, Any]:
+    out: dict[str, Any] = {
+        "without": repeated.change.what,
+        "answer": _plain(repeated_words(result)),
+        "failed": None if repeated.failed is None else finding_json(repeated.failed),
+        "left": [_doubt(i) for i in repeated.left],
+    }
+    if repeated.differences is not None:
+        table = repeated.differences
+        place = np.hypot(table["north"].to_numpy(), table["east"].to_numpy())
+        turn = np.abs(table["heading"].to_numpy(dtype=np.float64))
+        for name, unit, values in (("place", "m", place), ("heading", "deg", turn)):
+            out[f"{name}_apart"] = {
+                f"median_{unit}": _number(np.median(values)),
+                f"largest_{unit}": _number(values.max()),
+                f"at_end_{unit}": _number(values[-1]),
+            }
+    return out
+
+
+def _doubt(one: Inconsistency) -> dict[str, Any]:
+    return {
+        "observation": one.name,
+        "aid": one.aid,
+        "component": one.component,
+        "kind": one.kind,
+        "since_s": one.since,
+        "until_s": one.until,
+        "epochs_s": one.epochs.tolist(),
+        "what": one.finding.what,
+        "meaning": one.finding.remedy,
+    }

@@ -26,34 +26,20 @@ from strapdown.report.chart import (
     Line,
     Panel,
     break_jumps,
+    broken,
     curve,
+    kept_rows,
+    thin_fill,
 )
+from strapdown.report.chart import BUCKETS_OVER_TIME as BUCKETS
 from strapdown.report.navigation_found import (
     Agreement,
     NavigationErrors,
     NavigationTold,
     chi_square_far,
 )
-from strapdown.report.navigation_thinning import BUCKETS, broken, kept_rows, thin_fill
 from strapdown.report.values import StateBlock, at_marks, blocks_of, heading_shown, unwrapped
 from strapdown.tables import EULER, NED, VELOCITY
-
-__all__ = [
-    "attitude_chart",
-    "bound_chart",
-    "error_charts",
-    "height_chart",
-    "innovation_chart",
-    "mode_colour",
-    "nees_chart",
-    "nis_chart",
-    "outage_bands",
-    "over_time",
-    "state_charts",
-    "strip",
-    "velocity_chart",
-]
-
 
 Array = NDArray[np.float64]
 

@@ -16,6 +16,7 @@ from strapdown.report.document import (
     Paragraph,
     Section,
     TableBlock,
+    findings_list,
 )
 from strapdown.report.navigation_charts import error_charts, innovation_chart, nees_chart, nis_chart
 from strapdown.report.navigation_found import NavigationFound, NavigationTold, examine
@@ -30,8 +31,6 @@ from strapdown.report.navigation_words import (
     smoothing_table,
     smoothing_words,
 )
-
-__all__ = ["CONVENTIONS", "navigation_document"]
 
 
 def navigation_document(
@@ -51,10 +50,6 @@ def navigation_document(
         From `examine`, if already computed.
     light : Section, optional
         Integrity section, for a run whose verdict is on a separate page.
-
-    Returns
-    -------
-    Document
     """
     found = examine(told) if found is None else found
     verdict = trust(found)
@@ -84,7 +79,7 @@ def navigation_document(
         _section("observations", "What was observed", *_observations(found)),
         _section("outages", "Outages", *_outages(found)),
         _section("events", "Events", tables.event_table(found)),
-        _section("findings", "Findings", *_findings(found)),
+        _section("findings", "Findings", findings_list(found.findings)),
         _section("method", "Method and assumptions", *_method(found, name)),
         _section("conventions", "Conventions", Facts(CONVENTIONS)),
     )
@@ -183,21 +178,6 @@ def _capital(text: str) -> str:
 
 def _outages(found: NavigationFound) -> tuple[Block | None, ...]:
     return (tables.withheld_table(found), tables.outage_table(found))
-
-
-def _findings(found: NavigationFound) -> tuple[Block, ...]:
-    if not found.findings:
-        return (Paragraph("None."),)
-    rows = []
-    for finding in found.findings:
-        head = ", ".join(
-            str(p)
-            for p in (finding.file, finding.quantity, finding.row and f"row {finding.row}")
-            if p
-        )
-        text = finding.what if not finding.remedy else f"{finding.what}. {finding.remedy}."
-        rows.append((head, text))
-    return (Items(tuple(rows)),)
 
 
 def _method(found: NavigationFound, name: str) -> tuple[Block | None, ...]:

@@ -36,21 +36,6 @@ from strapdown.navigation.truth_comparison import (
 from strapdown.systems.navigation_run import NavigationRun, withheld_aid
 from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
 
-__all__ = [
-    "Agreement",
-    "NavigationErrors",
-    "NavigationFound",
-    "NavigationTold",
-    "Score",
-    "Withheld",
-    "agreements",
-    "chi_square_far",
-    "examine",
-    "navigation_errors",
-    "told_of",
-    "withheld_of",
-]
-
 
 @dataclass(frozen=True, eq=False)
 class NavigationFound:
@@ -92,14 +77,6 @@ class NavigationFound:
 
 def examine(told: NavigationTold) -> NavigationFound:
     """Evaluate a run for its report.
-
-    Parameters
-    ----------
-    told : NavigationTold
-
-    Returns
-    -------
-    NavigationFound
 
     Raises
     ------
@@ -446,10 +423,6 @@ class NavigationErrors:
 def navigation_errors(told: NavigationTold) -> NavigationErrors | None:
     """Compare a run with its truth.
 
-    Parameters
-    ----------
-    told : NavigationTold
-
     Returns
     -------
     NavigationErrors or None
@@ -555,16 +528,7 @@ NO_RULE = "none: every observation counts in full, however far off it is"
 
 
 def told_of(result: NavigationRun) -> NavigationTold:
-    """Return the report input of a navigation result.
-
-    Parameters
-    ----------
-    result : NavigationRun
-
-    Returns
-    -------
-    NavigationTold
-    """
+    """Return the report input of a navigation result."""
     spec, source = result.spec, result.source
     chain = [
         ("Record", f"{source.name}: {source.what}"),
@@ -608,11 +572,6 @@ def _of_aid(aid: ChoiceSpec) -> str:
 
 def withheld_of(aid: str, scores: Sequence[WithheldScores]) -> tuple[Withheld, ...]:
     """Return the GNSS outage tests of a measurement source as a report shows them.
-
-    Parameters
-    ----------
-    aid : str
-    scores : sequence of Withheld
 
     Returns
     -------

@@ -16,24 +16,12 @@ from strapdown.formats.trajectory_maps import thin
 from strapdown.frames import ned_from_geodetic
 from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.report.chart import BLACK, BLUE, GREY, PURPLE, VERMILLION, Chart, Line, Panel
-from strapdown.report.error_envelope import ellipse
 from strapdown.report.navigation_charts import mode_colour
 from strapdown.report.navigation_found import NavigationTold
 from strapdown.report.path_marks import View, path_marks, place_labels
-from strapdown.report.plan_view import nice_step
+from strapdown.report.plan_view import ellipse, nice_step
 from strapdown.report.values import GAP, duration_words, length_words, plain
 from strapdown.tables import places_of
-
-__all__ = [
-    "Plane",
-    "bound_labels",
-    "centres",
-    "ellipse_rows",
-    "ellipses",
-    "plan_chart",
-    "within_span",
-]
-
 
 Array = NDArray[np.float64]
 
@@ -50,10 +38,6 @@ NO_PATH = 0.05
 
 def plan_chart(told: NavigationTold) -> Chart | None:
     """Draw the path to one scale, with its fixes and 95 % ellipses.
-
-    Parameters
-    ----------
-    told : NavigationTold
 
     Returns
     -------
@@ -308,10 +292,6 @@ _LETTER, _TEXT = 0.0082, 0.04
 def ellipse_rows(record: NavigationRecord) -> tuple[list[int], list[tuple[int, Span]]]:
     """Covariance marks at which ellipses are drawn: along the path, and at the ends of outages.
 
-    Parameters
-    ----------
-    record : NavigationRecord
-
     Returns
     -------
     along : list of int
@@ -348,11 +328,6 @@ def ellipse_rows(record: NavigationRecord) -> tuple[list[int], list[tuple[int, S
 
 def ellipses(plane: Plane, view: View) -> tuple[list[Line], str, list[tuple[int, Span]]]:
     """Return ellipses, magnified by one factor to be visible, and their caption.
-
-    Parameters
-    ----------
-    plane : Plane
-    view : View
 
     Returns
     -------

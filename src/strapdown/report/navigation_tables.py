@@ -21,16 +21,6 @@ from strapdown.report.values import (
 from strapdown.report.values import alignment_values_instant as instant
 from strapdown.tables import EULER, VELOCITY
 
-__all__ = [
-    "end_table",
-    "error_table",
-    "event_table",
-    "observation_table",
-    "outage_table",
-    "state_table",
-    "withheld_table",
-]
-
 _MOST_EVENTS = 40
 
 

@@ -7,8 +7,6 @@ from strapdown.report.alignment_trust import Trust, reason
 from strapdown.report.navigation_found import FAR_OFF, Agreement, NavigationFound
 from strapdown.tables import EULER
 
-__all__ = ["trust"]
-
 # Errors of one run are correlated in time, so less than 95 % may lie within a good bound.
 _ENOUGH = 0.8
 # Share of the epochs; more rejected epochs are not outliers.
@@ -16,16 +14,7 @@ _MANY = 0.1
 
 
 def trust(found: NavigationFound) -> Trust:
-    """Judge a run by its consistency.
-
-    Parameters
-    ----------
-    found : NavigationFound
-
-    Returns
-    -------
-    alignment_trust.Trust
-    """
+    """Judge a run by its consistency."""
     reasons = [*_errors(found), *_withheld(found)]
     reasons += [_innovations(one) for one in found.agreements if one.used.any()]
     reasons += [_memory(one) for one in found.agreements if one.remembers]

@@ -12,10 +12,10 @@ from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.navigation.truth_comparison import SmootherConsistency
 from strapdown.report.chart import BLUE, GREY, Chart, Panel, curve
+from strapdown.report.chart import BUCKETS_OVER_TIME as BUCKETS
 from strapdown.report.document import KeyFigure, TableBlock
 from strapdown.report.navigation_charts import over_time
 from strapdown.report.navigation_found import NavigationFound
-from strapdown.report.navigation_thinning import BUCKETS
 from strapdown.report.values import (
     GAP,
     about,
@@ -31,19 +31,6 @@ from strapdown.report.values import (
 from strapdown.report.values import alignment_values_instant as instant
 from strapdown.rotation import within_half_turn
 from strapdown.tables import EULER, NED, VELOCITY
-
-__all__ = [
-    "agreement_words",
-    "cautions",
-    "headline",
-    "key_figures",
-    "longest_outages",
-    "place_words",
-    "smoothing_chart",
-    "smoothing_table",
-    "smoothing_words",
-]
-
 
 # 95 % bound in deg from which a heading is unknown.
 _NO_HEADING = 180.0

@@ -11,17 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown.report.chart import BLACK, GREEN, VERMILLION, Array, Line
 
-__all__ = [
-    "LONGEST_BESIDE",
-    "PLACES",
-    "View",
-    "label_rows",
-    "label_side",
-    "path_marks",
-    "place_labels",
-]
-
-
 Path = tuple[Array, Array]
 
 # Height of a plan as a share of its width, for one as wide as the picture: least, greatest; a
@@ -96,10 +85,6 @@ def path_marks(time: Array, paths: list[Path], view: View, colour: str) -> list[
     view : View
     colour : str
         Color of the arrows.
-
-    Returns
-    -------
-    list of Line
     """
     east, north = paths[0]
     way = _way(east, north)

@@ -7,11 +7,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Protocol
 
+import pandas as pd
+
 from strapdown.bundle.seal import InputFiles, Seal
 from strapdown.bundle.writing import write_bundle
 from strapdown.config.spec import Spec
-
-__all__ = ["report_bundle"]
+from strapdown.formats import csv
 
 
 class Ran(Protocol):
@@ -92,3 +93,16 @@ def report_bundle(
         seals=seals,
     ) as folder:
         yield folder
+
+
+def write_table(table: pd.DataFrame, path: Path, comments: dict[str, str]) -> None:
+    """Write a table as CSV with shortest round-trip numbers.
+
+    Parameters
+    ----------
+    table : DataFrame
+    path : Path
+    comments : dict of str to str
+        Written at the top.
+    """
+    csv.write(path, {str(c): table[c].to_numpy() for c in table.columns}, comments)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from xml.sax.saxutils import escape
+from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 Box = tuple[float, float, float, float]
 
-__all__ = ["INK", "SMALL", "Box", "Drawing", "number", "overlap", "shortened", "text_width"]
 
 INK = "#1b1f24"
 #: Smallest font size, in pixels of a picture at its size on paper.
@@ -82,20 +81,27 @@ class Drawing:
             f'<svg xmlns="http://www.w3.org/2000/svg" {size} {view} role="img" '
             'font-family="Helvetica, Arial, DejaVu Sans, sans-serif">'
         )
-        title = f"<title>{_clean(self.alt)}</title>" if self.alt else ""
+        title = f"<title>{escape(_kept(self.alt))}</title>" if self.alt else ""
         paper = (
             f'<rect width="{number(self.width)}" height="{number(self.height)}" fill="#ffffff"/>'
         )
         return "\n".join([head + title, paper, *self._parts, "</svg>\n"])
 
     @contextmanager
-    def within(self, box: Box) -> Iterator[None]:
+    def group(self, **attributes: str) -> Iterator[None]:
+        """Group everything drawn in this context; `data_x` becomes the attribute ``data-x``."""
+        self._parts.append(f"<g{_attributes(attributes)}>")
+        yield
+        self._parts.append("</g>")
+
+    @contextmanager
+    def within(self, box: Box, **attributes: str) -> Iterator[None]:
         """Clip everything drawn in this context to a box (left, top, right, bottom)."""
         left, top, right, bottom = box
         size = f"{number(left)} {number(top)} {number(right - left)} {number(bottom - top)}"
         x, y, width, height = size.split()
         place = f'x="{x}" y="{y}" width="{width}" height="{height}" viewBox="{size}"'
-        self._parts.append(f'<svg {place} overflow="hidden">')
+        self._parts.append(f'<svg {place} overflow="hidden"{_attributes(attributes)}>')
         yield
         self._parts.append("</svg>")
 
@@ -157,19 +163,19 @@ class Drawing:
     def curve(
         self, points: Array, colour: str = INK, width: float = 1.0, dash: str = "solid"
     ) -> None:
-        """Draw a line of many finite points, (n, 2), to a tenth of a pixel."""
+        """Draw a line of many finite points, (n, 2), to a hundredth of a pixel."""
         if len(points) < 2:
             return
         self._parts.append(
-            f'<polyline points="{_tenths(points)}" fill="none"{_stroke(colour, width, dash)}/>'
+            f'<path d="{_steps(points)}" fill="none"{_stroke(colour, width, dash)}/>'
         )
 
     def area(self, points: Array, fill: str, opacity: float = 1.0) -> None:
-        """Fill an outline of many finite points, (n, 2), to a tenth of a pixel."""
+        """Fill an outline of many finite points, (n, 2), to a hundredth of a pixel."""
         if len(points) < 3:
             return
         more = f' fill-opacity="{number(opacity)}"' if opacity < 1.0 else ""
-        self._parts.append(f'<polygon points="{_tenths(points)}" fill="{fill}"{more}/>')
+        self._parts.append(f'<path d="{_steps(points)}z" fill="{fill}"{more}/>')
 
     def points(
         self, at: Array, outline: Array, radius: float, colour: str, *, hollow: bool = False
@@ -183,12 +189,11 @@ class Drawing:
             begin = at + radius * outline[0]
             turn = "l" + " ".join(f"{number(x)},{number(y)}" for x, y in steps.tolist()) + "z"
         else:
-            begin = at - np.array([radius, 0.0])
-            half = f"a{size},{size} 0 1,0 {{}}{number(2.0 * radius)},0"
-            turn = half.format("") + half.format("-") + "z"
-        path = "".join(f"M{place}{turn}" for place in _tenths(begin).split(" "))
+            begin = at - np.array([0.0, radius])
+            turn = f"a{size},{size} 0 1 0 .01,0z"
+        path = "".join(f"M{place}{turn}" for place in _hundredths(begin).split(" "))
         look = f'fill="none"{_stroke(colour, 1.2, "")}' if hollow else f'fill="{colour}"'
-        self._parts.append(f'<path d="{path}" {look}/>')
+        self._parts.append(f'<path class="points" d="{path}" {look}/>')
 
     def arrow(
         self,
@@ -252,7 +257,7 @@ class Drawing:
             )
         place = f'x="{number(x)}" y="{number(y + 0.35 * size)}"'
         look = f'font-size="{number(size)}" fill="{colour}"'
-        self._parts.append(f"<text {place} {look}{more}>{_clean(text)}</text>")
+        self._parts.append(f"<text {place} {look}{more}>{escape(_kept(text))}</text>")
         self.boxes.append((text, box))
         return box
 
@@ -326,13 +331,33 @@ def _stroke(colour: str | None, width: float, dash: str) -> str:
     return text
 
 
-def _tenths(points: Array) -> str:
+def _hundredths(points: Array) -> str:
     """Format many points at once."""
-    return " ".join(["%.1f,%.1f"] * len(points)) % tuple(points.ravel().tolist())
+    return " ".join(["%.2f,%.2f"] * len(points)) % tuple(points.ravel().tolist())
 
 
-def _clean(text: str) -> str:
-    """Escape markup, and remove characters that XML does not allow."""
+def _steps(points: Array) -> str:
+    """Format a curve as its start and its steps, which are shorter than its points."""
+    rounded = np.rint(100.0 * points).astype(np.int64)
+    start = np.asarray(0.01 * rounded[:1], dtype=np.float64)
+    steps = [_short(v) for v in np.diff(rounded, axis=0).ravel().tolist()]
+    pairs = " ".join(f"{x},{y}" for x, y in zip(steps[::2], steps[1::2], strict=True))
+    return f"M{_hundredths(start)}l{pairs}"
+
+
+def _short(hundredths: int) -> str:
+    text = f"{abs(hundredths) / 100:g}".removeprefix("0") or "0"
+    return f"-{text}" if hundredths < 0 else text
+
+
+def _attributes(values: Mapping[str, str]) -> str:
+    return "".join(
+        f" {name.rstrip('_').replace('_', '-')}={quoteattr(_kept(text))}"
+        for name, text in values.items()
+    )
+
+
+def _kept(text: str) -> str:
+    """Remove characters that XML does not allow."""
     kept = "".join(c if c >= " " and not "\ud800" <= c <= "\udfff" else " " for c in text)
-    kept = "".join(c for c in kept if c not in "\ufffe\uffff\x7f")
-    return escape(kept)
+    return "".join(c for c in kept if c not in "\ufffe\uffff\x7f")

@@ -21,43 +21,6 @@ if TYPE_CHECKING:
     from strapdown.crash.pdof import AngleInterval
     from strapdown.crash.reconstruction import UnitReconstruction
 
-__all__ = [
-    "ANY",
-    "GAP",
-    "KMH",
-    "MEAN",
-    "NOT_KNOWN",
-    "StateBlock",
-    "about",
-    "alignment_values_instant",
-    "angle_bound",
-    "angle_range",
-    "at_marks",
-    "axis_names",
-    "blocks_of",
-    "distance_over_ground",
-    "duration_words",
-    "force_words",
-    "half",
-    "heading_shown",
-    "instant",
-    "length_words",
-    "moment",
-    "over_ground",
-    "plain",
-    "rate_words",
-    "recorder",
-    "share_words",
-    "shown_unit",
-    "side_words",
-    "small",
-    "spaced",
-    "speed",
-    "speed_range",
-    "unwrapped",
-    "worst_within",
-]
-
 
 #: km/h per m/s.
 KMH = 3.6
@@ -72,11 +35,6 @@ DIGITS = 2
 
 def plain(value: float, places: int) -> str:
     """Format a number with fixed decimals, a real minus sign, and zero without a sign.
-
-    Parameters
-    ----------
-    value : float
-    places : int
 
     Returns
     -------

@@ -43,16 +43,6 @@ from strapdown.report.verdict_words import (
 )
 from strapdown.systems.navigation_run import NavigationRun
 
-__all__ = [
-    "LIGHTS",
-    "heading_error",
-    "light_picture",
-    "light_section",
-    "repeated_picture",
-    "verdict_document",
-]
-
-
 #: Rows per table of the page; the files have all.
 _MOST = 12
 
@@ -65,10 +55,6 @@ def verdict_document(result: NavigationRun, name: str) -> Document:
     result : NavigationRun
     name : str
         Folder name.
-
-    Returns
-    -------
-    Document
     """
     trust = result.trust
     seen = len(trust.light.table) > 0

@@ -14,21 +14,6 @@ from strapdown.report.values import GAP, duration_words, half, length_words, pla
 from strapdown.report.values import alignment_values_instant as instant
 from strapdown.systems.navigation_run import NavigationRun
 
-__all__ = [
-    "advice_words",
-    "answer",
-    "degrees_words",
-    "first_words",
-    "heading_words",
-    "kind_words",
-    "place_words",
-    "promise",
-    "repeated_words",
-    "span_words",
-    "terminal_lines",
-    "witness_words",
-]
-
 _KINDS = {
     "change": "changes within the run",
     "understated": "scatters more than stated",

@@ -32,11 +32,7 @@ from strapdown.report.coast import rerun_coast
 from strapdown.report.crash_case import rerun_crash
 from strapdown.report.crash_simulation import write_crash_simulation
 from strapdown.report.navigation import rerun_navigation
-from strapdown.report.simulation import write_simulation
-from strapdown.report.trajectory_simulation import write_trajectory_simulation
-
-__all__ = ["Verification", "changed_case", "verify"]
-
+from strapdown.report.simulation import write_simulation, write_trajectory_simulation
 
 # Another processor or library may round the last digits differently, and a long integration
 # amplifies that. A larger difference is a different result.

@@ -67,7 +67,7 @@ from strapdown.systems.one_thread import one_thread
 from strapdown.tables import EULER, GEODETIC, VELOCITY
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from strapdown.report.chart_figure import ChartFigure
 
 __all__ = ["Drive", "NavigationRun", "make_chain", "run_navigation", "withheld_aid"]
 
@@ -347,7 +347,7 @@ class NavigationRun:
         """
         return self.trajectory.join(self.sd.add_suffix("_sd"), how="inner")
 
-    def plot(self, kind: str = "plan") -> Figure:
+    def plot(self, kind: str = "plan") -> ChartFigure:
         """Draw one chart of the report.
 
         Parameters
@@ -358,15 +358,15 @@ class NavigationRun:
 
         Returns
         -------
-        matplotlib.figure.Figure
-            Its ``axes`` are the panels. Independent of windows and global state.
+        ChartFigure
+            Displays itself in a notebook; `save` writes it as SVG, PNG or PDF.
 
         Raises
         ------
         ConfigError
             The chart does not exist for this run.
         """
-        from strapdown.report.navigation_view import plot
+        from strapdown.report.navigation import plot
 
         return plot(self, kind)
 

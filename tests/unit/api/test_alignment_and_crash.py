@@ -39,7 +39,7 @@ def test_an_alignment_of_a_table_is_that_of_its_file_and_is_verified(rest, tmp_p
     error = np.abs(one.end.roll_pitch_heading - [1.0, -2.0, 40.0])
     assert (error < 3.0 * one.end.sd_deg + 1e-6).all()
     assert repr(one).startswith("<AlignmentRun imu.npz: at the end roll")
-    assert one._repr_html_() and one.plot().axes and one.plot("heading").axes
+    assert one._repr_html_() and one.plot().panels and one.plot("heading").panels
     with pytest.raises(dataclasses.FrozenInstanceError):
         one.attitude = None
     one.save(tmp_path / "out", report=False)
@@ -72,7 +72,7 @@ def test_the_drift_of_an_outage_is_data(tmp_path):
     assert run.bound_m.is_monotonic_increasing
     assert len(run.to_pandas()) == len(run.bound_m)
     assert "after 20 s" in repr(run)
-    assert run.plot().axes and run._repr_html_()
+    assert run.plot().panels and run._repr_html_()
     run.save(tmp_path / "out", report=False)
     assert sd.verify(tmp_path / "out").verdict == "identical"
     with pytest.raises(ConfigError):
@@ -90,7 +90,7 @@ def test_a_case_is_reconstructed_as_by_the_engine(tmp_path, run_cli):
     assert set(case.recorders) == {u.name for u in engine.reconstruction.units}
     assert case.to_pandas().equals(engine.reconstruction.summary())
     assert "delta-V" in repr(case) and "<table" in case._repr_html_()
-    assert case.plot("delta-v").axes
+    assert case.plot("delta-v").panels
     with pytest.raises(ConfigError, match="there is no chart"):
         case.plot("nothing")
     with pytest.raises(TypeError):

@@ -132,7 +132,7 @@ def test_algorithms_are_compared_on_a_table_as_on_its_file(tmp_path):
     with pytest.raises(dataclasses.FrozenInstanceError):
         of_table.answer = None
     assert of_table._repr_html_().startswith("<div>")
-    assert of_table.plot("gyro").axes
+    assert of_table.plot("gyro").panels
 
     of_table.save(tmp_path / "out", report=False)
     of_file.save(tmp_path / "file", report=False)

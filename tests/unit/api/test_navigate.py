@@ -141,7 +141,7 @@ def test_a_run_shows_itself_and_cannot_be_changed(of_files):
     with pytest.raises(dataclasses.FrozenInstanceError):
         of_files.record = None
     for kind in ("plan", "bound", "gnss.position"):
-        assert of_files.plot(kind).axes
+        assert of_files.plot(kind).panels
     with pytest.raises(ConfigError, match=r"gnss\.position"):
         of_files.plot("gnss.positoin")
 

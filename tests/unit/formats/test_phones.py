@@ -414,7 +414,6 @@ def test_a_faulty_row_of_a_member_is_named_by_member_and_row(tmp_path):
         read_log(zipped(tmp_path / "rec.zip", {"Gyroscope.csv": "\n".join(lines)}))
 
 
-@pytest.mark.usefixtures("sketched")
 def test_a_folder_of_an_export_runs_and_runs_again_from_its_copy(tmp_path, run_cli):
     members = {
         "Gyroscope.csv": px_gyro(),

@@ -99,7 +99,7 @@ def test_the_numbers_are_those_of_a_run_at_once(late):
 
 @pytest.mark.parametrize("columns", [(*FIXES, *SD), (*FIXES[:3], *SD[:3])])
 @pytest.mark.parametrize("origin", [0.0, 1.7e9])
-def test_what_was_received_is_read_to_the_same_numbers(tmp_path, sketched, origin, columns):
+def test_what_was_received_is_read_to_the_same_numbers(tmp_path, origin, columns):
     live, _, told = received(lines(origin=origin, columns=columns))
     assert told == []
     result = result_of(live, tmp_path)
@@ -181,7 +181,7 @@ def test_before_navigation_began_there_is_no_run():
     assert live.error is not None
 
 
-def test_a_commanded_mode_begins_where_it_did_when_it_runs_again(tmp_path, sketched):
+def test_a_commanded_mode_begins_where_it_did_when_it_runs_again(tmp_path):
     more = {
         "start": None,
         "site": {"lat_deg": 45.0, "lon_deg": 20.0, "alt_m": 80.0},

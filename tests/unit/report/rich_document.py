@@ -31,6 +31,7 @@ from strapdown.report.document import (
     Section,
     TableBlock,
 )
+from strapdown.report.scene import Scene, SceneBody, SceneLine, SceneWord
 
 EVIL = (
     "<script>alert(1)</script>",
@@ -119,21 +120,21 @@ def plan_chart(slug="plan-live"):
 
 def animation(slug="motion", text="0.00 s"):
     t = np.linspace(0.0, 1.0, 21)
-    frames = [
-        {"name": f"{v:.2f} s", "data": [{"x": [0, 18 * v], "y": [0, 4 * v * v]}]}
-        for v in t.tolist()
-    ]
-    layout = {
-        "height": 360,
-        "margin": {"l": 60, "r": 20, "t": 20, "b": 50},
-        "xaxis": {"range": [-1, 20], "title": {"text": "x, m"}},
-        "yaxis": {"range": [-2, 6], "title": {"text": "y, m"}},
-        "annotations": [{"text": text, "x": 1, "y": 5, "showarrow": False}],
-    }
-    data = [{"type": "scatter", "mode": "lines+markers", "x": [0, 0], "y": [0, 0]}]
-    figure = {"data": data, "layout": layout, "frames": frames}
+    level = np.tile([1.0, 0.0, 0.0, 0.0], (t.size, 1))
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
+    faces = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
+    path = np.column_stack([18.0 * t, 4.0 * t**2, 0.0 * t])
+    scene = Scene(
+        (SceneBody(corners, faces, (BLUE,) * 6, level, path),),
+        (SceneLine(text, path, ORANGE),),
+        (SceneWord(text, (1.0, 5.0, 0.0), GREEN),),
+        tuple(f"{v:.2f} s" for v in t),
+        np.array([-2.0, -2.0, -2.0]),
+        np.array([20.0, 6.0, 2.0]),
+        trail=(text, BLUE),
+    )
     stills = picture(f"{slug}-stills", "four instants")
-    return Animation(slug, "The motion", "Play it, or move it by hand.", figure, stills)
+    return Animation(slug, "The motion", "Play it, or move it by hand.", scene, stills)
 
 
 def table(rows, columns=5, words=(0,), caption="Answers of each unit", strong=()):

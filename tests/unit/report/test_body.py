@@ -10,56 +10,44 @@ import pytest
 
 from strapdown import rotation
 from strapdown.evaluation.differences import attitude_at
-from strapdown.report.attitude_numbers import chosen_run
-from strapdown.report.attitude_page import MOST_FRAMES, body_caption, body_figure
-
-TURNING = 4  # box and three axes
+from strapdown.report.attitude_document import MOST_FRAMES, body_animation
+from strapdown.report.attitude_words import chosen_run
 
 
-def tip(part):
-    """End of an axis in north, east, down; the drawing has east, north, up."""
-    return np.array([part["y"][1], part["x"][1], -part["z"][1]])
+def times_of(animation):
+    return [float(name.removesuffix(" s")) for name in animation.scene.frames]
 
 
-def test_the_axes_point_where_the_attitude_turns_them(full_bench):
-    figure = body_figure(full_bench)
+def test_the_body_turns_as_the_attitude_says(full_bench):
+    animation = body_animation(full_bench)
+    (body, *_) = animation.scene.bodies
     run = chosen_run(full_bench)
     assert run.algorithm == full_bench.answer.algorithm
-    times = [float(frame["name"]) for frame in figure["frames"]]
-    # Coordinates have three digits, and a stamp of a millisecond turns by 0.0017 rad at most here.
+    times = times_of(animation)
+    assert len(times) == len(set(times)) == len(body.q) == MOST_FRAMES
+    # A stamp of a millisecond turns by 0.0017 rad at most here.
     for k in (0, len(times) // 2, len(times) - 1):
         dcm = rotation.dcm_from_quaternion(attitude_at(run.attitude, [times[k]])[0])
-        for axis in range(3):
-            seen = tip(figure["frames"][k]["data"][1 + axis])
-            np.testing.assert_allclose(seen, dcm[:, axis], atol=0.003)
+        np.testing.assert_allclose(rotation.dcm_from_quaternion(body.q[k]), dcm, atol=0.003)
+    np.testing.assert_array_equal([tip for _, tip, _ in body.axes], np.eye(3))
+    assert [name for name, _, _ in body.axes] == ["x forward", "y right", "z down"]
 
 
-def test_the_drawing_is_no_mirror_image(full_bench):
-    axes = np.array([tip(p) for p in body_figure(full_bench)["frames"][7]["data"][1:TURNING]])
-    np.testing.assert_allclose(np.linalg.det(axes), 1.0, atol=0.005)
-
-
-def test_it_stands_without_being_played_and_is_thinned(full_bench):
-    figure = body_figure(full_bench)
-    assert len(figure["frames"]) == MOST_FRAMES
-    assert figure["data"][0]["type"] == "mesh3d"
-    first = figure["frames"][0]["data"]
-    for still, moved in zip(figure["data"], first, strict=False):
-        assert {axis: still[axis] for axis in "xyz"} == moved
-    steps = figure["layout"]["sliders"][0]["steps"]
-    assert [s["args"][0][0] for s in steps] == [f["name"] for f in figure["frames"]]
-    assert len({f["name"] for f in figure["frames"]}) == MOST_FRAMES
-    assert len(json.dumps(figure, separators=(",", ":"))) < 500_000
+def test_its_data_are_few_and_need_no_other_coordinates(full_bench):
+    data = body_animation(full_bench).scene.data()
+    assert len(json.dumps(data, separators=(",", ":"), allow_nan=False)) < 100_000
+    faces = data["bodies"][0]["faces"]
+    # Each corner of the box belongs to three faces.
+    assert sorted(k for face in faces for k in face) == sorted(3 * list(range(8)))
 
 
 def test_the_ghost_is_there_where_the_truth_is(make_bench):
     bench = make_bench()
     half = bench.truth.iloc[: len(bench.truth) // 2]
-    figure = body_figure(replace(bench, truth=half, scored=bench.scored[: len(half)]))
-    ghosts = [f["data"][TURNING]["x"] for f in figure["frames"]]
-    assert ghosts[0][0] is not None
-    assert set(ghosts[-1]) == {None}
-    assert len(body_figure(make_bench(truth=False))["frames"][0]["data"]) == TURNING
+    short = body_animation(replace(bench, truth=half, scored=bench.scored[: len(half)]))
+    ghost = short.scene.data()["bodies"][1]
+    assert ghost["wire"] and ghost["q"][0] is not None and ghost["q"][-1] is None
+    assert len(body_animation(make_bench(truth=False)).scene.bodies) == 1
 
 
 def test_without_an_answer_the_least_wrong_is_shown(make_bench):
@@ -74,8 +62,8 @@ def test_a_long_log_says_how_fast_it_is_played(make_bench):
     table = run.attitude.set_axis(run.attitude.index * 100.0, axis=0)
     long = replace(bench, runs=(replace(run, attitude=table),), truth=None)
     # 700 s in 299 steps of 33 ms.
-    assert f"Played {700 / (299 * 0.033):.3g} times as fast" in body_caption(long)
-    assert "Played" not in body_caption(bench)
+    assert f"Played {700 / (299 * 0.033):.3g} times as fast" in body_animation(long).caption
+    assert "Played" not in body_animation(bench).caption
 
 
 @pytest.mark.parametrize("samples", [2, 3])
@@ -83,4 +71,4 @@ def test_few_samples_are_few_frames(make_bench, samples):
     bench = make_bench(truth=False)
     run = bench.runs[0]
     short = replace(bench, runs=(replace(run, attitude=run.attitude.iloc[:samples]),))
-    assert len(body_figure(short)["frames"]) == samples
+    assert len(body_animation(short).scene.frames) == samples

@@ -16,8 +16,13 @@ from strapdown.config.crash_case import AssumedSpec, CaseSpec, ReferenceSpec
 from strapdown.crash.case import case_severity, compare_reference, main_event, run_case
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import read_raw
-from strapdown.report.crash_case import file_name
-from strapdown.report.crash_json import crash_json, signals_table, trajectory_table, write_table
+from strapdown.report.crash_case import (
+    crash_json,
+    file_name,
+    signals_table,
+    trajectory_table,
+    write_table,
+)
 from strapdown.report.crash_limits import limitations
 from strapdown.report.values import spaced
 from strapdown.report.verify import changed_case

@@ -18,14 +18,16 @@ from strapdown import rotation
 from strapdown.config.crash_case import PointSpec, VehicleSpec
 from strapdown.crash.pdof import AngleInterval
 from strapdown.report.crash_animation import MOST_FRAMES, path_animation, vehicle_body
-from strapdown.report.crash_conventions import MountingPoint, conventions_picture
-from strapdown.report.crash_dial import Direction, pdof_dial
 from strapdown.report.crash_figures import crash_figures, reference_in_path_axes
-from strapdown.report.crash_moments import angle_words, interval_words, path_moments
-from strapdown.report.crash_outline import vehicle_outline
+from strapdown.report.crash_outline import (
+    angle_words,
+    interval_words,
+    path_moments,
+    vehicle_outline,
+)
+from strapdown.report.crash_pictures import Direction, MountingPoint, conventions_picture, pdof_dial
 from strapdown.report.crash_plan import path_plan
-from strapdown.report.error_envelope import ellipse, envelope, hull
-from strapdown.report.plan_view import PlanView, nice_step, tick_words
+from strapdown.report.plan_view import PlanView, ellipse, envelope, hull, nice_step, tick_words
 from strapdown.report.svg_drawing import SMALL, Drawing, overlap, shortened, text_width
 from strapdown.report.values import plain
 from strapdown.tables import NED
@@ -302,35 +304,27 @@ def test_a_path_without_length_and_error_is_drawn():
     assert "entry at rest" in [t for t, _, _ in texts(picture.svg)]
     animation = path_animation(still, CAR)
     check_readable(animation.stills)
-    json.dumps(animation.figure, allow_nan=False)
+    json.dumps(animation.scene.data(), allow_nan=False)
 
 
 def test_the_animation_follows_the_path_and_is_small():
     case = crash_case("two-impacts", ("IMU1",), (-0.1, 1.0), None)
     path = case.reconstruction.main.path
-    figure = figures_of("two-impacts", ("IMU1",), window=(-0.1, 1.0)).motion.figure
-    frames = figure["frames"]
-    assert 2 <= len(frames) <= MOST_FRAMES
-    assert len(json.dumps(figure, allow_nan=False)) < 1_500_000
-    # East to the right, north away, up upwards; a tenth of a millimetre.
-    last = frames[-1]["data"][2]
-    end = path.table[NED].iloc[-1]
-    found = [last["x"][-1], last["y"][-1], last["z"][-1]]
-    assert found == pytest.approx([end["east"], end["north"], -end["down"]], abs=6e-5)
-    body = vehicle_body(vehicle_outline(VehicleSpec()))
-    corners = body.placed(end.to_numpy(), path.q_nb[-1], (0.0, 0.0, 0.0))
-    mesh = frames[-1]["data"][0]
-    np.testing.assert_allclose(mesh["x"], corners[:, 1], atol=6e-5)
-    np.testing.assert_allclose(mesh["z"], -corners[:, 2], atol=6e-5)
-    scene = figure["layout"]["scene"]
-    sizes = {k: np.ptp(scene[f"{k}axis"]["range"]) for k in "xyz"}
-    scales = [scene["aspectratio"][k] / sizes[k] for k in "xyz"]
-    assert scales == pytest.approx([scales[0]] * 3, rel=1e-3)
-    # Down is written downward.
-    ticks = zip(scene["zaxis"]["tickvals"], scene["zaxis"]["ticktext"], strict=True)
-    assert all(float(t.replace("−", "-")) == pytest.approx(-v) for v, t in ticks)
-    labels = [step["label"] for step in figure["layout"]["sliders"][0]["steps"]]
-    assert labels[0] == "−100 ms" and len(labels) == len(frames)
+    scene = figures_of("two-impacts", ("IMU1",), window=(-0.1, 1.0)).motion.scene
+    data = scene.data()
+    assert 2 <= len(data["frames"]) <= MOST_FRAMES
+    assert len(json.dumps(data, allow_nan=False)) < 100_000
+    # North, east, down of the reference point; a tenth of a millimetre.
+    (body,) = data["bodies"]
+    end = path.table[NED].iloc[-1].to_numpy()
+    assert body["positions"][-1] == pytest.approx(end, abs=6e-5)
+    car = vehicle_body(vehicle_outline(VehicleSpec()))
+    corners = car.placed(end, path.q_nb[-1], (0.0, 0.0, 0.0))
+    placed = rotation.rotate(np.array(body["q"][-1]), np.array(body["corners"])) + end
+    np.testing.assert_allclose(placed, corners, atol=2e-3)
+    assert (corners >= scene.low).all() and (corners <= scene.high).all()
+    assert data["frames"][0] == "−100 ms"
+    assert len(data["frames"]) == len(body["q"]) == len(body["positions"])
 
 
 def test_the_conventions_show_where_units_and_point_are():
@@ -356,7 +350,7 @@ def test_names_from_outside_are_text_and_nothing_else():
         assert "<script" not in picture.svg and "\x00" not in picture.svg
         ElementTree.fromstring(picture.svg)
     assert "&lt;script&gt;" in figures.path.svg
-    assert "<script" not in json.dumps(figures.motion.figure)
+    assert "<script" not in json.dumps(figures.motion.scene.data())
 
 
 def test_long_names_are_cut_and_numbers_are_short():
@@ -374,4 +368,4 @@ def test_long_names_are_cut_and_numbers_are_short():
 def test_the_same_result_makes_the_same_bytes():
     first, second = figures_of(), crash_figures(crash_case())
     assert [p.svg for p in first.pictures] == [p.svg for p in second.pictures]
-    assert json.dumps(first.motion.figure) == json.dumps(second.motion.figure)
+    assert first.motion.scene.data() == second.motion.scene.data()

@@ -23,8 +23,8 @@ from strapdown.report.document import (
     Paragraph,
     Picture,
     TableBlock,
+    draw_stills,
 )
-from strapdown.report.document_data import draw_stills
 from strapdown.report.document_html import document_page
 from strapdown.report.document_pdf import shown, write_pdf
 

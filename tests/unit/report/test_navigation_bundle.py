@@ -12,11 +12,10 @@ import pytest
 from strapdown.config.navigation import NavigationSpec
 from strapdown.errors import Finding
 from strapdown.evaluation.plane_bound import plane_bound
-from strapdown.report.document_data import draw_stills
-from strapdown.report.document_files import drawings, write_drawings
+from strapdown.report.document import draw_stills, drawings, write_drawings
+from strapdown.report.navigation import navigation_json
 from strapdown.report.navigation_document import navigation_document
 from strapdown.report.navigation_found import examine, told_of, withheld_of
-from strapdown.report.navigation_json import navigation_json
 from strapdown.report.navigation_trust import trust
 from strapdown.report.verdict_words import answer, heading_words
 from strapdown.systems.navigation_run import run_navigation
@@ -123,7 +122,7 @@ def test_the_json_states_its_conventions_and_no_clock(result, found):
     assert "\u00a0" not in json.dumps(told, ensure_ascii=False)
 
 
-def test_each_drawing_is_a_file(result, found, sketched, tmp_path):
+def test_each_drawing_is_a_file(result, found, tmp_path):
     document = navigation_document(found.told, "out", found)
     write_drawings(document, draw_stills(document), tmp_path / "figures")
     names = sorted(p.stem for p in (tmp_path / "figures").iterdir())

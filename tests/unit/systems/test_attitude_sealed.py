@@ -12,8 +12,6 @@ from strapdown.api.attitude import compare_attitude
 from strapdown.peers import available_peers
 from strapdown.report.attitude import write_attitude
 
-pytestmark = pytest.mark.usefixtures("sketched")
-
 ASKED = {"algorithms": ["naive", "quaternion"], "rates_hz": [50, 25]}
 SENSOR = (
     'title = "x"\nclass = "phone"\nsummary = "x"\n[gyro]\n'

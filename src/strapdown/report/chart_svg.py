@@ -1,4 +1,8 @@
-"""A chart as a static SVG for paper, the same bytes every time."""
+"""A chart as an SVG, the same bytes every time: in the page, in the PDF and as a file.
+
+What the page's script needs to zoom, to show values and to hide a series is in ``data-``
+attributes: of a panel its scales, of a group the name of its series, of a label its point.
+"""
 
 from __future__ import annotations
 
@@ -23,27 +27,7 @@ from strapdown.report.chart import (
 )
 from strapdown.report.path_marks import LONGEST_BESIDE, label_rows, label_side
 from strapdown.report.plan_view import nice_step, tick_words
-from strapdown.report.svg_drawing import INK, Box, Drawing, overlap, text_width
-
-__all__ = [
-    "AXIS",
-    "LEVEL",
-    "LONG",
-    "RED",
-    "TICK",
-    "Frame",
-    "Scale",
-    "Tick",
-    "draw_pattern",
-    "draw_points",
-    "entries",
-    "fitted",
-    "legend_height",
-    "still",
-    "ticks",
-    "write_legend",
-]
-
+from strapdown.report.svg_drawing import INK, Box, Drawing, number, overlap, text_width
 
 # Points, legend samples and patterns of a static chart.
 
@@ -163,8 +147,9 @@ def write_legend(
     """Write a legend from a height downward."""
     for entry, x, row in _placed(legend, left, right):
         y = top + _STILL_MARKS_ROW * (row + 0.5)
-        _sample(drawing, entry.shown, x, y)
-        drawing.text((x + _SAMPLE, y), entry.name, _SIZE)
+        with drawing.group(data_entry=entry.name):
+            _sample(drawing, entry.shown, x, y)
+            drawing.text((x + _SAMPLE, y), entry.name, _SIZE)
 
 
 def _sample(drawing: Drawing, shown: Line | Fill | Bars, x: float, y: float) -> None:
@@ -211,6 +196,8 @@ class Frame:
     x_ticks, y_ticks : list of Tick
     x_named, y_named : bool
         Whether the tick labels are written here.
+    group : str
+        Panels of one group share the horizontal axis.
     """
 
     panel: Panel
@@ -221,6 +208,7 @@ class Frame:
     y_ticks: list[Tick]
     x_named: bool = True
     y_named: bool = True
+    group: str = ""
 
     def at(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Return points in the picture, (n, 2); NaN for values that an axis cannot show."""
@@ -234,16 +222,19 @@ class Frame:
     def draw(self, drawing: Drawing, bands: tuple[Band, ...], marks: tuple[Mark, ...]) -> None:
         """Draw everything within the axes of the panel."""
         panel, (left, top, right, bottom) = self.panel, self.box
-        with drawing.within(self.box):
+        with drawing.within(self.box, **self._attributes()):
+            with drawing.group(class_="grid"):
+                self._grid(drawing)
             for band in bands:
                 (x0, _), (x1, _) = self._edges([band.start, band.end])
                 corners = np.array([[x0, top], [x1, top], [x1, bottom], [x0, bottom]])
                 drawing.shape(corners, None, fill=_SHADE, opacity=0.07)
-            self._grid(drawing)
             for fill in panel.fills:
-                self._fill(drawing, fill)
+                with drawing.group(data_series=fill.name):
+                    self._fill(drawing, fill)
             for bars in panel.bars:
-                self._bars(drawing, bars)
+                with drawing.group(data_series=bars.name):
+                    self._bars(drawing, bars)
             self._zero(drawing)
             for level in panel.levels:
                 y = float(self.at([self.x.low], [level.y])[0, 1])
@@ -252,11 +243,27 @@ class Frame:
                 ((x, _),) = self._edges([mark.x])
                 drawing.line((x, top), (x, bottom), RED, 1.2, "dot")
             for line in panel.lines:
-                self._line(drawing, line)
+                with drawing.group(data_series=line.name, data_line=""):
+                    self._line(drawing, line)
         drawing.line((left, top), (left, bottom), INK, 0.8)
         drawing.line((left, bottom), (right, bottom), INK, 0.8)
-        self._ticks(drawing)
-        self._names(drawing)
+        with drawing.group(class_="ticks"):
+            self._ticks(drawing)
+        with drawing.group(class_="names"):
+            self._names(drawing)
+
+    def _attributes(self) -> dict[str, str]:
+        """Return what the page's script needs to know of the axes."""
+        named = "x" * self.x_named + "y" * (self.y_named and not self.panel.categories)
+        kind = "plane" if self.panel.x_label else "categories" if self.panel.categories else "time"
+        return {
+            "data_kind": kind,
+            "data_group": self.group,
+            "data_x": self.x.words,
+            "data_y": self.y.words,
+            "data_named": named,
+            "data_labels": f"{self.panel.x_label}|{self.panel.y_label}",
+        }
 
     def _edges(self, x: list[float]) -> Array:
         return self.at(x, [self.y.low] * len(x))
@@ -359,7 +366,8 @@ class Frame:
             while any(overlap(box, other) for other in taken):
                 at = (at[0], at[1] - 2.0)
                 box = drawing.box_of(at, level.label, LEVEL, anchor=anchor)
-            taken.append(drawing.text(at, level.label, LEVEL, RED, anchor=anchor))
+            with drawing.group(data_at=f"- {number(y)}"):
+                taken.append(drawing.text(at, level.label, LEVEL, RED, anchor=anchor))
         for bars in self.panel.bars:
             self._bar_names(drawing, bars)
         for line in self.panel.lines:
@@ -369,10 +377,11 @@ class Frame:
                 if not (left - 1 <= x <= right + 1 and top - 1 <= y <= bottom + 1):
                     continue
                 place = (x + _SIDE * side, y - _RISE * rise)
-                if abs(rise) > 1:
-                    drawing.line((x, y), place, _FAINT, 0.7)
                 anchor = {-1: "end", 0: "middle", 1: "start"}[side]
-                drawing.text(place, label, TICK, anchor=anchor, halo=not self.panel.categories)
+                with drawing.group(data_at=f"{number(x)} {number(y)}", data_series=line.name):
+                    if abs(rise) > 1:
+                        drawing.line((x, y), place, _FAINT, 0.7)
+                    drawing.text(place, label, TICK, anchor=anchor, halo=not self.panel.categories)
 
     def _bar_names(self, drawing: Drawing, bars: Bars) -> None:
         start = np.zeros_like(bars.values) if bars.start is None else bars.start
@@ -382,11 +391,12 @@ class Frame:
             x, y = (self.at([end], [at]) if across else self.at([at], [end]))[0]
             if not np.isfinite([x, y]).all():
                 continue
-            if across:
-                anchor = "start" if side > 0 else "end"
-                drawing.text((x + 5.0 * side, y), label, TICK, anchor=anchor)
-            else:
-                drawing.text((x, y - 8.0 * side), label, TICK, anchor="middle")
+            with drawing.group(data_at=f"{number(x)} {number(y)}", data_series=bars.name):
+                if across:
+                    anchor = "start" if side > 0 else "end"
+                    drawing.text((x + 5.0 * side, y), label, TICK, anchor=anchor)
+                else:
+                    drawing.text((x, y - 8.0 * side), label, TICK, anchor="middle")
 
 
 Array = NDArray[np.float64]
@@ -395,37 +405,42 @@ _WIDTH = 643.0  # pixels: 170 mm
 _INCH = 96.0
 _EDGE, _BETWEEN = 4.0, 7.0  # pixels
 _LINE = 13.0  # pixels per line of an axis name
-_TITLE = 12.0
+_TITLE, _HEAD = 12.0, 13.0
+_SOFT = "#4a525c"
 _DOWN, _ACROSS = 15.0, 64.0  # pixels of a step between ticks
 _ROW = LEVEL + 2.0
 
 
-def still(chart: Chart) -> str:
-    """Draw a chart as a static SVG for the column of a printed page, which prints the title itself.
+def still(chart: Chart, *, title: bool = False, caption: bool = False) -> str:
+    """Draw a chart for the column of a printed page, 170 mm wide.
 
     Parameters
     ----------
     chart : Chart
+    title, caption : bool
+        Whether to write them in the picture; a document writes them itself.
 
     Returns
     -------
     str
-        A whole SVG, 170 mm wide.
-
-    Notes
-    -----
-    `svg_chart.draw` draws the same chart with matplotlib, for a picture of a single chart; it takes
-    about 100 ms per chart, mostly for its tick objects.
+        A whole SVG.
     """
+    head = _folded(chart.title, _WIDTH - 2.0 * _EDGE, _HEAD, bold=True) if title else []
+    foot = _folded(chart.caption, _WIDTH - 2.0 * _EDGE, TICK) if caption else []
     legend = entries(chart)
     below = legend_height(legend, _EDGE, _WIDTH - _EDGE)
-    height = _INCH * _height(chart) + max(0.0, below - 20.0)
-    drawing = Drawing(_WIDTH, height, chart.title)
-    for frame, panel in zip(_frames(chart, height - below), chart.panels, strict=True):
+    top = 1.35 * _HEAD * len(head) + 4.0 * bool(head)
+    end = top + _INCH * _height(chart) + max(0.0, below - 20.0)
+    drawing = Drawing(_WIDTH, end + 1.3 * TICK * len(foot) + 4.0 * bool(foot), chart.title)
+    for k, line in enumerate(head):
+        drawing.text((_EDGE, 1.35 * _HEAD * (k + 0.5)), line, _HEAD, bold=True)
+    for frame, panel in zip(_frames(chart, top, end - below), chart.panels, strict=True):
         timed = not panel.x_label
         frame.draw(drawing, chart.bands if timed else (), chart.marks if timed else ())
         _around(drawing, chart, frame)
-    write_legend(drawing, legend, _EDGE, _WIDTH - _EDGE, height - below)
+    write_legend(drawing, legend, _EDGE, _WIDTH - _EDGE, end - below)
+    for k, line in enumerate(foot):
+        drawing.text((_EDGE, end + 1.3 * TICK * (k + 0.5)), line, TICK, _SOFT)
     return drawing.svg()
 
 
@@ -450,7 +465,8 @@ class _Room:
     below: float = 0.0
 
 
-def _frames(chart: Chart, height: float) -> list[Frame]:
+def _frames(chart: Chart, start: float, height: float) -> list[Frame]:
+    """Panels between two heights of the picture."""
     count = len(chart.panels)
     xs, ys = _x_scales(chart), [_y_scale(panel) for panel in chart.panels]
     if chart.beside and not any(panel.categories for panel in chart.panels):
@@ -460,12 +476,12 @@ def _frames(chart: Chart, height: float) -> list[Frame]:
     rooms = [_upright(chart, k, named[k], xs[k], ys[k]) for k in range(count)]
     if chart.beside:
         above, below = max(r.above for r in rooms), max(r.below for r in rooms)
-        spans = [(above, height - below)] * count
+        spans = [(start + above, height - below)] * count
     else:
         used = sum(r.above + r.below for r in rooms) + _BETWEEN * (count - 1)
         ratios = np.array([panel.height for panel in chart.panels])
-        free = np.maximum(height - used, 20.0 * count) * ratios / ratios.sum()
-        spans, top = [], 0.0
+        free = np.maximum(height - start - used, 20.0 * count) * ratios / ratios.sum()
+        spans, top = [], start
         for room, tall in zip(rooms, free.tolist(), strict=True):
             spans.append((top + room.above, top + room.above + tall))
             top += room.above + tall + room.below + _BETWEEN
@@ -486,7 +502,8 @@ def _frames(chart: Chart, height: float) -> list[Frame]:
         step = panel.x_step if panel.x_label or k == count - 1 else 0.0
         x_ticks = ticks(x, int((right - left) / _ACROSS), step=step, between=100.0)
         box = (left, top, right, bottom)
-        found.append(Frame(panel, box, x, y, x_ticks, y_ticks[k], named[k], y_named[k]))
+        group = f"plane-{k}" if panel.x_label else "time"
+        found.append(Frame(panel, box, x, y, x_ticks, y_ticks[k], named[k], y_named[k], group))
     return found
 
 
@@ -584,12 +601,12 @@ def _mark_rows(chart: Chart, x: Scale) -> tuple[int, ...]:
     return label_rows(shares, [mark.label for mark in chart.marks], _letter(chart))
 
 
-def _name_lines(name: str, tall: float) -> list[str]:
-    """Break an axis name between words into lines that fit its panel."""
+def _folded(text: str, width: float, size: float, bold: bool = False) -> list[str]:
+    """Break a text between words into lines of at most a width."""
     lines = [""]
-    for word in name.split():
+    for word in text.split():
         longer = f"{lines[-1]} {word}".strip()
-        if lines[-1] and text_width(longer, AXIS) > tall:
+        if lines[-1] and text_width(longer, size, bold) > width:
             lines.append(word)
         else:
             lines[-1] = longer
@@ -600,7 +617,7 @@ def _sides(panel: Panel, y_ticks: list[Tick], span: tuple[float, float]) -> tupl
     """Margins to the left and to the right of a panel."""
     left = _EDGE + LONG + 3.0
     left += max((text_width(tick.text, TICK) for tick in y_ticks), default=0.0)
-    lines = _name_lines(panel.y_label, span[1] - span[0] + 2.0 * _BETWEEN)
+    lines = _folded(panel.y_label, span[1] - span[0] + 2.0 * _BETWEEN, AXIS)
     if lines:
         left += 4.0 + _LINE * len(lines)
     beside = [lv.label for lv in panel.levels if len(lv.label) <= LONGEST_BESIDE]
@@ -643,8 +660,8 @@ def _around(drawing: Drawing, chart: Chart, frame: Frame) -> None:
     widest = max((text_width(t.text, TICK) for t in frame.y_ticks), default=0.0)
     x = left - LONG - 3.0 - (widest if frame.y_named else 0.0) - 4.0
     if not chart.beside:
-        x = _EDGE + _LINE * max(1, len(_name_lines(panel.y_label, _tall(frame))))
-    lines = _name_lines(panel.y_label, _tall(frame))
+        x = _EDGE + _LINE * max(1, len(_folded(panel.y_label, _tall(frame), AXIS)))
+    lines = _folded(panel.y_label, _tall(frame), AXIS)
     for j, line in enumerate(lines):
         place = (x - _LINE * (len(lines) - j - 0.5), 0.5 * (top + bottom))
         drawing.text(place, line, AXIS, anchor="middle", turn=-90.0)
@@ -663,7 +680,8 @@ def _write_marks(drawing: Drawing, chart: Chart, frame: Frame, above: float) -> 
         side = label_side(share, mark.label, _letter(chart))
         anchor = {"left": "start", "center": "middle", "right": "end"}[side]
         at = (left + share * (right - left), above - _ROW * (row + 0.5))
-        drawing.text(at, mark.label, LEVEL, RED, anchor=anchor)
+        with drawing.group(data_at=f"{number(at[0])} -", data_group=frame.group):
+            drawing.text(at, mark.label, LEVEL, RED, anchor=anchor)
     return above - _ROW * (1 + max(rows))
 
 
@@ -696,6 +714,11 @@ class Scale:
             return np.asarray((np.log10(np.where(v > 0.0, v, np.nan)) - low) / (high - low))
 
     @property
+    def words(self) -> str:
+        """Low and high end, whether logarithmic, and power of ten, for the page's script."""
+        return f"{float(self.low)!r} {float(self.high)!r} {int(self.log)} {self.power}"
+
+    @property
     def power(self) -> int:
         """Power of ten by which labels are divided."""
         largest = max(abs(self.low), abs(self.high))
@@ -723,10 +746,6 @@ def fitted(values: Sequence[ArrayLike], log: bool = False, margin: float = 0.05)
     log : bool
     margin : float
         As a share of the span of the values.
-
-    Returns
-    -------
-    Scale
     """
     v = np.concatenate([np.empty(0), *(np.asarray(x, dtype=np.float64).ravel() for x in values)])
     v = v[np.isfinite(v) & ((v > 0.0) if log else True)]
@@ -754,10 +773,6 @@ def ticks(scale: Scale, most: int, *, step: float = 0.0, between: float = 30.0) 
         Requested step, if any; not for a logarithmic axis.
     between : float
         A logarithmic axis of a smaller ratio also has labels at 2 and 5 times powers of ten.
-
-    Returns
-    -------
-    list of Tick
     """
     if not scale.log:
         return _even(scale, step or nice_step((scale.high - scale.low) / max(most, 1)))

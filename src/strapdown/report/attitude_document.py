@@ -1,0 +1,330 @@
+"""The report of the attitude bench, with the body in motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from html import escape
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown import __version__
+from strapdown.attitude_comparison.comparison import AttitudeComparison
+from strapdown.errors import ConfigError
+from strapdown.evaluation.differences import attitude_at
+from strapdown.report import attitude_tables as tables
+from strapdown.report import attitude_words as words
+from strapdown.report.attitude_charts import charts
+from strapdown.report.attitude_tables import result_tables
+from strapdown.report.attitude_words import MEANINGS, chosen_run, full_rate_errors, sweep_grid
+from strapdown.report.chart import AXIS_COLOURS, BLACK, GREY, Chart
+from strapdown.report.chart_figure import ChartFigure
+from strapdown.report.document import (
+    Animation,
+    Block,
+    ChartBlock,
+    Document,
+    Facts,
+    Items,
+    KeyFigure,
+    KeyFigures,
+    Paragraph,
+    Section,
+    TableBlock,
+    findings_list,
+)
+from strapdown.report.scene import Scene, SceneBody, SceneLine, SceneWord
+
+Array = NDArray[np.float64]
+
+
+def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None = None) -> Document:
+    """Return the report of a bench; its charts are drawn here unless they are given."""
+    made = {c.slug: c for c in (charts(bench) if drawn is None else drawn)}
+
+    def shown(*slugs: str) -> list[Block]:
+        return [ChartBlock(made[slug]) for slug in slugs if slug in made]
+
+    def kept(*blocks: Block | None) -> list[Block]:
+        return [block for block in blocks if block is not None]
+
+    answer = bench.answer
+    front = kept(
+        _key_figures(bench),
+        Paragraph(answer.sentence, "lead"),
+        Paragraph(words.standing(bench)),
+        *_named_items("Why:", answer.why),
+        *_named_items("What would help:", answer.helps),
+        None if bench.scores else Paragraph(words.HOW_TO_REFERENCE),
+        *_named_items(
+            "These rests look alike, and could be reference points:", tables.offer_lines(bench)
+        ),
+    )
+    sections: tuple[tuple[str, str, list[Block]], ...] = (
+        ("rates", "Cost, rate and error", [*shown("cost", "sweep"), *tables.sweep_tables(bench)]),
+        (
+            "results",
+            "Results",
+            kept(
+                *tables.result_tables(bench),
+                tables.condition_table(bench),
+                tables.cost_table(bench),
+            ),
+        ),
+        ("log", "Signals and attitude", [*shown("gyro", "attitude"), body_animation(bench)]),
+        (
+            "errors",
+            "Errors over time",
+            kept(
+                *shown("error", "reference-error", "difference"),
+                tables.difference_table(bench),
+                *_named_items("Reference points:", words.reference_lines(bench)),
+            ),
+        ),
+        (
+            "parts",
+            "Parts of the error, trials and other libraries",
+            kept(
+                *shown("share", "trials"),
+                tables.trial_table(bench),
+                tables.place_table(bench),
+                *shown("peers"),
+                tables.peer_table(bench),
+            ),
+        ),
+        ("findings", "Findings", [findings_list(bench.findings)]),
+        ("inputs", "Inputs and assumptions", [Facts(tuple(words.facts(bench))), *_readings(bench)]),
+        ("conventions", "Conventions", [Facts(words.CONVENTIONS)]),
+        (
+            "again",
+            "Run it again",
+            [
+                Paragraph(
+                    "This folder is sealed: manifest.json holds the configuration and the SHA-256 "
+                    "of every input and output."
+                ),
+                Paragraph("strapdown verify FOLDER", "mono"),
+            ],
+        ),
+    )
+    return Document(
+        bench.source,
+        "Attitude bench",
+        (("Made with", f"strapdown {__version__}"),),
+        tuple(front),
+        tuple(Section(slug, title, tuple(blocks)) for slug, title, blocks in sections if blocks),
+        bench.source,
+    )
+
+
+def _key_figures(bench: AttitudeComparison) -> KeyFigures | None:
+    """Algorithm, rate and error of the answer, if it names an algorithm."""
+    answer = bench.answer
+    if answer.algorithm is None:
+        return None
+    figures = [KeyFigure("Simplest sufficient algorithm", answer.algorithm, "")]
+    rate, meaning, error = answer.rate_hz, answer.meaning, math.nan
+    if rate is not None:
+        figures.append(
+            KeyFigure("Lowest sufficient rate", f"{rate:.4g} Hz", MEANINGS.get(meaning or "", ""))
+        )
+        grid = sweep_grid(bench, meaning or "drop")
+        if rate in grid.columns:
+            errors = grid[rate].to_dict()
+            error = float(errors.get(answer.algorithm, math.nan))
+    if math.isnan(error):
+        error = full_rate_errors(bench).get(answer.algorithm, math.nan)
+    whose = "its own error, without a reference" if answer.verdict == "own" else "largest error"
+    bound = f"tolerance {answer.tolerance_deg:g}°"
+    figures.append(KeyFigure(whose.capitalize(), words.degrees(error), bound))
+    return KeyFigures(tuple(figures))
+
+
+def _named_items(title: str, lines: Sequence[str]) -> list[Block]:
+    return [Paragraph(title), Items(tuple(("", line) for line in lines))] if lines else []
+
+
+def _readings(bench: AttitudeComparison) -> list[Block]:
+    rows = tuple(
+        (r.source, r.quantity, r.unit, words.first_value(r), r.why) for r in bench.readings
+    )
+    columns = ("column", "taken as", "unit", "first value", "because")
+    title = "How the log was read"
+    return [TableBlock(columns, rows, (0, 1, 2, 4), title=title)] if rows else []
+
+
+# The body in space: a box with its axes among north, east and down, over time.
+
+
+#: A slider on a page cannot resolve more frames.
+MOST_FRAMES = 300
+_AS_IT_WAS = 30_000.0  # ms: a longer log is played faster
+_SHORTEST = 33.0  # ms a frame
+# Half dimensions of a phone, in drawing units; forward along its long side.
+_HALF = np.array([0.72, 0.38, 0.07])
+_CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * _HALF
+# Aft, fore, left, right, up, down. The front and the upper face, with the screen, have their own
+# colors to show the orientation.
+_FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
+_COLOURS = ("#c5d2de", "#D55E00", "#c5d2de", "#c5d2de", "#3d5166", "#9fb3c8")
+_AXIS_NAMES = ("x forward", "y right", "z down")
+_SPACE = 1.3
+
+
+def body_animation(bench: AttitudeComparison) -> Animation:
+    """Animate the body by the chosen algorithm (`attitude_numbers.chosen_run`).
+
+    A wireframe follows the truth, where it is known.
+    """
+    run = chosen_run(bench)
+    time = _instants(run.attitude)
+    tips = np.eye(3).tolist()
+    axes = tuple(
+        (name, (tip[0], tip[1], tip[2]), colour)
+        for name, tip, colour in zip(_AXIS_NAMES, tips, AXIS_COLOURS, strict=True)
+    )
+    bodies = [SceneBody(_CORNERS, _FACES, _COLOURS, attitude_at(run.attitude, time), axes=axes)]
+    if (ghost := _ghost(bench, time)) is not None:
+        bodies.append(SceneBody(_CORNERS, _FACES, (BLACK,) * 6, ghost, wire=True))
+    ends = ((1.2, 0.0, 0.0), (0.0, 1.2, 0.0), (0.0, 0.0, 1.1))
+    lines = [SceneLine("", np.vstack([np.zeros(3), end]), GREY, 1.0, True) for end in ends]
+    names = ("north", "east", "down")
+    labels = [SceneWord(name, end, GREY) for name, end in zip(names, ends, strict=True)]
+    scene = Scene(
+        tuple(bodies),
+        tuple(lines),
+        tuple(labels),
+        tuple(f"{at:.3f} s" for at in time),
+        np.full(3, -0.8 * _SPACE),
+        np.full(3, 0.8 * _SPACE),
+        round(_frame_length(time), 1),
+        # From the south-east and above: north points away, east to the right.
+        (153.0, 28.0),
+    )
+    return Animation("body", "The body in space", _caption(bench, time), scene)
+
+
+def _caption(bench: AttitudeComparison, time: Array) -> str:
+    text = (
+        f"The attitude that {chosen_run(bench).algorithm} says: dark the upper side, orange the "
+        "front. Drag to look from elsewhere."
+    )
+    if bench.truth is not None:
+        text += " Wireframe: the truth, where it is known."
+    span = float(time[-1] - time[0])
+    faster = 1000.0 * span / (_frame_length(time) * (len(time) - 1))
+    if faster > 1.05:
+        text += (
+            f" Played {faster:.3g} times as fast as it was, "
+            f"one pose every {time[1] - time[0]:.3g} s."
+        )
+    return text
+
+
+def _instants(attitude: pd.DataFrame) -> Array:
+    """Equally spaced instants, at most as many as there are samples."""
+    start, end = float(attitude.index[0]), float(attitude.index[-1])
+    return np.linspace(start, end, min(MOST_FRAMES, max(2, len(attitude))))
+
+
+def _frame_length(time: Array) -> float:
+    """Frame length in ms: real time for a short log, else the fastest drawable."""
+    real = 1000.0 * float(time[-1] - time[0]) / (len(time) - 1)
+    return max(real, _SHORTEST) if real * (len(time) - 1) <= _AS_IT_WAS else _SHORTEST
+
+
+def _ghost(bench: AttitudeComparison, time: Array) -> Array | None:
+    """True attitude at the frames; NaN where it is not known."""
+    if bench.truth is None or not len(bench.truth):
+        return None
+    stamps = bench.truth.index.to_numpy(dtype=np.float64)
+    q = attitude_at(bench.truth, time)
+    q[(time < stamps[0]) | (time > stamps[-1])] = np.nan
+    return q
+
+
+# A bench in a notebook: a short text with its table, and its charts as figures.
+
+
+#: Chart kinds, and the data that a bench needs for each.
+KINDS = {
+    "cost": "costs",
+    "sweep": "a sweep of rates",
+    "gyro": "samples",
+    "attitude": "a run",
+    "error": "a truth",
+    "reference-error": "reference points",
+    "difference": "two algorithms",
+    "share": "shares",
+    "trials": "trials",
+    "peers": "scores of other libraries",
+}
+
+
+def plot(bench: AttitudeComparison, kind: str = "cost") -> ChartFigure:
+    """Draw one chart of a bench, as the page shows it.
+
+    Parameters
+    ----------
+    bench : AttitudeComparison
+    kind : str
+        One of `KINDS`.
+
+    Returns
+    -------
+    ChartFigure
+        Displays itself in a notebook; `save` writes it as SVG, PNG or PDF.
+
+    Raises
+    ------
+    ConfigError
+        The chart does not exist, or the bench lacks its data.
+    """
+    if kind not in KINDS:
+        raise ConfigError(
+            "report.no-chart-bench", quantity="kind", kind=kind, word=kind, known=KINDS
+        )
+    drawn = {chart.slug: chart for chart in charts(bench)}
+    if kind not in drawn:
+        raise ConfigError(
+            "report.nothing-draw-needs", quantity=f"kind '{kind}'", kinds=KINDS[kind], drawn=drawn
+        )
+    return ChartFigure(drawn[kind])
+
+
+def short_html(bench: AttitudeComparison) -> str:
+    """Return the answer and the table of results as HTML for a notebook.
+
+    Returns
+    -------
+    str
+        Everything from outside is escaped.
+    """
+    parts = [
+        f"<div><b>{escape(bench.source)}</b></div>",
+        f'<p style="font-size:1.25em;margin:.3em 0"><b>{escape(bench.answer.sentence)}</b></p>',
+        f'<p style="margin:.3em 0">{escape(words.standing(bench))}</p>',
+        *(_table(table) for table in result_tables(bench)),
+    ]
+    return "<div>" + "".join(parts) + "</div>"
+
+
+def _table(table: TableBlock) -> str:
+    def row(cells: tuple[str, ...], tag: str, bold: bool) -> str:
+        weight = ";font-weight:bold" if bold else ""
+        return (
+            "<tr>"
+            + "".join(
+                f'<{tag} style="text-align:{"left" if k in table.text else "right"}{weight}">'
+                f"{escape(cell)}</{tag}>"
+                for k, cell in enumerate(cells)
+            )
+            + "</tr>"
+        )
+
+    rows = "".join(row(r, "td", k in table.strong) for k, r in enumerate(table.rows))
+    note = f"<div><small>{escape(table.caption)}</small></div>" if table.caption else ""
+    head = row(table.columns, "th", False)
+    return f"<table><thead>{head}</thead><tbody>{rows}</tbody></table>{note}"
