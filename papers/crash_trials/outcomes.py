@@ -20,13 +20,11 @@ from strapdown.crash import (
     EventChanges,
     UnitReconstruction,
     VelocityChange,
+    at_point,
     ned_pdof,
     pdof,
     prepare_unit,
     reconstruct_unit,
-)
-from strapdown.crash import (
-    measuring_point as at_point,
 )
 from strapdown.earth import gravity
 from strapdown.errors import DataError

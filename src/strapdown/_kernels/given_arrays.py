@@ -25,7 +25,7 @@ UNCOUNTED = {"_nrt": False} if hasattr(CPUTargetOptions, "_nrt") else {}
 GIVEN: dict[str, Any] = {"cache": True, "error_model": "numpy", **UNCOUNTED}
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def fma(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
     """Return ``a b + c``, rounded once (IEEE 754 fusedMultiplyAdd)."""
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from importlib.resources import as_file, files
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from strapdown.api.reading import GnssFixes, Imu
 from strapdown.attitude_comparison.source import simulate_scenario
@@ -174,14 +174,14 @@ def simulate(
         return _crash(crash)
     if recorders:
         raise ConfigError("report.no-crash-no-recorders", quantity="--units", name=name)
-    told = {
+    stated: dict[str, Any] = {
         "rate_hz": rate_hz,
         "sampling": sampling and sampling.lower(),
         "seed": seed,
         "sensor": sensor,
     }
     if name.lower().endswith(".toml"):
-        return _trajectory(TrajectorySpec.read(Path(name), **told), receiver)
+        return _trajectory(TrajectorySpec.read(Path(name), **stated), receiver)
     packaged = files("strapdown").joinpath("simulation", "trajectories")
     trajectories = {
         entry.name.removesuffix(".toml"): entry
@@ -190,7 +190,7 @@ def simulate(
     }
     if name.lower() in trajectories:
         with as_file(trajectories[name.lower()]) as path:
-            return _trajectory(TrajectorySpec.read(path, **told), receiver)
+            return _trajectory(TrajectorySpec.read(path, **stated), receiver)
     if name.lower() not in SCENARIOS:
         raise ConfigError(
             "report.no-scenario-no-crash",
