@@ -256,8 +256,8 @@ def alignment_section(mktemp, run_cli) -> str:
     with pytest.MonkeyPatch.context() as patch:
         # The drawing says nothing, and takes most of the time.
         patch.setattr(module, "draw_stills", lambda document: [])
-        patch.setattr(module, "document_page", lambda document, stills: "<html></html>")
-        patch.setattr(module, "write_drawings", lambda document, stills, folder: None)
+        patch.setattr(module, "document_page", lambda document, stills=(): "<html></html>")
+        patch.setattr(module, "write_drawings", lambda *given: None)
         for case in ALIGNMENT_CASES:
             said, code = alignment_said(case, mktemp("alignment"), run_cli)
             words = " ".join(case.options)

@@ -345,8 +345,8 @@ def undrawn(patch: pytest.MonkeyPatch) -> None:
     import strapdown.report.navigation as module
 
     patch.setattr(module, "draw_stills", lambda document: [])
-    patch.setattr(module, "write_drawings", lambda document, stills, folder: None)
-    patch.setattr(module, "document_page", lambda document, stills: "<html></html>")
+    patch.setattr(module, "write_drawings", lambda *given: None)
+    patch.setattr(module, "document_page", lambda document, stills=(): "<html></html>")
 
 
 def navigate_section(mktemp, run_cli) -> str:

@@ -22,8 +22,8 @@ def undrawn(monkeypatch):
     import strapdown.report.alignment as module
 
     monkeypatch.setattr(module, "draw_stills", lambda document: [])
-    monkeypatch.setattr(module, "write_drawings", lambda document, stills, folder: None)
-    monkeypatch.setattr(module, "document_page", lambda document, stills: "<html></html>")
+    monkeypatch.setattr(module, "write_drawings", lambda *given: None)
+    monkeypatch.setattr(module, "document_page", lambda document, stills=(): "<html></html>")
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +96,7 @@ def test_a_draft_is_aligned_once_its_questions_are_answered(run_cli, tmp_path):
     assert done.code == 0, done.err
     assert "lat_deg" in done.out and "sensor" in done.out
     open_ = run_cli("align", path, "--out", tmp_path / "out")
-    assert open_.code == 4 and "is missing" in open_.err
+    assert open_.code == 4 and "3 values are missing" in open_.err
     text = path.read_text()
     for key, value in (("lat_deg", "55.0"), ("lon_deg", "37.0"), ("sensor", '"fog-1000"')):
         text = text.replace(f'{key} = "?"', f"{key} = {value}")

@@ -92,7 +92,7 @@ def test_a_second_log_and_rests(here, run_cli, logs):
         (["--trials", "0"], "0 trials are out of range"),
         (["--sensor", "nosuch"], "unknown sensor 'nosuch'"),
         (["--sensor", "nosuch.toml"], "does not exist"),
-        (["--interpolation", "spline"], "'linear' or 'cubic'"),
+        (["--interpolation", "spline"], "Known: linear, cubic"),
         (["--peers", "nosuch"], "unknown library 'nosuch'"),
         (["--peers", "vqf:nosuch"], "unknown filter 'nosuch' of vqf"),
         (["--reference-log", "nosuch.csv"], "does not exist"),

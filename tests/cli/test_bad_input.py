@@ -103,7 +103,7 @@ def crash_said(tmp_path_factory, run_cli):
     with pytest.MonkeyPatch.context() as patch:
         # The drawing says nothing, and takes most of the time.
         patch.setattr(module, "draw_stills", lambda document: ["<svg/>"] * 99)
-        patch.setattr(module, "document_page", lambda document, stills: "<html></html>")
+        patch.setattr(module, "document_page", lambda document, stills=(): "<html></html>")
         patch.setattr(module, "write_pdf", lambda document, path, stills: path.write_bytes(b""))
         for number, bad in enumerate(CRASH_CASES):
             folder = root / str(number)

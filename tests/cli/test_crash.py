@@ -231,7 +231,7 @@ def quick(monkeypatch, sealed_crash):
 
     monkeypatch.setattr(module, "write_pdf", write)
     monkeypatch.setattr(module, "draw_stills", lambda document: ["<svg/>"] * 99)
-    monkeypatch.setattr(module, "document_page", lambda document, stills: "<html></html>")
+    monkeypatch.setattr(module, "document_page", lambda document, stills=(): "<html></html>")
     return sealed_crash.records / "case.toml"
 
 
@@ -244,7 +244,7 @@ def test_json_is_the_file_alone_and_replaces_when_forced(run_cli, quick, tmp_pat
     before = sorted(p.name for p in tmp_path.iterdir())
     refused = run_cli("crash", quick, "--out", out)
     assert refused.code == 4
-    assert "it exists already" in refused.err
+    assert "the folder exists" in refused.err
     assert "--force" in refused.err
     (out / "mine.txt").write_text("mine")
     assert run_cli("crash", quick, "--out", out, "--force", "-q").code == 0
@@ -265,7 +265,7 @@ def test_a_folder_of_somebody_else_is_refused_even_when_forced(run_cli, quick, t
     (tmp_path / "letter.txt").write_text("mine")
     done = run_cli("crash", quick, "--out", tmp_path, "--force")
     assert done.code == 4
-    assert "it exists and is not a bundle" in done.err
+    assert "exists and is not a bundle" in done.err
     assert [p.name for p in tmp_path.iterdir()] == ["letter.txt"]
 
 

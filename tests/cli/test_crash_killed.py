@@ -79,7 +79,7 @@ def test_a_disk_that_is_full_is_said_and_nothing_is_left(
         raise OSError(errno.ENOSPC, "No space left on device", str(tmp_path / "out"))
 
     monkeypatch.setattr(module, "draw_stills", lambda document: ["<svg/>"] * 99)
-    monkeypatch.setattr(module, "document_page", lambda document, stills: "")
+    monkeypatch.setattr(module, "document_page", lambda document, stills=(): "")
     monkeypatch.setattr(module, fails, full)
     done = run_cli("crash", sealed_crash.records / "case.toml", "--out", tmp_path / "deep" / "out")
     assert done.code == 4

@@ -44,10 +44,13 @@ def test_json_is_what_really_happened(here, run_cli):
         (["pole", "--units", "IMU9"], "error: --units: 'pole' has no recorder 'IMU9'"),
         (["pole", "--units", "LAB1"], "LAB1 has no gyro and uses that of IMU1"),
         (["pole", "--format", "npz"], "error: --format: there is no writer of crash records"),
-        (["pole", "--sensor", "bmi270"], "error: --sensor: the recorders of a crash have parts"),
-        (["pole", "--sampling", "often"], "'often' does not fit"),
+        (
+            ["pole", "--sensor", "bmi270"],
+            "error: --sensor: the option does not apply to the recorders",
+        ),
+        (["pole", "--sampling", "often"], "there is no 'often'"),
         (["pole", "--rate", "0"], "give a number above 0"),
-        (["alexiev-fig4", "--units", "IMU1"], "'alexiev-fig4' is no crash and has no recorders"),
+        (["alexiev-fig4", "--units", "IMU1"], "'alexiev-fig4' is not a simulated crash"),
     ],
 )
 def test_what_cannot_be_is_named_and_nothing_is_written(here, run_cli, options, what):

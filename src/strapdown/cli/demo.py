@@ -143,7 +143,7 @@ def demo_runs(out: Path, data: Path) -> list[DemoRun]:
     turns = data / _TURNS
 
     def scenario(folder: Path, force: bool, progress: Progress) -> None:
-        _attitude(["alexiev-fig6"], folder / "hand", force, progress, options={"rate": 200.0})
+        _attitude(["alexiev-fig6"], folder / "hand", force, progress, rate_hz=200.0)
 
     def turn(folder: Path, force: bool, progress: Progress) -> None:
         _attitude(

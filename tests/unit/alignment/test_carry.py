@@ -71,7 +71,11 @@ def test_what_is_known_besides_goes_along():
 
 def test_an_instant_outside_of_the_record():
     imu, truth = ideal(rocking(600.0), 50.0)
-    with pytest.raises(DataError, match=r"log.csv, time: 601 s is not within the record"):
+    with pytest.raises(
+        DataError, match=r"log\.csv, time: 601 s is outside the record, 0 to 600 s: the attitude"
+    ):
         carry(imu, true_at(truth, 0), 601.0, SITE)
-    with pytest.raises(DataError, match="-5 s is not within"):
+    with pytest.raises(
+        DataError, match=r"log\.csv, time: -5 s is outside the record, 0 to 600 s: the attitude"
+    ):
         carry(imu, replace(true_at(truth, 0), time=-5.0), 10.0, SITE)

@@ -53,9 +53,11 @@ def test_nothing_is_said_of_a_body_that_stands(method, stood):
 @each
 def test_a_dead_channel(method, stood):
     imu, _, sensors = stood
-    with pytest.raises(DataError, match=r"(?s)log.csv, row 1, gyro_y: it reads 0 on all.*dead"):
+    with pytest.raises(
+        DataError, match=r"log\.csv, row 1, gyro_y: the channel reads 0 on all 6001 samples"
+    ):
         method.align(changed(imu, gyro_y=0.0), SITE, sensors)
-    with pytest.raises(DataError, match=r"accel_z: it reads -9.8 on all 6001 samples"):
+    with pytest.raises(DataError, match=r"accel_z: the channel reads -9.8 on all 6001 samples"):
         method.align(changed(imu, accel_z=-9.8), SITE, sensors)
 
 
@@ -71,7 +73,9 @@ def test_a_value_that_is_no_number(method, stood):
 @each
 def test_no_accelerometer_and_too_few_samples(method, stood):
     imu, _, sensors = stood
-    with pytest.raises(DataError, match="there is no accelerometer"):
+    with pytest.raises(
+        DataError, match=r"log\.csv, accel: the log has no accelerometer, and an alignment needs"
+    ):
         method.align(imu[GYRO], SITE, sensors)
     with pytest.raises(DataError, match=r"10 samples over 0.45 s"):
         method.align(imu.iloc[:10], SITE, sensors)
@@ -79,7 +83,7 @@ def test_no_accelerometer_and_too_few_samples(method, stood):
 
 @each
 @pytest.mark.parametrize(
-    ("factor", "remedy"), [(1 / 9.80665, "in g"), (1e3, "mm/s²"), (0.3, "unit")]
+    ("factor", "remedy"), [(1 / 9.80665, "to be g"), (1e3, "mm/s²"), (0.3, "unit")]
 )
 def test_forces_in_other_units(method, stood, factor, remedy):
     imu, _, sensors = stood
@@ -265,7 +269,7 @@ def test_a_burst_of_outliers(method, stood):
     burst.iloc[3000:3005, burst.columns.get_loc("accel_x")] += 50.0
     place = r"log.csv, row 300[16], accel_x: 2 steps between samples"
     if method.name == "inertial_frame":
-        with pytest.raises(DataError, match=rf"(?s){place}.*heading is not known.*robust_fir"):
+        with pytest.raises(DataError, match=rf"(?s){place}.*deviation of the heading.*robust_fir"):
             method.align(burst, SITE, sensors)
         return
     found = method.align(burst, SITE, sensors)
@@ -278,7 +282,7 @@ def test_options_out_of_range():
     for wrong in (1, 2000, True, "ten"):
         with pytest.raises(ConfigError, match="blocks"):
             TwoVector(wrong)
-    with pytest.raises(ConfigError, match="at: 'ende' is no epoch"):
+    with pytest.raises(ConfigError, match="at: unknown epoch 'ende'"):
         InertialFrame("ende")
     with pytest.raises(ConfigError, match="heading_deg"):
         KnownHeading(np.nan, 1.0)

@@ -209,10 +209,12 @@ def test_without_a_rest_an_attitude_is_worth_what_the_bias_leaves():
 def test_what_it_refuses():
     imu, _ = ideal(DRIVE, 100.0)
     sensors = unit(DRIVE, 100.0, 0)[2]
-    with pytest.raises(DataError, match=r"log.csv, gnss: there are no fixes"):
+    with pytest.raises(
+        DataError, match=r"log\.csv, gnss: the course needs fixes, and there are none"
+    ):
         GnssCourse().align(imu, SITE, sensors)
     with pytest.raises(
-        DataError, match=r"gnss.csv, VN, VE: fixes between 0 and 0.19 s of the inertial record: 1,"
+        DataError, match=r"gnss.csv, VN, VE: fixes between 0 and 0.19 s of the inertial record: 1"
     ):
         GnssCourse().align(imu.iloc[:20], SITE, sensors, fixes())
     other_clock = fixes()

@@ -153,7 +153,7 @@ def test_a_lever_arm_reaches_the_filter(folder, of_files):
         sensor=SENSOR,
         smooth=True,
     )
-    assert run.spec.aiding.gnss.lever_arm_m == (1.0, 0.0, -1.0)
+    assert run.spec.aiding["gnss"].lever_arm_m == (1.0, 0.0, -1.0)
     assert run.forward is not None and "smoothed" in repr(run)
 
 

@@ -36,7 +36,7 @@ BAD = {
         (STATED, 'kind="standstill"\ntime_s = 1'),
         ["time_s = 1", "(line 16)"],
     ),
-    "no file of fixes": ((STATED, 'kind="gnss"\n'), ["entry, path: it is missing"]),
+    "no file of fixes": ((STATED, 'kind="gnss"\n'), ["entry, path: the value is missing"]),
     "blank source": (('"speed trap"', '"  "'), ["config.entry-source-missing"]),
     "speed of nobody": ((SPEED, ""), ["write speed_m_per_s or speed_km_per_h"]),
     "sd of a bullet": (
@@ -87,7 +87,7 @@ BAD = {
         ("position_sd_m = 0.02", "position_sd_m = 20"),
         ["config.above-most", "position_sd_mm"],
     ),
-    "no position's sd": (("position_sd_m = 0.02", ""), ["position_sd_m: it is missing"]),
+    "no position's sd": (("position_sd_m = 0.02", ""), ["position_sd_m: the value is missing"]),
     "units named alike but for spaces": (('"IMU2"', '" imu1"'), ["(line 22)"]),
     "lender without a gyro": (
         (TRIGGER, 'trigger_s = 6.9\ngyro_from = "IMU2"', GYRO, "[units.other]"),
@@ -116,7 +116,7 @@ BAD = {
     ),
     "no trigger at all": (
         (TRIGGER, "", "trigger_s = 0", "", OPTIONS, '[options]\nclock = "correlation"'),
-        ["line 21, unit 1, trigger_s: it is missing", "no unit has one"],
+        ["line 21, unit 1, trigger_s: the value is missing", "no unit has one"],
     ),
     "assumed of nothing missing": (
         (GYRO, f"[units.assumed]\n{GYRO}"),
@@ -202,7 +202,7 @@ BAD = {
         ('name = "cameras"', 'name = "cameras"\naxis = "right"'),
         ["axis = 'right' contradicts kind = 'path' (line 63)"],
     ),
-    "no change of velocity": ((DELTA_V, ""), ["delta_v_m_per_s: it is missing"]),
+    "no change of velocity": ((DELTA_V, ""), ["delta_v_m_per_s: the value is missing"]),
     "change in km/h": (
         (DELTA_V, "delta_v_m_per_s = -97"),
         ["config.below-least", "delta_v_km_per_h"],

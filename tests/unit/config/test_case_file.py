@@ -129,8 +129,8 @@ def test_all_that_is_still_open_is_named_at_once(tmp_path):
         "all positions share; delta-V and the direction of force move with it\n"
         "  line 34, unit 1, accelerometer 1, channels, y: the column or channel of each axis: x "
         "forward, y right, z down\n"
-        '  Remedy: put what you know in place of each "?", numbers without quotation marks; a key '
-        "that may be left out may be deleted"
+        '  Remedy: replace each "?" by its value, numbers without quotation marks; optional keys '
+        "may be deleted"
     )
 
 

@@ -50,7 +50,9 @@ def test_a_record_in_place_of_a_file_is_answered_with_init(tmp_path):
 def test_a_list_that_does_not_end_is_named_at_the_end_of_the_file(tmp_path):
     path = tmp_path / "case.toml"
     path.write_text("a = [1,\n2,\n\n")
-    with pytest.raises(ConfigError, match="line 2: it is not TOML"):
+    with pytest.raises(
+        ConfigError, match=r"case\.toml, line 2: the file is not valid TOML: Invalid value"
+    ):
         read_toml(path)
 
 

@@ -280,7 +280,7 @@ class TestAnswers:
         (kind,) = found.main.types
         assert kind.name == "front"
         assert kind.roll is None
-        assert "a rollover cannot be detected" in kind.reason
+        assert "rolled over cannot be told" in kind.reason
 
     def test_an_impact_along_an_assumed_axis_is_no_event(self):
         # All of it to the side, where the unit has no accelerometer.
@@ -323,7 +323,7 @@ def test_a_gyro_on_the_same_vehicle_is_named_where_none_is_borrowed(stated):
     without = replace(other, gyro=None, assumed=assumed)
     if stated:
         found = reconstruct_crash([own, without], Entry.from_speed(15.65, 0.05))
-        (said,) = (f for f in found.findings if "borrows none" in f.what)
+        (said,) = (f for f in found.findings if f.code == "crash.gyro-not-borrowed")
         assert said.file == "IMU2"
         words = said.remedy
     else:

@@ -288,7 +288,7 @@ def test_what_is_refused():
         compare_units([one, one], window=(0.0, 0.02))
     with pytest.raises(ConfigError, match="three or more"):
         combine_units([one, one], "median")
-    with pytest.raises(ConfigError, match="no way"):
+    with pytest.raises(ConfigError, match="method: unknown method of combining units 'mode'"):
         combine_units([one, one], "mode")
 
 

@@ -116,9 +116,12 @@ def test_units_that_find_their_own_biases_are_compared_with_them():
     [
         ({"antenna": (1.0, 2.0)}, "antenna: .* three finite numbers"),
         ({"priors": {"side_slip": 1.0}}, "did you mean 'side_slip_sd_deg'"),
-        ({"priors": {"antenna_sd": -1.0}}, "antenna_sd: -1.0 is no standard deviation"),
-        ({"window": "10"}, "window: '10' is no number"),
-        ({"before": np.nan}, "before: nan is no number"),
+        (
+            {"priors": {"antenna_sd": -1.0}},
+            r"antenna_sd: a standard deviation of -1\.0 is negative",
+        ),
+        ({"window": "10"}, "GNSS entry, window: '10' is not a number"),
+        ({"before": np.nan}, "GNSS entry, before: nan is not a number"),
     ],
 )
 def test_what_cannot_be_is_told(cases, options, words):

@@ -237,8 +237,16 @@ def with_value(table, row, column, value):
     [
         (lambda t: with_value(t, 6, "accel_y", np.nan), 0, "IMU1, low-G, row 7, accel_y"),
         (lambda t: t.iloc[::-1], 1, "IMU1, high-G, row 2, time"),
-        (lambda t: t.iloc[1:], "gyro", "IMU1, gyro, time: its 2200 stamps"),
-        (lambda t: t.drop(columns="accel_z"), 1, "IMU1, high-G, accel_z: it has no accel_z"),
+        (
+            lambda t: t.iloc[1:],
+            "gyro",
+            r"IMU1, gyro, time: the 2200 stamps from -9\.995 to 1 s are not the",
+        ),
+        (
+            lambda t: t.drop(columns="accel_z"),
+            1,
+            "IMU1, high-G, accel_z: the part has no accel_z; a motion in space",
+        ),
     ],
 )
 def test_bad_input_names_the_part_the_row_and_the_quantity(edit, part, says):

@@ -374,7 +374,7 @@ def test_the_crash_test_of_nhtsa(recordings, tmp_path):
 
 
 def test_one_record_named_twice_is_refused(german):
-    with pytest.raises(ConfigError, match="named twice"):
+    with pytest.raises(ConfigError, match=r"Messung links\.csv, RECORD: the record is given twice"):
         read_records([german, german.parent / "." / german.name])
 
 

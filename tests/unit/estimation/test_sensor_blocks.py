@@ -133,7 +133,10 @@ def test_random_walk_has_its_drive():
         (lambda: accel_bias((1.0, 2.0)), r"accel_bias: \(1.0, 2.0\)"),
         (lambda: accel_scale(math.nan), "accel_scale: nan"),
         (lambda: time_offset((1.0, 1.0, 1.0)), "time_offset"),
-        (lambda: gyro_drift(1.0, math.inf), "correlation_time: inf"),
+        (
+            lambda: gyro_drift(1.0, math.inf),
+            "correlation_time: a correlation time of inf s of gyro_drift is not",
+        ),
         (lambda: gyro_misalignment(1.0, terms=("xy", "xx")), "terms"),
         (lambda: gyro_misalignment(1.0, terms=()), "terms"),
         (lambda: gyro_misalignment(1.0, terms=("xy", "xy")), "once"),

@@ -219,7 +219,9 @@ def test_damaged_headers(test_of, tmp_path):
     assert "left out: 'heavy' is not a number" in record.findings[0].what
     assert "mass_kg" not in record.facts
     (tmp_path / "T2.mme").write_text(MME)
-    with pytest.raises(DataError, match=r"holds 2 tests: T1\.mme, T2\.mme"):
+    with pytest.raises(
+        DataError, match=r"test_damaged_headers0: the folder has 2 tests: T1\.mme, T2\.mme"
+    ):
         read_crash_record(tmp_path)
     assert read_crash_record(tmp_path / "T1.mme").format == "mme"
     with pytest.raises(DataError, match="belong to other tests: T1"):

@@ -115,9 +115,15 @@ def test_maps_know_wgs84_alone(tmp_path, form):
     ("options", "message"),
     [
         ({"epoch": datetime(2026, 3, 1)}, "no time zone"),
-        ({"geoid_undulation": 4000.0}, "4000 m from the ellipsoid"),
-        ({"geoid_undulation": float("nan")}, "nan m from the ellipsoid"),
-        ({"most_points": 1}, "through 1 points"),
+        (
+            {"geoid_undulation": 4000.0},
+            "geoid_undulation: a geoid height of 4000 m over the ellipsoid is out",
+        ),
+        (
+            {"geoid_undulation": float("nan")},
+            "geoid_undulation: a geoid height of nan m over the ellipsoid is out",
+        ),
+        ({"most_points": 1}, "most_points: 1 points are too few for a line"),
         ({"tum_frame": "emu"}, "did you mean 'enu'"),
     ],
 )
@@ -127,7 +133,9 @@ def test_choices_that_are_none(options, message):
 
 
 def test_a_date_that_is_none(tmp_path):
-    with pytest.raises(DataError, match="is no date"):
+    with pytest.raises(
+        DataError, match=r"epoch: 1e\+12 s after 2026-03-01T12:00:00\+00:00 is beyond the range"
+    ):
         write("kml", tmp_path / "a", table([[1, 2, 3]], time=[1e12]), epoch=EPOCH)
 
 

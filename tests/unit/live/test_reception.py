@@ -122,7 +122,7 @@ def test_a_fix_that_comes_too_late_is_counted_and_not_used(tmp_path):
     assert live.run.record.innovations == {}
     # It runs again without any: the aid has states, but no file.
     spec = write_received(live.spec, live.got, tmp_path)
-    assert spec.aiding.gnss.path is None
+    assert spec.aiding["gnss"].path is None
 
 
 def test_a_line_that_cannot_be_used_changes_nothing():
@@ -263,7 +263,7 @@ def test_of_a_record_the_same_with_lines(tmp_path):
     whole["aiding"]["gnss"]["path"] = str(tmp_path / "fix.csv")
     spec = live_spec(NavigationSpec.checked({k: v for k, v in whole.items() if v is not None}))
     assert spec.log is None
-    assert spec.aiding.gnss.path is None
+    assert spec.aiding["gnss"].path is None
     assert spec.live.sampling == "mean"
 
 

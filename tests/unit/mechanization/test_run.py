@@ -77,7 +77,7 @@ def test_a_gap_is_refused_and_may_be_allowed():
     finding = caught.value.finding
     assert (finding.file, finding.quantity) == ("rest.csv", "dt")
     assert "a gap of 2.5 s, from 5.2 s to 7.7 s" in finding.what
-    assert "(2 such)" in finding.what
+    assert "(2 such gaps)" in finding.what
     assert "longest_step=2.5" in finding.remedy
     run = run_mechanization(NorthEastDown(), START, log, longest_step=2.5)
     assert len(run.trajectory) == 6

@@ -99,7 +99,7 @@ def test_what_means_nothing_is_refused():
         standing((LEVEL, Navigation()), commands=(Command(1.0, "fly"),))
     with pytest.raises(ConfigError, match="needs the errors of its sensors"):
         NavigationPipeline(navigator(), modes=(LEVEL, Navigation()))
-    with pytest.raises(ConfigError, match="no aid 'rtk'"):
+    with pytest.raises(ConfigError, match="fixes: no measurement 'rtk' has a table"):
         standing((LEVEL, Navigation()), fixes="rtk")
 
 
@@ -179,7 +179,9 @@ def test_a_known_state_begins_with_its_sample():
     assert run.record.trajectory.index[0] == pytest.approx(5.05)
     assert run.record.modes[0].begin == pytest.approx(5.0)
     late = NavState.from_degrees(*HERE, time=-3.0)
-    with pytest.raises(DataError, match="known at -3 s, and the samples begin at 0 s"):
+    with pytest.raises(
+        DataError, match=r"rest\.csv, start: the state is of -3 s, and the samples begin at 0 s"
+    ):
         run_batch(NavigationPipeline(navigator(), start=KnownStart(late, *sd)), imu)
     first = NavigationPipeline(navigator(), start=KnownStart(late, *sd, at_first_sample=True))
     assert run_batch(first, imu).record.trajectory.index[0] == pytest.approx(0.05)

@@ -163,7 +163,9 @@ def test_a_second_cleaning_does_nothing(document):
 
 def test_what_is_no_svg_is_named():
     broken = Picture("plan", "<svg><g></svg>", "The plan")
-    with pytest.raises(DataError, match="'plan' is no SVG: mismatched tag"):
+    with pytest.raises(
+        DataError, match="report, The plan: the picture 'plan' is not valid SVG: mismatched"
+    ):
         document_page(Document("t", "", (), (broken,), ()))
 
 

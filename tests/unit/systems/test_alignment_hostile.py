@@ -161,7 +161,7 @@ def test_rates_in_the_unit_in_which_they_are_small():
     [
         ({"lat": float("nan")}, "--lat", "nan does not fit"),
         ({"axes": "q,r,s"}, "--axes", "three axes"),
-        ({"method": "known_heading"}, "--method, heading_deg", "it is missing"),
+        ({"method": "known_heading"}, "--method, heading_deg", "the value is missing"),
         ({"duration": -1.0}, "--duration", "no duration"),
     ],
 )

@@ -224,8 +224,8 @@ def test_the_file_that_is_written_asks_for_the_latitude_alone(tmp_path):
     assert "latitude" in str(refused.value)
     file.write_text(draft.text.replace('lat_deg = "?"', "lat_deg = 48.0"))
     spec = NavigationSpec.read(file)
-    assert spec.aiding.stance.detector == "shoe"
-    assert spec.aiding.standing.kind == "zero_rate"
+    assert spec.aiding["stance"].detector == "shoe"
+    assert spec.aiding["standing"].kind == "zero_rate"
     assert "g_sensitivity" in spec.sensors.states
     result = run_navigation(spec)
     assert result.record.innovations["stance.velocity"].shape[0] > 200
