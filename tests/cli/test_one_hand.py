@@ -128,9 +128,9 @@ def test_a_draft_keeps_the_part_that_flags_name(
     ("flags", "said"),
     [
         (("--to", "5", "--duration", "5"), "error: --to, --duration: "),
-        (("--duration", "0"), "error: --duration: 0 s is no duration"),
+        (("--duration", "0"), "error: --duration: a duration of 0 s is not positive"),
         (("--from", "7", "--to", "5"), "error: --to: 5 s is not after the begin at 7 s"),
-        (("--from", "nan"), "error: --from: nan is no number"),
+        (("--from", "nan"), "error: --from: nan is not a finite number"),
     ],
 )
 def test_a_part_that_cannot_be_meant_is_refused_alike(tmp_path, run_cli, command, flags, said):
@@ -204,7 +204,7 @@ def test_a_folder_of_logs_names_them(tmp_path, run_cli):
     (tmp_path / "LICENSE").write_text("free\n")
     (tmp_path / "notes.txt").write_text("day,weather\n1,2\n2,3\n")
     said = run_cli("init", "navigate", tmp_path, "--foot", "--out", tmp_path / "x.toml").err
-    assert "it holds: LICENSE, notes.txt" in said
+    assert "it has: LICENSE, notes.txt" in said
     log(tmp_path / "one.csv")
     said = run_cli("init", "navigate", tmp_path, "--foot", "--out", tmp_path / "x.toml").err
     assert "contains one recording: one.csv" in said

@@ -199,6 +199,6 @@ def test_counts_are_as_uncertain_as_it_says():
 def test_a_counter_that_was_set_back_is_told():
     found = refused(odometer_from_distance, TIME, [0, 10, 20, 65_000.0, 65_010, 65_020], 0.1)
     assert (found.row, found.quantity) == (4, "distance")
-    assert "set back" in found.what
+    assert "reset" in found.what
     with pytest.raises(ConfigError, match="quantum"):
         odometer_from_distance(TIME, TIME, 0.0)

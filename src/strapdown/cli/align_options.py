@@ -109,8 +109,9 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
         The log cannot be read.
     """
     site = {"lat_deg": given["lat"], "lon_deg": given["lon"], "alt_m": given["alt"]}
+    keys = log_keys(given)
     try:
-        table = specify(LogTable, path=str(log), **log_keys(given))
+        table = specify(LogTable, path=str(log), **keys)
         return specify_alignment(
             ImuFile(table, given["axes"]),
             site={key: float(value) for key, value in site.items() if value is not None},

@@ -100,7 +100,7 @@ def test_columns_that_are_not_there_are_named():
 
 def test_a_filter_without_that_aiding():
     need("ahrs")
-    with pytest.raises(ConfigError, match="'madgwick' does not run on gyro"):
+    with pytest.raises(ConfigError, match="peers: ahrs: 'madgwick' does not support gyro"):
         PEERS["ahrs"].run(imu(), IDENTITY, "gyro", "madgwick")
 
 

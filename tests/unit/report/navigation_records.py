@@ -87,7 +87,9 @@ def record(
         sensors_sd=pd.DataFrame(unknown * fell, index=index, columns=list(UNITS)),
         units=UNITS,
         innovations={"rtk.position": innovations},
-        events=tuple(Event(s.begin, "outage", "rtk: nothing came") for s in spans),
+        events=tuple(
+            Event.of(s.begin, "outage", "outage", name="rtk", since=s.begin) for s in spans
+        ),
         modes=(Span("navigation", float(time[0]), float(time[-1])),),
         outages={"rtk": spans},
     )

@@ -268,7 +268,9 @@ def test_a_bench_plots_itself_without_global_state(full_bench, kind):
 
 def test_what_cannot_be_plotted_is_said(make_bench):
     bench = make_bench(("dcm",), truth=False, sweep=False)
-    with pytest.raises(ConfigError, match="'swep' is no chart") as unknown:
+    with pytest.raises(
+        ConfigError, match="kind: unknown chart 'swep' of an attitude comparison"
+    ) as unknown:
         bench.plot("swep")
     assert "sweep" in str(unknown.value)
     for kind in KINDS.keys() - {"cost", "gyro", "attitude", "share"}:

@@ -172,7 +172,9 @@ def test_a_bad_file_is_refused_by_file_and_key(tmp_path, old, new, key, message)
 
 
 def test_a_file_without_a_triad_is_refused(tmp_path):
-    with pytest.raises(ConfigError, match="there is neither"):
+    with pytest.raises(
+        ConfigError, match=r"mine\.toml, gyro, accel: the sensor has neither gyros nor"
+    ):
         load_sensor(write(tmp_path, "mine.toml", GOOD.split("[gyro]")[0]))
 
 

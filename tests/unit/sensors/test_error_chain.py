@@ -225,7 +225,7 @@ def test_what_makes_no_sensor_is_refused_by_name(values, quantity):
 
 def test_what_cannot_be_applied_is_refused():
     t, u = stamps(), truth()
-    with pytest.raises(ConfigError, match="no kind of sampling"):
+    with pytest.raises(ConfigError, match="sampling: unknown kind of sampling 'average'"):
         apply(TriadErrors(), t, u, sampling="average")
     with pytest.raises(ConfigError, match="specific force"):
         apply(KNOWN, t, u)

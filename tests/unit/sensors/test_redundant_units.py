@@ -362,7 +362,7 @@ def test_what_is_refused():
         vote_units(mounted, {"A": tables["A"]})
     with pytest.raises(DataError, match="stamps are not"):
         vote_units(mounted, {"A": tables["A"], "B": tables["B"].iloc[1:]})
-    with pytest.raises(ConfigError, match="no rotation"):
+    with pytest.raises(ConfigError, match="A, mounting: the mounting is not a rotation"):
         MountedUnit("A", mounted[0].uncertainty, 2.0 * np.eye(3))
     with pytest.raises(ConfigError, match="one plane"):
         parity_matrix(np.eye(3)[[0, 1, 0, 1]])

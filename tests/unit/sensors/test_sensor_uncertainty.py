@@ -56,7 +56,7 @@ def test_an_override_replaces_the_data_sheet():
         ("idg-500-isz-500", "accel", {}, "has no triad 'accel'"),
         ("lis302dlh", "magnet", {}, "has no triad 'magnet'"),
         ("lis302dlh", "accel", {"biass": 1.0}, "no 'biass'"),
-        ("lis302dlh", "accel", {"bias": -1.0}, "no standard deviation"),
+        ("lis302dlh", "accel", {"bias": -1.0}, r"bias: -1\.0 is not a standard deviation or range"),
     ],
 )
 def test_what_is_not_there_is_refused(name, triad, overrides, message):

@@ -365,7 +365,7 @@ def test_what_a_shorter_record_takes_from_the_others_is_told():
             ["IMU1, accel, accel_y", "no accel_y"],
         ),
         (lambda: [imu(), imu("IMU2", trigger=50.0)], ["IMU2", "50 s is not within the record"]),
-        (lambda: [imu(trigger="5.0")], ["IMU1", "trigger", "kind str"]),
+        (lambda: [imu(trigger="5.0")], ["IMU1", "trigger", "a value of type str"]),
         (
             lambda: [imu(trigger=6.8), imu("IMU2", trigger=3.2)],
             ["IMU1", "IMU2", "do not overlap"],
@@ -380,7 +380,7 @@ def test_what_a_shorter_record_takes_from_the_others_is_told():
         ),
         (
             lambda: [with_table(imu(), with_text)],
-            ["IMU1, accel, row 201, accel_y", "'n/a' is no number"],
+            ["IMU1, accel, row 201, accel_y", "'n/a' is not a number"],
         ),
         (
             lambda: [with_table(imu(), lambda t: t.iloc[[0, 2, 1, *range(3, 401)]])],

@@ -204,7 +204,7 @@ def test_what_is_no_pulse_is_refused(pulse):
 def test_a_pulse_outside_the_motion_is_refused():
     with pytest.raises(ConfigError, match="pulse 2") as refused:
         replace(CRASH, pulses=(PULSE, HaversinePulse(0.7, 0.1)))
-    assert "end before the motion" in str(refused.value)
+    assert "ends after the motion" in str(refused.value)
 
 
 @pytest.mark.parametrize("change", [(1.0, 2.0), (1.0, 2.0, math.inf)])

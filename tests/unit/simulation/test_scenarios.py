@@ -157,7 +157,7 @@ def test_mean_samples_hold_the_mean_of_the_trend():
         ({"rate": -5.0}, "fewer than two samples"),
         ({"rate": float("nan")}, "fewer than two samples"),
         ({"rate": 1e9}, "use at most"),
-        ({"rate": 10.0, "sampling": "average"}, "no kind of sampling"),
+        ({"rate": 10.0, "sampling": "average"}, "sampling: unknown kind of sampling 'average'"),
     ],
 )
 def test_what_cannot_be_sampled_is_refused(options, message):

@@ -162,7 +162,7 @@ def test_rates_in_the_unit_in_which_they_are_small():
         ({"lat": float("nan")}, "--lat", "nan does not fit"),
         ({"axes": "q,r,s"}, "--axes", "three axes"),
         ({"method": "known_heading"}, "--method, heading_deg", "the value is missing"),
-        ({"duration": -1.0}, "--duration", "no duration"),
+        ({"duration": -1.0}, "--duration", "--duration: a duration of -1 s is not positive"),
     ],
 )
 def test_a_flag_is_told_by_its_name(stand, tmp_path, given, place, said):

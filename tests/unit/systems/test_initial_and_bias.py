@@ -88,7 +88,7 @@ def test_one_text_stands_for_a_list_of_one(log):
 
 @pytest.mark.parametrize("option", [{"axes": "x,-y,-z"}, {"gyro_unit": "deg/s"}, {"repair": True}])
 def test_a_scenario_is_not_read_from_a_file(option):
-    with pytest.raises(ConfigError, match="not read from a file"):
+    with pytest.raises(ConfigError, match="alexiev-fig"):
         compare_attitude("alexiev-fig4", **option)
 
 

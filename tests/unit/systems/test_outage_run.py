@@ -227,8 +227,8 @@ def wrong_start(truth, spec, draws):
 @pytest.mark.parametrize(
     ("motion", "quantity", "says"),
     [
-        ({"turn_rate_deg_per_s": 3.0}, "--turn-rate", "stands"),
-        ({"speed_m_per_s": 100.0, "turn_rate_deg_per_s": 90.0}, "--turn-rate", "side"),
+        ({"turn_rate_deg_per_s": 3.0}, "--turn-rate", "stationary"),
+        ({"speed_m_per_s": 100.0, "turn_rate_deg_per_s": 90.0}, "--turn-rate", "lateral"),
         ({"to_speed_m_per_s": 2000.0}, "--to-speed", "m/s²"),
     ],
 )
