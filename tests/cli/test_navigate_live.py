@@ -145,7 +145,7 @@ def test_without_a_sample_there_is_no_bundle(live):
     _, err = job.communicate("imu,1,2\n", timeout=120)
     assert job.returncode == 3
     assert "line 1: line not used: imu needs 7 numbers, not 2" in err
-    assert "no sample came" in err
+    assert "no sample was received" in err
     assert [p.name for p in live.iterdir()] == ["run.toml"]
 
 

@@ -179,13 +179,13 @@ def test_what_is_no_bundle_is_said_to_be_none(tmp_path):
     with pytest.raises(DataError, match="no manifest"):
         verify(tmp_path)
     (tmp_path / MANIFEST).write_text("{")
-    with pytest.raises(DataError, match=r"manifest\.json: the file is not valid JSON: Expecting property name"):
+    with pytest.raises(DataError, match="the file is not valid JSON"):
         verify(tmp_path)
     (tmp_path / MANIFEST).write_text("[" * 100_000)
-    with pytest.raises(DataError, match=r"manifest\.json: the file is not valid JSON: Expecting property name"):
+    with pytest.raises(DataError, match="the file is not valid JSON"):
         verify(tmp_path)
     (tmp_path / MANIFEST).write_text('{"schema": "other"}')
-    with pytest.raises(DataError, match="not a manifest"):
+    with pytest.raises(DataError, match="the manifest is not of the form"):
         verify(tmp_path)
 
 

@@ -178,8 +178,10 @@ def test_a_full_disk_leaves_nothing(tmp_path, given, monkeypatch):
 
 
 def test_a_folder_that_is_not_there_is_not_called_empty(tmp_path):
-    with pytest.raises(DataError, match="there is no such folder"):
+    with pytest.raises(DataError, match="the folder does not exist"):
         read_manifest(tmp_path / "nowhere")
     (tmp_path / "here").mkdir()
-    with pytest.raises(DataError, match=r"no manifest\.json in it"):
+    with pytest.raises(
+        DataError, match=r"the folder has no manifest\.json: it is not a bundle of strapdown"
+    ):
         read_manifest(tmp_path / "here")

@@ -182,9 +182,13 @@ def simulate_gnss(
             fast += FALSE_VELOCITY * wild[:, 3:]
     position_sd = receiver.stated_position_sd or tuple(np.hypot(noise, drift))
     velocity_sd = receiver.stated_velocity_sd or receiver.velocity_noise
+    measured = moved_places(place, off, motion.ellipsoid)[kept]
+    # The longitude of a motion continues beyond a full turn; that of a receiver does not.
+    beyond = (measured[:, 1] < -180.0) | (measured[:, 1] >= 360.0)
+    measured[beyond, 1] = (measured[beyond, 1] + 180.0) % 360.0 - 180.0
     return gnss_table(
         (time + receiver.time_offset)[kept],
-        moved_places(place, off, motion.ellipsoid)[kept],
+        measured,
         (velocity + fast)[kept],
         position_sd,
         velocity_sd,

@@ -187,7 +187,7 @@ def test_an_end_that_is_not_where_it_is_stated():
     wrong = replace(made.accelerometers[1], uncertainty=replace(HIGH, full_scale=500 * G))
     out = prepare_unit(replace(made, accelerometers=(made.accelerometers[0], wrong)))
     assert out.clipped[:, 0].any()
-    assert "held between -980.66" in words(out)
+    assert "clipped between -980.66" in words(out)
 
 
 def test_swapped_axes_between_the_ranges():
@@ -200,7 +200,7 @@ def test_swapped_axes_between_the_ranges():
         return out
 
     text = words(prepare_unit(changed(made, 1, swap)))
-    assert "IMU1, high-G, accel_y: it follows -x of low-G" in text
+    assert "IMU1, high-G, accel_y: it corresponds to -x of low-G" in text
     assert "the source changes between" in text
 
 

@@ -166,7 +166,7 @@ def test_swapped_axes_are_found(four):
     assert not found.comparison.agree
     words = [str(f) for f in found.comparison.findings]
     assert any("IMU2, axes: the axes of its accelerometers differ" in w for w in words)
-    assert any("forward of IMU1 is right of it, right of IMU1 is forward of it" in w for w in words)
+    assert any("forward of IMU1 is its right, right of IMU1 is its forward" in w for w in words)
 
 
 @pytest.mark.parametrize("off", [(0.0, 0.5, 0.0), (0.5, 0.0, 0.0)])

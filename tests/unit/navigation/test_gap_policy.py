@@ -84,7 +84,7 @@ def test_a_short_gap_is_bridged_and_said():
     run = run_batch(chain(), log(), None)
     (gap,) = [event for event in run.record.events if event.kind == "gap"]
     assert gap.time == pytest.approx(2.0)
-    assert "a gap of 0.3 s, from 2 to 2.3 s" in gap.finding.what
+    assert "0.3 s without samples, from 2 to 2.3 s" in gap.finding.what
     assert len(run.record.trajectory) == len(log()) - 1
     # The truth is as near as the standard deviations say, and these are larger than without it.
     whole = run_batch(chain(), log(length=0.0), None).record

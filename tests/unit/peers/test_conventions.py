@@ -178,5 +178,7 @@ def test_an_error_of_a_library_is_a_message():
         pytest.skip("ahrs is not installed")
     imu, _ = turning("x", 1)
     imu[MAG] = 0.0
-    with pytest.raises(StrapdownError, match=r"ahrs 0\.4\.0 ekf, gyro\+accel\+mag: the filter failed: Invalid"):
+    with pytest.raises(
+        StrapdownError, match=r"ahrs 0\.4\.0 ekf, gyro\+accel\+mag: the filter failed: Invalid"
+    ):
         peer.run(imu, START, "gyro+accel+mag", "ekf")

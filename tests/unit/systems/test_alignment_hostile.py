@@ -168,4 +168,5 @@ def test_rates_in_the_unit_in_which_they_are_small():
 def test_a_flag_is_told_by_its_name(stand, tmp_path, given, place, said):
     with pytest.raises(ConfigError, match=said) as error:
         flagged(write(tmp_path / "a.csv", stand), **given)
-    assert error.value.finding.quantity == place
+    finding = error.value.finding
+    assert finding.data.get("faults", (finding,))[0].quantity == place

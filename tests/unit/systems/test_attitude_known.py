@@ -130,7 +130,9 @@ def test_a_second_log_with_an_attitude_tells_where_the_run_starts(logs, first):
 
 def test_two_truths_are_refused(logs, first):
     LOG_WRITERS["csv"](logs / "truth.csv", first[0], first[1])
-    with pytest.raises(ConfigError, match="--reference-log: an attitude reference is given as well"):
+    with pytest.raises(
+        ConfigError, match="--reference-log: an attitude reference is given as well"
+    ):
         compare_attitude(
             logs / "first.csv",
             reference=logs / "truth.csv",
@@ -192,7 +194,9 @@ def test_rests_without_any_are_refused(tmp_path):
     time = np.arange(300) * 0.01
     gyro = np.column_stack([np.sin(9 * time), np.cos(7 * time), np.sin(5 * time)])
     LOG_WRITERS["csv"](tmp_path / "log.csv", imu_table(time, gyro), None)
-    with pytest.raises(ConfigError, match=r"log\.csv, --reference rests: no stationary interval with acceleration"):
+    with pytest.raises(
+        ConfigError, match=r"log\.csv, --reference rests: no stationary interval with acceleration"
+    ):
         compare_attitude(tmp_path / "log.csv", reference="rests")
 
 

@@ -235,5 +235,7 @@ def test_what_are_no_trials_is_refused(asked):
 def test_a_log_is_not_drawn_again_or_named_twice(logs):
     with pytest.raises(ConfigError, match="several logs"):
         compare_attitude(logs[0], trials=3)
-    with pytest.raises(ConfigError, match="a log is given twice, and one trial does not count as two"):
+    with pytest.raises(
+        ConfigError, match="a log is given twice, and one trial does not count as two"
+    ):
         compare_attitude([logs[0], logs[0]])

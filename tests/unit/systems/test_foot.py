@@ -219,7 +219,7 @@ def test_the_file_that_is_written_asks_for_the_latitude_alone(tmp_path):
     assert [one.key for one in draft.asked] == ["lat_deg"]
     file = tmp_path / "foot.toml"
     file.write_text(draft.text)
-    with pytest.raises(ConfigError, match=r"foot\.toml: one value is missing:\.  line 14, site, lat_deg: geodetic") as refused:
+    with pytest.raises(ConfigError, match="one value is missing") as refused:
         NavigationSpec.read(file)
     assert "latitude" in str(refused.value)
     file.write_text(draft.text.replace('lat_deg = "?"', "lat_deg = 48.0"))
@@ -297,9 +297,7 @@ def test_the_recording_is_walked_to_its_control_points(proposed, detector, rule)
     stance = proposed.aiding["stance"].model_copy(
         update={"detector": detector, "threshold_rule": rule}
     )
-    spec = proposed.model_copy(
-        update={"aiding": proposed.aiding.model_copy(update={"stance": stance})}
-    )
+    spec = proposed.model_copy(update={"aiding": {**proposed.aiding, "stance": stance}})
     found = run_navigation(spec).points
     assert len(found.time) == 62
     assert found.rms < 0.6
