@@ -23,8 +23,7 @@ from strapdown.attitude_algorithms import make_algorithm, run_attitude
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.evaluation import dead_reckon
 from strapdown.increments import increments_from_imu
-from strapdown.sensors import SENSORS, load_sensor
-from strapdown.sensors.rest import RestStretch
+from strapdown.sensors import SENSORS, RestStretch, load_sensor
 from strapdown.simulation import ImuErrors, Motion, Pulse, PulseMotion, TriadErrors, simulate_imu
 from strapdown.tables import QUATERNION
 

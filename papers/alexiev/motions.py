@@ -20,8 +20,13 @@ from papers.reproduction import (
     amount,
 )
 from strapdown import rotation
-from strapdown.attitude_algorithms import AttitudeAlgorithm, attitude_history, make_algorithm
-from strapdown.attitude_algorithms.cost import Cost, count_cost
+from strapdown.attitude_algorithms import (
+    AttitudeAlgorithm,
+    Cost,
+    attitude_history,
+    count_cost,
+    make_algorithm,
+)
 from strapdown.increments import increments_from_imu
 from strapdown.simulation import ImuErrors, Motion, find_scenario, simulate_imu
 from strapdown.tables import GYRO, QUATERNION

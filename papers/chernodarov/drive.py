@@ -27,11 +27,11 @@ from strapdown.increments import motion_increments
 from strapdown.navigation import (
     ClosedLoop,
     Correction,
+    Gnss,
     LostCovarianceError,
     NavigationChunk,
     Navigator,
 )
-from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.simulation import (
     Accelerate,
     GnssReceiver,

@@ -11,6 +11,7 @@ from strapdown.attitude_algorithms.algorithm import (
     attitude_history,
     run_attitude,
 )
+from strapdown.attitude_algorithms.cost import Cost, count_cost
 from strapdown.attitude_algorithms.direction_cosine import DirectionCosine
 from strapdown.attitude_algorithms.euler_krylov import EulerKrylov
 from strapdown.attitude_algorithms.naive import Naive
@@ -24,6 +25,7 @@ __all__ = [
     "AttitudeAlgorithm",
     "AttitudeRun",
     "AttitudeTracker",
+    "Cost",
     "DirectionCosine",
     "EulerKrylov",
     "Naive",
@@ -31,6 +33,7 @@ __all__ = [
     "RotationVector",
     "RungeKutta",
     "attitude_history",
+    "count_cost",
     "make_algorithm",
     "run_attitude",
 ]

@@ -9,12 +9,14 @@ from strapdown.lazy_names import load_on_first_use
 if TYPE_CHECKING:
     from strapdown.navigation.engine import LostCovarianceError
     from strapdown.navigation.filter_options import ClosedLoop, Correction, OpenLoop
+    from strapdown.navigation.measurements import Gnss
     from strapdown.navigation.navigator import Navigator
     from strapdown.navigation.record import NavigationChunk
 
 __all__ = [
     "ClosedLoop",
     "Correction",
+    "Gnss",
     "LostCovarianceError",
     "NavigationChunk",
     "Navigator",
@@ -26,6 +28,7 @@ load_on_first_use(
     {
         "engine": "LostCovarianceError",
         "filter_options": "ClosedLoop Correction OpenLoop",
+        "measurements": "Gnss",
         "navigator": "Navigator",
         "record": "NavigationChunk",
     },

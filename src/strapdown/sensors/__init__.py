@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from strapdown.sensors.catalogue import SENSORS, Sensor, load_sensor
     from strapdown.sensors.crash_unit import CrashUnit, Mounting
     from strapdown.sensors.error_chain import apply, child, intervals, white_noise
+    from strapdown.sensors.rest import RestStretch
     from strapdown.sensors.synchronise import synchronise
     from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
     from strapdown.sensors.uncertainty import (
@@ -25,6 +26,7 @@ __all__ = [
     "ImuErrors",
     "ImuUncertainty",
     "Mounting",
+    "RestStretch",
     "Sensor",
     "TriadErrors",
     "TriadUncertainty",
@@ -44,6 +46,7 @@ load_on_first_use(
         "catalogue": "SENSORS Sensor load_sensor",
         "crash_unit": "CrashUnit Mounting",
         "error_chain": "apply child intervals white_noise",
+        "rest": "RestStretch",
         "synchronise": "synchronise",
         "triad_errors": "ImuErrors TriadErrors",
         "uncertainty": "ImuUncertainty TriadUncertainty crash_priors draw_errors",

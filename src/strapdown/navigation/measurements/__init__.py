@@ -9,7 +9,18 @@ from strapdown.navigation.measurements.measurement import Measurement
 from strapdown.navigation.measurements.standstill import ZeroRate, ZeroVelocity
 from strapdown.navigation.measurements.vehicle import BodyVelocity, NoSlip, Odometer
 
-__all__ = ["AIDS"]
+__all__ = [
+    "AIDS",
+    "Barometer",
+    "BodyVelocity",
+    "Gnss",
+    "Heading",
+    "Measurement",
+    "NoSlip",
+    "Odometer",
+    "ZeroRate",
+    "ZeroVelocity",
+]
 
 #: Measurements by their kind in a configuration; plug-ins are added.
 AIDS: dict[str, type[Measurement]] = {
