@@ -3,9 +3,9 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN = $(VENV)/bin
 PIP = $(BIN)/python -m pip --disable-pip-version-check install --quiet -c constraints.txt
-PYTEST = NUMBA_CACHE_DIR="$$cache" $(BIN)/python -m pytest
-# Numba's cache does not see every change of a source; each run of the tests has its own.
-FRESH = cache=$$(mktemp -d); trap 'rm -rf "$$cache"' EXIT;
+PYTEST = $(BIN)/python -m pytest
+# A cache of compiled kernels for one run; otherwise its folder is named after their sources.
+FRESH = cache=$$(mktemp -d); trap 'rm -rf "$$cache"' EXIT; NUMBA_CACHE_DIR="$$cache"
 
 .PHONY: demo test test-slow test-bounds examples papers record mutation check format bench docs codes pictures clean
 .DEFAULT_GOAL := help
@@ -40,13 +40,13 @@ demo: $(VENV)/.run
 	$(BIN)/strapdown demo --out demo --force
 
 test: $(VENV)/.test
-	@$(FRESH) $(PYTEST) -n 2
+	$(PYTEST) -n 2 --dist worksteal
 
 test-slow: $(VENV)/.test
-	@$(FRESH) $(PYTEST) -m slow tests papers
+	$(PYTEST) -n 2 --dist worksteal -m slow tests papers
 
 examples: $(VENV)/.test
-	@$(FRESH) $(PYTEST) -n 2 -m slow tests/cli/test_manual.py
+	$(PYTEST) -n 2 --dist worksteal -m slow tests/cli/test_manual.py
 
 test-bounds: $(VENV)/.test
 	@$(FRESH) NUMBA_BOUNDSCHECK=1 $(PYTEST) tests/unit/kernels tests/contracts
@@ -55,7 +55,7 @@ record: $(VENV)/.run
 	$(BIN)/python tests/record
 
 mutation: $(VENV)/.test
-	@$(FRESH) NUMBA_CACHE_DIR="$$cache" $(BIN)/python tests/mutation --jobs 2
+	@$(FRESH) $(BIN)/python tests/mutation --jobs 2
 
 check: $(VENV)/.dev
 	$(BIN)/ruff check .
@@ -68,22 +68,22 @@ format: $(VENV)/.dev
 	$(BIN)/ruff format .
 
 bench: $(VENV)/.dev
-	@$(FRESH) NUMBA_CACHE_DIR="$$cache" $(BIN)/python -m benchmarks
+	$(BIN)/python -m benchmarks
 
 codes: $(VENV)/.test
-	@$(FRESH) STRAPDOWN_WRITE_CODES=1 $(PYTEST) -m '' tests/cli/test_bad_input.py
+	STRAPDOWN_WRITE_CODES=1 $(PYTEST) -m '' tests/cli/test_bad_input.py
 
 papers: $(VENV)/.test
-	@$(FRESH) $(PYTEST) -n 2 papers
-	@$(FRESH) for paper in alexiev tadic chernodarov; do \
-		NUMBA_CACHE_DIR="$$cache" $(BIN)/python -m papers.$$paper --out papers-reproduced/$$paper --quiet \
+	$(PYTEST) -n 2 --dist worksteal papers
+	for paper in alexiev tadic chernodarov; do \
+		$(BIN)/python -m papers.$$paper --out papers-reproduced/$$paper --quiet \
 		|| exit 1; done
 
 statements: $(VENV)/.test
-	@$(FRESH) STRAPDOWN_WRITE_STATEMENTS=1 $(PYTEST) -m '' papers -k statements_of_this_code
+	STRAPDOWN_WRITE_STATEMENTS=1 $(PYTEST) -m '' papers -k statements_of_this_code
 
 pictures: $(VENV)/.test
-	@$(FRESH) STRAPDOWN_WRITE_PICTURES=1 $(PYTEST) -m '' tests/cli/test_pictures.py papers -k picture
+	STRAPDOWN_WRITE_PICTURES=1 $(PYTEST) -m '' tests/cli/test_pictures.py papers -k picture
 
 docs: $(VENV)/.dev
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
