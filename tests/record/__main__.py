@@ -127,8 +127,11 @@ def forget(folder, run):
         (folder / f"{run}.{suffix}").unlink(missing_ok=True)
 
 
-def record(side, python, adapter, runs, out, data, jobs):
-    """Record runs, each in a process of its own; returns those that did not end."""
+def record(side, python, adapter, runs, out, data, jobs, keys=None):
+    """Record runs, each in a process of its own; returns those that did not end.
+
+    A run that ended keeps its key at once, so that an interrupted record goes on where it was.
+    """
     out.mkdir(parents=True, exist_ok=True)
 
     def one(name):
@@ -150,6 +153,8 @@ def record(side, python, adapter, runs, out, data, jobs):
         print(f"{side} {name}: {'recorded' if code == 0 else 'FAILED'}, {took:.0f} s", flush=True)
         if said:
             print("  " + said.replace("\n", "\n  "), flush=True)
+        if keys and not code:
+            (out / f"{name}.key").write_text(keys[name])
         return name if code else None
 
     with ThreadPoolExecutor(jobs) as pool:
@@ -194,10 +199,7 @@ def main():
     for name in due:
         forget(old_out, name)
     begin = time.monotonic()
-    broken = record("old", old_python, "adapter_0_1", due, old_out, data, words.jobs)
-    for name in due:
-        if name not in broken:
-            (old_out / f"{name}.key").write_text(keys[name])
+    broken = record("old", old_python, "adapter_0_1", due, old_out, data, words.jobs, keys)
     middle = time.monotonic()
     broken += record("new", sys.executable, "adapter", runs, new_out, data, words.jobs)
     end = time.monotonic()
