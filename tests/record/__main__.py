@@ -52,10 +52,9 @@ def python_of(folder):
 
 
 def build_old(folder):
-    """Make the environment of version 0.1: its wheel, with the versions of its constraints.
+    """Make the environment of version 0.1: its wheel, with the library versions of this tree.
 
-    The versions are those of version 0.1's own constraints; where the working tree has moved on,
-    the comparison of libraries says so.
+    The tag, or the commit behind it, is checked out and patched (see `STRICT`).
     """
     print(f"making version 0.1 in {folder}", flush=True)
     source, venv = folder / "src", folder / "venv"
