@@ -66,10 +66,10 @@ class Finding:
     line : int, optional
         Line of a file that a person wrote, counted from 1; such a file has no rows.
     data : mapping, optional
-        More of `values`, with names that are no identifiers or are taken by the parameters.
+        More of `values`, with names that are not identifiers or equal those of parameters.
     **values
         Numbers, texts, sequences of them, or findings that explain this one; what the sentence
-        shows, and `shown`, a value as the user wrote it, which stands before the sentence.
+        shows, and `shown`, a value as the user wrote it, shown before the sentence.
     """
 
     __slots__ = ("code", "data", "file", "line", "quantity", "row", "severity")
@@ -227,7 +227,7 @@ class DataError(StrapdownError):
 
 
 class ConfigError(StrapdownError):
-    """What was asked for cannot be done, or was not understood."""
+    """The request cannot be met, or was not understood."""
 
     exit_code = 4
 

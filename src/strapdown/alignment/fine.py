@@ -73,7 +73,7 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True)
 class FineAlignment:
-    """Attitude, drifts and biases of a body at rest, with what cannot be known of them.
+    """Attitude, drifts and biases of a stationary body, by a filter.
 
     Chernodarov (2009), Eqs. (16)-(18): the measured rate is that of the Earth, the position is
     constant, the velocity is zero. Errors that a rest cannot separate stay correlated in the

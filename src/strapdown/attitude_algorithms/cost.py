@@ -50,7 +50,7 @@ class Cost:
 
 
 class _State(list[Any]):
-    """A state that records how much of it was used."""
+    """A state that records which of its elements were used."""
 
     used = 0
 

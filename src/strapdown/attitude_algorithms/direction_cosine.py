@@ -26,8 +26,8 @@ class DirectionCosine(AttitudeAlgorithm):
         Highest power of the increment in the series of the exponential, 1 to 20; 0 for the
         closed form (12).
     orthogonalise_every : int
-        Steps between re-orthogonalizations, 0 for never. A truncated exponential is no
-        rotation, and the loss accumulates; the closed form loses only rounding.
+        Steps between re-orthogonalizations, 0 for never. A truncated exponential is not
+        orthogonal, and the loss accumulates; the closed form loses only rounding.
     """
 
     name = "dcm"

@@ -27,7 +27,7 @@ AnySource = Annotated[ScenarioSpec | LogSpec, Field(discriminator="kind")]
 
 
 class AttitudeSpec(Spec):
-    """A comparison as it is sealed: `AttitudeOptions`, with sources, words and files told apart."""
+    """A comparison as it is sealed: `AttitudeOptions` with typed sources."""
 
     source: AnySource
     also: tuple[AnySource, ...] = ()

@@ -80,7 +80,7 @@ class AlignFlags:
         str,
         typer.Option(
             metavar="NAME",
-            help="What the samples pass first, with options after a colon, as "
+            help="Pre-filter of the samples, with options after a colon: "
             "robust_fir:rate_hz=100 (none).",
             show_default=False,
             rich_help_panel=RUN_PANEL,

@@ -53,7 +53,7 @@ def refuse_beside_file(
     given: Mapping[str, Any],
     flags: Mapping[str, str] = FLAGS,
 ) -> None:
-    """Refuse options beside a file that states all of them, and name the key for each.
+    """Refuse options beside a configuration file, and name the key for each.
 
     Parameters
     ----------

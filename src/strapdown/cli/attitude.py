@@ -59,7 +59,7 @@ class ComparisonFlags:
         float,
         typer.Option(
             metavar="DEG",
-            help="What is accurate enough: the largest error (1).",
+            help="Tolerance: the largest acceptable error (1).",
             show_default=False,
             rich_help_panel=RUN_PANEL,
         ),
@@ -86,7 +86,7 @@ class ComparisonFlags:
         list[str] | None,
         typer.Option(
             metavar="WORDS|FILE",
-            help="What is known, as often as you like: 'end same as start', 'end 2 turns about z "
+            help="Known parts of the motion, repeatable: 'end same as start', 'end 2 turns about z "
             "since start', '12.5 roll 0 pitch 0 heading 90', '8 same place as 2', rests (gravity "
             "at every rest), a file of such lines (.txt .toml .csv), or an attitude truth.",
             rich_help_panel=RUN_PANEL,
@@ -113,9 +113,9 @@ class ComparisonFlags:
         str,
         typer.Option(
             metavar="BIAS",
-            help="none; rest (mean of the first stationary stretch); rests (course through all of "
-            "them); 'x,y,z deg/s' about forward, right, down; or a log of the sensor lying still "
-            "(none).",
+            help="none; rest (mean of the first stationary stretch); rests (interpolated between "
+            "all of these); 'x,y,z deg/s' about forward, right, down; or a log of the stationary "
+            "sensor (none).",
             show_default=False,
             rich_help_panel=RUN_PANEL,
         ),

@@ -23,9 +23,9 @@ EPILOG = (
     "Example: strapdown coast drive-navigate --outage 30 (a folder of strapdown navigate)"
 )
 _WHAT, _START, _WHERE = (
-    "How it moves, of a sensor",
-    "What is known at the start, of a sensor",
-    "Where, of a run of navigation",
+    "Motion, for a sensor",
+    "Initial standard deviations, for a sensor",
+    "Instants, for a navigation run",
 )
 
 
@@ -66,7 +66,7 @@ class MotionFlags:
 
 @dataclass(frozen=True)
 class StartFlags:
-    """What is known of a sensor at the start, by key of its table."""
+    """Initial standard deviations, by key of the table."""
 
     aided_s: Annotated[
         float | None,
@@ -112,7 +112,7 @@ class StartFlags:
         typer.Option(
             "--gyro-bias-sd",
             metavar="DEG/H",
-            help="What is left of the gyro biases.",
+            help="Gyro biases after alignment or aiding.",
             rich_help_panel=_START,
         ),
     ] = None
@@ -121,7 +121,7 @@ class StartFlags:
         typer.Option(
             "--accel-bias-sd",
             metavar="UG",
-            help="What is left of the accelerometer biases, millionths of g.",
+            help="Accelerometer biases after alignment or aiding, µg.",
             rich_help_panel=_START,
         ),
     ] = None

@@ -91,12 +91,12 @@ class Compilations:
 
     Parameters
     ----------
-    tell : callable
+    report : callable
         Called with True at the begin of the first of nested compilations, with False at its end.
     """
 
-    def __init__(self, tell: Callable[[bool], None]) -> None:
-        self._tell = tell
+    def __init__(self, report: Callable[[bool], None]) -> None:
+        self._report = report
         self._listener: Any = None
 
     def listen(self) -> None:
@@ -237,7 +237,7 @@ def print_findings(findings: Sequence[Finding], most: int | None = None) -> None
         if remedy:
             out.print(remedy, style="dim")
     if most is not None and len(findings) > most:
-        more = f"{len(findings) - most} more; all of them are in the report"
+        more = f"{len(findings) - most} more; see the report"
         out.print(f"note: {more}", style="yellow")
 
 

@@ -193,7 +193,7 @@ def demo_runs(out: Path, data: Path) -> list[DemoRun]:
             Shown(
                 "A",
                 "tunnel",
-                "A drive, half a minute of it in a tunnel",
+                "A drive with half a minute in a tunnel",
                 "A simulation: fixes with outliers, none in the tunnel; smoothed at the end. Below "
                 "the path: the heading status.",
                 f"strapdown navigate {out / 'tunnel.toml'} \\\n  --out {out / 'tunnel'}",

@@ -70,7 +70,7 @@ class NavigateFlags:
         float | None,
         typer.Option(
             metavar="DEG",
-            help="Heading at the start, where neither the gyros nor a course can tell it.",
+            help="Initial heading, if neither gyros nor course determine it.",
             rich_help_panel=WITH_PANEL,
         ),
     ] = None
@@ -93,7 +93,7 @@ class NavigateFlags:
         bool,
         typer.Option(
             "--smooth",
-            help="When it has ended, tell every state by all observations, later ones too.",
+            help="Smooth the run: estimate every state from all measurements (RTS).",
             rich_help_panel=RUN_PANEL,
         ),
     ] = False
@@ -101,8 +101,8 @@ class NavigateFlags:
         str | None,
         typer.Option(
             metavar="N|max",
-            help="Play the record sample by sample, N times as fast as it was taken, and tell how "
-            "long each sample takes.",
+            help="Replay the record sample by sample, N times as fast as recorded, and report "
+            "the latency of each sample.",
             rich_help_panel=RUN_PANEL,
         ),
     ] = None

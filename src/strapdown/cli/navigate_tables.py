@@ -91,7 +91,7 @@ def print_navigation(
             print_block(replace(block, rows=block.rows[:most]))
             room -= 4 + min(len(block.rows), most)
             if len(block.rows) > most:
-                out.print(f"  {len(block.rows) - most} more rows; all of them are in the report")
+                out.print(f"  {len(block.rows) - most} more rows; see the report")
                 room -= 1
     for said, style in lines:
         out.print(spaced(said), style=style)

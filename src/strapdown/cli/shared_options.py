@@ -65,7 +65,7 @@ def part_long(panel: str) -> Any:
     return typer.Option(
         "--duration",
         metavar="S",
-        help="Use so much of it, in place of --to.",
+        help="Length of the part to use, instead of --to.",
         rich_help_panel=panel,
     )
 

@@ -185,7 +185,7 @@ class SensorsTable(Spec):
 
 
 class CoarseSpec(ChoiceSpec):
-    """Coarse alignment over the first part of the record, or over all of it."""
+    """Coarse alignment over the first part of the record, or the whole record."""
 
     duration_s: Positive | None = None
 

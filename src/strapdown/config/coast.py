@@ -63,7 +63,7 @@ class CoastSpec(Spec):
     )
     #: For a navigation run: start of the outage; by default at evenly spaced instants.
     at_s: Number | None = None
-    #: Alternatively the part of the log that contains them; by default all of it.
+    #: Alternatively the part of the log that contains them; by default the whole log.
     from_s: Number | None = None
     to_s: Number | None = None
     duration_s: Positive | None = None

@@ -140,7 +140,7 @@ class TriadSpec(Spec):
     the other way; an omitted axis is missing.
     """
 
-    name: Words = Field(default="", description="a name, to be told apart by")
+    name: Words = Field(default="", description="a unique name")
     path: FileName = Field(description="the file, from the folder of this one")
     channels: dict[Literal["x", "y", "z"], Channel] = Field(
         default_factory=dict,
@@ -183,7 +183,7 @@ class AssumedSpec(Spec):
 class UnitSpec(Spec):
     """A recorder on the vehicle."""
 
-    name: Word = Field(description="a name, to be told apart by")
+    name: Word = Field(description="a unique name")
     position_m: Triple = Field(
         default=(0.0, 0.0, 0.0),
         description=f"forward, right, down of the recorder {_FROM}; delta-V and the direction of "

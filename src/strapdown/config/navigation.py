@@ -178,7 +178,7 @@ class FineModeSpec(ChoiceSpec):
 class CoarseModeSpec(FineModeSpec):
     """Coarse alignment; it ends at the first condition met."""
 
-    #: Length of the latest part to align; by default all of it.
+    #: Length of the latest part to align; by default the whole part.
     window_s: Positive | None = None
 
 

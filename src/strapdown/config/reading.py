@@ -27,7 +27,7 @@ class FileSpec(Spec):
     """Specification of a run, from a file or from plain data."""
 
     unwritten: ClassVar[tuple[str, ...]] = ("name",)
-    #: What it is called in messages.
+    #: Name in messages.
     called: ClassVar[str] = "run"
     #: Whether `faults` looks into files.
     looks_into_files: ClassVar[bool] = False

@@ -577,7 +577,7 @@ def _equation(path: KeyPath, value: Any) -> str:
 
 
 def _big(value: Any) -> bool:
-    """A table that contains tables, or several of them."""
+    """A table that contains tables, or a list of tables."""
     parts = list(value.values()) if isinstance(value, dict) else value
     return isinstance(parts, list) and any(isinstance(part, dict) for part in parts)
 

@@ -373,7 +373,7 @@ def table_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skippe
         lost = rows - int(kept.sum())
         names = tuple(group.columns.values())
         if rows - lost < LEAST_SAMPLES:
-            skipped.append(Skipped(path, ", ".join(names), "hardly a row of it is whole", names))
+            skipped.append(Skipped(path, ", ".join(names), "hardly any complete row", names))
             continue
         if not np.ptp(values[kept][:, has], axis=0).any():
             skipped.append(Skipped(path, ", ".join(names), "they are constant", names))
@@ -391,7 +391,7 @@ def table_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skippe
             label=group.label,
             named=group.by_heading,
             sampling=(kinds.pop() or "") if len(kinds) == 1 else "",
-            notes=(f"{lost} of {rows} rows have no value of it",) if lost else (),
+            notes=(f"{lost} of {rows} rows have no value",) if lost else (),
             remarks=record.remarks,
         )
         parts.append(part)
@@ -581,7 +581,7 @@ USUAL_PULSE = 0.06
 # line through both end points, relative to that of the steps, as rounding moves both ends of the
 # line; spread of rounded steps relative to their mean.
 EVEN, ROUNDED, STEP = 0.01, 2.0, 1.05
-# Clock steps are within this of their median, except for at most this share of them.
+# Tolerance of clock steps about their median, and the largest share of steps outside it.
 REGULAR, IRREGULAR_PART = 0.5, 0.05
 # Sampling rates of crash records; a column outside them is a sum, not a clock.
 SLOWEST, FASTEST = 5.0, 200_000.0  # Hz
@@ -649,7 +649,7 @@ def _clock(name: str, values: Array, heading: Heading, why: str) -> tuple[Clock,
 def evenly(clock: Clock, time: Array) -> tuple[Clock, Array]:
     """Make rounded or late stamps, (n,), s, even; return others unchanged.
 
-    The stamps of an even clock rounded to q are within q of it, and their steps differ by q.
+    The stamps of an even clock rounded to q deviate by at most q, and their steps differ by q.
     Several missing samples bend the line by more.
     """
     count = np.arange(time.size)
@@ -1100,7 +1100,7 @@ def _as_accelerations(part: Part) -> Part:
         sampling="",
         uncertainty=RECORDER,
         basis="what 49 CFR 563.8 asks of a recorder: 10 % of the change of velocity",
-        notes=(*part.notes, "changes of velocity; mean accelerations are made of them"),
+        notes=(*part.notes, "changes of velocity; converted to mean accelerations"),
     )
 
 

@@ -980,4 +980,4 @@ def _like(unit: Unit, goal: float | None, name: str) -> Unit:
         f"{side_of(at)}"
         for turn, at in came.items()
     ]
-    return replace(unit, heading_why=", ".join(told) or "the record does not tell it")
+    return replace(unit, heading_why=", ".join(told) or "not in the record")

@@ -245,7 +245,7 @@ def score_places(
     imu : DataFrame
         The Imu table that the run used, with acceleration.
     rests : sequence of RestStretch
-        In order of time; every instant of `places` lies in one or within half a second of it.
+        In order of time; every instant of `places` lies in one, or at most half a second outside.
     errors : SensorErrors, optional
         For the standard deviation of the position; a consumer sensor if not given.
     gravity : float, m/s², optional

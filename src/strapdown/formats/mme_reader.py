@@ -539,7 +539,7 @@ def _remarks(file: MmeFile, against: str, notes: list[str]) -> tuple[str, ...]:
     remarks = [against] if against else []
     if known is None:
         remarks.append(
-            f"'{file.code}' is no channel code of sixteen characters"
+            f"'{file.code}' is not a channel code of sixteen characters"
             if file.code
             else "it has no channel code"
         )

@@ -61,7 +61,7 @@ class Mechanization(ABC):
     largest_speed : float, m/s
         Above it the state is taken to have diverged.
     height_limits : tuple of float, m
-        A run stops outside of them, too.
+        Outside these limits a run stops, too.
 
     Raises
     ------

@@ -43,19 +43,19 @@ COLOURS = ("green", "amber", "red")
 GREEN, AMBER, RED = range(3)
 #: Reason of a status other than green, by its code.
 REASONS: dict[str, str] = {
-    "": "two reckonings agree that it is within the limit",
-    "assumed": "its own bound is good, but rests on what it began with or on one aid alone",
-    "faint": "a second reckoning does not know it well enough yet to bear it out",
-    "wide": "its own bound is beyond the limit",
-    "scatter": "observations scatter more than they should",
-    "apart": "a reckoning that began without a heading says otherwise",
-    "unknown": "it is hardly known",
+    "": "the run and an independent check agree that it is within the limit",
+    "assumed": "its own bound is small, but rests on the start or on one measurement only",
+    "faint": "the independent check has not converged",
+    "wide": "its own bound exceeds the limit",
+    "scatter": "innovations scatter more than expected",
+    "apart": "an independent check contradicts it",
+    "unknown": "it is unknown",
 }
 #: Independent heading checks, by kind.
 WITNESSES: dict[str, str] = {
-    "motion": "a second reckoning by fixes",
-    "gyrocompass": "north as the gyros found it at rest",
-    "sources": "two sources of a heading that share nothing",
+    "motion": "an independent solution from GNSS fixes",
+    "gyrocompass": "gyrocompassing at rest",
+    "sources": "two independent heading measurements",
 }
 #: Two-sided 99 % quantile of the normal distribution: a larger difference is significant, and
 #: so many standard deviations bound the error of an independent check.
@@ -69,8 +69,8 @@ CARRIED, GROWS = 60.0, 2.0
 RECENT, FEWEST = 30.0, 8
 #: Labels of components without information on the heading.
 VERTICAL = ("down", "VD", "height")
-#: Limit of one normalized innovation, and its value if it was rejected: half of them are as much as
-#: refutes a run.
+#: Limit of one normalized innovation, and its value if it was rejected: half of all rejected refute
+#: a run.
 CLIP, REJECTED = 4.0, 3.0
 
 

@@ -110,7 +110,7 @@ class IntegrityReport:
     inconsistencies : tuple of Inconsistency
         In order of time.
     repeated : Repeated or None
-        The run without the first of them.
+        The run without the first inconsistent measurement.
     """
 
     light: HeadingIntegrity
@@ -159,7 +159,7 @@ def assess_integrity(
     repeat : bool
         Whether to run again excluding the first inconsistent measurement.
     progress : callable
-        Called with a stage and the share of it that is done.
+        Called with a stage and its completed share.
 
     Returns
     -------

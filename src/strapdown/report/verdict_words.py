@@ -65,7 +65,7 @@ def heading_words(trust: IntegrityReport) -> str:
     )
     witness = witness_words(trust)
     if witness and last.colour == "green":
-        now = f"{now[:-1]}, borne out by {witness}."
+        now = f"{now[:-1]}, confirmed by {witness}."
     if trust.unwitnessed:
         now += f" Nothing could confirm it: {unwitnessed_words(trust)}."
     return f"Heading: {said} of the time; {now}"

@@ -150,7 +150,7 @@ def _sensors(page: Page) -> None:
     page.key("sensor", ASK, "only you know: one of the catalogue, or a .toml file of your own")
     page.say(
         f"Of those that can find north, or nearly: {', '.join(good)}; all: strapdown modules",
-        "In its place, or to replace numbers of it, in tables [sensors.gyro] and [sensors.accel]: "
+        "Alternatively, or to replace single values: tables [sensors.gyro] and [sensors.accel]: "
         "bias_sd_deg_per_h, noise_density_deg_per_sqrt_h; bias_sd_ug, "
         "noise_density_ug_per_sqrt_hz, …",
     )
@@ -203,7 +203,7 @@ def toml_value(value: Any) -> str | None:
 
 
 def _rest(page: Page) -> None:
-    page.table("[output]", "What is written beside the report.")
+    page.table("[output]", "Files beside the report.")
     page.key("rate_hz", "10.0", "of attitude.csv")
     page.blank()
     page.say(

@@ -178,7 +178,7 @@ def run_alignment(
         source.truth,
         spec.reference,
     )
-    progress("looking for what a turn would tell", 0.66)
+    progress("predicting the effect of a rotation", 0.66)
     manoeuvres = () if fine is None else manoeuvres_after(fine, site)
     files = () if file is None else (input_files("configuration", str(file), (file,)),)
     of_filter = () if report is None else report.findings

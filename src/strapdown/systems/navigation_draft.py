@@ -206,7 +206,7 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
         page.key("sensor", string(named), remark, check=check)
     page.say(
         f"The catalogue (strapdown modules): {', '.join(s.name for s in _whole())}; or a .toml "
-        "file of your own. In its place, or to replace numbers of it, in tables [sensors.gyro] "
+        "file of your own. Alternatively, or to replace single values: tables [sensors.gyro] "
         "and [sensors.accel]: bias_sd_deg_per_h, noise_density_deg_per_sqrt_h; bias_sd_ug, "
         "noise_density_ug_per_sqrt_hz, …",
         f"states = [ … ]: which of their errors are estimated, of {', '.join(STATED_STATES)}; "
@@ -258,10 +258,10 @@ def _stage(page: Page, name: str, chosen: Mapping[str, Any]) -> None:
 
 #: End conditions of an alignment.
 _ENDS = {
-    "duration_s": "it ends then",
-    "window_s": "the newest part of it that is aligned",
-    "until_heading_sd_deg": "it ends when the heading is known so well",
-    "until_tilt_sd_deg": "and roll and pitch so well",
+    "duration_s": "its end",
+    "window_s": "length of the latest part that is aligned",
+    "until_heading_sd_deg": "ends when the sd of heading is below",
+    "until_tilt_sd_deg": "and those of roll and pitch",
 }
 
 
@@ -294,10 +294,10 @@ WHEELS = ("[aiding.no_slip]", 'kind = "no_slip"', "mounting_sd_deg = [6.0, 6.0]"
 
 #: Ready-made tables for a unit on a shoe.
 ON_FOOT = (
-    "stance: zero velocity at each stance, the heart of it. It bounds velocity, roll and pitch, "
-    "and with them two of the gyros' biases; of heading and place it tells nothing: the heading "
-    "drifts by the bias of the gyro that is upright, and the error of place grows with the way. "
-    "More time standing at the start, ten seconds, tells that bias.",
+    "stance: zero velocity update (ZUPT) at each stance. It bounds velocity, roll, pitch and two "
+    "gyro biases. Heading and position are not observable: the heading drifts with the bias of "
+    "the vertical gyro, and the position error grows with the distance. A stationary start of ten "
+    "seconds determines that bias.",
     'threshold_rule = "stated" keeps the threshold, in standard deviations of the two keys below '
     "it; otsu finds it from stances and swings as they come. pivot_m: height of the unit over the "
     "ground.",
@@ -314,7 +314,7 @@ def _aids(page: Page, made: Proposal, folder: Path, foot: bool) -> list[str]:
     slot = SLOTS["aiding"]
     page.blank()
     page.say(
-        "What tells more than the inertial sensors do: [aiding.NAME], each with a name of its own. "
+        "Measurements beside the inertial sensors: [aiding.NAME], each with a name of its own. "
         "Kinds:",
         *listed_kinds(slot, False),
     )
