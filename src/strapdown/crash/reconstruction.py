@@ -122,7 +122,7 @@ Array = NDArray[np.float64]
 
 #: Length of the trailing window: Tadic and Vukajlovic (2016), section 4.
 PEAK_WINDOW = 0.030
-NO_ROLL = "whether it rolled over cannot be told without a gyro about the forward axis"
+NO_ROLL = "whether it rolled over cannot be determined without a gyro about the forward axis"
 
 
 @dataclass(frozen=True, eq=False)
