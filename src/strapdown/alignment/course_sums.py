@@ -20,14 +20,14 @@ from strapdown.tables import ACCEL, DV, GYRO, VELOCITY, VELOCITY_SD, check_gnss
 from strapdown.tables.checks import source_of
 
 __all__ = [
+    "ACCEL_BIAS",
     "ACCEL_MATRIX",
     "ACCEL_NOISE",
     "ASKED",
     "AXLE",
     "COUNT",
-    "COURSE_UNKNOWNS_ACCEL",
-    "COURSE_UNKNOWNS_GYRO",
-    "COURSE_UNKNOWNS_VELOCITY",
+    "END_VELOCITY",
+    "GYRO_BIAS",
     "GYRO_BY_FORCE",
     "GYRO_MATRIX",
     "GYRO_NOISE",
@@ -440,7 +440,7 @@ STRETCHES: Final = 24
 
 # At the end of the record: velocity, rotation from the computed attitude to the true one, biases of
 # gyros and accelerometers.
-COURSE_UNKNOWNS_VELOCITY, TURN, COURSE_UNKNOWNS_GYRO, COURSE_UNKNOWNS_ACCEL = (
+END_VELOCITY, TURN, GYRO_BIAS, ACCEL_BIAS = (
     slice(0, 3),
     slice(3, 6),
     slice(6, 9),
@@ -460,8 +460,8 @@ OFFSET: Final = YAW + 2
 COUNT: Final = YAW + 3
 
 #: In the order of `DriveSums.by_gyro` and `DriveSums.by_accel`.
-OF_GYROS = np.r_[COURSE_UNKNOWNS_GYRO, GYRO_MATRIX, GYRO_BY_FORCE, GYRO_NOISE]
-OF_ACCELS = np.r_[COURSE_UNKNOWNS_ACCEL, ACCEL_MATRIX, ACCEL_NOISE]
-OF_SENSORS = slice(COURSE_UNKNOWNS_GYRO.start, ACCEL_NOISE.stop)
+OF_GYROS = np.r_[GYRO_BIAS, GYRO_MATRIX, GYRO_BY_FORCE, GYRO_NOISE]
+OF_ACCELS = np.r_[ACCEL_BIAS, ACCEL_MATRIX, ACCEL_NOISE]
+OF_SENSORS = slice(GYRO_BIAS.start, ACCEL_NOISE.stop)
 #: Known beyond the record: all but its own noise and the unknowns of the vehicle and the fixes.
 HANDED = np.r_[:ASKED, GYRO_MATRIX, GYRO_BY_FORCE, ACCEL_MATRIX]

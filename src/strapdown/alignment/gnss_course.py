@@ -13,11 +13,14 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.alignment.alignment import Alignment, CoarseAlignment, Site
 from strapdown.alignment.course_sums import (
+    ACCEL_BIAS,
     ACCEL_MATRIX,
     ACCEL_NOISE,
     ASKED,
     AXLE,
     COUNT,
+    END_VELOCITY,
+    GYRO_BIAS,
     GYRO_BY_FORCE,
     GYRO_MATRIX,
     GYRO_NOISE,
@@ -36,15 +39,6 @@ from strapdown.alignment.course_sums import (
     drive_sums,
     rest_rates,
 )
-from strapdown.alignment.course_sums import (
-    COURSE_UNKNOWNS_ACCEL as ACCEL,
-)
-from strapdown.alignment.course_sums import (
-    COURSE_UNKNOWNS_GYRO as GYRO,
-)
-from strapdown.alignment.course_sums import (
-    COURSE_UNKNOWNS_VELOCITY as VELOCITY,
-)
 from strapdown.alignment.record_checks import check_record
 from strapdown.constants import MAD_TO_SD, STANDARD_GRAVITY
 from strapdown.dsp.running_integral import running_integral
@@ -52,8 +46,7 @@ from strapdown.earth import transport_rate
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.estimation.robust import Huber, Igg3, Influence
 from strapdown.sensors.uncertainty import ImuUncertainty
-from strapdown.tables import ACCEL as ACCEL_COLUMNS
-from strapdown.tables import GYRO as GYRO_COLUMNS
+from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import is_number, source_of
 
 __all__ = [
@@ -362,7 +355,7 @@ class CourseFit:
             onward = (np.abs(courses[0] - courses[1] @ x) < GROSS).astype(np.float64)
         return Found(
             rotation.dcm_from_rotation_vector(x[TURN]) @ found.C,
-            found.velocity + x[VELOCITY],
+            found.velocity + x[END_VELOCITY],
             found.errors + x[OF_SENSORS],
             inverse[np.ix_(HANDED, HANDED)] * np.outer(SIGN, SIGN),
             np.einsum("kij,kj->ki", level[:k], there[:k] + by[:k] @ x),
@@ -377,12 +370,12 @@ class CourseFit:
         inputs = self.means - found.bias
         rate, force = inputs[:3], inputs[3:]
         sd = np.zeros(COUNT)
-        sd[VELOCITY], sd[TURN] = UNKNOWN
+        sd[END_VELOCITY], sd[TURN] = UNKNOWN
         still = np.square(gyro.axis("bias")) + np.square(self.sensors.gyro_drift.triad)
         still = still + np.square(gyro.axis("g_sensitivity")) * float(force @ force)
-        sd[GYRO] = np.sqrt(still + gyro.variance_by_input(rate))
+        sd[GYRO_BIAS] = np.sqrt(still + gyro.variance_by_input(rate))
         still = np.square(accel.axis("bias")) + np.square(self.sensors.accel_drift.triad)
-        sd[ACCEL] = np.sqrt(still + accel.variance_by_input(force))
+        sd[ACCEL_BIAS] = np.sqrt(still + accel.variance_by_input(force))
         apart = np.sqrt(np.maximum(sums.stretch, 1e-9))[:, None]
         for triad, matrix, noise in (
             (gyro, GYRO_MATRIX, GYRO_NOISE),
@@ -412,7 +405,7 @@ class CourseFit:
         )[1:]
         v = v + np.cross(self.site.earth_rate, way)
         by = np.zeros((len(v), 3, COUNT))
-        by[:, :, VELOCITY] = np.eye(3)
+        by[:, :, END_VELOCITY] = np.eye(3)
         by[:, :, TURN] = rotation.cross_matrix(gained)
         by[:, :, OF_GYROS] = found.C @ sums.by_turn
         by[:, :, OF_ACCELS] = found.C @ sums.by_accel
@@ -472,7 +465,7 @@ class CourseFit:
         """The gyros read their bias and the Earth's rate, ``C' exp(-[theta x]) w_ie``."""
         earth, inputs = self.site.earth_rate, self.means - found.bias
         A = C.T @ rotation.cross_matrix(earth[None])[0] @ turns
-        A[:, GYRO] += np.eye(3)
+        A[:, GYRO_BIAS] += np.eye(3)
         A[:, GYRO_MATRIX] -= np.kron(np.eye(3), inputs[:3])
         force = -C.T @ self.site.gravity
         A[:, GYRO_BY_FORCE] += np.kron(np.eye(3), force - inputs[3:])
@@ -566,7 +559,7 @@ class CourseSearch:
         newest = fixes.time[-min(LEAST_FIXES, len(fixes.time))]
         length = end - min(newest, fixes.time[-1] - LEAST_LENGTH)
         bias, sd = self._bias_of_rests()
-        means = self.imu[[*GYRO_COLUMNS, *ACCEL_COLUMNS]].to_numpy(dtype=np.float64).mean(axis=0)
+        means = self.imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64).mean(axis=0)
         length = max(length, LINEAR / max(sd, 1e-12))
         found = None
         while True:
@@ -720,7 +713,7 @@ def _attitude(force_b: Array, force_n: Array, heading: float) -> Array:
 
 
 #: A slope of more standard deviations is significant.
-FORWARD_SIGN_CLEAR = 5.0
+CLEAR_SLOPE = 5.0
 LEAST_STEPS = 6
 
 
@@ -760,7 +753,7 @@ def check_forward(imu: pd.DataFrame, fixes: CourseFixes, sums: DriveSums, revers
     slope = float(x @ y) / power
     left = y - slope * x
     sd = float(np.sqrt(left @ left / (len(x) - 2) / power))
-    if not (slope < 0.0 and abs(slope) > FORWARD_SIGN_CLEAR * sd):
+    if not (slope < 0.0 and abs(slope) > CLEAR_SLOPE * sd):
         return
     raise DataError(
         "alignment.drives-other-way",

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.alignment.alignment import Alignment, CoarseAlignment, Site
+from strapdown.alignment.alignment import Alignment, Site
 from strapdown.alignment.fine import FineResult, alignment_of, settled_epoch
 from strapdown.alignment.inertial_sums import sum_inertially
 from strapdown.alignment.mean_errors import sensor_covariance, sensor_noise
@@ -29,7 +29,6 @@ __all__ = [
     "Readiness",
     "carried_attitude",
     "carry",
-    "coarse_readiness",
     "durations_of",
     "manoeuvres_after",
     "null_space",
@@ -52,7 +51,6 @@ class Readiness:
 
     Attributes
     ----------
-    method : str
     table : DataFrame
         Index ``duration``, s. Columns: ``time``, s, of validity; ``roll pitch heading``, deg;
         ``*_sd``, deg, as stated; ``*_error``, deg, estimate − reference, NaN without one;
@@ -60,7 +58,6 @@ class Readiness:
         whose numbers are NaN, else None.
     """
 
-    method: str
     table: pd.DataFrame
 
     def ready(self, heading_sd_deg: float) -> float:
@@ -118,7 +115,6 @@ def durations_of(imu: pd.DataFrame, count: int = 10) -> Array:
 
 
 def readiness(
-    method: str,
     align: Callable[[pd.DataFrame], Alignment],
     imu: pd.DataFrame,
     durations: Sequence[float] | Array | None = None,
@@ -128,8 +124,6 @@ def readiness(
 
     Parameters
     ----------
-    method : str
-        Its name.
     align : callable
         Returns an alignment of an Imu table: coarse, fine, or both in sequence.
     imu : DataFrame
@@ -168,26 +162,7 @@ def readiness(
     ends = np.searchsorted(imu.index.to_numpy(), start + times * (1.0 + 1e-12), side="right")
     rows = [_row(align, imu.iloc[:end], reference) for end in ends]
     index = pd.Index(times, name="duration")
-    return Readiness(method, pd.DataFrame(rows, index=index, columns=READINESS))
-
-
-def coarse_readiness(
-    method: CoarseAlignment,
-    imu: pd.DataFrame,
-    site: Site,
-    sensors: ImuUncertainty,
-    gnss: pd.DataFrame | None = None,
-    durations: Sequence[float] | Array | None = None,
-    reference: pd.DataFrame | None = None,
-) -> Readiness:
-    """`readiness` of a coarse alignment; parameters as there and of `CoarseAlignment.align`."""
-    return readiness(
-        method.name,
-        lambda piece: method.align(piece, site, sensors, gnss),
-        imu,
-        durations,
-        reference,
-    )
+    return Readiness(pd.DataFrame(rows, index=index, columns=READINESS))
 
 
 def _row(

@@ -14,7 +14,7 @@ from strapdown.crash.severity import SEVERITY_MODELS
 from strapdown.errors import Finding, StrapdownError
 from strapdown.formats.columns import unit_of
 from strapdown.sensors.catalogue import KEYS, SENSORS, load_sensor
-from strapdown.sensors.uncertainty import SENSOR_UNCERTAINTY_FACTS, SPREADS
+from strapdown.sensors.uncertainty import SHEET_FACTS, SPREADS
 
 __all__ = ["case_faults"]
 
@@ -403,7 +403,7 @@ def _sensor(at: KeyPath, kind: str, triad: TriadSpec) -> Iterator[Fault]:
 
 
 def _uncertainty(at: KeyPath, kind: str, stated: Mapping[str, Any]) -> Iterator[Fault]:
-    facts = (*SPREADS, *SENSOR_UNCERTAINTY_FACTS)
+    facts = (*SPREADS, *SHEET_FACTS)
     known = {n: k.quantity for n, k in KEYS[kind].items() if k.quantity in facts}
     by: dict[str, str] = {}
     for name, given in stated.items():

@@ -1,4 +1,4 @@
-"""First derivative of noisy samples by sliding polynomials, with noise, delay and attenuation."""
+"""Local weights of samples: slopes by sliding polynomials, with their noise and attenuation."""
 
 from __future__ import annotations
 
@@ -10,21 +10,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from strapdown.dsp.samples import as_channels, positive_step
 from strapdown.errors import ConfigError, DataError
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 __all__ = [
-    "Derivative",
     "LocalSlope",
     "LocalWeights",
-    "SlidingFit",
     "bandwidth",
-    "derivative",
     "fitted_weights",
     "local_slope",
     "mirrored",
@@ -33,147 +29,6 @@ __all__ = [
 
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class Derivative:
-    """First derivative of channels.
-
-    Attributes
-    ----------
-    values : ndarray, (n, k), unit of the samples per s
-        The derivative at ``stamp - delay``.
-    noise_gain : ndarray, (n,), 1/s
-        Standard deviation of each output divided by that of white noise of the samples, exact.
-        Outputs with overlapping windows have correlated noise.
-    delay : float, s
-    valid : ndarray of bool, (n,)
-        False for the first outputs of a causal fit, whose window is incomplete; they are 0.
-    """
-
-    values: Array
-    noise_gain: Array
-    delay: float
-    valid: NDArray[np.bool_]
-
-
-@dataclass(frozen=True)
-class SlidingFit:
-    """Savitzky-Golay differentiator: slope of a polynomial fitted to a sliding window.
-
-    Attributes
-    ----------
-    step : float, s
-        Sampling interval.
-    half : int
-        The window has ``2 half + 1`` samples.
-    degree : int
-        Degrees 1 and 2 give the same slope at the middle, and so do 3 and 4 (Savitzky & Golay
-        1964, doi:10.1021/ac60214a047); up to ``2 half``.
-
-    Raises
-    ------
-    ConfigError
-        The step, window or degree is out of its range.
-    """
-
-    step: float
-    half: int
-    degree: int = 2
-
-    def __post_init__(self) -> None:
-        positive_step(self.step)
-        if not (self.half >= 1 and 1 <= self.degree <= 2 * self.half):
-            raise ConfigError(
-                "dsp.samples-do-not-fix-polynomial",
-                quantity="degree",
-                half=2 * self.half + 1,
-                degree=self.degree,
-            )
-
-    def weights(self, at: int = 0) -> Array:
-        """Weights of the slope at sample `at` of the window, -half to half, in 1/s."""
-        slope = fitted_weights(self._window[None], np.array([at * self.step]), self.degree)[1]
-        return np.asarray(slope[0])
-
-    @property
-    def _window(self) -> Array:
-        return self.step * np.arange(-self.half, self.half + 1, dtype=np.float64)
-
-    def noise_gain(self, at: int = 0) -> float:
-        """Compute the standard deviation of the slope per that of white noise, in 1/s."""
-        return float(np.linalg.norm(self.weights(at)))
-
-    def response(self, frequency: ArrayLike) -> Array:
-        """Compute the gain of the centered fit relative to the true derivative; real, no delay.
-
-        Parameters
-        ----------
-        frequency : array_like, Hz
-            Above zero.
-        """
-        given = np.atleast_1d(np.asarray(frequency, dtype=np.float64))
-        return np.asarray(self._response(given).real)
-
-    def _response(self, frequency: Array) -> NDArray[np.complex128]:
-        return slope_response(self.weights(), self._window, frequency)
-
-    def bandwidth(self, loss: float = 0.01) -> float:
-        """Find the frequency in Hz up to which a sine's derivative is within `loss` (relative)."""
-        # The response first leaves 1 before the first zero of the window's transform.
-        return bandwidth(self._response, 0.5 / self.step, 64 * (2 * self.half + 1), loss)
-
-    def pulse_loss(self, duration: float) -> float:
-        """Compute the relative peak loss of a haversine pulse of the derivative.
-
-        Parameters
-        ----------
-        duration : float, s
-            T of ``sin²(π t/T)``; the samples are its integral, and one lies at the peak.
-        """
-        t = np.clip(self._window, -0.5 * duration, 0.5 * duration)
-        # About the peak the pulse is cos²(π t/T).
-        turned = 0.5 * t + duration / (4.0 * np.pi) * np.sin(2.0 * np.pi * t / duration)
-        return 1.0 - float(self.weights() @ turned)
-
-
-def derivative(values: ArrayLike, fit: SlidingFit, *, causal: bool = False) -> Derivative:
-    """Differentiate evenly spaced samples, such as angular rates to angular acceleration.
-
-    Parameters
-    ----------
-    values : array_like, (n,) or (n, k)
-    fit : SlidingFit
-    causal : bool
-        Use past samples only: the same slopes, each at the stamp of the last sample of its
-        window, with a delay of exactly ``half`` steps at every frequency.
-
-    Returns
-    -------
-    Derivative
-        Centered: no delay. The first and last ``half`` outputs are off-center slopes of the
-        polynomial through the first or last window; `noise_gain` has their larger noise.
-
-    Raises
-    ------
-    DataError
-        A sample is not finite, or there are fewer samples than the window has.
-    """
-    channels = as_channels(values)
-    n, window = len(channels), 2 * fit.half + 1
-    if n < window:
-        raise DataError("dsp.samples-fewer-than-window", quantity="values", n=n, window=window)
-    at = np.arange(n)
-    if causal:
-        first = at[window - 1 :] - (window - 1)
-        local = LocalWeights(first, np.tile(fit.weights(), (len(first), 1)))
-        out, gain = np.zeros(channels.shape), np.zeros(n)
-        out[window - 1 :], gain[window - 1 :] = local.apply(channels), local.noise_factor
-        return Derivative(out, gain, fit.half * fit.step, at >= window - 1)
-    first = np.clip(at - fit.half, 0, n - window)
-    table = np.array([fit.weights(k) for k in range(-fit.half, fit.half + 1)])
-    local = LocalWeights(first, table[at - first])
-    return Derivative(local.apply(channels), local.noise_factor, 0.0, np.ones(n, dtype=bool))
 
 
 # Value and slope of a polynomial fitted to a few samples, as weights of the samples.

@@ -155,7 +155,6 @@ class Kernels:
 # its first function: conditions on options are decided, and excluded branches and unused
 # parameters and variables are dropped. The same formulas remain in the same order. This part is
 # independent of C.
-# formulas in the same order. Nothing here knows C.
 
 
 class Specialiser:

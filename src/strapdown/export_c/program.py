@@ -816,9 +816,9 @@ def main_program(vector: Vector, q_nb: Array, lag: int) -> str:
         n=len(vector.samples),
         lag=lag,
         start=f"static const real_t start[4] = {{{from_}}};\n".replace("R(", "\n    R("),
-        samples=_rows_main(vector.samples),
-        single=_rows_main(vector.single),
-        double=_rows_main(vector.double),
+        samples=_braced(vector.samples),
+        single=_braced(vector.single),
+        double=_braced(vector.double),
         bound="\n".join(comment(f"{bound}.")),
         roundings=f"{vector.roundings:.4g}".replace("e+0", "e"),
         finish=_FINISH if lag else "",
@@ -827,7 +827,7 @@ def main_program(vector: Vector, q_nb: Array, lag: int) -> str:
     )
 
 
-def _rows_main(values: Array) -> str:
+def _braced(values: Array) -> str:
     # Hexadecimal is exact.
     return "\n".join(f"    {{{', '.join(_hex(v) for v in row)}}}," for row in values)
 

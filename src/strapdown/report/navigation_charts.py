@@ -38,7 +38,7 @@ from strapdown.report.navigation_found import (
     NavigationTold,
     chi_square_far,
 )
-from strapdown.report.values import StateBlock, at_marks, blocks_of, heading_shown, unwrapped
+from strapdown.report.values import ShownStates, at_marks, blocks_of, heading_shown, unwrapped
 from strapdown.tables import EULER, NED, VELOCITY
 
 Array = NDArray[np.float64]
@@ -195,7 +195,7 @@ def state_charts(record: NavigationRecord) -> tuple[Chart, ...]:
     return tuple(_block_chart(record, block) for block in blocks_of(record))
 
 
-def _block_chart(record: NavigationRecord, block: StateBlock) -> Chart:
+def _block_chart(record: NavigationRecord, block: ShownStates) -> Chart:
     time = record.sensors.index.to_numpy(dtype=np.float64)
     panels = []
     for k, (column, label) in enumerate(zip(block.columns, block.labels, strict=True)):

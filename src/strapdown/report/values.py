@@ -151,7 +151,7 @@ MOST_TURN = 900.0
 
 
 @dataclass(frozen=True)
-class StateBlock:
+class ShownStates:
     """States of one kind, with their display unit.
 
     Attributes
@@ -176,7 +176,7 @@ class StateBlock:
     factor: float
 
 
-def blocks_of(record: NavigationRecord) -> tuple[StateBlock, ...]:
+def blocks_of(record: NavigationRecord) -> tuple[ShownStates, ...]:
     """Return the blocks of sensor and measurement error states, in their order."""
     groups: dict[str, list[str]] = {}
     for column in record.sensors.columns:
@@ -191,7 +191,7 @@ def blocks_of(record: NavigationRecord) -> tuple[StateBlock, ...]:
         aid, dot, own = name.rpartition(".")
         words = own.replace("_", " ")
         out.append(
-            StateBlock(
+            ShownStates(
                 f"{aid}: {words}" if dot else words.replace("accel ", "accelerometer "),
                 name.replace("_", "-").replace(".", "-"),
                 tuple(columns),

@@ -47,14 +47,9 @@ __all__ = [
 ]
 
 
-# Health tests of log channels: saturation, implausible means, noise, stuck values, jumps.
+Array = NDArray[np.float64]
 
-
-# Fraction of the step between the near sixths of both windows, 1.3 ms apart; a rotating head takes
-# longer.
-ABRUPT = 0.8
-
-
+# Saturated samples closer together than this are one fault.
 SAME_FAULT = 1.0  # s
 
 
@@ -92,8 +87,6 @@ def find_saturated(log: HealthLog) -> list[ChannelFault]:
 
 # Consistency of the means at rest with gravity and the Earth's rate.
 
-
-Array = NDArray[np.float64]
 
 # Consecutive stationary blocks required for a mean.
 LEAST_REST = 3
@@ -205,7 +198,7 @@ OWN_SCATTER = 6.0
 # those of normal noise is below 0.3186 of their rms.
 OUTLIER, LEAST_OUTLIERS = 6.0, 3
 QUARTER, BURST_SHARE = 0.3186, 0.5
-HEALTH_NOISE_SAME_FAULT = 10  # blocks
+SAME_NOISE = 10  # blocks
 # Variance of a median over that of a mean, for normal values.
 MEDIAN = math.pi / 2.0
 
@@ -255,7 +248,7 @@ def find_noisy(log: HealthLog) -> list[ChannelFault]:
         flags = lasting.copy()
         alone = np.flatnonzero(high & rest & ~lasting)
         flags[alone] = _struck(_second(log, k, alone), base)
-        for first, last in intervals_of(flags, HEALTH_NOISE_SAME_FAULT):
+        for first, last in intervals_of(flags, SAME_NOISE):
             within = np.flatnonzero(flags[first : last + 1]) + first
             kind = "burst" if _is_burst(_second(log, k, within).ravel()) else "noisy"
             faults.append(_fault(log, k, kind, (first, last), flags, sizes, limit, reason))
@@ -452,7 +445,7 @@ def _channel(log: HealthLog, k: int, sums: Array) -> list[ChannelFault]:
             limit = np.maximum(limit, longest_by_chance(shared, n, log.false_alarm))
     found = lengths[most] > limit
     return [
-        _fault_health_stuck(log, k, int(x), int(y) - 1, float(lim))
+        _stuck_fault(log, k, int(x), int(y) - 1, float(lim))
         for x, y, lim in zip(a[found], b[found], limit[found], strict=True)
         if _others_live(sums, k, int(x), int(y))
     ]
@@ -489,7 +482,7 @@ def _others_live(sums: Array, k: int, a: int, b: int) -> bool:
     return bool(moved.any())
 
 
-def _fault_health_stuck(log: HealthLog, k: int, a: int, b: int, limit: float) -> ChannelFault:
+def _stuck_fault(log: HealthLog, k: int, a: int, b: int, limit: float) -> ChannelFault:
     n, value, count = log.time.size, float(log.values[k, a]), b - a + 1
     if value == 0.0 and (a == 0 or b == n - 1):
         if a > 0:
@@ -514,6 +507,9 @@ LEAST_WINDOWS = 40
 SEEN, SURE = 0.5, 3.0
 # Relative standard deviation of the means on both sides of a step when its abruptness is tested.
 KNOWN = 0.05
+# Fraction of the step between the near sixths of both windows, 1.3 ms apart; a rotating head takes
+# longer.
+ABRUPT = 0.8
 
 
 def find_jumps(log: HealthLog) -> list[ChannelFault]:
@@ -553,7 +549,7 @@ def find_jumps(log: HealthLog) -> list[ChannelFault]:
             where = _where(log, k, at + SIDE, step)
             if where is None or (name in GYRO and _turned(log, k, at, step)):
                 continue
-            faults.append(_fault_health_jump(log, k, where, step, limit))
+            faults.append(_jump_fault(log, k, where, step, limit))
     return _until_next(log, faults)
 
 
@@ -670,7 +666,7 @@ def _where(log: HealthLog, k: int, block: int, step: float) -> int | None:
     return a + at
 
 
-def _fault_health_jump(log: HealthLog, k: int, at: int, step: float, limit: float) -> ChannelFault:
+def _jump_fault(log: HealthLog, k: int, at: int, step: float, limit: float) -> ChannelFault:
     name = log.names[k]
     code = "sensors.gyro-zero-jumps" if name in GYRO else "sensors.accelerometer-zero-jumps"
     return log.fault(k, "jump", (at, log.time.size - 1), abs(step), limit, code, step=step)

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.dsp.chi_square import chi_square_quantile
 from strapdown.ellipsoids import WGS84
 from strapdown.errors import Finding
 from strapdown.sensors.crash_unit import CrashUnit
@@ -157,10 +158,8 @@ def _threshold(
     sd: Array, degrees: int, values: int, stated: float, rounding: float, most: float
 ) -> Array:
     """Per column, three times the quietest or the stated noise, limited by a cap."""
-    from scipy.stats import chi2
-
     # The quietest of many short blocks is low by chance; this is the factor for normal noise.
-    chance = math.sqrt(float(chi2.ppf(QUIET_QUANTILE, degrees)) / values)
+    chance = math.sqrt(chi_square_quantile(QUIET_QUANTILE, degrees) / values)
     quietest = np.quantile(sd, QUIET_QUANTILE, axis=0) / chance
     cap = np.hypot(most, QUIET_FACTOR * stated)
     limit = np.maximum(QUIET_FACTOR * np.maximum(quietest, stated), rounding)
@@ -231,9 +230,7 @@ def gyro_bias_from(
         prior = np.asarray(stated)
         weight = prior**2 / (prior**2 + sd**2)
         mean, sd = weight * mean, np.sqrt(weight) * sd
-    return BiasEstimate(
-        (float(mean[0]), float(mean[1]), float(mean[2])), (float(sd[0]), float(sd[1]), float(sd[2]))
-    )
+    return BiasEstimate(triad_of(mean), triad_of(sd))
 
 
 def in_axes(rest: RestStretch, C: Array) -> RestStretch:

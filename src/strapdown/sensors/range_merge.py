@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.sensors.crash_unit import CrashUnit, UnitArrays
+from strapdown.sensors.pre_crash import BiasEstimate
 from strapdown.sensors.rest import sd_of_mean
 from strapdown.sensors.saturation import RangeLimits
+from strapdown.sensors.triad_errors import triad_of
 from strapdown.tables.checks import check_rows, check_time
 
 __all__ = [
     "MergedRanges",
-    "RangeBias",
     "agreement_findings",
     "bias_from_lower_range",
     "merge_ranges",
@@ -389,30 +390,10 @@ def _in_g(ratio: float) -> bool:
 # Bias of a high range from the range below it.
 
 
-HIGH_G_BIAS_LEAST_SAMPLES = 5
+LEAST_BIAS_SAMPLES = 5
 # If the input does not vary over a good part of a quantization step, averaging does not help (the
 # error of the mean is below q/100 for noise above 0.7 q, and q/√12 without noise).
 DITHERED = 0.5
-
-
-@dataclass(frozen=True)
-class RangeBias:
-    """Difference of two ranges with the same input.
-
-    Attributes
-    ----------
-    bias : tuple of float, u
-        Bias of the higher range relative to the lower.
-    sd : tuple of float, u
-        Standard deviation of that difference: noise of the mean, and quantization that noise does
-        not average out. The lower range's own bias is in the difference but not in this.
-    samples : tuple of int
-        Number of samples per axis.
-    """
-
-    bias: tuple[float, float, float]
-    sd: tuple[float, float, float]
-    samples: tuple[int, int, int]
 
 
 def bias_from_lower_range(
@@ -422,7 +403,7 @@ def bias_from_lower_range(
     use: Mask,
     *,
     quantization: tuple[float, float, float] = (0.0, 0.0, 0.0),
-) -> RangeBias | None:
+) -> BiasEstimate | None:
     """Estimate the bias of a range from the next lower one.
 
     Parameters
@@ -437,7 +418,9 @@ def bias_from_lower_range(
 
     Returns
     -------
-    RangeBias or None
+    BiasEstimate or None
+        Bias relative to the lower range, whose own bias is in it; its standard deviation, from the
+        noise of the mean and quantization that noise does not average out, does not include that.
         None if an axis has fewer than five usable samples.
 
     Notes
@@ -447,10 +430,10 @@ def bias_from_lower_range(
     paper's bias of up to 11.91 m/s² was found this way (Tadic and Vukajlovic 2016, section 3); the
     low range's own bias, 0.2 m/s² there, remains.
     """
-    bias, sd, samples = np.zeros(3), np.zeros(3), np.zeros(3, dtype=np.int64)
+    bias, sd = np.zeros(3), np.zeros(3)
     for k in range(3):
         rows = np.flatnonzero(use[:, k])
-        if rows.size < HIGH_G_BIAS_LEAST_SAMPLES:
+        if rows.size < LEAST_BIAS_SAMPLES:
             return None
         difference = (higher[rows, k] - lower[rows, k])[:, None]
         bias[k] = difference.mean()
@@ -458,9 +441,4 @@ def bias_from_lower_range(
         step = float(quantization[k])
         dithered = float(higher[rows, k].std()) >= DITHERED * step
         sd[k] = np.hypot(noise, 0.0 if dithered else step / np.sqrt(12.0))
-        samples[k] = rows.size
-    return RangeBias(
-        (float(bias[0]), float(bias[1]), float(bias[2])),
-        (float(sd[0]), float(sd[1]), float(sd[2])),
-        (int(samples[0]), int(samples[1]), int(samples[2])),
-    )
+    return BiasEstimate(triad_of(bias), triad_of(sd))

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from strapdown.dsp.chi_square import chi_square_exceeded
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.sensors.crash_unit import SAME_STAMP
 from strapdown.sensors.health_log import WORDS, known_median
@@ -48,8 +49,8 @@ __all__ = [
 ]
 
 
-# Redundant axes that measure one vector: least squares, parity tests, voting.
-
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 # Parity of redundant axes: their consistency, independent of the motion.
 
@@ -225,11 +226,6 @@ class VotingState:
     arrays: tuple[NDArray[np.generic], ...]
     samples: int
 
-    @property
-    def excluded(self) -> Mask:
-        """Excluded axes, (m,)."""
-        return np.asarray(self.arrays[8] != 0)
-
 
 @dataclass(frozen=True)
 class AxisEvent:
@@ -308,7 +304,6 @@ class AxisVoting:
     changes count, so that the vector does not step when an axis is excluded. An axis is excluded
     where the others agree without it and no other explains the deviation as well; a unit, where no
     single axis does. The axes are assumed to share stamps and delay.
-    single axis does. Axes are taken to share their stamps and their delay.
     """
 
     directions: ArrayLike
@@ -462,12 +457,10 @@ class AxisVoting:
 
     def _limits(self) -> Array:
         """Chi-square limits by degrees of freedom, (m + 1,), for all samples of an hour."""
-        from scipy.special import chdtri
-
         m = len(np.asarray(self.directions))
         tests = HOUR * self.rate * len(self.rule.windows) * TRIADS
         chance = self.rule.false_alarm / tests
-        return np.array([0.0] + [float(chdtri(k, chance)) for k in range(1, m + 1)])
+        return np.array([0.0] + [chi_square_exceeded(chance, k) for k in range(1, m + 1)])
 
     def _facts(self) -> Array:
         e = self.errors
@@ -483,9 +476,6 @@ class AxisVoting:
                 e.quantization**2 / 12.0,
             ]
         )
-
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -846,8 +836,6 @@ def _words(channel: str) -> str:
 
 
 # Uncertainty of the vector fused from redundant axes.
-
-Mask = NDArray[np.bool_]
 
 
 def fused_noise(voting: AxisVoting, used: Mask) -> Array:

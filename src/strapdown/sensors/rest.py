@@ -293,14 +293,14 @@ def of_one_bias(rests: list[RestStretch]) -> tuple[RestStretch, ...]:
 # 14 m/s on streets and in one on a motorway, no window of 4 s had means that scatter by less than
 # 0.33 deg/s and 0.084 m/s² (root of the summed variances of the axes). In a parked car with people
 # getting in and doors slammed they scatter by 0.03 to 0.19 deg/s and 0.004 to 0.061 m/s².
-SHAKING_REST_WINDOW = 4.0  # s
+SHAKING_WINDOW = 4.0  # s
 BLOCKS = 8
 STEP = 1.0  # s
 MAX_GYRO_SCATTER = 0.0044  # rad/s, 0.25 deg/s: root of the summed variances of the block means
 MAX_ACCEL_SCATTER = 0.065  # m/s²
 # A hand or a foot exceeds these regardless of its means, and so does a vibrating motor mount.
-SHAKING_REST_MAX_GYRO_SD = 0.1  # rad/s
-SHAKING_REST_MAX_ACCEL_SD = 1.0  # m/s²
+SHAKING_MAX_GYRO_SD = 0.1  # rad/s
+SHAKING_MAX_ACCEL_SD = 1.0  # m/s²
 NEAR_GRAVITY = (0.8 * 9.81, 1.2 * 9.81)  # m/s²
 
 
@@ -331,25 +331,25 @@ def find_shaking_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
     time = imu.index.to_numpy(dtype=np.float64)
     values = imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64)
     spans: list[tuple[float, float]] = []
-    for start in np.arange(time[0], time[-1] - SHAKING_REST_WINDOW + 1e-9, STEP):
+    for start in np.arange(time[0], time[-1] - SHAKING_WINDOW + 1e-9, STEP):
         if not _shakes_in_place(time, values, float(start)):
             continue
         if spans and start <= spans[-1][1]:
-            spans[-1] = (spans[-1][0], float(start) + SHAKING_REST_WINDOW)
+            spans[-1] = (spans[-1][0], float(start) + SHAKING_WINDOW)
         else:
-            spans.append((float(start), float(start) + SHAKING_REST_WINDOW))
+            spans.append((float(start), float(start) + SHAKING_WINDOW))
     return of_one_bias([rest_between(imu, a, b, grade="shaking") for a, b in spans])
 
 
 def _shakes_in_place(time: Array, values: Array, start: float) -> bool:
-    edges = np.searchsorted(time, start + np.linspace(0.0, SHAKING_REST_WINDOW, BLOCKS + 1))
+    edges = np.searchsorted(time, start + np.linspace(0.0, SHAKING_WINDOW, BLOCKS + 1))
     if np.diff(edges).min() < 3:
         return False
     whole = values[edges[0] : edges[-1]]
     mean, variance = whole.mean(axis=0), whole.var(axis=0)
     if (
-        np.sqrt(variance[:3].sum()) > SHAKING_REST_MAX_GYRO_SD
-        or np.sqrt(variance[3:].sum()) > SHAKING_REST_MAX_ACCEL_SD
+        np.sqrt(variance[:3].sum()) > SHAKING_MAX_GYRO_SD
+        or np.sqrt(variance[3:].sum()) > SHAKING_MAX_ACCEL_SD
     ):
         return False
     size = float(np.sqrt(mean[3:] @ mean[3:]))
@@ -387,7 +387,7 @@ def find_rests_of_every_grade(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
         start = min([shaking.start, *(r.start for r in inside)])
         end = max([shaking.end, *(r.end for r in inside)])
         covered = sum(r.end - r.start for r in inside)
-        if inside and end - start - covered <= SHAKING_REST_WINDOW:
+        if inside and end - start - covered <= SHAKING_WINDOW:
             continue
         still = [r for r in still if r not in inside]
         whole = rest_between(imu, start, end, grade="shaking") if inside else shaking

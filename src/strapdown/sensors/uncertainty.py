@@ -148,7 +148,7 @@ SPREADS = {
     "g_sensitivity": "g_sensitivity",
     "nonlinearity": "nonlinearity_2",
 }
-SENSOR_UNCERTAINTY_FACTS = ("noise_density", "full_scale", "quantization", "bandwidth")
+SHEET_FACTS = ("noise_density", "full_scale", "quantization", "bandwidth")
 
 
 def uncertainty_of(sensor: Sensor, triad: str, **overrides: TriadLike) -> TriadUncertainty:
@@ -184,7 +184,7 @@ def uncertainty_of(sensor: Sensor, triad: str, **overrides: TriadLike) -> TriadU
             triads=TRIADS,
         )
     errors = sensor.imu_errors.gyro if triad == "gyro" else sensor.imu_errors.accel
-    values: dict[str, Any] = {name: getattr(errors, name) for name in SENSOR_UNCERTAINTY_FACTS}
+    values: dict[str, Any] = {name: getattr(errors, name) for name in SHEET_FACTS}
     spreads = sensor.spreads.get(triad, {})
     values.update((SPREADS[name], _sd(spread)) for name, spread in spreads.items())
     try:
@@ -296,9 +296,7 @@ Stated = float | Sequence[float]
 
 def _usable(keys: Mapping[str, Key]) -> dict[str, Key]:
     return {
-        k: key
-        for k, key in keys.items()
-        if key.quantity in SPREADS or key.quantity in SENSOR_UNCERTAINTY_FACTS
+        k: key for k, key in keys.items() if key.quantity in SPREADS or key.quantity in SHEET_FACTS
     }
 
 
@@ -396,7 +394,7 @@ def stated_imu(
             # Name the triad itself in the finding.
             place = (error.finding.quantity or "").replace("uncertainty", triad)
             raise error.replaced(quantity=place) from None
-        drifts[triad] = _drift_stated_imu(
+        drifts[triad] = _stated_drift(
             triad, slow, None if base is None else getattr(base, f"{triad}_drift")
         )
         _require(triad, triads[triad])
@@ -407,9 +405,7 @@ def _quantity(triad: str, key: str) -> str:
     return KEYS[triad][key].quantity
 
 
-def _drift_stated_imu(
-    triad: str, stated: Mapping[str, Stated], base: BiasDrift | None
-) -> BiasDrift:
+def _stated_drift(triad: str, stated: Mapping[str, Stated], base: BiasDrift | None) -> BiasDrift:
     drift = base or BiasDrift()
     sd, time = drift.sd, drift.correlation_time
     for name, given in stated.items():
@@ -475,22 +471,16 @@ def draw_errors(uncertainty: TriadUncertainty, seed: Seed, *streams: int) -> Tri
     ConfigError
         The draw is not a valid sensor: a scale factor of -1 or less, or angles that sum to 1 rad.
     """
-    bias = _numbers_uncertainty_draws(uncertainty.axis("bias"), seed, *streams, BIAS)[:, 0]
-    scale = _numbers_uncertainty_draws(uncertainty.axis("scale"), seed, *streams, SCALE)[:, 0]
-    turned = _numbers_uncertainty_draws(
-        uncertainty.axis("misalignment"), seed, *streams, MISALIGNMENT
-    )
+    bias = _draws(uncertainty.axis("bias"), seed, *streams, BIAS)[:, 0]
+    scale = _draws(uncertainty.axis("scale"), seed, *streams, SCALE)[:, 0]
+    turned = _draws(uncertainty.axis("misalignment"), seed, *streams, MISALIGNMENT)
     np.fill_diagonal(turned, 0.0)
-    pulled = _numbers_uncertainty_draws(
-        uncertainty.axis("g_sensitivity"), seed, *streams, G_SENSITIVITY
-    )
-    bent = _numbers_uncertainty_draws(
-        uncertainty.axis("nonlinearity_2"), seed, *streams, NONLINEARITY
-    )[:, 0]
+    pulled = _draws(uncertainty.axis("g_sensitivity"), seed, *streams, G_SENSITIVITY)
+    bent = _draws(uncertainty.axis("nonlinearity_2"), seed, *streams, NONLINEARITY)[:, 0]
     most = MOST_NONLINEARITY * (1.0 + scale)
-    shaken = _numbers_uncertainty_draws(
-        uncertainty.axis("vibration_rectification"), seed, *streams, RECTIFICATION
-    )[:, 0]
+    shaken = _draws(uncertainty.axis("vibration_rectification"), seed, *streams, RECTIFICATION)[
+        :, 0
+    ]
     return TriadErrors(
         noise_density=uncertainty.noise_density,
         bias=triad_of(bias),
@@ -505,7 +495,7 @@ def draw_errors(uncertainty: TriadUncertainty, seed: Seed, *streams: int) -> Tri
     )
 
 
-def _numbers_uncertainty_draws(sd: Triad, seed: Seed, *place: int) -> Array:
+def _draws(sd: Triad, seed: Seed, *place: int) -> Array:
     """Three numbers per axis, (3, 3), each axis with its own standard deviation."""
     rows = np.empty((3, 3))
     for axis in range(3):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,8 +17,8 @@ from strapdown.alignment.readiness import (
     Manoeuvre,
     carried_attitude,
     carry,
-    coarse_readiness,
     manoeuvres_after,
+    readiness,
 )
 from strapdown.bundle.seal import InputFiles, input_files
 from strapdown.config.alignment import AlignmentSpec, ReferenceTable, sensors_of
@@ -167,12 +167,9 @@ def run_alignment(
     start = _at(first, float(attitude.index[0]), imu, site, sensors)
     end = _at(answer, float(attitude.index[-1]), imu, site, sensors)
     progress("trying shorter alignments", 0.6)
-    readiness = alignment_readiness(
-        coarse_way,
+    curve = alignment_readiness(
+        lambda piece: coarse_way.align(piece, site, sensors, source.gnss),
         imu,
-        site,
-        sensors,
-        source.gnss,
         attitude,
         fine,
         source.truth,
@@ -201,7 +198,7 @@ def run_alignment(
         start=start,
         end=end,
         attitude=attitude,
-        readiness=readiness,
+        readiness=curve,
         manoeuvres=manoeuvres,
         inputs=(*files, *source.inputs),
         unread=unread,
@@ -492,11 +489,8 @@ class AlignmentReadiness:
 
 
 def alignment_readiness(
-    way: CoarseAlignment,
+    align: Callable[[pd.DataFrame], Alignment],
     imu: pd.DataFrame,
-    site: Site,
-    sensors: ImuUncertainty,
-    gnss: pd.DataFrame | None,
     attitude: pd.DataFrame,
     fine: FineResult | None,
     truth: pd.DataFrame | None,
@@ -506,13 +500,10 @@ def alignment_readiness(
 
     Parameters
     ----------
-    way : CoarseAlignment
+    align : callable
+        Coarse alignment of a part of the record.
     imu : DataFrame
         Imu table of the whole record.
-    site : Site
-    sensors : ImuUncertainty
-    gnss : DataFrame, optional
-        Gnss table.
     attitude : DataFrame
         Attitude table of the result over the record.
     fine : FineResult, optional
@@ -532,7 +523,7 @@ def alignment_readiness(
         offset = reference_offset(attitude, reference)
     known = attitude if truth is None else truth
     lengths = _lengths(float(imu.index[-1]) - begin)
-    found = coarse_readiness(way, imu, site, sensors, gnss, lengths, known).table
+    found = readiness(align, imu, lengths, known).table
     refused = found["refused"].notna().to_numpy()
     coarse = found[~refused]
     sd = coarse[[f"{a}_sd" for a in EULER]].to_numpy(dtype=np.float64)

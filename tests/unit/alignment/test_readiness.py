@@ -14,18 +14,21 @@ sys.path.insert(0, str(Path(__file__).parent))
 from stands import SITE, ideal, rocking, still, unit
 
 from strapdown.alignment.inertial_frame import InertialFrame
-from strapdown.alignment.readiness import READINESS, coarse_readiness, durations_of
+from strapdown.alignment.readiness import READINESS, durations_of, readiness
 from strapdown.alignment.two_vector import TwoVector
 from strapdown.errors import ConfigError, DataError
 from strapdown.tables import attitude_table
 
 
+def aligning(way, sensors):
+    return lambda part: way.align(part, SITE, sensors)
+
+
 def test_a_curve_with_its_truth():
     imu, truth, sensors = unit(rocking(600.0), 50.0, 2)
     reference = attitude_table(imu.index.to_numpy(), truth)
-    found = coarse_readiness(InertialFrame(), imu, SITE, sensors, reference=reference)
+    found = readiness(aligning(InertialFrame(), sensors), imu, reference=reference)
     table = found.table
-    assert found.method == "inertial_frame"
     assert list(table.columns) == READINESS
     assert len(table) == 10
     assert table.index[0] == pytest.approx(6.0)
@@ -43,7 +46,7 @@ def test_a_curve_with_its_truth():
 
 def test_what_is_refused_says_why():
     imu, _, sensors = unit(rocking(300.0), 50.0, 2)
-    table = coarse_readiness(TwoVector(), imu, SITE, sensors, durations=[30.0, 300.0]).table
+    table = readiness(aligning(TwoVector(), sensors), imu, durations=[30.0, 300.0]).table
     assert {one.code for one in table["refused"]} == {"alignment.heading-lost"}
     assert {one.data["reason"].code for one in table["refused"]} == {"alignment.rate-scatters"}
     assert table["heading"].isna().all()
@@ -65,10 +68,10 @@ def test_durations():
 def test_durations_that_do_not_rise_within_the_record(wrong):
     imu, _, sensors = unit(still(300.0), 20.0, 3)
     with pytest.raises(ConfigError, match="durations"):
-        coarse_readiness(TwoVector(), imu, SITE, sensors, durations=wrong)
+        readiness(aligning(TwoVector(), sensors), imu, durations=wrong)
 
 
 def test_a_reference_is_checked():
     imu, _, sensors = unit(still(300.0), 20.0, 3)
     with pytest.raises(DataError):
-        coarse_readiness(TwoVector(), imu, SITE, sensors, reference=pd.DataFrame({"roll": [1.0]}))
+        readiness(aligning(TwoVector(), sensors), imu, reference=pd.DataFrame({"roll": [1.0]}))
