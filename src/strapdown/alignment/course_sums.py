@@ -60,29 +60,17 @@ STEADY = 0.1
 class DriveSums:
     """A record integrated from the fixes to its end: k fixes, m nodes, s stretches.
 
-    Attributes
-    ----------
-    until_end : ndarray, (k,), s
-        From the fixes to the end of the record.
-    turned : ndarray, (k, 3, 3)
-        From the body axes at a fix to those at the end, in inertial space.
-    gained : ndarray, (k, 3), m/s
-        Integral of the specific force from a fix to the end, in the axes at the end.
-    rate : ndarray, (k, 3), rad/s
-        Of the body at the fixes, without vibration; body axes.
-    stretch : ndarray, (s,), s
-        Lengths of the stretches.
-    by_gyro : ndarray, (k, 3, 21 + 3 s)
-        Attitude error at a fix by errors of the gyros, in the axes at the end, rad:
-        a bias of each axis, the nine elements (i, j) of an error of axis i in proportion to the
-        rate of axis j above its mean, nine in proportion to the specific force above its mean,
-        and a bias of each axis in each stretch alone. Signs: bias is reading − truth, the
-        attitude error is true − computed.
-    by_turn : ndarray, (k, 3, 21 + 3 s)
-        Velocity error at a fix by the same errors, in the axes at the end, m/s.
-    by_accel : ndarray, (k, 3, 12 + 3 s)
-        Velocity error at a fix by errors of the accelerometers: likewise, nine in proportion to
-        the specific force.
+    `until_end` ((k,), s): from the fixes to the end of the record. `turned` ((k, 3, 3)): from the
+    body axes at a fix to those at the end, in inertial space. `gained` ((k, 3), m/s): integral of
+    the specific force from a fix to the end, in the axes at the end. `rate` ((k, 3), rad/s): of the
+    body at the fixes, without vibration; body axes. `stretch` ((s,), s): lengths of the stretches.
+    `by_gyro` ((k, 3, 21 + 3 s)): attitude error at a fix by errors of the gyros, in the axes at the
+    end, rad: a bias of each axis, the nine elements (i, j) of an error of axis i in proportion to
+    the rate of axis j above its mean, nine in proportion to the specific force above its mean, and
+    a bias of each axis in each stretch alone. Signs: bias is reading − truth, the attitude error is
+    true − computed. `by_turn` ((k, 3, 21 + 3 s)): velocity error at a fix by the same errors, in
+    the axes at the end, m/s. `by_accel` ((k, 3, 12 + 3 s)): velocity error at a fix by errors of
+    the accelerometers: likewise, nine in proportion to the specific force.
     """
 
     until_end: Array
@@ -98,26 +86,13 @@ class DriveSums:
 def drive_sums(imu: pd.DataFrame, time: Array, means: Array, errors: Array) -> DriveSums:
     """Integrate a record from its fixes to its end.
 
-    Parameters
-    ----------
-    imu : DataFrame
-    time : ndarray, (k,), s
-        Of fixes, within the record.
-    means : ndarray, (6,)
-        Of rate and force, about which errors in proportion to the input are counted.
-    errors : ndarray
-        The columns `course_unknowns.OF_SENSORS`, which are subtracted.
+    `time` ((k,), s): of fixes, within the record. `means` ((6,)): of rate and force, about which
+    errors in proportion to the input are counted. `errors`: the columns
+    `course_unknowns.OF_SENSORS`, which are subtracted.
 
-    Returns
-    -------
-    DriveSums
-
-    Notes
-    -----
     With theta the rotation from the computed attitude to the true one,
     ``C_true = exp([theta x]) C``, and the true rate and force less by db and da than taken, it is
-    ``theta(t) = theta_e + int_t^e C db`` and
-    ``v(t) = v_e - int_t^e (C f + theta x C f - C da)``.
+    ``theta(t) = theta_e + int_t^e C db`` and ``v(t) = v_e - int_t^e (C f + theta x C f - C da)``.
     """
     stamps = imu.index.to_numpy(dtype=np.float64)
     table = imu.copy()
@@ -227,14 +202,8 @@ LEAST_SD = 1e-6
 class Antenna:
     """Lever arm and clock of a receiver.
 
-    Attributes
-    ----------
-    lever_arm : triad, m
-        From the inertial sensors, body axes.
-    velocity_delay : float, s
-        By which a stated velocity is older than its stamp.
-    time_offset_sd : float, s
-        By which all stamps may be wrong.
+    `lever_arm` (m): from the inertial sensors, body axes. `velocity_delay` (s): by which a stated
+    velocity is older than its stamp. `time_offset_sd` (s): by which all stamps may be wrong.
     """
 
     lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -246,18 +215,9 @@ class Antenna:
 class CourseFixes:
     """Fixes with a velocity during an inertial record.
 
-    Attributes
-    ----------
-    time : ndarray, (k,), s
-        At which the velocities hold.
-    velocity, sd : ndarray, (k, 3), m/s
-        North, east, down. The standard deviation of the last may be infinite.
-    fast : ndarray of bool, (k,)
-        Whether they are fast enough to have a course.
-    row : ndarray of int, (k,)
-        Of the table, from 1.
-    source : str, optional
-        Of the fixes.
+    `time` ((k,), s): at which the velocities hold. `velocity`, `sd` ((k, 3), m/s): North, east,
+    down. The standard deviation of the last may be infinite. `fast` ((k,)): whether they are fast
+    enough to have a course. `row` ((k,)): of the table, from 1. `source`: of the fixes.
     """
 
     time: Array
@@ -288,24 +248,9 @@ def course_fixes(
 ) -> CourseFixes:
     """Select the fixes with a velocity of a record that ends in motion.
 
-    Parameters
-    ----------
-    imu : DataFrame
-    gnss : DataFrame, optional
-    least_speed : float, m/s
-    largest_sd : float, rad
-        Of a course by the noise of the receiver.
-    velocity_delay : float, s
-
-    Returns
-    -------
-    CourseFixes
-
-    Raises
-    ------
-    DataError
-        The Gnss table is missing, it has fewer than two fixes with a velocity during the
-        record, or the last two are too slow.
+    `least_speed` (m/s). `largest_sd` (rad): of a course by the noise of the receiver.
+    `velocity_delay` (s). DataError: the Gnss table is missing, it has fewer than two fixes with a
+    velocity during the record, or the last two are too slow.
     """
     if gnss is None:
         raise DataError("alignment.no-fixes-for-course", file=source_of(imu), quantity="gnss")
@@ -363,13 +308,9 @@ LEAST = 1.0
 class RestRate:
     """Mean rate of a rest.
 
-    Attributes
-    ----------
-    time : float, s
-        Middle of the rest.
-    rate, sd : ndarray, (3,), rad/s
-        The mean, and its standard deviation as a measure of the bias at the end of the record:
-        scatter within the rest, and bias drift since.
+    `time` (s): middle of the rest. `rate`, `sd` ((3,), rad/s): the mean, and its standard deviation
+    as a measure of the bias at the end of the record: scatter within the rest, and bias drift
+    since.
     """
 
     time: float
@@ -384,16 +325,7 @@ def rest_rates(
 
     A gyro cannot distinguish a stationary vehicle from one on a straight road; the fixes can.
 
-    Parameters
-    ----------
-    imu : DataFrame
-    fixes : CourseFixes
-    sensors : ImuUncertainty
-
-    Returns
-    -------
-    tuple of RestRate
-        Empty if no fix lies in a rest.
+    Returns empty if no fix lies in a rest.
     """
     speed = np.hypot(fixes.velocity[:, 0], fixes.velocity[:, 1])
     slow = speed <= np.maximum(CLEAR * fixes.sd[:, :2].max(axis=1), CREEP)

@@ -387,26 +387,9 @@ def settled(
 ) -> Iterator[tuple[FilterState, Seen]]:
     """Process the epochs of a rest.
 
-    Parameters
-    ----------
-    filter_ : ErrorFilter
-    state : FilterState
-    time : ndarray, (k,), s
-        Ends of the steps.
-    rows : ndarray, (k, 10)
-        Motion increments.
-    ends : ndarray of int
-        Number of steps before the end of each epoch.
-    home : NavState
-        The position of alignment and the attitude of rest.
-    standing : Standing
-    observe : tuple of str
-
-    Yields
-    ------
-    state : FilterState
-    seen : dict
-        By name, each observation and its innovations.
+    `time` ((k,), s): ends of the steps. `rows` ((k, 10)): motion increments. `ends`: number of
+    steps before the end of each epoch. `home`: the position of alignment and the attitude of rest.
+    Yields `state`; `seen`: by name, each observation and its innovations.
     """
     at = 0
     for end in ends.tolist():
@@ -469,14 +452,7 @@ def heading_floor_deg(result: FineResult, site: Site) -> float:
     the heading is the prior information plus that on the drift:
     ``1/s^2 = 1/s_0^2 + (omega cos(lat) / s_E)^2``.
 
-    Parameters
-    ----------
-    result : FineResult
-    site : Site
-
-    Returns
-    -------
-    float, deg
+    In deg.
     """
     gyro = np.asarray(result.filter.model.sensors[0].sd[:3], dtype=np.float64)
     east = float(np.linalg.norm(rotation.dcm_from_quaternion(result.alignment.q_nb)[1] * gyro))
@@ -489,17 +465,10 @@ def heading_floor_deg(result: FineResult, site: Site) -> float:
 def refuse_false_claims(result: FineResult, site: Site) -> None:
     """Refuse a heading that is stated to be more accurate than the sensors allow.
 
-    A filter is linear: with biases so large that the second order of tilt, heading and bias
-    exceeds the noise, it takes that for information.
+    A filter is linear: with biases so large that the second order of tilt, heading and bias exceeds
+    the noise, it takes that for information.
 
-    Parameters
-    ----------
-    result : FineResult
-    site : Site
-
-    Raises
-    ------
-    DataError
+    Raises DataError.
     """
     heading = result.history["heading"].to_numpy()
     moved = float(heading[-1] - heading[0])
@@ -538,10 +507,7 @@ GAPS = ("mechanization.gap-before-body-did-not", "mechanization.gap-body-did-not
 def telling_record(imu: pd.DataFrame) -> Iterator[None]:
     """Add the remedy at a command to a gap error, and the gyro readings to a divergence.
 
-    Parameters
-    ----------
-    imu : DataFrame
-        Imu table that is aligned inside.
+    `imu`: Imu table that is aligned inside.
     """
     try:
         yield
@@ -587,17 +553,7 @@ INCONSISTENT = 3.0
 
 
 def fine_findings(result: FineResult, site: Site) -> tuple[Finding, ...]:
-    """Report assumptions that do not hold, and quantities that the sensors could not determine.
-
-    Parameters
-    ----------
-    result : FineResult
-    site : Site
-
-    Returns
-    -------
-    tuple of Finding
-    """
+    """Report assumptions that do not hold, and quantities that the sensors could not determine."""
     return (
         *_north(result, site),
         *_stands(result),
@@ -766,12 +722,7 @@ def alignment_of(filter_: ErrorFilter, state: FilterState) -> Alignment:
 
 
 class Epochs:
-    """Epochs of a run.
-
-    Parameters
-    ----------
-    filter_ : ErrorFilter
-    """
+    """Epochs of a run."""
 
     def __init__(self, filter_: ErrorFilter) -> None:
         self._filter = filter_

@@ -209,17 +209,10 @@ LEAST_SLIP, LEAST_RATE_SD = 1e-6, 1e-10
 class CourseModel:
     """Prior uncertainty of a vehicle's motion and of its fixes.
 
-    Attributes
-    ----------
-    reverse : bool
-        It drives backward.
-    yaw : float, rad
-        Heading of the unit's forward axis minus the course.
-    yaw_sd, slip_sd : float, rad
-        The part that stays over a drive, and the part that changes from second to second.
-    axle_sd : float, m
-        Uncertainty of the distance of the unit from the unsteered axle, ahead or behind.
-    antenna : Antenna
+    `reverse`: it drives backward. `yaw` (rad): heading of the unit's forward axis minus the course.
+    `yaw_sd`, `slip_sd` (rad): the part that stays over a drive, and the part that changes from
+    second to second. `axle_sd` (m): uncertainty of the distance of the unit from the unsteered
+    axle, ahead or behind.
     """
 
     reverse: bool
@@ -234,24 +227,12 @@ class CourseModel:
 class Found:
     """Current estimates of the least squares.
 
-    Attributes
-    ----------
-    C : ndarray, (3, 3)
-        Attitude at the end of the record.
-    velocity : ndarray, (3,), m/s
-        At the end.
-    errors : ndarray, rad/s, m/s² and relative
-        Of the sensors, the columns `course_unknowns.OF_SENSORS`; reading − truth.
-    covariance : ndarray, (39, 39)
-        As `Alignment.joint`.
-    fitted : ndarray, (k, 3), m/s
-        Velocities at the fixes, north, east, down, near which courses are linear.
-    weight : ndarray, (k,)
-        Weight of each fix.
-    scale : float
-        Factor of the scatter of the velocities over their stated one; at least 1.
-    onward : float
-        Share of the courses that agree with the assumed direction of driving.
+    `C` ((3, 3)): attitude at the end of the record. `velocity` ((3,), m/s): at the end. `errors`
+    (rad/s, m/s² and relative): of the sensors, the columns `course_unknowns.OF_SENSORS`; reading −
+    truth. `covariance` ((39, 39)): as `Alignment.joint`. `fitted` ((k, 3), m/s): velocities at the
+    fixes, north, east, down, near which courses are linear. `weight` ((k,)): weight of each fix.
+    `scale`: factor of the scatter of the velocities over their stated one; at least 1. `onward`:
+    share of the courses that agree with the assumed direction of driving.
     """
 
     C: Array
@@ -278,18 +259,8 @@ class Found:
 class CourseFit:
     """Least squares over the fixes of a part of a record that reaches to its end.
 
-    Attributes
-    ----------
-    imu : DataFrame
-        Of that part.
-    means : ndarray, (6,)
-        Means of rate and force, at which the biases are estimated.
-    fixes : CourseFixes
-        In that part, two at least.
-    rests : tuple of RestRate
-    site : Site
-    sensors : ImuUncertainty
-    model : CourseModel
+    `imu`: of that part. `means` ((6,)): means of rate and force, at which the biases are estimated.
+    `fixes`: in that part, two at least.
     """
 
     imu: pd.DataFrame
@@ -303,16 +274,8 @@ class CourseFit:
     def step(self, found: Found, influence: Influence) -> Found:
         """Solve once, about the last estimates, with weights by the residuals.
 
-        Parameters
-        ----------
-        found : Found
-            Its covariance is not used.
-        influence : Influence
-            Of the velocities of fixes, by the largest residual of the three.
-
-        Returns
-        -------
-        Found
+        `found`: its covariance is not used. `influence`: of the velocities of fixes, by the largest
+        residual of the three.
         """
         fixes, rests = self.fixes, self.rests
         time = np.concatenate([fixes.time, [rest.time for rest in rests]])
@@ -527,17 +490,7 @@ HEADING_SPAN = 5.0
 
 @dataclass(frozen=True, eq=False)
 class CourseSearch:
-    """Search of the initial values for `course_fit.CourseFit`, over a whole record.
-
-    Attributes
-    ----------
-    imu : DataFrame
-    fixes : CourseFixes
-    rests : tuple of RestRate
-    site : Site
-    sensors : ImuUncertainty
-    model : CourseModel
-    """
+    """Search of the initial values for `course_fit.CourseFit`, over a whole record."""
 
     imu: pd.DataFrame
     fixes: CourseFixes
@@ -549,10 +502,7 @@ class CourseSearch:
     def over(self) -> Found:
         """Solve over increasing parts that end with the record, up to the whole.
 
-        Returns
-        -------
-        Found
-            Gross errors among the fixes are excluded.
+        Returns gross errors among the fixes are excluded.
         """
         fixes = self.fixes
         end, begin = float(self.imu.index[-1]), float(fixes.time[0])
@@ -720,21 +670,9 @@ LEAST_STEPS = 6
 def check_forward(imu: pd.DataFrame, fixes: CourseFixes, sums: DriveSums, reverse: bool) -> None:
     """Compare the force along the forward axis with the change of the speed.
 
-    Parameters
-    ----------
-    imu : DataFrame
-        For its name.
-    fixes : CourseFixes
-    sums : DriveSums
-        At the fixes.
-    reverse : bool
-        Whether the drive was taken for a reverse one.
-
-    Raises
-    ------
-    DataError
-        The force falls while the vehicle gains speed. Fewer than six steps from fix to fix, or
-        no changes of speed, allow no check.
+    `imu`: for its name. `sums`: at the fixes. `reverse`: whether the drive was taken for a reverse
+    one. DataError: the force falls while the vehicle gains speed. Fewer than six steps from fix to
+    fix, or no changes of speed, allow no check.
     """
     fast = fixes.fast
     if fast.sum() <= LEAST_STEPS:

@@ -231,17 +231,12 @@ class Response:
     """Sensitivity of the estimates to an error in a node, (m, 5, 3) each.
 
     The estimates are: error of the attitude at the first instant (3, north-east-down, rad), of the
-    latitude (rad) and of the magnitude of gravity (relative). An error is a vector in the body
-    axes at the first instant.
+    latitude (rad) and of the magnitude of gravity (relative). An error is a vector in the body axes
+    at the first instant.
 
-    Attributes
-    ----------
-    turn : ndarray, (m, 5, 3), per rad
-        Of an error of the angle within the node.
-    push : ndarray, (m, 5, 3), per m/s
-        Of an error of the velocity gained within the node.
-    place : ndarray, (m, 5, 3), per m s
-        Of an error of the second integral, times the length of the node.
+    `turn` ((m, 5, 3), per rad): of an error of the angle within the node. `push` ((m, 5, 3), per
+    m/s): of an error of the velocity gained within the node. `place` ((m, 5, 3), per m s): of an
+    error of the second integral, times the length of the node.
     """
 
     turn: Array
@@ -253,17 +248,10 @@ class Response:
 class InertialFit:
     """The attitude at the first instant, and the residuals.
 
-    Attributes
-    ----------
-    C_nb : ndarray, (3, 3)
-        Body to local level at the first instant.
-    measured, known : ndarray, (DEGREES, 3), m
-        Coefficients of S in north-east-down by the fitted attitude, and of W.
-    latitude_change : float, rad
-        Measured latitude minus the site's: from the Earth's rate across the vertical.
-    gravity_change : float
-        Measured gravity minus the site's, relative.
-    response : Response
+    `C_nb` ((3, 3)): body to local level at the first instant. `measured`, `known` ((DEGREES, 3),
+    m): coefficients of S in north-east-down by the fitted attitude, and of W. `latitude_change`
+    (rad): measured latitude minus the site's: from the Earth's rate across the vertical.
+    `gravity_change`: measured gravity minus the site's, relative.
     """
 
     C_nb: Array
@@ -309,20 +297,9 @@ def _wahba(measured: Array, known: Array, weights: Array) -> Array:
 def fit_inertially(sums: InertialSums, site: Site) -> InertialFit:
     """Fit the attitude.
 
-    Parameters
-    ----------
-    sums : InertialSums
-    site : Site
-
-    Returns
-    -------
-    InertialFit
-
-    Notes
-    -----
-    Wahba's problem by the singular value decomposition (Markley, J. Astronaut. Sci. 36 (1988)
-    245): north, east and down are determined by ``g`` and by ``ω x g``, which the second and third
-    powers of the time carry.
+    Wahba's problem by the singular value decomposition (Markley, J. Astronaut. Sci. 36 (1988) 245):
+    north, east and down are determined by ``g`` and by ``ω x g``, which the second and third powers
+    of the time carry.
     """
     gravity, rate = site.gravity, site.earth_rate
     basis = turning_gravity(sums.stamps, float(np.sqrt(rate @ rate)))
@@ -380,14 +357,8 @@ def _solve(normal: Array, rows: Array) -> Array:
 def functionals(sums: InertialSums) -> tuple[Array, Array]:
     """Coefficients per second integral times time in a node, and per velocity gained in it.
 
-    Parameters
-    ----------
-    sums : InertialSums
-
-    Returns
-    -------
-    place, push : ndarray, (DEGREES, m)
-        Exact for a constant within a node: by integrals of the polynomials from the end.
+    Returns `place`, `push` ((DEGREES, m)): exact for a constant within a node: by integrals of the
+    polynomials from the end.
     """
     from numpy.polynomial import legendre
 
@@ -427,19 +398,9 @@ def heading_rate(
 ) -> tuple[float, float]:
     """Rate of the body about the vertical against the local level.
 
-    Parameters
-    ----------
-    sums : InertialSums
-    C_nb : ndarray, (3, 3)
-        At the first sample.
-    site : Site
-    sensors : ImuUncertainty
-
-    Returns
-    -------
-    rate, sd : float, rad/s
-        Slope of the line through the angle. The variance adds to the sensor errors the scatter of
-        the angle about the line, ``12 s²/(m T²)`` with s that of the means of m = 10 parts.
+    `C_nb` ((3, 3)): at the first sample. Returns `rate`, `sd` (rad/s): slope of the line through
+    the angle. The variance adds to the sensor errors the scatter of the angle about the line,
+    ``12 s²/(m T²)`` with s that of the means of m = 10 parts.
     """
     picked = np.unique(np.linspace(0, len(sums.stamps) - 1, 50 * BLOCKS).astype(np.int64))
     time = sums.stamps[picked]
@@ -467,11 +428,8 @@ def turn_findings(
 ) -> tuple[Finding, ...]:
     """Report a rotation about the vertical; parameters as of `heading_rate`.
 
-    Returns
-    -------
-    tuple of Finding
-        One, if the rate is more than five standard deviations from zero. It does no harm to
-        an inertial-frame alignment of a body that turned; it does if the body was stationary.
+    Returns one, if the rate is more than five standard deviations from zero. It does no harm to an
+    inertial-frame alignment of a body that turned; it does if the body was stationary.
     """
     rate, sd = heading_rate(sums, C_nb, site, sensors)
     if not abs(rate) > CONTRADICTION * sd:
@@ -517,17 +475,11 @@ _ROUNDS = 300
 class ResidualNoise:
     """Excess noise over the noise of the sensors.
 
-    Attributes
-    ----------
-    ratio : float
-        Root of the mean ratio of energies: measured over predicted by the sensors.
-    significant : bool
-        Whether chance gives this with a probability below one in a million.
-    excess : ndarray, (4,)
-        Spectral densities of `KINDS`: m²/Hz, (m/s)²/Hz, (m/s²)²/Hz, (m/s³)²/Hz; zero where it
-        is not significant.
-    sway : float, m
-        Root mean square of the horizontal excursion that no fit takes away.
+    `ratio`: root of the mean ratio of energies: measured over predicted by the sensors.
+    `significant`: whether chance gives this with a probability below one in a million. `excess`
+    ((4,)): spectral densities of `KINDS`: m²/Hz, (m/s)²/Hz, (m/s²)²/Hz, (m/s³)²/Hz; zero where it
+    is not significant. `sway` (m): root mean square of the horizontal excursion that no fit takes
+    away.
     """
 
     ratio: float
@@ -538,14 +490,7 @@ class ResidualNoise:
     def covariance(self, sums: InertialSums, push: Array, place: Array) -> Array:
         """Covariance of an estimate to errors of velocity gain and position; as `Response`.
 
-        Parameters
-        ----------
-        sums : InertialSums
-        push, place : ndarray, (m, k, 3)
-
-        Returns
-        -------
-        ndarray, (k, k)
+        `push`, `place` ((m, k, 3)). Returns (k, k).
         """
         dt = sums.node_length
         by_place, by_force = place, push
@@ -567,22 +512,10 @@ def _onward(response: Array) -> Array:
 def residual_noise(sums: InertialSums, fit: InertialFit, sensors: ImuUncertainty) -> ResidualNoise:
     """Test and estimate the noise in the residuals of a fit.
 
-    Parameters
-    ----------
-    sums : InertialSums
-    fit : InertialFit
-    sensors : ImuUncertainty
-
-    Returns
-    -------
-    ResidualNoise
-
-    Notes
-    -----
     The energies of a degree are exponentially distributed about the sum of the contributions of
-    each kind of noise; maximum-likelihood densities are found by steps that keep them
-    positive and never lose likelihood (Févotte and Idier 2011, doi:10.1162/NECO_a_00168, the
-    Itakura-Saito divergence with exponent 1/2).
+    each kind of noise; maximum-likelihood densities are found by steps that keep them positive and
+    never lose likelihood (Févotte and Idier 2011, doi:10.1162/NECO_a_00168, the Itakura-Saito
+    divergence with exponent 1/2).
     """
     shapes = _energies(sums)[:, FIRST_FREE:]
     g = float(np.linalg.norm(sums.node_velocity.sum(axis=0))) / sums.length

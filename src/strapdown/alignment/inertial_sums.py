@@ -27,23 +27,12 @@ class InertialSums:
 
     These axes are fixed in inertial space; ``C`` rotates from the body to them.
 
-    Attributes
-    ----------
-    start, length : float, s
-        First stamp, and time to the last.
-    stamps : ndarray, (n,), s
-        From the first.
-    fallen : ndarray, (n, 3), m
-        Second integral of the specific force at the stamps.
-    turned : ndarray, (n, 4)
-        ``C`` at the stamps, as quaternions.
-    node_length : ndarray, (m,), s
-    node_velocity : ndarray, (m, 3), m/s
-        Integral of the specific force over each node.
-    times : ndarray, (m, 3, 3), s
-        Integral of ``C`` over each node.
-    turns, pushes : ndarray, (m, 3, 3, 3), rad and m/s
-        Sums of ``C[:, i] phi[j]`` and ``C[:, i] dv[j]``, indices (node, component, i, j).
+    `start`, `length` (s): first stamp, and time to the last. `stamps` ((n,), s): from the first.
+    `fallen` ((n, 3), m): second integral of the specific force at the stamps. `turned` ((n, 4)):
+    ``C`` at the stamps, as quaternions. `node_length` ((m,), s). `node_velocity` ((m, 3), m/s):
+    integral of the specific force over each node. `times` ((m, 3, 3), s): integral of ``C`` over
+    each node. `turns`, `pushes` ((m, 3, 3, 3), rad and m/s): sums of ``C[:, i] phi[j]`` and
+    ``C[:, i] dv[j]``, indices (node, component, i, j).
     """
 
     start: float
@@ -66,21 +55,8 @@ class InertialSums:
 def sum_inertially(imu: pd.DataFrame, ends: Indices | None = None) -> InertialSums:
     """Integrate an Imu table with specific force.
 
-    Parameters
-    ----------
-    imu : DataFrame
-    ends : ndarray of int, (m,), optional
-        Samples at which nodes end, rising, above zero, the last one that of the record; equal
-        parts of the time, if not given.
-
-    Returns
-    -------
-    InertialSums
-
-    Raises
-    ------
-    DataError
-        As `increments.motion_increments`.
+    `ends` ((m,)): samples at which nodes end, rising, above zero, the last one that of the record;
+    equal parts of the time, if not given. DataError: as `increments.motion_increments`.
     """
     from strapdown._kernels.sums import inertial_sums
 
@@ -120,17 +96,8 @@ def sum_inertially(imu: pd.DataFrame, ends: Indices | None = None) -> InertialSu
 def moments(stamps: Array, values: Array, degrees: int) -> Array:
     """Coefficients of a record in Legendre polynomials over its length.
 
-    Parameters
-    ----------
-    stamps : ndarray, (n,), s
-        From zero to the length.
-    values : ndarray, (n, k)
-    degrees : int
-
-    Returns
-    -------
-    ndarray, (degrees, k), the unit of `values`
-        Degree zero first.
+    `stamps` ((n,), s): from zero to the length. `values` ((n, k)). Returns (degrees, k), the unit
+    of `values`: degree zero first.
     """
     from strapdown._kernels.sums import legendre_moments
 

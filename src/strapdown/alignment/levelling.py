@@ -148,32 +148,13 @@ def level_at_rest(
 ) -> Alignment:
     """Level a stationary record.
 
-    Parameters
-    ----------
-    method : str
-        To be named in the result.
-    imu : DataFrame
-    site : Site
-    sensors : ImuUncertainty
-    heading_deg : float, deg
-    heading_sd : float, rad
+    `method`: to be named in the result. `heading_deg` (deg). `heading_sd` (rad). Returns at the
+    last sample. Scatter of the force beyond noise, and the angles by which the body swings, are
+    included in the covariance, with a finding. DataError: as `record_checks.check_record` and
+    `check_gravity`; the body points to the zenith or the nadir.
 
-    Returns
-    -------
-    Alignment
-        At the last sample. Scatter of the force beyond noise, and the angles by which the body
-        swings, are included in the covariance, with a finding.
-
-    Notes
-    -----
     `levelling.level` takes gravity as vertical; above the ellipsoid its north component is
     ``8e-9 alt sin(2 lat)`` m/s², a microradian of tilt at 1200 m, which is neglected.
-
-    Raises
-    ------
-    DataError
-        As `record_checks.check_record` and `check_gravity`; the body points to the zenith or
-        the nadir.
     """
     source = source_of(imu)
     findings = [*check_record(imu)]
@@ -233,30 +214,14 @@ def error_of_force_and_heading(
 ) -> tuple[Array, Array]:
     """Sensitivities of an attitude from a force in both frames and a stated heading.
 
-    Parameters
-    ----------
-    force : ndarray, (3,), m/s²
-        North-east-down, known: minus gravity at rest.
-    pitch_deg, heading_deg : float, deg
-    source : str, optional
-        For messages.
+    `force` ((3,), m/s²): North-east-down, known: minus gravity at rest. `pitch_deg`, `heading_deg`
+    (deg). `source`: for messages. Returns `by_force` ((3, 3), rad per m/s²): of ``phi`` per error
+    of the known force minus that of the measured one, north-east-down; `by_heading` ((3,),
+    rad/rad). DataError: the body points to the zenith or the nadir: it has no heading.
 
-    Returns
-    -------
-    by_force : ndarray, (3, 3), rad per m/s²
-        Of ``phi`` per error of the known force minus that of the measured one, north-east-down.
-    by_heading : ndarray, (3,), rad/rad
-
-    Raises
-    ------
-    DataError
-        The body points to the zenith or the nadir: it has no heading.
-
-    Notes
-    -----
-    ``phi x F = e`` leaves the rotation about F free: ``phi = F x e/F² + l F``. The heading
-    changes by ``phi_D + tan(pitch) (cos(heading) phi_N + sin(heading) phi_E)``, which gives l. At
-    rest this is ``phi_N = -df_E/g``, ``phi_E = df_N/g``.
+    ``phi x F = e`` leaves the rotation about F free: ``phi = F x e/F² + l F``. The heading changes
+    by ``phi_D + tan(pitch) (cos(heading) phi_N + sin(heading) phi_E)``, which gives l. At rest this
+    is ``phi_N = -df_E/g``, ``phi_E = df_N/g``.
     """
     if not abs(pitch_deg) <= STEEPEST:
         raise DataError(

@@ -37,17 +37,8 @@ Array = NDArray[np.float64]
 def rate_covariance(sensors: ImuUncertainty, length: float, rate: Array, force: Array) -> Array:
     """Covariance of a mean rate.
 
-    Parameters
-    ----------
-    sensors : ImuUncertainty
-    length : float, s
-        Time over which it is a mean.
-    rate, force : ndarray, (3,), rad/s and m/s²
-        The means.
-
-    Returns
-    -------
-    ndarray, (3, 3), (rad/s)²
+    `length` (s): time over which it is a mean. `rate`, `force` ((3,), rad/s and m/s²): the means.
+    Returns (3, 3), (rad/s)².
     """
     gyro = sensors.gyro
     variance = gyro.variance_by_input(rate)
@@ -67,17 +58,8 @@ def force_covariance(sensors: ImuUncertainty, length: float, force: Array) -> Ar
 def gravity_change(force: Array, covariance: Array, gravity: Array) -> tuple[float, float]:
     """Magnitude of a mean specific force against gravity, relative, and its standard deviation.
 
-    Parameters
-    ----------
-    force : ndarray, (3,), m/s²
-    covariance : ndarray, (3, 3), (m/s²)²
-        In the same axes.
-    gravity : ndarray, (3,), m/s²
-        In any.
-
-    Returns
-    -------
-    change, sd : float
+    `force` ((3,), m/s²). `covariance` ((3, 3), (m/s²)²): in the same axes. `gravity` ((3,), m/s²):
+    in any. Returns `change`, `sd`.
     """
     size, g = (float(np.sqrt(x @ x)) for x in (force, gravity))
     return size / g - 1.0, float(np.sqrt(force @ covariance @ force)) / (size * g)
@@ -109,13 +91,8 @@ CHANCE = 1e-6
 class BlockMeans:
     """Means over equal parts of a record.
 
-    Attributes
-    ----------
-    length : float, s
-        Of the record.
-    rate, force : ndarray, (m, 3), rad/s and m/s²
-    whole_rate, whole_force : ndarray, (3,)
-        Means over all samples.
+    `length` (s): of the record. `rate`, `force` ((m, 3), rad/s and m/s²). `whole_rate`,
+    `whole_force` ((3,)): means over all samples.
     """
 
     length: float
@@ -128,16 +105,8 @@ class BlockMeans:
 def block_means(imu: pd.DataFrame, blocks: int) -> BlockMeans:
     """Average an Imu table as a whole and by parts.
 
-    Parameters
-    ----------
-    imu : DataFrame
-    blocks : int
-        Parts of equal time; those without a sample are left out.
-
-    Returns
-    -------
-    BlockMeans
-        Each sample is weighted by its time interval.
+    `blocks`: parts of equal time; those without a sample are left out. Returns each sample is
+    weighted by its time interval.
     """
     time = imu.index.to_numpy(dtype=np.float64)
     values = imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64)
@@ -163,25 +132,11 @@ def _stands_for(time: Array, mean: bool) -> Array:
 def unexplained(means: Array, length: float, density: Triad, drift: BiasDrift) -> float:
     """Scatter of block means over that of the noise, if significant; else 1.
 
-    Parameters
-    ----------
-    means : ndarray, (m, 3)
-        Of equal parts.
-    length : float, s
-        Of the record.
-    density : triad
-        White noise, unit of `means` over √Hz.
-    drift : BiasDrift
+    `means` ((m, 3)): of equal parts. `length` (s): of the record. `density`: white noise, unit of
+    `means` over √Hz. Returns ratio of standard deviations of the worst axis.
 
-    Returns
-    -------
-    float
-        Ratio of standard deviations of the worst axis.
-
-    Notes
-    -----
-    Within a record a Gauss-Markov process walks by ``q = 2 sd²/correlation_time`` a second, and
-    the means of its parts scatter about that of the whole by ``q length/6`` (variance).
+    Within a record a Gauss-Markov process walks by ``q = 2 sd²/correlation_time`` a second, and the
+    means of its parts scatter about that of the whole by ``q length/6`` (variance).
     """
     m = len(means)
     if m < 2:
@@ -199,16 +154,8 @@ def unexplained(means: Array, length: float, density: Triad, drift: BiasDrift) -
 def of_mean(means: Array) -> Array:
     """Covariance of a mean from the scatter of its parts.
 
-    Parameters
-    ----------
-    means : ndarray, (m, k)
-        Of equal parts.
-
-    Returns
-    -------
-    ndarray, (k, k)
-        As if the parts were independent: too large for an oscillation, whose parts are
-        negatively correlated.
+    `means` ((m, k)): of equal parts. Returns (k, k): as if the parts were independent: too large
+    for an oscillation, whose parts are negatively correlated.
     """
     off = means - means.mean(axis=0)
     count = len(means)
@@ -218,17 +165,9 @@ def of_mean(means: Array) -> Array:
 def excursion(imu: pd.DataFrame, density: Triad) -> Array:
     """Covariance of the small angles of a body's swing about its mean attitude.
 
-    Parameters
-    ----------
-    imu : DataFrame
-    density : triad, rad/s/√Hz
-        The effect of the gyro noise is subtracted.
-
-    Returns
-    -------
-    ndarray, (3, 3), rad²
-        Body axes: of the integral of the rate minus its regression line. A walk of the noise
-        keeps a fifteenth of its variance at the end on average.
+    `density` (rad/s/√Hz): the effect of the gyro noise is subtracted. Returns (3, 3), rad²: body
+    axes: of the integral of the rate minus its regression line. A walk of the noise keeps a
+    fifteenth of its variance at the end on average.
     """
     time = imu.index.to_numpy(dtype=np.float64)
     gyro = imu[GYRO].to_numpy(dtype=np.float64)
@@ -255,19 +194,10 @@ def sensor_covariance(
 ) -> Array:
     """Covariance of an estimate of k numbers by all constant or drifting errors of the sensors.
 
-    Parameters
-    ----------
-    sums : InertialSums
-    turn, push : ndarray, (m, k, 3)
-        Sensitivities of the estimate to an error of the angle and of the velocity gained within
-        a node; the error in the body axes at the first instant.
-    sensors : ImuUncertainty
-        Biases, their drift, scale, misalignment and g-sensitivity; nonlinearity and the
-        rectification of vibration are not in it.
-
-    Returns
-    -------
-    ndarray, (k, k)
+    `turn`, `push` ((m, k, 3)): sensitivities of the estimate to an error of the angle and of the
+    velocity gained within a node; the error in the body axes at the first instant. `sensors`:
+    biases, their drift, scale, misalignment and g-sensitivity; nonlinearity and the rectification
+    of vibration are not in it. Returns (k, k).
     """
     gyro, accel = sensors.gyro, sensors.accel
     total = _biases(turn, sums, gyro.axis("bias"), sensors.gyro_drift)

@@ -81,23 +81,9 @@ class Readiness:
 def durations_of(imu: pd.DataFrame, count: int = 10) -> Array:
     """Durations that a record allows, equally spaced in their logarithm.
 
-    Parameters
-    ----------
-    imu : DataFrame
-    count : int
-        At least 2.
-
-    Returns
-    -------
-    ndarray, (count,), s
-        From 5 s, or a hundredth of the record if longer, to the whole record.
-
-    Raises
-    ------
-    ConfigError
-        Fewer than two are requested.
-    DataError
-        The record is shorter than 10 s.
+    `count`: at least 2. Returns (count,), s: from 5 s, or a hundredth of the record if longer, to
+    the whole record. ConfigError: fewer than two are requested. DataError: the record is shorter
+    than 10 s.
     """
     if count < 2:
         raise ConfigError("alignment.too-few-durations", quantity="count", count=count)
@@ -429,25 +415,12 @@ def carry(
 def carried_attitude(alignment: Alignment, imu: pd.DataFrame, site: Site) -> pd.DataFrame:
     """Propagate an attitude over its own record.
 
-    Parameters
-    ----------
-    alignment : Alignment
-        At an instant of the record; its gyro bias, if any, is subtracted.
-    imu : DataFrame
-        Imu table of a body that stays at its position.
-    site : Site
-
-    Returns
-    -------
-    DataFrame
-        Attitude table: ``q_nb(t) = q_n(t)n(T) q_nb(T) q_b(T)b(t)``, the body's rotation in
-        inertial space by the gyros and that of the level by the Earth's rate. One sample of a
-        mean rate has no step before it and takes the start of the first whole interval.
-
-    Raises
-    ------
-    DataError
-        The instant of the alignment is not in the record.
+    `alignment`: at an instant of the record; its gyro bias, if any, is subtracted. `imu`: Imu table
+    of a body that stays at its position. Returns attitude table:
+    ``q_nb(t) = q_n(t)n(T) q_nb(T) q_b(T)b(t)``, the body's rotation in inertial space by the gyros
+    and that of the level by the Earth's rate. One sample of a mean rate has no step before it and
+    takes the start of the first whole interval. DataError: the instant of the alignment is not in
+    the record.
     """
     from strapdown.attitude_algorithms.algorithm import run_attitude
     from strapdown.attitude_algorithms.quaternion import Quaternion

@@ -43,20 +43,8 @@ ROUNDING = 1e-12
 def check_record(imu: pd.DataFrame) -> tuple[Finding, ...]:
     """Check an Imu table before alignment.
 
-    Parameters
-    ----------
-    imu : DataFrame
-
-    Returns
-    -------
-    tuple of Finding
-        Outliers, gaps.
-
-    Raises
-    ------
-    DataError
-        As `tables.check_imu`; accelerometers are missing, there are fewer than 20 samples, or a
-        channel does not change at all while others do.
+    Returns outliers, gaps. DataError: as `tables.check_imu`; accelerometers are missing, there are
+    fewer than 20 samples, or a channel does not change at all while others do.
     """
     check_imu(imu)
     source = source_of(imu)
@@ -80,21 +68,8 @@ def check_record(imu: pd.DataFrame) -> tuple[Finding, ...]:
 def check_gravity(force: Array, source: str | None) -> tuple[Finding, ...]:
     """Check that a mean specific force is that of gravity.
 
-    Parameters
-    ----------
-    force : ndarray, (3,), m/s²
-    source : str, optional
-        Of the record, for messages.
-
-    Returns
-    -------
-    tuple of Finding
-        If the body is upside down.
-
-    Raises
-    ------
-    DataError
-        Its length is not within 20 % of 9.8 m/s².
+    `force` ((3,), m/s²). `source`: of the record, for messages. Returns if the body is upside down.
+    DataError: its length is not within 20 % of 9.8 m/s².
     """
     size = float(np.sqrt(force @ force))
     if not abs(size / STANDARD_GRAVITY - 1.0) <= NEAR_GRAVITY:
@@ -122,18 +97,8 @@ def check_gravity(force: Array, source: str | None) -> tuple[Finding, ...]:
 def gravity_findings(change: float, sd: float, source: str | None) -> tuple[Finding, ...]:
     """Compare the magnitude of a mean specific force with the gravity of the site.
 
-    Parameters
-    ----------
-    change : float
-        Measured minus the site's, relative.
-    sd : float
-        Its standard deviation.
-    source : str, optional
-
-    Returns
-    -------
-    tuple of Finding
-        One, if it is more than five standard deviations.
+    `change`: measured minus the site's, relative. `sd`: its standard deviation. Returns one, if it
+    is more than five standard deviations.
     """
     if not abs(change) > CONTRADICTION * sd:
         return ()
@@ -201,18 +166,9 @@ FACTOR = 10.0
 def outlier_findings(values: Array, columns: list[str], source: str | None) -> tuple[Finding, ...]:
     """Find jumps beyond noise and rocking.
 
-    Parameters
-    ----------
-    values : ndarray, (n, k)
-    columns : list of str
-        Their names.
-    source : str, optional
-
-    Returns
-    -------
-    tuple of Finding
-        At most one, of the channel that jumps most, with the row of its largest jump. A channel
-        whose usual step is zero (a coarse converter) is not judged.
+    `values` ((n, k)). `columns`: their names. Returns at most one, of the channel that jumps most,
+    with the row of its largest jump. A channel whose usual step is zero (a coarse converter) is not
+    judged.
     """
     steps = np.abs(np.diff(values, axis=0))
     place = int(USUAL * (len(steps) - 1))
@@ -249,26 +205,11 @@ def still_by_gnss(
 ) -> tuple[Finding, ...]:
     """Refuse a steady motion, which inertial sensors cannot distinguish from rest.
 
-    Parameters
-    ----------
-    gnss : DataFrame, optional
-        Gnss table; no check if not given.
-    imu : DataFrame
-    site : Site
-    heading_sd : float, rad
-        Stated standard deviation; an error that is small against it is accepted.
-
-    Returns
-    -------
-    tuple of Finding
-        One, if the vehicle moves and the heading uncertainty covers the error.
-
-    Raises
-    ------
-    DataError
-        The vehicle moves, and the error of the heading found as if stationary exceeds its
-        standard deviation: the level of a vehicle that goes north rotates like one on an Earth
-        that rotates faster about east, by ``v_N/(R w cos(lat))``.
+    `gnss`: Gnss table; no check if not given. `heading_sd` (rad): stated standard deviation; an
+    error that is small against it is accepted. Returns one, if the vehicle moves and the heading
+    uncertainty covers the error. DataError: the vehicle moves, and the error of the heading found
+    as if stationary exceeds its standard deviation: the level of a vehicle that goes north rotates
+    like one on an Earth that rotates faster about east, by ``v_N/(R w cos(lat))``.
     """
     if gnss is None:
         return ()
@@ -319,25 +260,9 @@ def north_findings(
 ) -> tuple[Finding, ...]:
     """Report the standard deviation of north.
 
-    Parameters
-    ----------
-    site : Site
-    sd : float, rad
-        Of the heading.
-    sensors : ImuUncertainty
-    source : str, optional
-        Of the record, for messages.
-
-    Returns
-    -------
-    tuple of Finding
-        Where the latitude is high.
-
-    Raises
-    ------
-    DataError
-        The standard deviation exceeds 1 rad, or the position is so close to a pole that it is
-        not finite.
+    `sd` (rad): of the heading. `source`: of the record, for messages. Returns where the latitude is
+    high. DataError: the standard deviation exceeds 1 rad, or the position is so close to a pole
+    that it is not finite.
     """
     rate = site.earth_rate
     size, across = float(np.sqrt(rate @ rate)), float(abs(rate[0]))
@@ -373,14 +298,7 @@ def north_findings(
 def seems_in_deg_per_s(rate: Array, site: Site) -> bool:
     """Whether the mean rate of a body at rest is 57 times the Earth's.
 
-    Parameters
-    ----------
-    rate : ndarray, (3,), rad/s
-    site : Site
-
-    Returns
-    -------
-    bool
+    `rate` ((3,), rad/s).
     """
     size, earth = (float(np.sqrt(x @ x)) for x in (rate, site.earth_rate))
     return abs(size / earth / float(np.degrees(1.0)) - 1.0) < 0.1
@@ -396,17 +314,8 @@ def latitude_findings(
 ) -> tuple[Finding, ...]:
     """Compare the latitude measured by the sensors with the site's.
 
-    Parameters
-    ----------
-    site : Site
-    measured_deg, sd_deg : float, deg
-        From the angle between gravity and the Earth's rate.
-    source : str, optional
-
-    Returns
-    -------
-    tuple of Finding
-        One, if they differ by more than five standard deviations.
+    `measured_deg`, `sd_deg` (deg): from the angle between gravity and the Earth's rate. Returns
+    one, if they differ by more than five standard deviations.
     """
     off = measured_deg - site.lat_deg
     if not abs(off) > CONTRADICTION * sd_deg:

@@ -66,20 +66,7 @@ def still_observations(
 ) -> list[Observation]:
     """Return the observations at the end of an epoch: (17) and (18).
 
-    Parameters
-    ----------
-    filter_ : ErrorFilter
-    state : FilterState
-        At the end of the epoch.
-    home : NavState
-        The position of alignment.
-    standing : Standing
-    names : sequence of str
-        Of `OBSERVATIONS`.
-
-    Returns
-    -------
-    list of Observation
+    `state`: at the end of the epoch. `home`: the position of alignment. `names`: of `OBSERVATIONS`.
     """
     made = []
     if "position" in names:
@@ -165,18 +152,7 @@ def rate_observation(
 def turns_between(used: Mechanization, segment: Segment, home: NavState, every: int) -> Array:
     """Changes of the rotation vector from the attitude of rest, from epoch to epoch.
 
-    Parameters
-    ----------
-    used : Mechanization
-    segment : Segment
-    home : NavState
-    every : int
-        Steps from epoch to epoch.
-
-    Returns
-    -------
-    ndarray, (k // every, 3), rad
-        In level axes.
+    `every`: steps from epoch to epoch. Returns (k // every, 3), rad: in level axes.
     """
     history = segment.history[::every]
     levels = used.levels(history)
@@ -206,18 +182,10 @@ def attitude_of_rest(segment: Segment) -> Array:
 def without_steady_turn(rows: Array, earth: Array) -> Array:
     """Motion increments minus the mean rate, if that keeps the body's attitude constant.
 
-    Without observations, gyros with a bias of degrees a minute turn the computed attitude over.
-    For a coning body the mean rate is not a bias: its unchanged rates return to its attitude.
+    Without observations, gyros with a bias of degrees a minute turn the computed attitude over. For
+    a coning body the mean rate is not a bias: its unchanged rates return to its attitude.
 
-    Parameters
-    ----------
-    rows : ndarray, (k, 10)
-    earth : ndarray, (3,), rad/s
-        Rate of the Earth in body axes.
-
-    Returns
-    -------
-    ndarray, (k, 10)
+    `rows` ((k, 10)). `earth` ((3,), rad/s): rate of the Earth in body axes. Returns (k, 10).
     """
     length = float(rows[:, 0].sum())
     excess = rows[:, 1:4].sum(axis=0) / length - earth
@@ -244,29 +212,15 @@ def measured_standing(
 ) -> Standing:
     """Estimate the residual motion of a stationary body from a run without observations.
 
-    A filter takes the motion as independent from epoch to epoch. Slow sway or settling is not:
-    so the motion is evaluated over stretches of 1, 2, 4 ... epochs, and the result is the
-    independent motion that is equivalent at the stretch where it is largest. The drift of the
-    run itself is smooth, and removed by differences: the third for velocity, the fourth for the
-    position.
+    A filter takes the motion as independent from epoch to epoch. Slow sway or settling is not: so
+    the motion is evaluated over stretches of 1, 2, 4 ... epochs, and the result is the independent
+    motion that is equivalent at the stretch where it is largest. The drift of the run itself is
+    smooth, and removed by differences: the third for velocity, the fourth for the position.
 
-    Parameters
-    ----------
-    segment : Segment
-        Of the whole record.
-    home : NavState
-        The position of alignment and the attitude of rest.
-    every : int
-        Steps from epoch to epoch.
-    least : Standing
-        Lower bounds of the result.
-    gyro_noise : triad, rad/√s
-        It rotates the level, too, and is not motion of the body: where no significant rotation
-        is found, a fraction of this noise is assumed.
-
-    Returns
-    -------
-    Standing
+    `segment`: of the whole record. `home`: the position of alignment and the attitude of rest.
+    `every`: steps from epoch to epoch. `least`: lower bounds of the result. `gyro_noise` (rad/√s):
+    it rotates the level, too, and is not motion of the body: where no significant rotation is
+    found, a fraction of this noise is assumed.
     """
     used = segment.mechanization
     levels = used.levels(segment.history)
@@ -303,18 +257,8 @@ def _as_independent(values: Array, order: int) -> Array:
 def velocity_of_noise(gyro: Triad, accel: Triad, interval: float, epochs: int) -> float:
     """Velocity that `measured_standing` finds for a stationary body, by the noise of sensors.
 
-    Parameters
-    ----------
-    gyro, accel : triad, rad/√s and m/s/√s
-    interval : float, s
-        From epoch to epoch.
-    epochs : int
-        Number of epochs.
-
-    Returns
-    -------
-    float, m/s
-        Of a horizontal axis, with the largest noise of the three.
+    `gyro`, `accel` (rad/√s and m/s/√s). `interval` (s): from epoch to epoch. `epochs`: number of
+    epochs. Returns m/s: of a horizontal axis, with the largest noise of the three.
     """
     order, length, most = 3, 1, 0.0
     signs = [(-1) ** k * math.comb(order, k) for k in range(order + 1)]

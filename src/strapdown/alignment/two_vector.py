@@ -133,15 +133,7 @@ class TwoVector(CoarseAlignment):
 def triad_attitude(force: Array, rate: Array, site: Site) -> Array:
     """``C_nb`` that aligns minus the force with gravity, and the rate with the Earth's meridian.
 
-    Parameters
-    ----------
-    force, rate : ndarray, (3,)
-        Body axes.
-    site : Site
-
-    Returns
-    -------
-    ndarray, (3, 3)
+    `force`, `rate` ((3,)): body axes. Returns (3, 3).
     """
     known = _triad(site.gravity, site.earth_rate)
     return known @ _triad(-force, rate).T

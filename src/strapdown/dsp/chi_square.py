@@ -19,17 +19,9 @@ __all__ = [
 def chi_square_quantile(share: Any, freedom: Any) -> Any:
     """Compute the chi-square quantile of a probability.
 
-    Parameters
-    ----------
-    share : array_like
-        Probability of a value below the quantile, 0 to 1.
-    freedom : array_like
-        Degrees of freedom, above 0.
-
-    Returns
-    -------
-    float or ndarray
-        ``2 P⁻¹(freedom/2, share)``, P the regularized incomplete gamma function (DLMF 8.2.4).
+    `share`: probability of a value below the quantile, 0 to 1. `freedom`: degrees of freedom, above
+    0. Returns float or ndarray: ``2 P⁻¹(freedom/2, share)``, P the regularized incomplete gamma
+    function (DLMF 8.2.4).
     """
     from scipy.special import gammaincinv
 

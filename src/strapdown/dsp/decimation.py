@@ -45,15 +45,10 @@ SLACK = 1e-6  # steps
 class Resampled:
     """Channels at new stamps.
 
-    Attributes
-    ----------
-    values : ndarray, (m, k)
-    noise_factor : ndarray, (m,)
-        Standard deviation of each output divided by that of white noise of the samples, exact.
-    whole : ndarray of bool, (m,)
-        False where the output uses the padding beyond an end of the record.
-    touched : ndarray of bool, (m, k)
-        Whether a marked sample contributes to the output.
+    `values` ((m, k)). `noise_factor` ((m,)): standard deviation of each output divided by that of
+    white noise of the samples, exact. `whole` ((m,)): False where the output uses the padding
+    beyond an end of the record. `touched` ((m, k)): whether a marked sample contributes to the
+    output.
     """
 
     values: Array
@@ -66,16 +61,9 @@ class Resampled:
 class LowPassDesign:
     """A windowed sinc low-pass, symmetric about each output stamp.
 
-    Attributes
-    ----------
-    passband, stopband : float, Hz
-        Up to `passband` the gain is 1, and from `stopband` on 0, both to `ripple`.
-    attenuation : float, dB
-        Attenuation of the stopband.
-    reach : float, s
-        Half the length of the kernel.
-    beta : float
-        Shape parameter of the Kaiser window.
+    `passband`, `stopband`: up to `passband` the gain is 1, and from `stopband` on 0, both to
+    `ripple`. `attenuation` (dB): attenuation of the stopband. `reach` (s): half the length of the
+    kernel. `beta`: shape parameter of the Kaiser window.
     """
 
     passband: float
@@ -110,28 +98,13 @@ def low_pass_design(
 ) -> LowPassDesign:
     """Design the anti-aliasing low-pass for a lower rate.
 
-    Parameters
-    ----------
-    step : float, s
-        Sampling interval.
-    rate : float, Hz
-        Output rate. The stopband begins at its Nyquist frequency.
-    passband : float
-        End of the passband, as a fraction of that Nyquist frequency. The kernel's length grows as
-        ``1/(1 - passband)``: at 0.5 and 80 dB it reaches 10.9 output steps to either side.
-    attenuation : float, dB
-        40 to 150.
-
-    Returns
-    -------
-    LowPassDesign
-        By Kaiser (1974): Oppenheim & Schafer, Discrete-Time Signal Processing, 3rd edition,
-        Eqs. (7.75) and (7.76), with five decibels in reserve.
-
-    Raises
-    ------
-    ConfigError
-        An option is out of its range, or the output is not slower than the samples.
+    `step` (s): sampling interval. `rate`: output rate. The stopband begins at its Nyquist
+    frequency. `passband`: end of the passband, as a fraction of that Nyquist frequency. The
+    kernel's length grows as ``1/(1 - passband)``: at 0.5 and 80 dB it reaches 10.9 output steps to
+    either side. `attenuation` (dB): 40 to 150. Returns by Kaiser (1974): Oppenheim & Schafer,
+    Discrete-Time Signal Processing, 3rd edition, Eqs. (7.75) and (7.76), with five decibels in
+    reserve. ConfigError: an option is out of its range, or the output is not slower than the
+    samples.
     """
     step = positive_step(step)
     if not (math.isfinite(rate) and 0.0 < rate <= (1.0 + 1e-9) / step):
@@ -164,30 +137,14 @@ def decimate(
 ) -> Resampled:
     """Resample evenly spaced samples to stamps with a zero-delay low-pass.
 
-    Parameters
-    ----------
-    values : array_like, (n,) or (n, k)
-    start, step : float, s
-        Stamp of the first sample, and the sampling interval.
-    stamps : array_like, (m,), s
-        Anywhere in the record, at any ratio of rates; they need not be even.
-    design : LowPassDesign
-        From `low_pass_design`.
-    marked : ndarray of bool, (n, k), optional
-        Samples to trace: `Resampled.touched` marks the outputs that they contribute to.
-
-    Returns
-    -------
-    Resampled
-        Each output is a weighted sum of samples, with the kernel centered at its stamp (zero
-        delay) and weights that sum to 1. Within `reach` of the ends the record is padded by its
-        point mirror, which preserves constants and straight lines.
-
-    Raises
-    ------
-    DataError
-        A sample or stamp is not finite, a stamp lies outside the record, or the record is shorter
-        than the reach of the kernel.
+    `values` ((n,) or (n, k)). `start`, `step` (s): stamp of the first sample, and the sampling
+    interval. `stamps` ((m,), s): anywhere in the record, at any ratio of rates; they need not be
+    even. `design`: from `low_pass_design`. `marked` ((n, k)): samples to trace: `Resampled.touched`
+    marks the outputs that they contribute to. Returns each output is a weighted sum of samples,
+    with the kernel centered at its stamp (zero delay) and weights that sum to 1. Within `reach` of
+    the ends the record is padded by its point mirror, which preserves constants and straight lines.
+    DataError: a sample or stamp is not finite, a stamp lies outside the record, or the record is
+    shorter than the reach of the kernel.
     """
     channels, at = as_channels(values), as_channels(stamps, "stamps")[:, 0]
     step = positive_step(step)
@@ -228,33 +185,15 @@ def mean_samples(
 ) -> Resampled:
     """Average over the interval that ends at each stamp.
 
-    Parameters
-    ----------
-    values : array_like, (n,) or (n, k)
-    start, step : float, s
-        Stamp of the first sample, and the sampling interval.
-    stamps : array_like, (m,), s
-    length : float, s
-        Length of the intervals; at least one step of the samples.
-    sampling : {'instantaneous', 'mean'}
-        Whether a sample is the value at its stamp, linear in between (trapezoids), or the mean
-        over the step that ends there.
-    marked : ndarray of bool, (n, k), optional
-        As in `decimate`.
-
-    Returns
-    -------
-    Resampled
-        Integrals over consecutive intervals add up to the integral of the whole, to rounding. The
-        gain at f is ``sinc(f length)``, times ``sinc²(f step)`` for the trapezoids: a mean is only
-        a weak low-pass. It belongs to the middle of the interval.
-
-    Raises
-    ------
-    ConfigError
-        `sampling` is unknown, or the intervals are shorter than a step.
-    DataError
-        A sample or stamp is not finite, or an interval does not lie in the record.
+    `values` ((n,) or (n, k)). `start`, `step` (s): stamp of the first sample, and the sampling
+    interval. `stamps` ((m,), s). `length` (s): length of the intervals; at least one step of the
+    samples. `sampling` ({'instantaneous', 'mean'}): whether a sample is the value at its stamp,
+    linear in between (trapezoids), or the mean over the step that ends there. `marked` ((n, k)): as
+    in `decimate`. Returns integrals over consecutive intervals add up to the integral of the whole,
+    to rounding. The gain at f is ``sinc(f length)``, times ``sinc²(f step)`` for the trapezoids: a
+    mean is only a weak low-pass. It belongs to the middle of the interval. ConfigError: `sampling`
+    is unknown, or the intervals are shorter than a step. DataError: a sample or stamp is not
+    finite, or an interval does not lie in the record.
     """
     channels, at = as_channels(values), as_channels(stamps, "stamps")[:, 0]
     step = positive_step(step)
@@ -333,13 +272,7 @@ def _check_within(at: Array, low: float, high: float, step: float) -> None:
 class FirState:
     """State between chunks.
 
-    Attributes
-    ----------
-    first : int
-        Index of the oldest sample kept.
-    given : int
-        Number of outputs so far.
-    values : ndarray, (k, c)
+    `first`: index of the oldest sample kept. `given`: number of outputs so far. `values` ((k, c)).
     """
 
     first: int
@@ -354,15 +287,9 @@ class FirDecimation:
     Output j has the stamp of sample ``centre + j factor``, in the middle of its window: the delay
     is the same at all frequencies, and this stamp compensates it.
 
-    Attributes
-    ----------
-    design : LowPassDesign
-    step : float, s
-        Sampling interval.
-    factor : int
-    means : bool
-        Whether a sample is a mean over the step that ends at its stamp. The weights are then
-        symmetric about the output's stamp, half a step off the samples' stamps.
+    `step` (s): sampling interval. `means`: whether a sample is a mean over the step that ends at
+    its stamp. The weights are then symmetric about the output's stamp, half a step off the samples'
+    stamps.
     """
 
     design: LowPassDesign
@@ -423,15 +350,7 @@ class FirDecimation:
     def advance(self, state: FirState, values: Array) -> tuple[FirState, Array]:
         """Process a chunk of samples and return the outputs that are complete.
 
-        Parameters
-        ----------
-        state : FirState
-        values : ndarray, (k, c)
-
-        Returns
-        -------
-        state : FirState
-        outputs : ndarray, (m, c)
+        `values` ((k, c)). Returns `state`; `outputs` ((m, c)).
         """
         from strapdown._kernels.signals import fir_decimate
 
@@ -455,20 +374,9 @@ def fir_decimation(
 ) -> FirDecimation:
     """Design the low-pass for decimation by an integer factor.
 
-    Parameters
-    ----------
-    step : float, s
-    factor : int
-        Two or more.
-    means : bool
-        Whether a sample is the mean over the step that ends at its stamp.
-    passband, attenuation : float
-        As `low_pass_design`.
-
-    Raises
-    ------
-    ConfigError
-        An option is out of its range.
+    `step` (s). `factor`: two or more. `means`: whether a sample is the mean over the step that ends
+    at its stamp. `passband`, `attenuation`: as `low_pass_design`. ConfigError: an option is out of
+    its range.
     """
     if factor != int(factor) or factor < 2:
         raise ConfigError("dsp.every-th-sample-no-decimation", quantity="factor", factor=factor)
@@ -489,30 +397,14 @@ def interpolate(
 ) -> Resampled:
     """Interpolate samples to stamps.
 
-    Parameters
-    ----------
-    time : array_like, (n,), s
-        Increasing, any spacing.
-    values : array_like, (n,) or (n, k)
-    stamps : array_like, (m,), s
-        Within the record.
-    marked : ndarray of bool, (n, k), optional
-        As in `decimation.decimate`.
-
-    Returns
-    -------
-    Resampled
-        The polynomial of degree 5 through the six nearest samples, one-sided near the ends: exact
-        for polynomials up to that degree, and at the samples. Midway between even samples the
-        gain at f is ``150/128 cos x - 25/128 cos 3x + 3/128 cos 5x`` with ``x = π f step``: 0.9990
-        at an eighth of the sampling rate, 0.950 at a quarter. The noise factor there is 0.84;
-        between the first two samples it is up to 1.6.
-
-    Raises
-    ------
-    DataError
-        Fewer than six samples, time does not advance, a stamp is outside the record, or a number
-        is not finite.
+    `time` ((n,), s): increasing, any spacing. `values` ((n,) or (n, k)). `stamps` ((m,), s): within
+    the record. `marked` ((n, k)): as in `decimation.decimate`. Returns the polynomial of degree 5
+    through the six nearest samples, one-sided near the ends: exact for polynomials up to that
+    degree, and at the samples. Midway between even samples the gain at f is
+    ``150/128 cos x - 25/128 cos 3x + 3/128 cos 5x`` with ``x = π f step``: 0.9990 at an eighth of
+    the sampling rate, 0.950 at a quarter. The noise factor there is 0.84; between the first two
+    samples it is up to 1.6. DataError: fewer than six samples, time does not advance, a stamp is
+    outside the record, or a number is not finite.
     """
     t, channels = as_channels(time, "time")[:, 0], as_channels(values)
     at = as_channels(stamps, "stamps")[:, 0]
@@ -575,17 +467,9 @@ def interpolated_means(
 ) -> Resampled:
     """Average `interpolate` over intervals that end at stamps (three-point Gauss quadrature).
 
-    Parameters
-    ----------
-    time, values, stamps, marked
-        As in `interpolate`; the intervals lie within the record.
-    length : float, s
-        Length of the intervals, at most two steps of the samples.
-
-    Returns
-    -------
-    Resampled
-        Exact for polynomials up to degree 5.
+    `time`, `values`, `stamps`, `marked`: as in `interpolate`; the intervals lie within the record.
+    `length` (s): length of the intervals, at most two steps of the samples. Returns exact for
+    polynomials up to degree 5.
     """
     t, channels = as_channels(time, "time")[:, 0], as_channels(values)
     at = as_channels(stamps, "stamps")[:, 0]

@@ -38,11 +38,8 @@ TRUNCATE = 4.0
 class EvenSignal:
     """A record on an even grid.
 
-    Attributes
-    ----------
-    start, step : float, s
-        Stamp of the first sample, and the sampling interval, on the record's own clock.
-    values : ndarray, (n, k)
+    `start`, `step` (s): stamp of the first sample, and the sampling interval, on the record's own
+    clock. `values` ((n, k)).
     """
 
     start: float
@@ -59,22 +56,11 @@ class EvenSignal:
 class Delay:
     """Delay of one motion between two clocks.
 
-    Attributes
-    ----------
-    delay : float, s
-        Stamp on the second clock minus stamp on the first, for the same instant.
-    sd : float, s
-        Standard deviation, from the residuals, their correlation in time, and the slopes.
-    correlation : float
-        Correlation coefficient at the delay.
-    runner_up, runner_up_delay : float, s
-        The next best peak; 0 and NaN where there is only one.
-    ambiguous : bool
-        Whether the next best peak fits about as well.
-    gain : float
-        Second record divided by the first.
-    shared : float, s
-        Length of the overlap.
+    `delay` (s): stamp on the second clock minus stamp on the first, for the same instant. `sd` (s):
+    standard deviation, from the residuals, their correlation in time, and the slopes.
+    `correlation`: correlation coefficient at the delay. `runner_up`, `runner_up_delay` (s): the
+    next best peak; 0 and NaN where there is only one. `ambiguous`: whether the next best peak fits
+    about as well. `gain`: second record divided by the first. `shared` (s): length of the overlap.
     """
 
     delay: float
@@ -97,36 +83,20 @@ def find_delay(
 ) -> Delay:
     """Estimate the delay of the second record against the first by correlation.
 
-    Parameters
-    ----------
-    first, second : EvenSignal
-        Any rates; the same number of channels, which show one motion in one unit or in
-        proportion, such as magnitudes of vectors, which do not depend on the mounting. Each
-        channel may have a constant offset.
-    least_shared : float, s, optional
-        Smallest overlap; half the shorter record if not given.
-    near : tuple of float, s, optional
-        Guess and its half-width: only delays within are searched.
-    refuse_ambiguous : bool
-        Raise where another peak fits about as well; otherwise only flag it.
-
-    Returns
-    -------
-    Delay
-        Both records are decimated to the slower rate, at most 1 kHz. The highest correlation
-        coefficient gives the delay to one sample. Least squares with a gain and constants refines
-        it to a fraction, after the Gaussian smoothing that gives the smallest variance:
-        ``second(t + d) = g first(t) + c``. The variance is ``Σ r_l Σ_i x'_i x'_(i+l)`` over
-        ``(Σ x' y')²``, with the autocovariance r of the residuals. For white residuals it is
-        ``σ²/Σ x'²``, the Cramér-Rao bound for known shapes (Kay, Fundamentals of Statistical
-        Signal Processing I, Eq. (3.14)). Where two points of a vehicle move differently, the
-        difference is part of the residuals.
-
-    Raises
-    ------
-    DataError
-        The numbers of channels differ, the overlap is too short, the signal is constant, or the
-        peak is ambiguous.
+    `first`, `second`: any rates; the same number of channels, which show one motion in one unit or
+    in proportion, such as magnitudes of vectors, which do not depend on the mounting. Each channel
+    may have a constant offset. `least_shared` (s): smallest overlap; half the shorter record if not
+    given. `near` (s): guess and its half-width: only delays within are searched.
+    `refuse_ambiguous`: raise where another peak fits about as well; otherwise only flag it. Returns
+    both records are decimated to the slower rate, at most 1 kHz. The highest correlation
+    coefficient gives the delay to one sample. Least squares with a gain and constants refines it to
+    a fraction, after the Gaussian smoothing that gives the smallest variance:
+    ``second(t + d) = g first(t) + c``. The variance is ``Σ r_l Σ_i x'_i x'_(i+l)`` over
+    ``(Σ x' y')²``, with the autocovariance r of the residuals. For white residuals it is
+    ``σ²/Σ x'²``, the Cramér-Rao bound for known shapes (Kay, Fundamentals of Statistical Signal
+    Processing I, Eq. (3.14)). Where two points of a vehicle move differently, the difference is
+    part of the residuals. DataError: the numbers of channels differ, the overlap is too short, the
+    signal is constant, or the peak is ambiguous.
     """
     one, two = _at_common_rate(first, second)
     step = one.step
@@ -319,21 +289,10 @@ def lag_correlation(
 ) -> tuple[Array, Array]:
     """Compute the correlation coefficient for each lag: sample k of y lies at k + lag of x.
 
-    Parameters
-    ----------
-    x, y : ndarray, (n,) and (m,), or (n, k) and (m, k)
-        On one step; channels are pooled, each about its own mean.
-    known_x, known_y : ndarray of bool, (n,) and (m,)
-        False where a sample is missing.
-    least : float
-        Samples that both must have at a lag.
-
-    Returns
-    -------
-    lags : ndarray
-        Lags with enough overlap.
-    coefficient : ndarray
-        -1 to 1; means and variances are taken over the overlap at the lag.
+    `x`, `y` ((n,) and (m,), or (n, k) and (m, k)): on one step; channels are pooled, each about its
+    own mean. `known_x`, `known_y` ((n,) and (m,)): False where a sample is missing. `least`:
+    samples that both must have at a lag. Returns `lags`: lags with enough overlap; `coefficient`:
+    -1 to 1; means and variances are taken over the overlap at the lag.
     """
     from scipy.signal import correlate
 

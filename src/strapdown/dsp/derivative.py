@@ -37,22 +37,10 @@ Array = NDArray[np.float64]
 def fitted_weights(time: Array, at: Array, degree: int) -> tuple[Array, Array]:
     """Compute the weights of the value and slope of a least-squares polynomial.
 
-    Parameters
-    ----------
-    time : ndarray, (m, w), s
-        Stamps of the samples of m windows, increasing, any spacing.
-    at : ndarray, (m,), s
-        Stamp of the output of each window.
-    degree : int
-        1 to w - 1.
+    `time` ((m, w), s): stamps of the samples of m windows, increasing, any spacing. `at` ((m,), s):
+    stamp of the output of each window. `degree`: 1 to w - 1. Returns `value` ((m, w)); `slope` ((m,
+    w), 1/s).
 
-    Returns
-    -------
-    value : ndarray, (m, w)
-    slope : ndarray, (m, w), 1/s
-
-    Notes
-    -----
     With equal steps, the filters of Savitzky and Golay (1964, doi:10.1021/ac60214a047). The basis
     is Legendre's over the window: its normal equations are well conditioned.
     """
@@ -72,17 +60,8 @@ def fitted_weights(time: Array, at: Array, degree: int) -> tuple[Array, Array]:
 def slope_response(weights: Array, offset: Array, frequency: Array) -> NDArray[np.complex128]:
     """Compute the response of slope weights relative to the true derivative of a sine.
 
-    Parameters
-    ----------
-    weights : ndarray, (w,), 1/s
-    offset : ndarray, (w,), s
-        Stamp of each sample minus the stamp of the slope.
-    frequency : ndarray, (k,), Hz
-        Above zero.
-
-    Returns
-    -------
-    ndarray of complex, (k,)
+    `weights` ((w,), 1/s). `offset` ((w,), s): stamp of each sample minus the stamp of the slope.
+    `frequency` ((k,)): above zero. Returns (k,).
     """
     omega = 2.0 * np.pi * frequency
     return np.asarray(np.exp(1j * np.outer(omega, offset)) @ weights / (1j * omega))
@@ -93,19 +72,8 @@ def bandwidth(
 ) -> float:
     """Find the frequency up to which the magnitude of a response is within a loss of 1.
 
-    Parameters
-    ----------
-    response : callable
-        Response at frequencies (k,), Hz.
-    highest : float, Hz
-        Nyquist frequency of the samples.
-    parts : int
-        Number of steps of the search grid.
-    loss : float
-
-    Returns
-    -------
-    float, Hz
+    `response`: response at frequencies (k,), Hz. `highest`: nyquist frequency of the samples.
+    `parts`: number of steps of the search grid.
     """
     grid = np.linspace(0.0, highest, parts)[1:]
     over = np.abs(1.0 - np.abs(response(grid))) > loss
@@ -134,18 +102,11 @@ USUAL_SAMPLES = 7
 class LocalSlope:
     """Weights that give values and slopes of a signal from its samples.
 
-    Attributes
-    ----------
-    first : ndarray of int, (n,)
-        First sample of each row's window.
-    slope, value : ndarray, (n, w)
-        Weights of the samples of the window: of the slope, in 1/s, and of the value.
-    bandwidth : float, Hz
-        Frequency at which the slope in the middle of a record has fallen to 1/√2 of the true one
-        (for a delayed signal: deviates by as much). The delay is zero there: the window is
-        symmetric.
-    window : float, s
-        From the first to the last sample of a window.
+    `first` ((n,)): first sample of each row's window. `slope`, `value` ((n, w)): weights of the
+    samples of the window: of the slope, in 1/s, and of the value. `bandwidth`: frequency at which
+    the slope in the middle of a record has fallen to 1/√2 of the true one (for a delayed signal:
+    deviates by as much). The delay is zero there: the window is symmetric. `window` (s): from the
+    first to the last sample of a window.
     """
 
     first: NDArray[np.int64]
@@ -165,15 +126,8 @@ class LocalSlope:
     def weighted(self, rows: Array) -> tuple[Array, Array]:
         """Compute the weights of the samples in sums of slopes and of values.
 
-        Parameters
-        ----------
-        rows : ndarray, (m, n)
-            Weights of the slopes (and values) in each of m sums.
-
-        Returns
-        -------
-        slope, value : ndarray, (m, n)
-            Weights of the samples of the signal.
+        `rows` ((m, n)): weights of the slopes (and values) in each of m sums. Returns `slope`,
+        `value` ((m, n)): weights of the samples of the signal.
         """
         by_slope, by_value = self._matrices
         return np.asarray(rows @ by_slope), np.asarray(rows @ by_value)
@@ -193,35 +147,18 @@ class LocalSlope:
 def local_slope(time: Array, *, window: float | None = None, delay: float = 0.0) -> LocalSlope:
     """Compute the weights of a least-squares polynomial about each sample.
 
-    Parameters
-    ----------
-    time : ndarray, (n,), s
-        Increasing stamps, any spacing.
-    window : float, s, optional
-        Length of a window; seven samples if not given, at least three. The degree is four with
-        seven samples or more, and two otherwise.
-    delay : float, s
-        Delay of the signal: value and slope are taken this much after each stamp.
+    `time` ((n,), s): increasing stamps, any spacing. `window` (s): length of a window; seven
+    samples if not given, at least three. The degree is four with seven samples or more, and two
+    otherwise. `delay` (s): delay of the signal: value and slope are taken this much after each
+    stamp. Returns with equal steps, the Savitzky-Golay filter. White noise of standard deviation s
+    becomes ``s sqrt(sum(slope²))``. Without delay the values are the samples themselves. DataError:
+    fewer than three samples. ConfigError: the window is not positive, or the delay is longer than
+    half the window.
 
-    Returns
-    -------
-    LocalSlope
-        With equal steps, the Savitzky-Golay filter. White noise of standard deviation s becomes
-        ``s sqrt(sum(slope²))``. Without delay the values are the samples themselves.
-
-    Notes
-    -----
     Errors of the slope, for steps h: a parabola through five samples, ``17/30 h²`` times the third
     derivative; degree four through seven samples, ``-131/630 h⁴`` times the fifth. For a pulse of
     60 ms at 200 Hz these are 15 % and 1.6 %. White noise s gives 0.32 and 0.51 s/h in a slope, and
     0.48 and 0.59 s at each end of an integral of slopes, which is the noise of a velocity change.
-
-    Raises
-    ------
-    DataError
-        Fewer than three samples.
-    ConfigError
-        The window is not positive, or the delay is longer than half the window.
     """
     n = time.size
     if n < LEAST_SAMPLES:
@@ -266,10 +203,7 @@ Indices = NDArray[np.int64]
 class LocalWeights:
     """Output j is ``sum_i weights[j, i] x[first[j] + i]``.
 
-    Attributes
-    ----------
-    first : ndarray of int64, (m,)
-    weights : ndarray, (m, w)
+    `first` ((m,)). `weights` ((m, w)).
     """
 
     first: Indices
@@ -288,11 +222,8 @@ class LocalWeights:
     def any_of(self, marked: NDArray[np.bool_], least: float = 0.01) -> NDArray[np.bool_]:
         """Whether a marked sample contributes to each output, (m, k).
 
-        Parameters
-        ----------
-        marked : ndarray of bool, (n, k)
-        least : float
-            Fraction of the output's largest weight above which a sample contributes.
+        `marked` ((n, k)). `least`: fraction of the output's largest weight above which a sample
+        contributes.
         """
         size = np.abs(self.weights)
         counts = size > least * size.max(axis=1, keepdims=True)
@@ -305,13 +236,8 @@ def mirrored(first: Indices, weights: Array, n: int) -> LocalWeights:
 
     The record is padded by its point mirror about the end samples, ``x[-i] = 2 x[0] - x[i]``.
 
-    Parameters
-    ----------
-    first : ndarray of int64, (m,)
-        May be negative.
-    weights : ndarray, (m, w)
-    n : int
-        Samples of the record; `weights` reach beyond it by fewer than n.
+    `first` ((m,)): may be negative. `weights` ((m, w)). `n`: samples of the record; `weights` reach
+    beyond it by fewer than n.
     """
     width = weights.shape[1]
     if first.min() >= 0 and first.max() + width <= n:

@@ -30,15 +30,10 @@ LEAST_WINDOW, LONGEST_RUN = 16, 5
 class Screened:
     """Samples that have been checked.
 
-    Attributes
-    ----------
-    first : int
-        Index of the first sample, from the start of the record.
-    values, raw : ndarray, (k, c)
-        With outliers replaced, and as recorded.
-    flags : ndarray of int8, (k, c)
-        `REPLACED`; `KEPT` where a sample deviates more than its neighbors but the two sides do
-        not both contradict it, as at a step; otherwise zero.
+    `first`: index of the first sample, from the start of the record. `values`, `raw` ((k, c)): with
+    outliers replaced, and as recorded. `flags` ((k, c)): `REPLACED`; `KEPT` where a sample deviates
+    more than its neighbors but the two sides do not both contradict it, as at a step; otherwise
+    zero.
     """
 
     first: int
@@ -51,20 +46,10 @@ class Screened:
 class OutlierState:
     """State between chunks.
 
-    Attributes
-    ----------
-    first : int
-        Index of the oldest sample kept.
-    judged : int
-        Index of the first sample not checked yet.
-    given : int
-        Index of the first sample not output yet.
-    raw, work : ndarray, (c, n)
-    flags : ndarray of int8, (c, n)
-    ahead : ndarray of int64, (c,)
-        Next sample of each channel to check: a run may extend beyond `judged`.
-    own : ndarray, (c, 3)
-        The quantization step and the last run of each channel.
+    `first`: index of the oldest sample kept. `judged`: index of the first sample not checked yet.
+    `given`: index of the first sample not output yet. `raw`, `work` ((c, n)). `flags` ((c, n)).
+    `ahead` ((c,)): next sample of each channel to check: a run may extend beyond `judged`. `own`
+    ((c, 3)): the quantization step and the last run of each channel.
     """
 
     first: int
@@ -96,27 +81,16 @@ class OutlierDesign:
     repeats its value because its quantization is coarse, only residuals of 30 quantization steps or
     more are outliers. This needs the readings as recorded, before channels are mixed.
 
-    Parameters
-    ----------
-    threshold : float
-        In standard deviations of the residual, which is 1.52 times that of white noise (runs of
-        two and three: 1.83 and 2.11). On white noise a sample is wrongly replaced with a
-        probability of at most ``E[erfc(threshold m / sqrt 2)]``, m the larger of two independent
-        scales: 4.2e-8 for 6 and a window of 128, with runs 1e-7. Outliers of 10, 12, 15 and 20
-        standard deviations of the noise are detected with probability 0.45, 0.82, 0.99 and 1.
-    window : int, samples
-        16 or more, on each side. Up to a quarter of the residuals in it may be spoiled by
-        outliers: some four outliers in 128 samples.
-    longest_run : int, samples
-        1 to 5. A real pulse of at most this length, isolated in a quiet signal, is taken for an
-        outlier; with 3, a pulse of eight samples or more at its base is not, whatever its shape.
-    bandwidth : float
-        Of the motion, as a fraction of the sampling rate: below 0.25.
-
-    Raises
-    ------
-    ConfigError
-        A parameter is out of its range.
+    `threshold`: in standard deviations of the residual, which is 1.52 times that of white noise
+    (runs of two and three: 1.83 and 2.11). On white noise a sample is wrongly replaced with a
+    probability of at most ``E[erfc(threshold m / sqrt 2)]``, m the larger of two independent
+    scales: 4.2e-8 for 6 and a window of 128, with runs 1e-7. Outliers of 10, 12, 15 and 20 standard
+    deviations of the noise are detected with probability 0.45, 0.82, 0.99 and 1. `window`
+    (samples): 16 or more, on each side. Up to a quarter of the residuals in it may be spoiled by
+    outliers: some four outliers in 128 samples. `longest_run` (samples): 1 to 5. A real pulse of at
+    most this length, isolated in a quiet signal, is taken for an outlier; with 3, a pulse of eight
+    samples or more at its base is not, whatever its shape. `bandwidth`: of the motion, as a
+    fraction of the sampling rate: below 0.25. ConfigError: a parameter is out of its range.
     """
 
     threshold: float = 6.0
@@ -184,12 +158,9 @@ class OutlierDesign:
     def begin(self, channels: int, steps: Array | None = None) -> OutlierState:
         """Return the state before the first sample.
 
-        Parameters
-        ----------
-        channels : int
-        steps : ndarray, (channels,), optional
-            Quantization step of each channel, zero where it has none. If not given, the smallest
-            change between samples so far is taken: two such steps are never outliers.
+        `steps` ((channels,)): quantization step of each channel, zero where it has none. If not
+        given, the smallest change between samples so far is taken: two such steps are never
+        outliers.
         """
         own = np.zeros((channels, 3))
         own[:, 0] = -np.inf if steps is None else np.where(np.asarray(steps) > 0.0, steps, TINY)
@@ -210,24 +181,9 @@ class OutlierDesign:
     ) -> tuple[OutlierState, Screened]:
         """Check the samples that a further chunk completes.
 
-        Parameters
-        ----------
-        state : OutlierState
-        values : ndarray, (k, c)
-            Finite; k may be zero.
-        last : bool
-            Whether the record ends with them.
-
-        Returns
-        -------
-        state : OutlierState
-        screened : Screened
-            The same numbers however the record is split into chunks.
-
-        Raises
-        ------
-        DataError
-            A value is not finite.
+        `values` ((k, c)): finite; k may be zero. `last`: whether the record ends with them. Returns
+        `state`; `screened`: the same numbers however the record is split into chunks. DataError: a
+        value is not finite.
         """
         from strapdown._kernels.signals import replace_outliers
 

@@ -13,24 +13,11 @@ __all__ = ["running_integral"]
 def running_integral(time: Array, values: Array, *, means: bool = False) -> Array:
     """Integrate samples from the first stamp to each.
 
-    Parameters
-    ----------
-    time : ndarray, (n,), s
-        At least one stamp, any spacing.
-    values : ndarray, (n, ...)
-        In any unit.
-    means : bool
-        A sample is the mean over the interval that ends at its stamp, and the first is unused.
-        Otherwise it is the value at its stamp, linear in between (trapezoids; error of second
-        order in the step).
+    `time` ((n,), s): at least one stamp, any spacing. `values` ((n, ...)): in any unit. `means`: a
+    sample is the mean over the interval that ends at its stamp, and the first is unused. Otherwise
+    it is the value at its stamp, linear in between (trapezoids; error of second order in the step).
+    Returns (n, ...), unit of the values times s: zero at the first stamp.
 
-    Returns
-    -------
-    ndarray, (n, ...), unit of the values times s
-        Zero at the first stamp.
-
-    Notes
-    -----
     The trapezoids equal `scipy.integrate.cumulative_trapezoid` to the last bit; importing that
     takes a fifth of a second, for every log with velocities.
     """

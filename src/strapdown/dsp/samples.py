@@ -20,16 +20,8 @@ JITTER = 0.1
 def as_channels(values: ArrayLike, quantity: str = "values") -> Array:
     """Convert samples to floats of shape (n, k), all finite.
 
-    Parameters
-    ----------
-    values : array_like, (n,) or (n, k)
-    quantity : str
-        Name for messages.
-
-    Raises
-    ------
-    DataError
-        The shape is wrong, or a value is not finite.
+    `values` ((n,) or (n, k)). `quantity`: name for messages. DataError: the shape is wrong, or a
+    value is not finite.
     """
     try:
         array = np.asarray(values, dtype=np.float64)
@@ -56,17 +48,9 @@ def as_channels(values: ArrayLike, quantity: str = "values") -> Array:
 def check_segment(values: Array, first: int) -> None:
     """Check that every value of a further chunk is finite.
 
-    Parameters
-    ----------
-    values : ndarray, (k, c)
-    first : int
-        Index of its first sample, from the start of the record.
-
-    Raises
-    ------
-    DataError
-        A value is not finite. The message names the row, counted from 1 over the whole record,
-        and the channel.
+    `values` ((k, c)). `first`: index of its first sample, from the start of the record. DataError:
+    a value is not finite. The message names the row, counted from 1 over the whole record, and the
+    channel.
     """
     # A sum is finite only if every term is.
     with np.errstate(invalid="ignore", over="ignore"):
@@ -86,10 +70,7 @@ def check_segment(values: Array, first: int) -> None:
 def positive_step(step: float) -> float:
     """Return the sampling interval in s.
 
-    Raises
-    ------
-    ConfigError
-        The interval is not positive and finite.
+    ConfigError: the interval is not positive and finite.
     """
     if not (math.isfinite(step) and step > 0.0):
         raise ConfigError("dsp.no-distance-samples", quantity="step", step=step)
@@ -99,22 +80,9 @@ def positive_step(step: float) -> float:
 def even_step(time: ArrayLike, quantity: str = "time") -> float:
     """Return the step of evenly spaced stamps.
 
-    Parameters
-    ----------
-    time : array_like, (n,), s
-    quantity : str
-        Name for messages.
-
-    Returns
-    -------
-    float, s
-        Last minus first stamp, divided by the number of steps. Stamps may be off the grid by a
-        tenth of a step, as printed ones are.
-
-    Raises
-    ------
-    DataError
-        Fewer than two stamps, time does not advance, or the stamps are not even.
+    `time` ((n,), s). `quantity`: name for messages. Returns s: last minus first stamp, divided by
+    the number of steps. Stamps may be off the grid by a tenth of a step, as printed ones are.
+    DataError: fewer than two stamps, time does not advance, or the stamps are not even.
     """
     stamps = as_channels(time, quantity)[:, 0]
     if len(stamps) < 2:

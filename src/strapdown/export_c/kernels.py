@@ -15,18 +15,9 @@ from strapdown._kernels.arithmetic import SOURCES, kernel_module, kernels_of
 class Function:
     """One function of a kernel, specialized.
 
-    Attributes
-    ----------
-    name : str
-        Name of the kernel; a second version has a number appended.
-    doc : str
-        First paragraphs of its docstring.
-    parameters : list of str
-        Parameters that are still used.
-    body : list of stmt
-        Statements; ``comment`` of each holds the comment lines above it.
-    results : int
-        Number of returned values.
+    `name`: name of the kernel; a second version has a number appended. `doc`: first paragraphs of
+    its docstring. `parameters`: parameters that are still used. `body`: statements; ``comment`` of
+    each holds the comment lines above it. `results`: number of returned values.
     """
 
     name: str
@@ -49,14 +40,9 @@ class Constant:
 class Kernels:
     """The sources of all kernels, and the functions required so far.
 
-    Attributes
-    ----------
-    home : str
-        Module of the algorithm's kernels (`attitude_algorithms.cost.kernel_home`).
-    ranges : dict
-        For a variable with an integer value at run time: the least and the greatest.
-    functions : list of Function
-        In the order of definition.
+    `home`: module of the algorithm's kernels (`attitude_algorithms.cost.kernel_home`). `ranges`:
+    for a variable with an integer value at run time: the least and the greatest. `functions`: in
+    the order of definition.
     """
 
     home: str
@@ -90,14 +76,8 @@ class Kernels:
     ) -> Function:
         """Specialize a function and all functions that it calls.
 
-        Parameters
-        ----------
-        name : str
-            A function of a kernel module.
-        options : dict
-            Known values of its parameters.
-        keep : tuple of int
-            Results to keep, by position; by default all.
+        `name`: a function of a kernel module. `options`: known values of its parameters. `keep`:
+        results to keep, by position; by default all.
         """
         options = options or {}
         key = (name, tuple(sorted(options.items())), keep)

@@ -42,29 +42,12 @@ def export_c(
     In double precision the file reproduces `run_attitude` bitwise wherever the C library's sine and
     cosine equal those of Python.
 
-    Parameters
-    ----------
-    algorithm : AttitudeAlgorithm
-    interpolation : {'linear', 'cubic'}
-        As in `increments_from_imu`; the cubic delays the attitude by one sample.
-    sampling : {'instantaneous', 'mean'}, optional
-        Meaning of a sample; by default as in `imu`, or the rate at its instant.
-    q_nb : array_like, (4,)
-        Initial attitude of the test.
-    imu : DataFrame, optional
-        An Imu table whose first 48 samples are the test; by default a built-in motion.
-
-    Returns
-    -------
-    str
-        The text of the file.
-
-    Raises
-    ------
-    ConfigError
-        `interpolation` or `sampling` is unknown, or `sampling` differs from that of `imu`.
-    DataError
-        `q_nb` is not a rotation; or as `tables.check_imu`.
+    `interpolation` ({'linear', 'cubic'}): as in `increments_from_imu`; the cubic delays the
+    attitude by one sample. `sampling` ({'instantaneous', 'mean'}): meaning of a sample; by default
+    as in `imu`, or the rate at its instant. `q_nb` ((4,)): initial attitude of the test. `imu`: an
+    Imu table whose first 48 samples are the test; by default a built-in motion. Returns the text of
+    the file. ConfigError: `interpolation` or `sampling` is unknown, or `sampling` differs from that
+    of `imu`. DataError: `q_nb` is not a rotation; or as `tables.check_imu`.
     """
     kind = _kind(interpolation, sampling, imu)
     around, shape = SAMPLINGS[kind], shape_of(algorithm)
@@ -298,18 +281,10 @@ NEAREST = """real_t m[9];
 class Shape:
     """Initialization and output of an algorithm's state.
 
-    Attributes
-    ----------
-    state : str
-        Meaning of its numbers.
-    begin, read : str
-        Statements: from w, x, y, z into ``a->state``; from there into ``q_nb``.
-    begun : int
-        Count of state numbers that `begin` sets; the rest is zero.
-    kernels : tuple of str
-        Kernels that these call.
-    ranges : callable
-        Least and greatest value of integers that a kernel computes at run time.
+    `state`: meaning of its numbers. `begin`, `read`: statements: from w, x, y, z into ``a->state``;
+    from there into ``q_nb``. `begun`: count of state numbers that `begin` sets; the rest is zero.
+    `kernels`: kernels that these call. `ranges`: least and greatest value of integers that a kernel
+    computes at run time.
     """
 
     state: str
@@ -380,18 +355,9 @@ def shape_of(algorithm: AttitudeAlgorithm) -> Shape:
 class Sampling:
     """Conversion of samples to steps.
 
-    Attributes
-    ----------
-    words : str
-        Description in the file header.
-    memory : str
-        Stored data of the structure, as declarations.
-    code : str
-        The functions; ``STEP`` is replaced by the call of the algorithm.
-    bytes : int
-        Size of the stored data in single precision.
-    lag : int
-        Delay of the attitude in samples.
+    `words`: description in the file header. `memory`: stored data of the structure, as
+    declarations. `code`: the functions; ``STEP`` is replaced by the call of the algorithm. `bytes`:
+    size of the stored data in single precision. `lag`: delay of the attitude in samples.
     """
 
     words: str
@@ -588,14 +554,9 @@ ROUNDINGS = 32
 class Vector:
     """A test vector.
 
-    Attributes
-    ----------
-    samples : ndarray, (n, 4)
-        dt in s and the rates in rad/s, each exactly representable in single precision.
-    double, single : ndarray, (n, 4)
-        Attitude at each sample from the kernels in either precision.
-    condition : float
-        Factor by which the algorithm magnifies an error near its singularity.
+    `samples` ((n, 4)): dt in s and the rates in rad/s, each exactly representable in single
+    precision. `double`, `single` ((n, 4)): attitude at each sample from the kernels in either
+    precision. `condition`: factor by which the algorithm magnifies an error near its singularity.
     """
 
     samples: Array
@@ -633,14 +594,8 @@ def make_vector(
 ) -> Vector:
     """Run the kernels in both precisions over the same samples.
 
-    Parameters
-    ----------
-    algorithm : AttitudeAlgorithm
-    q_nb : ndarray, (4,)
-        Initial attitude.
-    kind : {'linear', 'cubic', 'mean'}
-    imu : DataFrame, optional
-        Its first 48 samples; by default a built-in motion.
+    `q_nb` ((4,)): initial attitude. `kind` ({'linear', 'cubic', 'mean'}). `imu`: its first 48
+    samples; by default a built-in motion.
     """
     rows = motion() if imu is None else _rows(imu)
     rows = rows.astype(np.float32).astype(np.float64)
@@ -797,13 +752,7 @@ _LAST = """\
 def main_program(vector: Vector, q_nb: Array, lag: int) -> str:
     """Return the end of the file, which is compiled only for a test.
 
-    Parameters
-    ----------
-    vector : Vector
-    q_nb : ndarray, (4,)
-        Initial attitude.
-    lag : int
-        Delay of the attitude in samples.
+    `q_nb` ((4,)): initial attitude. `lag`: delay of the attitude in samples.
     """
     from_ = ", ".join(f"R({float(v).hex()})" for v in q_nb)
     bound = (

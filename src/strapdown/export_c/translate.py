@@ -144,10 +144,7 @@ POINTERS = 4
 class Kinds:
     """C types of all names in the required functions.
 
-    Attributes
-    ----------
-    state_size : int
-        Count of state numbers that the functions written so far use.
+    `state_size`: count of state numbers that the functions written so far use.
     """
 
     def __init__(self, kernels: Kernels) -> None:

@@ -21,15 +21,9 @@ STREAMED = ("linear", "cubic")
 class IncrementStreamState:
     """State between chunks.
 
-    Attributes
-    ----------
-    mean : bool
-        Whether samples are means over the step ending at their stamp.
-    time : ndarray, (k,), s
-        Newest stamps, as many as the next step needs.
-    values : ndarray, (k, 6)
-    done : int
-        Steps between these stamps already returned.
+    `mean`: whether samples are means over the step ending at their stamp. `time` ((k,), s): newest
+    stamps, as many as the next step needs. `values` ((k, 6)). `done`: steps between these stamps
+    already returned.
     """
 
     mean: bool
@@ -42,16 +36,9 @@ class IncrementStreamState:
 class IncrementStream:
     """Stream the rows of `motion_increments`, bit-identical to processing the whole record.
 
-    Attributes
-    ----------
-    interpolation : {'linear', 'cubic'}
-        See `motion_increments`. ``linear`` returns each step with the sample that ends it,
-        ``cubic`` one sample later.
-
-    Raises
-    ------
-    ConfigError
-        The interpolation is unknown.
+    `interpolation` ({'linear', 'cubic'}): see `motion_increments`. ``linear`` returns each step
+    with the sample that ends it, ``cubic`` one sample later. ConfigError: the interpolation is
+    unknown.
     """
 
     interpolation: str = "linear"
@@ -69,10 +56,7 @@ class IncrementStream:
     def begin(self, sampling: str = "instantaneous") -> IncrementStreamState:
         """Return the state before the first sample.
 
-        Parameters
-        ----------
-        sampling : {'instantaneous', 'mean'}
-            As `tables.imu_table`.
+        `sampling` ({'instantaneous', 'mean'}): as `tables.imu_table`.
         """
         return IncrementStreamState(sampling == "mean", np.empty(0), np.empty((0, 6)), 0)
 
@@ -81,24 +65,10 @@ class IncrementStream:
     ) -> tuple[IncrementStreamState, Array, Array]:
         """Process further samples.
 
-        Parameters
-        ----------
-        state : IncrementStreamState
-            Not changed.
-        time : ndarray, (k,), s
-            Stamps, increasing, after the previous ones; k may be zero.
-        values : ndarray, (k, 6)
-            Rates in rad/s and specific forces in m/s².
-        last : bool
-            Whether no sample follows; steps still waiting for one are then returned without it.
-
-        Returns
-        -------
-        state : IncrementStreamState
-        ends : ndarray, (m,), s
-            Ends of the steps.
-        rows : ndarray, (m, 10)
-            Rows of a MotionIncrements table.
+        `state`: not changed. `time` ((k,), s): stamps, increasing, after the previous ones; k may
+        be zero. `values` ((k, 6)): rates in rad/s and specific forces in m/s². `last`: whether no
+        sample follows; steps still waiting for one are then returned without it. Returns `state`;
+        `ends` ((m,), s): ends of the steps; `rows` ((m, 10)): rows of a MotionIncrements table.
         """
         stamps = np.concatenate([state.time, time])
         samples = np.concatenate([state.values, values])

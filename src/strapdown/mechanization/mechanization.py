@@ -46,27 +46,14 @@ Array = NDArray[np.float64]
 class Mechanization(ABC):
     """A method to navigate by motion increments, with its options; stateless.
 
-    Attributes
-    ----------
-    ellipsoid : str
-        One of `ellipsoids.ELLIPSOIDS`; also of the input and output positions.
-    height : {'free', 'held', 'damped'}
-        The height follows from the sensors, whose errors it multiplies by e every 570 s; or is
-        kept where it is, and the vertical velocity at zero; or a loop of the third order draws
-        it to the reference heights that `advance` is given.
-    height_time_constant : float, s
-        Of each of the three poles of that loop, 1 to 1000, however often references come.
-    latitude_limit_deg : float, deg
-        North is not used beyond it: a run stops. A wander azimuth has no such limit.
-    largest_speed : float, m/s
-        Above it the state is taken to have diverged.
-    height_limits : tuple of float, m
-        Outside these limits a run stops, too.
-
-    Raises
-    ------
-    ConfigError
-        An option is unknown or outside its range.
+    `ellipsoid`: one of `ellipsoids.ELLIPSOIDS`; also of the input and output positions. `height`
+    ({'free', 'held', 'damped'}): the height follows from the sensors, whose errors it multiplies by
+    e every 570 s; or is kept where it is, and the vertical velocity at zero; or a loop of the third
+    order draws it to the reference heights that `advance` is given. `height_time_constant` (s): of
+    each of the three poles of that loop, 1 to 1000, however often references come.
+    `latitude_limit_deg` (deg): North is not used beyond it: a run stops. A wander azimuth has no
+    such limit. `largest_speed` (m/s): above it the state is taken to have diverged. `height_limits`
+    (m): outside these limits a run stops, too. ConfigError: an option is unknown or outside its range.
     """
 
     ellipsoid: str = "wgs84"

@@ -24,26 +24,13 @@ def antenna_motion(
 ) -> tuple[Array, Array]:
     """Position and velocity of a point fixed to a body.
 
-    Parameters
-    ----------
-    place : array_like, (n, 3)
-        Position of the body: latitude and longitude in deg, height in m.
-    v_n : array_like, (n, 3), m/s
-        Velocity relative to the Earth, north, east, down.
-    q_nb : array_like, (n, 4)
-    rate : array_like, (n, 3), rad/s
-        Angular rate relative to inertial space, in body axes, as measured by gyros.
-    arm : array_like, (3,), m
-        Lever arm from the body's reference point to the other point, in body axes.
-    ellipsoid : Ellipsoid
-
-    Returns
-    -------
-    place : ndarray, (n, 3)
-        Position of the end of the straight lever arm, as the argument.
-    v_n : ndarray, (n, 3), m/s
-        ``v + C_nb (w_eb x r)``, along local-level axes at the body's own position; those at the
-        point are rotated by arm over Earth radius, 1.6e-7 rad per meter.
+    `place` ((n, 3)): position of the body: latitude and longitude in deg, height in m. `v_n` ((n,
+    3), m/s): velocity relative to the Earth, north, east, down. `q_nb` ((n, 4)). `rate` ((n, 3),
+    rad/s): angular rate relative to inertial space, in body axes, as measured by gyros. `arm`
+    ((3,), m): lever arm from the body's reference point to the other point, in body axes. Returns
+    `place` ((n, 3)): position of the end of the straight lever arm, as the argument; `v_n` ((n, 3),
+    m/s): ``v + C_nb (w_eb x r)``, along local-level axes at the body's own position; those at the
+    point are rotated by arm over Earth radius, 1.6e-7 rad per meter.
     """
     p, v = np.asarray(place, dtype=np.float64), np.asarray(v_n, dtype=np.float64)
     q, r = np.asarray(q_nb, dtype=np.float64), np.asarray(arm, dtype=np.float64)

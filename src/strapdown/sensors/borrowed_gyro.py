@@ -26,10 +26,7 @@ FEELS = 1e-3
 def check_lenders(units: dict[str, CrashUnit]) -> None:
     """Check that every borrowed gyro exists.
 
-    Raises
-    ------
-    ConfigError
-        A unit borrows from itself, from an unknown unit, or from one without a gyro.
+    ConfigError: a unit borrows from itself, from an unknown unit, or from one without a gyro.
     """
     for unit in units.values():
         if unit.gyro is not None or unit.gyro_from is None:
@@ -57,18 +54,9 @@ def check_lenders(units: dict[str, CrashUnit]) -> None:
 def turned_gyro(lent: TriadAtStamps, lender: Mounting, borrower: Mounting) -> TriadAtStamps:
     """Rotate a gyro through both mountings into the borrower's sensor axes.
 
-    Parameters
-    ----------
-    lent : TriadAtStamps
-        In the lender's sensor axes.
-    lender, borrower : Mounting
-
-    Returns
-    -------
-    TriadAtStamps
-        ``ω_b = C_vb^T C_va ω_a``. Standard deviations are rotated as for independent axes, ``sd_b²
-        = (C ∘ C) sd_a²``. The range of an axis is the least of the contributing ranges, and the
-        axis is clipped where one of those is.
+    `lent`: in the lender's sensor axes. Returns ``ω_b = C_vb^T C_va ω_a``. Standard deviations are
+    rotated as for independent axes, ``sd_b² = (C ∘ C) sd_a²``. The range of an axis is the least of
+    the contributing ranges, and the axis is clipped where one of those is.
     """
     C_ba = borrower.C_vs.T @ lender.C_vs
     square = C_ba**2
@@ -90,17 +78,9 @@ def turned_gyro(lent: TriadAtStamps, lender: Mounting, borrower: Mounting) -> Tr
 def turned_uncertainty(uncertainty: TriadUncertainty, C: Array) -> TriadUncertainty:
     """Rotate the stated uncertainty of a triad into other axes.
 
-    Parameters
-    ----------
-    uncertainty : TriadUncertainty
-    C : ndarray, (3, 3)
-        Rotates vectors from the axes of the triad into the others.
-
-    Returns
-    -------
-    TriadUncertainty
-        Standard deviations rotated as for independent axes, ``sd² -> (C ∘ C) sd²``; the range of an
-        axis is the least of the contributing ranges.
+    `C` ((3, 3)): rotates vectors from the axes of the triad into the others. Returns standard
+    deviations rotated as for independent axes, ``sd² -> (C ∘ C) sd²``; the range of an axis is the
+    least of the contributing ranges.
     """
     square, feels = C**2, np.abs(C) > FEELS
 

@@ -324,15 +324,9 @@ ALLAN_OF_GAUSS_MARKOV = 0.61736
 class Key:
     """Meaning of a key of a sensor file.
 
-    Attributes
-    ----------
-    quantity : str
-        The attribute of `TriadErrors`, or ``nonlinearity`` or ``output_rate``.
-    factor : float
-        Converts to the SI units of `TriadErrors`.
-    spread : str
-        How a unit's value follows from the figure: ``value`` unchanged, ``sd`` a normal draw,
-        ``bound`` a uniform draw within ±.
+    `quantity`: the attribute of `TriadErrors`, or ``nonlinearity`` or ``output_rate``. `factor`:
+    converts to the SI units of `TriadErrors`. `spread`: how a unit's value follows from the figure:
+    ``value`` unchanged, ``sd`` a normal draw, ``bound`` a uniform draw within ±.
     """
 
     quantity: str

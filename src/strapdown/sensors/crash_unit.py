@@ -196,13 +196,7 @@ SAME_STAMP = 1e-3
 class UnitArrays:
     """Arrays of a unit whose triads share their stamps.
 
-    Attributes
-    ----------
-    time : ndarray, (n,), s
-    accelerometers : tuple of ndarray, (n, 3), m/s²
-    gyro : ndarray, (n, 3), rad/s
-    sampling : str
-    findings : tuple of Finding
+    `time` ((n,), s). `accelerometers` ((n, 3), m/s²). `gyro` ((n, 3), rad/s).
     """
 
     time: Array
@@ -215,20 +209,9 @@ class UnitArrays:
 def check_unit(unit: CrashUnit) -> UnitArrays:
     """Check a unit and extract its arrays.
 
-    Parameters
-    ----------
-    unit : CrashUnit
-        On the common clock, all triads at the same stamps.
-
-    Returns
-    -------
-    UnitArrays
-
-    Raises
-    ------
-    DataError
-        Accelerometer, gyro or an axis is missing, a value is not finite, time does not increase, or
-        the triads' stamps or kinds of sampling differ.
+    `unit`: on the common clock, all triads at the same stamps. DataError: accelerometer, gyro or an
+    axis is missing, a value is not finite, time does not increase, or the triads' stamps or kinds
+    of sampling differ.
     """
     if not unit.accelerometers:
         raise DataError("sensors.no-accelerometer", file=unit.name, quantity="accelerometers")
@@ -402,17 +385,9 @@ class Assumed:
 def assumed_shapes(time: Array, over: tuple[float, float], sampling: str) -> Array:
     """Rates of the two profiles at the samples, for a standard deviation of one at the end.
 
-    Parameters
-    ----------
-    time : ndarray, (n,), s
-    over : (float, float), s
-    sampling : {'instantaneous', 'mean'}
-
-    Returns
-    -------
-    ndarray, (2, n), 1/s
-        Means over the interval that ends at the stamp, or about it, so that their sum times the
-        step is exact even with few samples in `over`.
+    `time` ((n,), s). `over` ((float, float), s). `sampling` ({'instantaneous', 'mean'}). Returns
+    (2, n), 1/s: means over the interval that ends at the stamp, or about it, so that their sum
+    times the step is exact even with few samples in `over`.
     """
     steps = np.diff(time, prepend=2.0 * time[0] - time[1])
     after = np.append(steps[1:], steps[-1])

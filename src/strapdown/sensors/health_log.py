@@ -54,19 +54,10 @@ WORDS = {
 class ChannelFault:
     """A defect of a channel.
 
-    Attributes
-    ----------
-    channel : str
-        ``gyro_x`` to ``accel_z``, or ``gyro``, ``accel`` for the triad as a whole.
-    kind : str
-        A key of `imu_health.TESTS`, or ``dead``, ``burst``.
-    begin, end : float, s
-        Stamps of the first and last affected sample.
-    first, last : int
-        The same as row numbers of the table, from 0, both included.
-    size, limit : float
-        Measured value and its limit.
-    finding : Finding
+    `channel`: ``gyro_x`` to ``accel_z``, or ``gyro``, ``accel`` for the triad as a whole. `kind`: a
+    key of `imu_health.TESTS`, or ``dead``, ``burst``. `begin`, `end` (s): stamps of the first and
+    last affected sample. `first`, `last`: the same as row numbers of the table, from 0, both
+    included. `size`, `limit`: measured value and its limit.
     """
 
     channel: str
@@ -84,18 +75,10 @@ class ChannelFault:
 class Blocks:
     """Statistics of blocks with equal numbers of samples, (blocks, channels).
 
-    Attributes
-    ----------
-    samples : int
-        Per block.
-    mean, sd : ndarray
-    noise : ndarray
-        Standard deviation of a sample from second differences: the white part, without slow motion.
-    white : ndarray
-        Squared ratio of that to the estimate from first differences: one for white noise, less for
-        signals slower than a quarter of the rate.
-    valid : ndarray of bool
-        Block without missing samples and without samples known to be faulty.
+    `samples`: per block. `noise`: standard deviation of a sample from second differences: the white
+    part, without slow motion. `white`: squared ratio of that to the estimate from first
+    differences: one for white noise, less for signals slower than a quarter of the rate. `valid`:
+    block without missing samples and without samples known to be faulty.
     """
 
     samples: int
@@ -110,21 +93,9 @@ class Blocks:
 class HealthLog:
     """A log under test.
 
-    Attributes
-    ----------
-    source : str or None
-    time : ndarray, (n,), s
-    names : tuple of str
-        Names of the c channels.
-    values : ndarray, (c, n)
-        As recorded, NaN where missing.
-    wrong : ndarray of bool, (c, n)
-        Samples excluded by an earlier test.
-    sensors : ImuUncertainty or None
-    gravity : tuple of float, m/s²
-        Smallest and largest possible value.
-    false_alarm : float
-        Probability per channel, test and record.
+    `time` ((n,), s). `names`: names of the c channels. `values` ((c, n)): as recorded, NaN where
+    missing. `wrong` ((c, n)): samples excluded by an earlier test. `gravity` (m/s²): smallest and
+    largest possible value. `false_alarm`: probability per channel, test and record.
     """
 
     source: str | None
@@ -225,10 +196,7 @@ def health_log(
 ) -> HealthLog:
     """Prepare a table for testing; its values may be NaN.
 
-    Raises
-    ------
-    DataError
-        A column is missing, time does not increase, or there are too few samples.
+    DataError: a column is missing, time does not increase, or there are too few samples.
     """
     source = source_of(imu)
     check_columns(imu, GYRO, source)
@@ -302,27 +270,14 @@ def tail_limit(
 ) -> float:
     """Extrapolate the upper tail of a record's own values.
 
-    Parameters
-    ----------
-    values : array_like, (m,)
-        Mostly from sound samples.
-    near, far : int
-        Ranks from the largest, ``near > far``, between which the tail is estimated. Fewer than
-        `far` faulty values hardly change it.
-    false_alarm : float
-        Probability that the largest sound value exceeds the limit.
-    slack : float
-        Factor on the scale of the tail.
+    `values` ((m,)): mostly from sound samples. `near`, `far`: ranks from the largest,
+    ``near > far``, between which the tail is estimated. Fewer than `far` faulty values hardly
+    change it. `false_alarm`: probability that the largest sound value exceeds the limit. `slack`:
+    factor on the scale of the tail. Returns ``u + slack e ln(far / false_alarm)`` with u of rank
+    `far` and the scale ``e = (u - v) / ln(near / far)``, v of rank `near`: exact for a geometric or
+    exponential tail, too high for a normal one. Infinite with fewer than `near` values, or where
+    `far` is zero.
 
-    Returns
-    -------
-    float
-        ``u + slack e ln(far / false_alarm)`` with u of rank `far` and the scale ``e = (u - v) /
-        ln(near / far)``, v of rank `near`: exact for a geometric or exponential tail, too high for
-        a normal one. Infinite with fewer than `near` values, or where `far` is zero.
-
-    Notes
-    -----
     Peaks over a threshold with shape parameter zero (Coles 2001, An Introduction to Statistical
     Modeling of Extreme Values, section 4.2); the scale is from two order statistics, which are
     robust to a few outliers.
@@ -343,13 +298,7 @@ Indices = NDArray[np.int64]
 def equal_runs(v: Array) -> tuple[Indices, Indices]:
     """Starts and lengths of runs of equal values; a NaN equals no other value.
 
-    Parameters
-    ----------
-    v : ndarray, (n,)
-
-    Returns
-    -------
-    starts, lengths : ndarray of int, (m,)
+    `v` ((n,)). Returns `starts`, `lengths` ((m,)).
     """
     starts = np.flatnonzero(np.concatenate([[True], np.diff(v) != 0.0]))
     return starts.astype(np.int64), np.diff(np.append(starts, v.size)).astype(np.int64)
@@ -358,20 +307,11 @@ def equal_runs(v: Array) -> tuple[Indices, Indices]:
 def longest_by_chance(repeats: Array, samples: int, false_alarm: float) -> Array:
     """Length that a run of independent repetitions exceeds with at most a given probability.
 
-    Parameters
-    ----------
-    repeats : ndarray, (k,)
-        Probability that a sample repeats the previous one, from 0 to 1.
-    samples : int
-        Number of samples of the record; a run may start at each.
-    false_alarm : float
-        Probability that any run of the record is longer.
-
-    Returns
-    -------
-    ndarray, (k,)
-        ``1 + ln(false_alarm / n) / ln(r)``, for which the expected number of runs of L or more
-        samples, ``n (1 - r) r^(L-1)``, is below `false_alarm`. Infinite for r = 1.
+    `repeats` ((k,)): probability that a sample repeats the previous one, from 0 to 1. `samples`:
+    number of samples of the record; a run may start at each. `false_alarm`: probability that any
+    run of the record is longer. Returns (k,): ``1 + ln(false_alarm / n) / ln(r)``, for which the
+    expected number of runs of L or more samples, ``n (1 - r) r^(L-1)``, is below `false_alarm`.
+    Infinite for r = 1.
     """
     r = np.clip(repeats, 1e-300, 1.0)
     with np.errstate(divide="ignore"):

@@ -694,16 +694,8 @@ ANOMALY = 0.005  # m/s²
 class HealthTest:
     """One test of the channels of a log.
 
-    Attributes
-    ----------
-    title : str
-    limit : str
-        Reference with which a channel is compared.
-    false_alarm : str
-        Source of its false-alarm rate.
-    find : callable
-    takes_out : bool
-        Whether later tests exclude the samples that it found.
+    `limit`: reference with which a channel is compared. `false_alarm`: source of its false-alarm
+    rate. `takes_out`: whether later tests exclude the samples that it found.
     """
 
     title: str

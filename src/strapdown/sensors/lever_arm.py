@@ -27,20 +27,11 @@ __all__ = ["MovedImu", "lever_matrix", "move_imu", "move_unit"]
 class MovedImu:
     """Readings of an ideal accelerometer at another point of the body.
 
-    Attributes
-    ----------
-    imu : DataFrame
-        Imu table; the rates are those given.
-    lever_arm : ndarray, (3,), m
-        From the original to the new point, body axes.
-    angular_acceleration : ndarray, (n, 3), rad/s²
-    added : ndarray, (n, 3, 3), (m/s²)²
-        Covariance that gyro noise adds to each sample. Neighboring samples are correlated: `slope`
-        has the weights.
-    bandwidth : float, Hz
-        Bandwidth of the angular acceleration; for faster rotation the correction is too small.
-    slope : LocalSlope
-        Differentiation filter used.
+    `imu`: Imu table; the rates are those given. `lever_arm` ((3,), m): from the original to the new
+    point, body axes. `angular_acceleration` ((n, 3), rad/s²). `added` ((n, 3, 3), (m/s²)²):
+    covariance that gyro noise adds to each sample. Neighboring samples are correlated: `slope` has
+    the weights. `bandwidth`: bandwidth of the angular acceleration; for faster rotation the
+    correction is too small. `slope`: differentiation filter used.
     """
 
     imu: pd.DataFrame
@@ -63,13 +54,7 @@ class MovedImu:
     def of_rate(self, rate: Array) -> Array:
         """Specific force error due to small rate errors through the lever arm.
 
-        Parameters
-        ----------
-        rate : ndarray, (n, 3), rad/s
-
-        Returns
-        -------
-        ndarray, (n, 3), m/s²
+        `rate` ((n, 3), rad/s). Returns (n, 3), m/s².
         """
         by_value = rate_effect(self.turning, self.lever_arm)
         turned = np.einsum("nij,nj->ni", by_value, self.slope.value_of(rate))
@@ -78,15 +63,8 @@ class MovedImu:
     def of_rates_in_sums(self, weights: Array) -> Array:
         """Weights of the rate errors in sums of the specific force.
 
-        Parameters
-        ----------
-        weights : ndarray, (m, n)
-            Weights of the specific force samples in each of m sums.
-
-        Returns
-        -------
-        ndarray, (m, n, 3, 3)
-            From an error of each rate to each axis of each sum.
+        `weights` ((m, n)): weights of the specific force samples in each of m sums. Returns (m, n,
+        3, 3): from an error of each rate to each axis of each sum.
         """
         by_slope = self.slope.weighted(weights)[0]
         out = np.einsum("an,ij->anij", by_slope, -cross_matrix(self.lever_arm))
@@ -173,18 +151,8 @@ def move_unit(
 ) -> MovedImu:
     """Move a prepared unit from its position to a point of the vehicle.
 
-    Parameters
-    ----------
-    prepared : PreparedUnit
-    point : array_like, (3,), m
-        In vehicle axes from the vehicle's origin.
-    window, gyro_delay
-        As `move_imu`.
-
-    Returns
-    -------
-    MovedImu
-        In vehicle axes.
+    `point` ((3,), m): in vehicle axes from the vehicle's origin. `window`, `gyro_delay`: as
+    `move_imu`. Returns in vehicle axes.
     """
     noise = prepared.gyro_noise_covariance
     place = triple(point, "point", "sensors.point-not-three-numbers")
@@ -195,14 +163,8 @@ def move_unit(
 def lever_matrix(alpha: Array, omega: Array) -> Array:
     """Matrices that map a lever arm to a specific force difference.
 
-    Parameters
-    ----------
-    alpha, omega : ndarray, (n, 3), rad/s² and rad/s
-
-    Returns
-    -------
-    ndarray, (n, 3, 3), 1/s²
-        ``[α×] + [ω×]²``; times r, ``α × r + ω × (ω × r)``.
+    `alpha`, `omega` ((n, 3), rad/s² and rad/s). Returns (n, 3, 3), 1/s²: ``[α×] + [ω×]²``; times r,
+    ``α × r + ω × (ω × r)``.
     """
     turning = cross_matrix(omega)
     return cross_matrix(alpha) + turning @ turning
@@ -211,15 +173,7 @@ def lever_matrix(alpha: Array, omega: Array) -> Array:
 def rate_effect(omega: Array, r: Array) -> Array:
     """Derivative of ``ω × (ω × r)`` with respect to the rate.
 
-    Parameters
-    ----------
-    omega : ndarray, (n, 3), rad/s
-    r : ndarray, (3,), m
-
-    Returns
-    -------
-    ndarray, (n, 3, 3), m/s
-        ``(ω·r) I + ω rᵀ - 2 r ωᵀ``.
+    `omega` ((n, 3), rad/s). `r` ((3,), m). Returns (n, 3, 3), m/s: ``(ω·r) I + ω rᵀ - 2 r ωᵀ``.
     """
     along = np.einsum("ni,i->n", omega, r)[:, None, None] * np.eye(3)
     return np.asarray(along + omega[:, :, None] * r - 2.0 * r[:, None] * omega[:, None, :])

@@ -61,28 +61,15 @@ def find_pre_crash_rest(
 ) -> RestStretch | None:
     """Find a stationary, or else a steady, stretch before a crash.
 
-    Parameters
-    ----------
-    imu : DataFrame
-        Imu table with acceleration of the lowest range.
-    impact : float, s
-        Samples after it are not used.
-    moving_at_impact : bool
-        A vehicle that moves at the impact was not stationary just before: a quiet stretch up to the
-        impact is then coasting, grade ``steady``. False for a vehicle struck while stationary.
-    accel_noise, gyro_noise : float, m/s² and rad/s
-        Stated standard deviation of a sample of an axis: a lower limit of the noise.
+    `imu`: Imu table with acceleration of the lowest range. `impact` (s): samples after it are not
+    used. `moving_at_impact`: a vehicle that moves at the impact was not stationary just before: a
+    quiet stretch up to the impact is then coasting, grade ``steady``. False for a vehicle struck
+    while stationary. `accel_noise`, `gyro_noise` (m/s² and rad/s): stated standard deviation of a
+    sample of an axis: a lower limit of the noise. Returns of grade ``still``: the longest that
+    ended within a minute before the impact, else the latest. Otherwise ``steady``: no rotation and
+    constant specific force for at least 40 ms. An inertial sensor cannot distinguish constant
+    velocity from rest, nor constant acceleration from a tilt. None if the record has neither.
 
-    Returns
-    -------
-    RestStretch or None
-        Of grade ``still``: the longest that ended within a minute before the impact, else the
-        latest. Otherwise ``steady``: no rotation and constant specific force for at least 40 ms. An
-        inertial sensor cannot distinguish constant velocity from rest, nor constant acceleration
-        from a tilt. None if the record has neither.
-
-    Notes
-    -----
     The gyro selects the candidates (`sensors.rest.find_rests`). Because a gyro does not sense a car
     driving off, each candidate is divided where the mean specific force changes by more than 50
     mm/s² and five standard deviations, and where it is noisier than three times the quietest part
@@ -189,9 +176,7 @@ def _groups(quiet: NDArray[np.bool_], means: Array, noise: Array) -> list[list[i
 class BiasEstimate:
     """Bias of a triad and its standard deviation.
 
-    Attributes
-    ----------
-    bias, sd : tuple of float, u
+    `bias`, `sd` (u).
     """
 
     bias: tuple[float, float, float]
@@ -203,22 +188,12 @@ def gyro_bias_from(
 ) -> BiasEstimate:
     """Gyro bias from a stretch before the crash.
 
-    Parameters
-    ----------
-    rest : RestStretch, optional
-        In the axes of the gyro.
-    stated : tuple of float, rad/s
-        Prior standard deviation of the bias.
-    steady_rate : float, rad/s
-        Standard deviation of the vehicle's rate over a ``steady`` stretch: 0.6 deg/s is a bend of
-        1.5 km radius at 15 m/s.
-
-    Returns
-    -------
-    BiasEstimate
-        Without a stretch, zero with the stated sd. At rest, the mean and its sd; the Earth's rate,
-        up to 7.3e-5 rad/s, is part of the bias and is included in the sd. Over a steady stretch the
-        mean and the stated bias are weighted by their variances.
+    `rest`: in the axes of the gyro. `stated` (rad/s): prior standard deviation of the bias.
+    `steady_rate` (rad/s): standard deviation of the vehicle's rate over a ``steady`` stretch: 0.6
+    deg/s is a bend of 1.5 km radius at 15 m/s. Returns without a stretch, zero with the stated sd.
+    At rest, the mean and its sd; the Earth's rate, up to 7.3e-5 rad/s, is part of the bias and is
+    included in the sd. Over a steady stretch the mean and the stated bias are weighted by their
+    variances.
     """
     if rest is None:
         return BiasEstimate((0.0, 0.0, 0.0), stated)
@@ -236,16 +211,8 @@ def gyro_bias_from(
 def in_axes(rest: RestStretch, C: Array) -> RestStretch:
     """Rotate a stretch into other axes.
 
-    Parameters
-    ----------
-    rest : RestStretch
-    C : ndarray, (3, 3)
-        Rotates vectors into the other axes. Standard deviations are rotated as for independent
-        axes.
-
-    Returns
-    -------
-    RestStretch
+    `C` ((3, 3)): rotates vectors into the other axes. Standard deviations are rotated as for
+    independent axes.
     """
 
     def mean(v: tuple[float, float, float] | None) -> tuple[float, float, float] | None:

@@ -39,22 +39,12 @@ MEMORY = 5.0
 class MergedRanges:
     """One triad merged from several ranges.
 
-    Attributes
-    ----------
-    values : ndarray, (n, 3), u
-    noise : ndarray, (n, 3), u
-        Standard deviation of each sample.
-    spoken : ndarray of int8, (n, 3)
-        Range used; within a cross-fade, the one with the larger weight.
-    clipped : ndarray of bool, (n, 3)
-        Whether even that range was saturated.
-    step : ndarray, (m - 1, 3), u
-        Mean difference of neighboring ranges at their switch-overs in each axis, upper minus lower;
-        zero where the lower range is always used.
-    step_sd : ndarray, (m - 1, 3), u
-        Standard deviation of that, from the noise of both.
-    switches : ndarray of int, (m - 1, 3)
-        Number of switch-overs between them.
+    `values` ((n, 3), u). `noise` ((n, 3), u): standard deviation of each sample. `spoken` ((n, 3)):
+    range used; within a cross-fade, the one with the larger weight. `clipped` ((n, 3)): whether
+    even that range was saturated. `step` ((m - 1, 3), u): mean difference of neighboring ranges at
+    their switch-overs in each axis, upper minus lower; zero where the lower range is always used.
+    `step_sd` ((m - 1, 3), u): standard deviation of that, from the noise of both. `switches` ((m -
+    1, 3)): number of switch-overs between them.
     """
 
     values: Array
@@ -80,45 +70,21 @@ def merge_ranges(
 ) -> MergedRanges:
     """Use the lowest range while it is clear of its end, and the next one beyond.
 
-    Parameters
-    ----------
-    time : ndarray, (n,), s
-    values : sequence of ndarray, (n, 3), u
-        As recorded, in order of increasing range, all at the same stamps in the same axes.
-    limits : sequence of RangeLimits
-        From `saturation.find_limits`.
-    noise : sequence of ndarray, (n, 3), u
-        Standard deviation of each sample.
-    bias : sequence of ndarray, (3,), u, optional
-        Subtracted from each range after the saturation test, so that the ranges join without a
-        step.
-    bandwidth : sequence of float, Hz, optional
-        Bandwidth of the low-pass before each sampler.
-    margin : float
-        Fraction of full scale from its end at which a range is left.
-    hysteresis : float
-        Fraction of full scale by which a range must be further inside before it is used again, so
-        that noise about the threshold does not cause repeated switching.
-    fade : float, s
-        Length of the cross-fade, on the side where both ranges are clear; zero for none.
+    `time` ((n,), s). `values` ((n, 3), u): as recorded, in order of increasing range, all at the
+    same stamps in the same axes. `limits`: from `saturation.find_limits`. `noise` ((n, 3), u):
+    standard deviation of each sample. `bias` ((3,), u): subtracted from each range after the
+    saturation test, so that the ranges join without a step. `bandwidth`: bandwidth of the low-pass
+    before each sampler. `margin`: fraction of full scale from its end at which a range is left.
+    `hysteresis`: fraction of full scale by which a range must be further inside before it is used
+    again, so that noise about the threshold does not cause repeated switching. `fade` (s): length
+    of the cross-fade, on the side where both ranges are clear; zero for none. DataError: a value is
+    not finite, time does not increase, or shapes disagree. ConfigError: margins are not within [0,
+    1), or the fade is negative.
 
-    Returns
-    -------
-    MergedRanges
-
-    Notes
-    -----
     Each axis is treated separately. The higher range is also used for the sample before an
     excursion, and afterwards for one sample and for five time constants ``1 / (2 pi bandwidth)``,
     because a filter behind the saturated element still outputs the clipped signal. Within a
     cross-fade with weight w the variance is ``w² s_low² + (1 - w)² s_high²``.
-
-    Raises
-    ------
-    DataError
-        A value is not finite, time does not increase, or shapes disagree.
-    ConfigError
-        Margins are not within [0, 1), or the fade is negative.
     """
     _check(time, values, limits, noise, margin, hysteresis, fade)
     count, n = len(values), time.size
@@ -268,17 +234,9 @@ NEAR_G = 0.15
 def regress_range(higher: Array, lower: Array) -> tuple[Array, Array]:
     """Regress each axis of the higher range on the axes of the lower range.
 
-    Parameters
-    ----------
-    higher, lower : ndarray, (n, 3)
-        Where both are clear of their ends.
-
-    Returns
-    -------
-    matrix : ndarray, (3, 3)
-        Least-squares solution of ``higher = matrix lower + constant``; the identity if they agree.
-    sd : ndarray, (3, 3)
-        From the residuals; infinite where the lower range did not vary.
+    `higher`, `lower` ((n, 3)): where both are clear of their ends. Returns `matrix` ((3, 3)):
+    least-squares solution of ``higher = matrix lower + constant``; the identity if they agree; `sd`
+    ((3, 3)): from the residuals; infinite where the lower range did not vary.
     """
     x = lower - lower.mean(axis=0)
     y = higher - higher.mean(axis=0)
@@ -314,18 +272,8 @@ def agreement_findings(
 ) -> list[Finding]:
     """Find ranges with swapped or inverted axes, or that are never both unsaturated.
 
-    Parameters
-    ----------
-    unit : CrashUnit
-    data : UnitArrays
-    limits : sequence of RangeLimits
-    noise : sequence of ndarray, (n, 3), m/s²
-
-    Returns
-    -------
-    list of Finding
-        Empty if the motion is insufficient: gravity alone is, because the bias of the higher range
-        may be as large.
+    `noise` ((n, 3), m/s²). Returns empty if the motion is insufficient: gravity alone is, because
+    the bias of the higher range may be as large.
     """
     found: list[Finding] = []
     for j in range(1, len(limits)):
@@ -406,25 +354,13 @@ def bias_from_lower_range(
 ) -> BiasEstimate | None:
     """Estimate the bias of a range from the next lower one.
 
-    Parameters
-    ----------
-    time : ndarray, (n,), s
-    higher, lower : ndarray, (n, 3), m/s²
-        At the same stamps, in the same axes.
-    use : ndarray of bool, (n, 3)
-        Samples at which the lower range is clear of its end and the vehicle is quiet.
-    quantization : tuple of float, m/s²
-        Quantization step of the higher range.
+    `time` ((n,), s). `higher`, `lower` ((n, 3), m/s²): at the same stamps, in the same axes. `use`
+    ((n, 3)): samples at which the lower range is clear of its end and the vehicle is quiet.
+    `quantization` (m/s²): quantization step of the higher range. Returns bias relative to the lower
+    range, whose own bias is in it; its standard deviation, from the noise of the mean and
+    quantization that noise does not average out, does not include that. None if an axis has fewer
+    than five usable samples.
 
-    Returns
-    -------
-    BiasEstimate or None
-        Bias relative to the lower range, whose own bias is in it; its standard deviation, from the
-        noise of the mean and quantization that noise does not average out, does not include that.
-        None if an axis has fewer than five usable samples.
-
-    Notes
-    -----
     Mean of ``higher - lower``. Vehicle motion cancels, except for the difference of the two scale
     factors times the specific force over the stretch (gravity at rest), which appears as bias. The
     paper's bias of up to 11.91 m/s² was found this way (Tadic and Vukajlovic 2016, section 3); the

@@ -63,10 +63,7 @@ PARALLEL = 1e-9
 def checked_directions(directions: ArrayLike) -> Array:
     """Check and return unit vectors, one per row, that span space.
 
-    Raises
-    ------
-    ConfigError
-        They are not (m, 3) numbers of length one to within 1e-6, or they lie in a plane.
+    ConfigError: they are not (m, 3) numbers of length one to within 1e-6, or they lie in a plane.
     """
     h = np.asarray(directions, dtype=np.float64)
     if h.ndim != 2 or h.shape[1] != 3 or h.shape[0] < 3 or not np.isfinite(h).all():
@@ -88,20 +85,11 @@ def checked_directions(directions: ArrayLike) -> Array:
 def parity_matrix(directions: ArrayLike) -> Array:
     """Parity matrix V, which cancels the motion: ``V H = 0``, ``V Vᵀ = I``.
 
-    Parameters
-    ----------
-    directions : array_like, (m, 3)
-        H, unit vectors of the measurement axes.
+    `directions` ((m, 3)): H, unit vectors of the measurement axes. Returns (m - 3, m): the parity
+    vector of readings z is ``p = V z``. Errors e with covariance C give it the covariance
+    ``V C Vᵀ``, and ``pᵀ (V C Vᵀ)⁻¹ p`` is chi-square with m - 3 degrees of freedom. Its sign and
+    rotation are those of a singular value decomposition.
 
-    Returns
-    -------
-    ndarray, (m - 3, m)
-        The parity vector of readings z is ``p = V z``. Errors e with covariance C give it the
-        covariance ``V C Vᵀ``, and ``pᵀ (V C Vᵀ)⁻¹ p`` is chi-square with m - 3 degrees of freedom.
-        Its sign and rotation are those of a singular value decomposition.
-
-    Notes
-    -----
     Potter and Suman 1977 (AGARDograph 224, Thresholdless redundancy management with arrays of
     skewed instruments). An axis that fails moves p along its own column of V, which identifies it
     among five or more axes if no two columns are parallel.
@@ -231,18 +219,10 @@ class VotingState:
 class AxisEvent:
     """A decision of the vote.
 
-    Attributes
-    ----------
-    kind : {'excluded', 'readmitted', 'disagree'}
-    row : int
-        Sample of the chunk at which it was decided, from 0.
-    since : int
-        Sample from which the chi-square has exceeded its limit; negative if before the chunk.
-    axes : tuple of int
-        The failed axes; for a disagreement, the two most likely ones.
-    size : float
-        Deviation of the first axis from the others, in the unit of the readings.
-    chi_square, limit : float
+    `kind` ({'excluded', 'readmitted', 'disagree'}). `row`: sample of the chunk at which it was
+    decided, from 0. `since`: sample from which the chi-square has exceeded its limit; negative if
+    before the chunk. `axes`: the failed axes; for a disagreement, the two most likely ones. `size`:
+    deviation of the first axis from the others, in the unit of the readings.
     """
 
     kind: str
@@ -258,12 +238,7 @@ class AxisEvent:
 class AxisVote:
     """Result of a vote over a chunk.
 
-    Attributes
-    ----------
-    values : ndarray, (n, 3)
-        Vector in body axes, from the healthy axes.
-    used : ndarray of bool, (n, m)
-    events : tuple of AxisEvent
+    `values` ((n, 3)): vector in body axes, from the healthy axes. `used` ((n, m)).
     """
 
     values: Array
@@ -768,17 +743,9 @@ class MountedUnit:
 class VoteEvent:
     """A decision of the vote.
 
-    Attributes
-    ----------
-    kind : {'excluded', 'readmitted', 'disagree'}
-    channels : tuple of str
-        Such as ``A.gyro_x``; for a disagreement, the most likely ones.
-    time, since : float, s
-        Time of the decision, and start of the disagreement.
-    size : float, rad/s or m/s²
-        Deviation of the first channel from the others.
-    chi_square, limit : float
-    finding : Finding
+    `kind` ({'excluded', 'readmitted', 'disagree'}). `channels`: such as ``A.gyro_x``; for a
+    disagreement, the most likely ones. `time`, `since` (s): time of the decision, and start of the
+    disagreement. `size` (rad/s or m/s²): deviation of the first channel from the others.
     """
 
     kind: str
@@ -841,15 +808,7 @@ def _words(channel: str) -> str:
 def fused_noise(voting: AxisVoting, used: Mask) -> Array:
     """Noise density of the fused vector at each sample.
 
-    Parameters
-    ----------
-    voting : AxisVoting
-    used : ndarray of bool, (n, m)
-        Axes included in the vector.
-
-    Returns
-    -------
-    ndarray, (n, 3), u/√Hz
+    `used` ((n, m)): axes included in the vector. Returns (n, 3), u/√Hz.
     """
     out = np.empty((len(used), 3))
     code = used @ (2 ** np.arange(used.shape[1], dtype=np.int64))

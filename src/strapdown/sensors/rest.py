@@ -238,18 +238,10 @@ def rest_between(
 def sd_of_mean(time: Array, values: Array) -> Array:
     """Standard deviation of the mean of a stretch.
 
-    Parameters
-    ----------
-    time : ndarray, (n,), s
-    values : ndarray, (n, k)
-
-    Returns
-    -------
-    ndarray, (k,)
-        The larger of ``sd / sqrt(n)``, valid for white noise, and the estimate from the means of 4
-        to 20 parts of at least half a second, valid for noise correlated over less than a part
-        (batch means; Law and Kelton 1984, doi:10.1287/opre.32.6.1241). A stretch of less than 2 s
-        has only the first.
+    `time` ((n,), s). `values` ((n, k)). Returns (k,): the larger of ``sd / sqrt(n)``, valid for
+    white noise, and the estimate from the means of 4 to 20 parts of at least half a second, valid
+    for noise correlated over less than a part (batch means; Law and Kelton 1984,
+    doi:10.1287/opre.32.6.1241). A stretch of less than 2 s has only the first.
     """
     white = values.std(axis=0, ddof=1) / np.sqrt(len(values))
     parts = min(MOST_PARTS, int((time[-1] - time[0]) / WINDOW))

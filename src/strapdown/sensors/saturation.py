@@ -36,16 +36,9 @@ ROUNDING = 1e-9
 class RangeLimits:
     """Ends of the range of a triad, and the samples there.
 
-    Attributes
-    ----------
-    lower, upper : ndarray, (3,)
-        Ends of the range, as stated or as detected, in the unit of the values.
-    clipped : ndarray of bool, (n, 3)
-        Samples at either end.
-    found : ndarray of bool, (3,)
-        Axes with an end detected within the stated range.
-    beyond : ndarray of bool, (3,)
-        Axes with readings beyond their stated full scale.
+    `lower`, `upper` ((3,)): ends of the range, as stated or as detected, in the unit of the values.
+    `clipped` ((n, 3)): samples at either end. `found` ((3,)): axes with an end detected within the
+    stated range. `beyond` ((3,)): axes with readings beyond their stated full scale.
     """
 
     lower: Array
@@ -66,26 +59,12 @@ def find_limits(
 ) -> RangeLimits:
     """Find the ends of a triad's range and the saturated samples.
 
-    Parameters
-    ----------
-    time : ndarray, (n,), s
-    values : ndarray, (n, k)
-        Any axes, usually three, as recorded: saturation occurs before any bias is removed.
-    full_scale : ndarray, (3,)
-        As stated; may be infinite.
-    quantization : ndarray, (3,)
-        Quantization step; zero if unknown.
-    held : ndarray of bool, (n, k), optional
-        Samples that include saturated ones; there the low-pass can overshoot the end.
-    longest_flat : float, s
-        Longest duration of a flat extreme.
+    `time` ((n,), s). `values` ((n, k)): any axes, usually three, as recorded: saturation occurs
+    before any bias is removed. `full_scale` ((3,)): as stated; may be infinite. `quantization`
+    ((3,)): quantization step; zero if unknown. `held` ((n, k)): samples that include saturated
+    ones; there the low-pass can overshoot the end. `longest_flat` (s): longest duration of a flat
+    extreme.
 
-    Returns
-    -------
-    RangeLimits
-
-    Notes
-    -----
     A sample is clipped within a step of the stated full scale. In addition, an axis has an end
     where it repeats the extreme value of the record for three or more samples, up to
     `longest_flat`, and jumps by three or more steps on both sides (ten or more samples: on one

@@ -47,25 +47,12 @@ LEAST_STAMPS = 8
 class SynchronisedUnit:
     """A unit at the common stamps.
 
-    Attributes
-    ----------
-    unit : CrashUnit
-        Tables on the common clock, all at the same stamps; `trigger` is 0 and `trigger_sd` that of
-        the clock. A borrowed gyro is in `gyro`, in the unit's own sensor axes, and `gyro_from`
-        names its unit.
-    accelerometers : tuple of TriadAtStamps
-        The same triads with noise, clipping and range ends.
-    gyro : TriadAtStamps or None
-    offset : float, s
-        Recorded stamp minus common time.
-    time_sd : float, s
-        Standard deviation of `offset`.
-    how : str
-        Source of `offset`.
-    lender : str or None
-        Name of the unit whose gyro is borrowed.
-    gyro_time_sd : float, s
-        Of the borrowed gyro relative to this unit's accelerometers; 0 for the unit's own gyro.
+    `unit`: tables on the common clock, all at the same stamps; `trigger` is 0 and `trigger_sd` that
+    of the clock. A borrowed gyro is in `gyro`, in the unit's own sensor axes, and `gyro_from` names
+    its unit. `accelerometers`: the same triads with noise, clipping and range ends. `offset` (s):
+    recorded stamp minus common time. `time_sd` (s): standard deviation of `offset`. `how`: source
+    of `offset`. `lender`: name of the unit whose gyro is borrowed. `gyro_time_sd` (s): of the
+    borrowed gyro relative to this unit's accelerometers; 0 for the unit's own gyro.
     """
 
     unit: CrashUnit
@@ -410,12 +397,7 @@ def clipped_findings(
 def cut_findings(spans: Sequence[tuple[str, float, float]], time: Array) -> list[Finding]:
     """Report the part of the longest record omitted because another is shorter.
 
-    Parameters
-    ----------
-    spans : sequence of (source, first, last)
-        Interval each part can supply, s on the common clock.
-    time : ndarray, (n,), s
-        Common stamps.
+    `spans`: interval each part can supply, s on the common clock. `time` ((n,), s): common stamps.
     """
     latest, earliest = max(spans, key=lambda s: s[1]), min(spans, key=lambda s: s[2])
     first, last = min(spans, key=lambda s: s[1]), max(spans, key=lambda s: s[2])
@@ -462,10 +444,7 @@ def check_options(
 ) -> None:
     """Check the options of `synchronise`.
 
-    Raises
-    ------
-    ConfigError
-        No unit is given, two units have the same name, or an option is invalid.
+    ConfigError: no unit is given, two units have the same name, or an option is invalid.
     """
     if not units:
         raise ConfigError("sensors.no-units-given", quantity="units")
@@ -504,16 +483,7 @@ def check_options(
 def check_rate(rate: float, steps: Sequence[float]) -> None:
     """Raise if the common rate far exceeds that of every record.
 
-    Parameters
-    ----------
-    rate : float, Hz
-    steps : sequence of float, s
-        Of the records.
-
-    Raises
-    ------
-    ConfigError
-        The rate is more than ten times that of the fastest.
+    `steps` (s): of the records. ConfigError: the rate is more than ten times that of the fastest.
     """
     fastest = 1.0 / min(steps)
     if rate > MOST_FASTER * fastest:
@@ -531,19 +501,8 @@ def compare_sizes(
 ) -> list[Finding]:
     """Compare measurements of one rigid body to detect wrong units of measurement.
 
-    Parameters
-    ----------
-    units : sequence of (gyro or None, accelerometers)
-
-    Returns
-    -------
-    list of Finding
-        For specific forces that differ by a factor of about 9.8.
-
-    Raises
-    ------
-    DataError
-        Rates differ by a factor of about 57, though equal everywhere on the body.
+    Returns for specific forces that differ by a factor of about 9.8. DataError: rates differ by a
+    factor of about 57, though equal everywhere on the body.
     """
     turning = [(gyro.source, _spread(gyro)) for gyro, _ in units if gyro is not None]
     for one, size in turning:

@@ -38,14 +38,8 @@ _ASSUMED = {ACCEL[0]: "delta_v_sd", GYRO[0]: "turn_sd_deg"}
 class AxisGroup:
     """Axes that share their stamps.
 
-    Attributes
-    ----------
-    axes : tuple of int
-        0, 1, 2 for x, y, z.
-    time : ndarray, (n,), s
-    values : ndarray, (n, len(axes))
-    step : float, s
-        Nominal sample interval.
+    `axes`: 0, 1, 2 for x, y, z. `time` ((n,), s). `values` ((n, len(axes))). `step` (s): nominal
+    sample interval.
     """
 
     axes: tuple[int, ...]
@@ -58,14 +52,7 @@ class AxisGroup:
 class TriadChannels:
     """A triad ready for resampling.
 
-    Attributes
-    ----------
-    source : str
-        Unit and part, for messages.
-    groups : tuple of AxisGroup
-        One group if all axes were sampled together.
-    sampling : str
-    findings : tuple of Finding
+    `source`: unit and part, for messages. `groups`: one group if all axes were sampled together.
     """
 
     source: str
@@ -87,24 +74,10 @@ class TriadChannels:
 def triad_channels(unit: CrashUnit, triad: RecordedTriad, columns: list[str]) -> TriadChannels:
     """Check a triad and extract its channels.
 
-    Parameters
-    ----------
-    unit : CrashUnit
-    triad : RecordedTriad
-        Its table may hold axes with different rates and starts, with NaN in rows where an axis has
-        no sample.
-    columns : list of str
-        `ACCEL` or `GYRO`.
-
-    Returns
-    -------
-    TriadChannels
-
-    Raises
-    ------
-    DataError
-        An axis is missing, time does not increase, a value is not finite, a gap occurs, there are
-        fewer than six samples, or the units of measurement are evidently wrong.
+    `triad`: its table may hold axes with different rates and starts, with NaN in rows where an axis
+    has no sample. `columns`: `ACCEL` or `GYRO`. DataError: an axis is missing, time does not
+    increase, a value is not finite, a gap occurs, there are fewer than six samples, or the units of
+    measurement are evidently wrong.
     """
     source = f"{unit.name}, {triad.name}"
     table = triad.table

@@ -251,20 +251,8 @@ FARTHEST = 30.0  # m
 def triple(given: Any, quantity: str, code: str, file: str | None = None, **values: Any) -> Triad:
     """Return three finite numbers as a triad.
 
-    Parameters
-    ----------
-    given : object
-    quantity : str
-    code : str
-        Of the error, whose data include `given` and `values`.
-    file : str, optional
-    **values
-        Further data of the error.
-
-    Raises
-    ------
-    ConfigError
-        The input is not three finite numbers.
+    `code`: of the error, whose data include `given` and `values`. `**values`: further data of the
+    error. ConfigError: the input is not three finite numbers.
     """
     try:
         x, y, z = (float(v) for v in given)
@@ -283,10 +271,7 @@ def finite(given: Any) -> bool:
 def check_sd(given: Any, quantity: str, unit: str, file: str | None = None) -> None:
     """Check a standard deviation.
 
-    Raises
-    ------
-    ConfigError
-        The value is not a number, negative or not finite.
+    ConfigError: the value is not a number, negative or not finite.
     """
     if not finite(given) or given < 0.0:
         raise ConfigError(
@@ -318,23 +303,9 @@ _LEVEL, _FAR = 0.94, 0.7  # cosines of 20° and 45°
 def check_axes_matrix(matrix: ArrayLike, quantity: str = "matrix") -> Array:
     """Check that a matrix rotates one right-handed triad into another.
 
-    Parameters
-    ----------
-    matrix : array_like, (3, 3)
-        Sensor axes to body forward-right-down.
-    quantity : str
-        For messages.
-
-    Returns
-    -------
-    ndarray, (3, 3)
-        The nearest rotation, without the rounding of the input decimals.
-
-    Raises
-    ------
-    ConfigError
-        It is not 3x3 finite numbers, its rows are not orthonormal to 2e-3, or it is a mirror image
-        (determinant -1).
+    `matrix` ((3, 3)): sensor axes to body forward-right-down. `quantity`: for messages. Returns (3,
+    3): the nearest rotation, without the rounding of the input decimals. ConfigError: it is not 3x3
+    finite numbers, its rows are not orthonormal to 2e-3, or it is a mirror image (determinant -1).
     """
     try:
         m = np.array(matrix, dtype=np.float64)
@@ -383,18 +354,9 @@ def _not_square(product: Array, worst: tuple[int, int], quantity: str) -> Config
 def axes_letters(matrix: Array) -> tuple[str, Array]:
     """Split a rotation into signed axes, as in ``--axes``, and a remaining rotation.
 
-    Parameters
-    ----------
-    matrix : ndarray, (3, 3)
-        As returned by `check_axes_matrix`.
-
-    Returns
-    -------
-    letters : str
-        Such as ``x,-y,-z``: the sensor axes nearest to forward, right and down, among all
-        right-handed choices.
-    turn : ndarray, (3, 3)
-        Remaining rotation: ``matrix = turn @ letters``; the identity if the axes are parallel.
+    `matrix` ((3, 3)): as returned by `check_axes_matrix`. Returns `letters`: such as ``x,-y,-z``:
+    the sensor axes nearest to forward, right and down, among all right-handed choices; `turn` ((3,
+    3)): remaining rotation: ``matrix = turn @ letters``; the identity if the axes are parallel.
     """
     best, found = -np.inf, np.eye(3)
     for plain in _right_handed():
@@ -424,17 +386,8 @@ def report_transposed(
 ) -> tuple[Finding, ...]:
     """Report a matrix that appears transposed: gravity is level only with its transpose.
 
-    Parameters
-    ----------
-    matrix : ndarray, (3, 3)
-    force : array_like, (3,), m/s²
-        Mean specific force in body axes, after applying the matrix.
-    file, quantity : str
-        For messages.
-
-    Returns
-    -------
-    tuple of Finding
+    `matrix` ((3, 3)). `force` ((3,), m/s²): mean specific force in body axes, after applying the
+    matrix. `file`, `quantity`: for messages.
     """
     body = np.asarray(force, dtype=np.float64)
     size = float(np.linalg.norm(body))

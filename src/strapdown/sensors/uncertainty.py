@@ -154,26 +154,12 @@ SHEET_FACTS = ("noise_density", "full_scale", "quantization", "bandwidth")
 def uncertainty_of(sensor: Sensor, triad: str, **overrides: TriadLike) -> TriadUncertainty:
     """Convert a catalogue sensor to the uncertainty of one of its units.
 
-    Parameters
-    ----------
-    sensor : Sensor
-    triad : {'gyro', 'accel'}
-    **overrides : triad
-        Attributes of `TriadUncertainty`, in its units, that replace the data sheet's, for example
-        from a calibration.
-
-    Returns
-    -------
-    TriadUncertainty
-        A standard deviation of the data sheet is used unchanged; a bound is divided by √3 (uniform
-        distribution). The bound of a nonlinearity is assigned entirely to its second order: the
-        third has zero mean, and a data sheet does not separate them. Drifts within a record (bias
-        instability, random walk, trend) are not included.
-
-    Raises
-    ------
-    ConfigError
-        The sensor lacks that triad, or an override is not one of the attributes.
+    `triad` ({'gyro', 'accel'}). `**overrides`: attributes of `TriadUncertainty`, in its units, that
+    replace the data sheet's, for example from a calibration. Returns a standard deviation of the
+    data sheet is used unchanged; a bound is divided by √3 (uniform distribution). The bound of a
+    nonlinearity is assigned entirely to its second order: the third has zero mean, and a data sheet
+    does not separate them. Drifts within a record (bias instability, random walk, trend) are not
+    included. ConfigError: the sensor lacks that triad, or an override is not one of the attributes.
     """
     if triad not in TRIADS or not any(f.key.startswith(f"{triad}.") for f in sensor.sources):
         raise ConfigError(
@@ -308,23 +294,10 @@ def stated_uncertainty(
 ) -> TriadUncertainty:
     """Convert the stated values of a triad to its uncertainty.
 
-    Parameters
-    ----------
-    triad : {'gyro', 'accel'}
-    stated : dict
-        By catalogue key (``bias_sd_mg``, ``full_scale_g``): one number, or three. A bound is
-        converted to the standard deviation of a uniform distribution.
-    sensor : Sensor, optional
-        Supplies the values that are not stated.
-
-    Returns
-    -------
-    TriadUncertainty
-
-    Raises
-    ------
-    ConfigError
-        A key is unknown, a quantity is stated twice, or a value is not a number.
+    `triad` ({'gyro', 'accel'}). `stated`: by catalogue key (``bias_sd_mg``, ``full_scale_g``): one
+    number, or three. A bound is converted to the standard deviation of a uniform distribution.
+    `sensor`: supplies the values that are not stated. ConfigError: a key is unknown, a quantity is
+    stated twice, or a value is not a number.
     """
     keys = STATED_KEYS[triad]
     values: dict[str, Any] = {}
@@ -363,22 +336,10 @@ def stated_imu(
 ) -> ImuUncertainty:
     """Combine a catalogue sensor and stated values into an uncertainty.
 
-    Parameters
-    ----------
-    sensor : Sensor, optional
-        Supplies the values that are not stated.
-    gyro, accel : dict
-        By catalogue key: one number, or three.
-
-    Returns
-    -------
-    ImuUncertainty
-
-    Raises
-    ------
-    ConfigError
-        A key is unknown, a value is not a number, or bias or noise of a triad is neither stated nor
-        in the data sheet. Zero instead would give the bounds of a perfect sensor.
+    `sensor`: supplies the values that are not stated. `gyro`, `accel`: by catalogue key: one
+    number, or three. ConfigError: a key is unknown, a value is not a number, or bias or noise of a
+    triad is neither stated nor in the data sheet. Zero instead would give the bounds of a perfect
+    sensor.
     """
     base = None if sensor is None else ImuUncertainty.of_sensor(sensor)
     triads: dict[str, TriadUncertainty] = {}
@@ -449,27 +410,13 @@ MOST_NONLINEARITY = 0.49
 def draw_errors(uncertainty: TriadUncertainty, seed: Seed, *streams: int) -> TriadErrors:
     """Draw the errors of one unit.
 
-    Parameters
-    ----------
-    uncertainty : TriadUncertainty
-    seed : int or SeedSequence
-        Identifies the unit.
-    *streams : int
-        Path below the seed, where one seed serves several triads.
-
-    Returns
-    -------
-    TriadErrors
-        All draws are normal and independent. Each quantity and axis has its own stream, so setting
-        one spread to zero does not change the other draws. The second order of the curve is limited
-        to 0.49 of the slope, so that the inverse is unique; this takes effect only for standard
-        deviations of tenths of full scale. Noise, range, quantization and low-pass are those of the
-        uncertainty.
-
-    Raises
-    ------
-    ConfigError
-        The draw is not a valid sensor: a scale factor of -1 or less, or angles that sum to 1 rad.
+    `seed` (int or SeedSequence): identifies the unit. `*streams`: path below the seed, where one
+    seed serves several triads. Returns all draws are normal and independent. Each quantity and axis
+    has its own stream, so setting one spread to zero does not change the other draws. The second
+    order of the curve is limited to 0.49 of the slope, so that the inverse is unique; this takes
+    effect only for standard deviations of tenths of full scale. Noise, range, quantization and
+    low-pass are those of the uncertainty. ConfigError: the draw is not a valid sensor: a scale
+    factor of -1 or less, or angles that sum to 1 rad.
     """
     bias = _draws(uncertainty.axis("bias"), seed, *streams, BIAS)[:, 0]
     scale = _draws(uncertainty.axis("scale"), seed, *streams, SCALE)[:, 0]
@@ -514,23 +461,11 @@ def _matrix(rows: Array) -> Matrix:
 def crash_priors(rate: float = 200.0) -> dict[str, TriadUncertainty]:
     """Return the error model of a merged consumer-grade crash recorder.
 
-    Parameters
-    ----------
-    rate : float, Hz
-        Sample rate for which the specific force noise per sample is stated.
-
-    Returns
-    -------
-    dict
-        ``accel``: bias 0.2 m/s² (Tadic and Vukajlovic 2016, section 3: the low-g parts' own), scale
-        factor 2 %, noise 0.4 m/s² per sample. ``gyro``: bias 0.3 deg/s. All are standard deviations
-        of every axis. All other errors are zero, and the range is unlimited. Scale, noise and gyro
-        bias are chosen; the paper gives no values.
-
-    Raises
-    ------
-    ConfigError
-        The rate is not positive.
+    `rate`: sample rate for which the specific force noise per sample is stated. Returns ``accel``:
+    bias 0.2 m/s² (Tadic and Vukajlovic 2016, section 3: the low-g parts' own), scale factor 2 %,
+    noise 0.4 m/s² per sample. ``gyro``: bias 0.3 deg/s. All are standard deviations of every axis.
+    All other errors are zero, and the range is unlimited. Scale, noise and gyro bias are chosen;
+    the paper gives no values. ConfigError: the rate is not positive.
     """
     if not (math.isfinite(rate) and rate > 0.0):
         raise ConfigError("sensors.rate-not-positive", quantity="rate", rate=rate)

@@ -51,13 +51,7 @@ FORCE, RATES = "specific force", "rates"
 class UnitClock:
     """Offset of a unit's clock from the common one.
 
-    Attributes
-    ----------
-    offset : float, s
-        Unit's stamp minus common time.
-    sd : float, s
-    how : str
-        Method, for display.
+    `offset` (s): unit's stamp minus common time. `sd` (s). `how`: method, for display.
     """
 
     offset: float
@@ -77,10 +71,7 @@ class UnitChannels:
 def clocks_by_trigger(units: Sequence[UnitChannels]) -> list[UnitClock]:
     """Use each unit's own trigger as zero.
 
-    Raises
-    ------
-    DataError
-        A unit has no trigger.
+    DataError: a unit has no trigger.
     """
     return [UnitClock(_trigger_within(u), u.unit.trigger_sd, "trigger") for u in units]
 
@@ -90,24 +81,10 @@ def clocks_by_correlation(
 ) -> tuple[list[UnitClock], list[Finding]]:
     """Align each unit's specific force, or rates, with the reference unit's by correlation.
 
-    Parameters
-    ----------
-    units : sequence of UnitChannels
-    reference : UnitChannels
-        One of the units; its trigger is the common zero.
-
-    Returns
-    -------
-    clocks : list of UnitClock
-        The delays, corrected for each part's stated bandwidth. The reference unit's clock has the
-        standard deviation 0, because all units share its trigger error.
-    findings : list of Finding
-
-    Raises
-    ------
-    DataError
-        The reference unit has no trigger, a unit has too little overlap with it, or the motion is
-        periodic.
+    `reference`: one of the units; its trigger is the common zero. Returns `clocks`: the delays,
+    corrected for each part's stated bandwidth. The reference unit's clock has the standard
+    deviation 0, because all units share its trigger error; `findings`. DataError: the reference
+    unit has no trigger, a unit has too little overlap with it, or the motion is periodic.
     """
     zero = _trigger(reference.unit)
     clocks, findings = [], []
@@ -238,22 +215,14 @@ AT_END = 0.999
 class TriadAtStamps:
     """A triad at the common stamps.
 
-    Attributes
-    ----------
-    triad : RecordedTriad
-        Its `uncertainty` is the recorded one, because the noise density at low frequencies, which
-        determines integrals, is unchanged. `noise` is the standard deviation of a single sample.
-    noise_factor : ndarray, (n, 3)
-        Standard deviation of a sample divided by that of a recorded sample, exact for white noise.
-    noise : ndarray, (n, 3), u
-        Standard deviation of each sample from the stated density: ``density/√dt``, dt the recorded
-        step, times `noise_factor`.
-    clipped : ndarray of bool, (n, 3)
-        Whether a saturated recorded sample contributes to the sample.
-    whole : ndarray of bool, (n,)
-        False where the record was extrapolated beyond its end to form the sample.
-    method : str
-        'as recorded', 'decimated', 'averaged' or 'interpolated'.
+    `triad`: its `uncertainty` is the recorded one, because the noise density at low frequencies,
+    which determines integrals, is unchanged. `noise` is the standard deviation of a single sample.
+    `noise_factor` ((n, 3)): standard deviation of a sample divided by that of a recorded sample,
+    exact for white noise. `noise` ((n, 3), u): standard deviation of each sample from the stated
+    density: ``density/√dt``, dt the recorded step, times `noise_factor`. `clipped` ((n, 3)):
+    whether a saturated recorded sample contributes to the sample. `whole` ((n,)): False where the
+    record was extrapolated beyond its end to form the sample. `method`: 'as recorded', 'decimated',
+    'averaged' or 'interpolated'.
     """
 
     triad: RecordedTriad
@@ -269,14 +238,8 @@ def allowed_stamps(
 ) -> tuple[float, float]:
     """First and last common stamp that a triad can supply.
 
-    Parameters
-    ----------
-    channels : TriadChannels
-    offset : float, s
-        Unit's stamp minus common time.
-    rate : float, Hz
-    sampling : {'instantaneous', 'mean'}
-        Of the output.
+    `offset` (s): unit's stamp minus common time. `sampling` ({'instantaneous', 'mean'}): of the
+    output.
     """
     lows, highs = [], []
     for g in channels.groups:
@@ -308,25 +271,10 @@ def onto_stamps(
 ) -> tuple[TriadAtStamps, list[Finding]]:
     """Resample a triad to common stamps.
 
-    Parameters
-    ----------
-    channels : TriadChannels
-    triad : RecordedTriad
-        Triad that `channels` belong to.
-    columns : list of str
-    offset : float, s
-        Unit's stamp minus common time.
-    stamps : ndarray, (n,), s
-        On the common clock, within `allowed_stamps`.
-    rate : float, Hz
-    sampling : {'instantaneous', 'mean'}
-    attenuation : float, dB
-        Attenuation of aliased signals, for instantaneous output.
-
-    Raises
-    ------
-    DataError
-        Faster samples are not evenly spaced, or the record is shorter than the low-pass.
+    `triad`: triad that `channels` belong to. `offset` (s): unit's stamp minus common time. `stamps`
+    ((n,), s): on the common clock, within `allowed_stamps`. `sampling` ({'instantaneous', 'mean'}).
+    `attenuation` (dB): attenuation of aliased signals, for instantaneous output. DataError: faster
+    samples are not evenly spaced, or the record is shorter than the low-pass.
     """
     n = len(stamps)
     values, factor, noise = (np.empty((n, 3)) for _ in range(3))
@@ -369,13 +317,7 @@ def onto_stamps(
 def at_rows(triad: TriadAtStamps, stamps: Array, rate: float) -> TriadAtStamps:
     """The same triad at some of its stamps.
 
-    Parameters
-    ----------
-    triad : TriadAtStamps
-    stamps : ndarray, (m,), s
-        Consecutive, among those of the triad.
-    rate : float, Hz
-        Of both.
+    `stamps` ((m,), s): consecutive, among those of the triad. `rate`: of both.
     """
     table = triad.triad.table
     first = round((stamps[0] - float(table.index[0])) * rate)
