@@ -8,8 +8,6 @@ from strapdown.alignment.inertial_frame import InertialFrame
 from strapdown.alignment.levelling import KnownHeading, Levelling
 from strapdown.alignment.two_vector import TwoVector
 
-__all__ = ["COARSE_ALIGNMENTS"]
-
 #: A new method is a new file and a line here.
 COARSE_ALIGNMENTS: dict[str, type[CoarseAlignment]] = {
     "levelling": Levelling,

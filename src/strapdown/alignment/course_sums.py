@@ -19,36 +19,6 @@ from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, DV, GYRO, VELOCITY, VELOCITY_SD, check_gnss
 from strapdown.tables.checks import source_of
 
-__all__ = [
-    "ACCEL_BIAS",
-    "ACCEL_MATRIX",
-    "ACCEL_NOISE",
-    "ASKED",
-    "AXLE",
-    "COUNT",
-    "END_VELOCITY",
-    "GYRO_BIAS",
-    "GYRO_BY_FORCE",
-    "GYRO_MATRIX",
-    "GYRO_NOISE",
-    "HANDED",
-    "OFFSET",
-    "OF_ACCELS",
-    "OF_GYROS",
-    "OF_SENSORS",
-    "STRETCHES",
-    "TURN",
-    "YAW",
-    "Antenna",
-    "CourseFixes",
-    "DriveSums",
-    "RestRate",
-    "course_fixes",
-    "drive_sums",
-    "rest_rates",
-]
-
-
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 

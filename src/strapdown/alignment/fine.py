@@ -45,18 +45,6 @@ from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, EULER, GYRO, MOTION
 from strapdown.tables.checks import is_number, source_of, values_of
 
-__all__ = [
-    "FINE_COLUMNS",
-    "Epochs",
-    "FineAlignment",
-    "FineResult",
-    "alignment_of",
-    "heading_floor_deg",
-    "refuse_false_claims",
-    "telling_record",
-]
-
-
 Array = NDArray[np.float64]
 
 # Motion of a body on a floor in a town; a smaller one is not assumed.

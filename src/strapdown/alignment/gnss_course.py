@@ -49,17 +49,6 @@ from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import is_number, source_of
 
-__all__ = [
-    "CourseFit",
-    "CourseModel",
-    "CourseSearch",
-    "Found",
-    "GnssCourse",
-    "check_forward",
-    "left_out",
-]
-
-
 Array = NDArray[np.float64]
 
 #: Largest allowed tilt error, rad: beyond it attitude errors are no longer small.

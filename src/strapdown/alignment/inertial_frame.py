@@ -32,22 +32,6 @@ from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import GYRO
 from strapdown.tables.checks import source_of
 
-__all__ = [
-    "DEGREES",
-    "EPOCHS",
-    "FIRST_FREE",
-    "KINDS",
-    "InertialFit",
-    "InertialFrame",
-    "ResidualNoise",
-    "Response",
-    "fit_inertially",
-    "heading_rate",
-    "residual_noise",
-    "turn_findings",
-]
-
-
 Array = NDArray[np.float64]
 
 EPOCHS = ("end", "start")

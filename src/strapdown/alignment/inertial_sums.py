@@ -14,7 +14,6 @@ from strapdown.tables import MOTION
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-__all__ = ["InertialSums", "moments", "sum_inertially"]
 
 # Nodes over which sensor errors are taken as constant: alignment depends on changes over a fifth of
 # the record and more, and the weight of a node of a 240th is accurate to 1e-4.

@@ -25,15 +25,6 @@ from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables.checks import is_number, source_of
 
-__all__ = [
-    "UNKNOWN_HEADING",
-    "KnownHeading",
-    "Levelling",
-    "error_of_force_and_heading",
-    "level_at_rest",
-]
-
-
 # Roll and pitch alone: the heading is undetermined.
 
 

@@ -16,21 +16,6 @@ from strapdown.sensors.triad_errors import Triad
 from strapdown.sensors.uncertainty import BiasDrift, ImuUncertainty
 from strapdown.tables import ACCEL, GYRO
 
-__all__ = [
-    "BlockMeans",
-    "block_means",
-    "excursion",
-    "force_covariance",
-    "gravity_change",
-    "mean_of_drift",
-    "of_mean",
-    "rate_covariance",
-    "sensor_covariance",
-    "sensor_noise",
-    "unexplained",
-]
-
-
 Array = NDArray[np.float64]
 
 

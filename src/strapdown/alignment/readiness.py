@@ -23,19 +23,6 @@ from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import EULER, GYRO, QUATERNION, attitude_table, check_attitude, check_imu
 from strapdown.tables.checks import source_of, values_of
 
-__all__ = [
-    "READINESS",
-    "Manoeuvre",
-    "Readiness",
-    "carried_attitude",
-    "carry",
-    "durations_of",
-    "manoeuvres_after",
-    "null_space",
-    "readiness",
-]
-
-
 Array = NDArray[np.float64]
 
 SD = [f"{angle}_sd" for angle in EULER]

@@ -14,22 +14,6 @@ from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GYRO, VELOCITY, VELOCITY_SD, check_gnss, check_imu, find_gaps
 from strapdown.tables.checks import source_of
 
-__all__ = [
-    "CONTRADICTION",
-    "HIGH_LATITUDE",
-    "LARGEST_SD",
-    "LEAST_SAMPLES",
-    "check_gravity",
-    "check_record",
-    "gravity_findings",
-    "latitude_findings",
-    "north_findings",
-    "outlier_findings",
-    "seems_in_deg_per_s",
-    "still_by_gnss",
-]
-
-
 Array = NDArray[np.float64]
 
 # As in levelling: deviation from gravity beyond any bias, scale or rocking.

@@ -39,8 +39,6 @@ from strapdown.tables.checks import source_of
 
 Array = NDArray[np.float64]
 
-__all__ = ["TwoVector", "triad_attitude"]
-
 
 @dataclass(frozen=True)
 class TwoVector(CoarseAlignment):

@@ -13,13 +13,6 @@ from strapdown.errors import ConfigError, DataError
 
 Array = NDArray[np.float64]
 
-__all__ = [
-    "CHANNEL_CLASSES",
-    "DESIGN_FREQUENCY",
-    "CfcCoefficients",
-    "cfc_coefficients",
-    "cfc_filter",
-]
 
 CHANNEL_CLASSES = (60, 180, 600, 1000)
 # Design frequency of one pass, divided by the class number.

@@ -6,15 +6,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = [
-    "chi_square_above",
-    "chi_square_below",
-    "chi_square_exceeded",
-    "chi_square_quantile",
-    "normal_above",
-    "normal_quantile",
-]
-
 
 def chi_square_quantile(share: Any, freedom: Any) -> Any:
     """Compute the chi-square quantile of a probability.

@@ -14,21 +14,6 @@ from strapdown.dsp.derivative import LocalWeights, mirrored
 from strapdown.dsp.samples import as_channels, positive_step
 from strapdown.errors import ConfigError, DataError
 
-__all__ = [
-    "POINTS",
-    "FirDecimation",
-    "FirState",
-    "LowPassDesign",
-    "Resampled",
-    "decimate",
-    "fir_decimation",
-    "interpolate",
-    "interpolated_means",
-    "low_pass_design",
-    "mean_samples",
-]
-
-
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 

@@ -12,9 +12,6 @@ from strapdown.dsp.decimation import decimate, low_pass_design
 from strapdown.dsp.samples import as_channels, positive_step
 from strapdown.errors import DataError
 
-__all__ = ["Delay", "EvenSignal", "find_delay", "lag_correlation", "repeats", "top_peaks"]
-
-
 Array = NDArray[np.float64]
 
 # Rates above add noise and hardly any signal: structures of vehicles vibrate at 30 to 300 Hz.

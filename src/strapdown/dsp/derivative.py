@@ -17,16 +17,6 @@ from strapdown.errors import ConfigError, DataError
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-__all__ = [
-    "LocalSlope",
-    "LocalWeights",
-    "bandwidth",
-    "fitted_weights",
-    "local_slope",
-    "mirrored",
-    "slope_response",
-]
-
 
 Array = NDArray[np.float64]
 

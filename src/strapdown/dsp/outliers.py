@@ -15,7 +15,6 @@ from strapdown.errors import ConfigError
 Array = NDArray[np.float64]
 Flags = NDArray[np.int8]
 
-__all__ = ["KEPT", "REPLACED", "OutlierDesign", "OutlierState", "Screened"]
 
 #: Flags of `Screened`: as those of the kernel.
 REPLACED, KEPT = 1, 2

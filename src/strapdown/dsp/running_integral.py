@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-__all__ = ["running_integral"]
-
 
 def running_integral(time: Array, values: Array, *, means: bool = False) -> Array:
     """Integrate samples from the first stamp to each.

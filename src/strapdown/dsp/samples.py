@@ -11,7 +11,6 @@ from strapdown.errors import ConfigError, DataError
 
 Array = NDArray[np.float64]
 
-__all__ = ["as_channels", "check_segment", "even_step", "positive_step"]
 
 # Stamps printed to a tenth of a step still count as an even grid.
 JITTER = 0.1

@@ -9,9 +9,6 @@ from strapdown._kernels import increments as kernel
 from strapdown.errors import ConfigError
 from strapdown.tables import GYRO, check_imu, increments_table
 
-__all__ = ["increments_from_imu"]
-
-
 INTERPOLATIONS = ("linear", "cubic")
 
 

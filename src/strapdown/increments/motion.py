@@ -15,16 +15,6 @@ from strapdown.increments.angle import INTERPOLATIONS as BETWEEN_STAMPS
 from strapdown.tables import ACCEL, GYRO, MOTION, check_imu, check_motion_increments, imu_table
 from strapdown.tables.checks import as_array, check_same_length, check_time
 
-__all__ = [
-    "INTERPOLATIONS",
-    "ROWS",
-    "MotionAccuracy",
-    "imu_from_increments",
-    "motion_accuracy",
-    "motion_increments",
-]
-
-
 Array = NDArray[np.float64]
 #: `constant` applies to mean samples only.
 INTERPOLATIONS = ("constant", *BETWEEN_STAMPS)

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from strapdown._kernels import motion_increments as kernel
 from strapdown.errors import ConfigError
 
-__all__ = ["IncrementStream", "IncrementStreamState"]
-
 Array = NDArray[np.float64]
 
 STREAMED = ("linear", "cubic")

@@ -36,9 +36,6 @@ from strapdown.nav_state import NavState
 from strapdown.tables import MOTION, TRAJECTORY, check_trajectory
 from strapdown.tables.checks import is_number, values_of
 
-__all__ = ["displacement_between", "state_error"]
-
-
 Array = NDArray[np.float64]
 
 

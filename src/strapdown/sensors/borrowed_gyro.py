@@ -17,7 +17,6 @@ from strapdown.tables import GYRO
 
 Array = NDArray[np.float64]
 
-__all__ = ["check_lenders", "turned_gyro", "turned_uncertainty"]
 
 # A component with a smaller share of an axis is not affected by that axis's range limit.
 FEELS = 1e-3

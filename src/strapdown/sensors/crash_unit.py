@@ -17,9 +17,6 @@ from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.tables import ACCEL, GYRO, SAMPLINGS, find_gaps
 from strapdown.tables.checks import check_rows, check_time, is_number
 
-__all__ = ["SHAPES", "Assumed", "UnitArrays", "assumed_shapes", "check_unit"]
-
-
 Array = NDArray[np.float64]
 
 

@@ -17,19 +17,6 @@ from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import check_columns, check_time, index_of, source_of, values_of
 
-__all__ = [
-    "Blocks",
-    "ChannelFault",
-    "HealthLog",
-    "equal_runs",
-    "health_log",
-    "intervals_of",
-    "known_median",
-    "longest_by_chance",
-    "tail_limit",
-]
-
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 

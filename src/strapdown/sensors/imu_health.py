@@ -31,22 +31,6 @@ from strapdown.sensors.saturation import find_limits
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GYRO
 
-__all__ = [
-    "FALSE_ALARM",
-    "TESTS",
-    "ChannelFault",
-    "HealthTest",
-    "ImuHealth",
-    "check_imu_channels",
-    "find_implausible",
-    "find_jumps",
-    "find_missing",
-    "find_noisy",
-    "find_saturated",
-    "find_stuck",
-]
-
-
 Array = NDArray[np.float64]
 
 # Saturated samples closer together than this are one fault.

@@ -20,8 +20,6 @@ from strapdown.tables.checks import check_columns
 
 Array = NDArray[np.float64]
 
-__all__ = ["MovedImu", "lever_matrix", "move_imu", "move_unit"]
-
 
 @dataclass(frozen=True, eq=False)
 class MovedImu:

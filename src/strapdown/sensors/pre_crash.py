@@ -24,9 +24,6 @@ from strapdown.sensors.rest import (
 from strapdown.sensors.triad_errors import Triad, triad_of
 from strapdown.tables import ACCEL, GYRO
 
-__all__ = ["BiasEstimate", "find_pre_crash_rest", "gyro_bias_from", "in_axes"]
-
-
 Array = NDArray[np.float64]
 
 # Block lengths for comparing means within a stretch: long for long records, short for records that

@@ -18,15 +18,6 @@ from strapdown.sensors.saturation import RangeLimits
 from strapdown.sensors.triad_errors import triad_of
 from strapdown.tables.checks import check_rows, check_time
 
-__all__ = [
-    "MergedRanges",
-    "agreement_findings",
-    "bias_from_lower_range",
-    "merge_ranges",
-    "regress_range",
-]
-
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 

@@ -26,29 +26,6 @@ from strapdown.tables.checks import (
     values_of,
 )
 
-__all__ = [
-    "AxisErrors",
-    "AxisEvent",
-    "AxisVote",
-    "AxisVoting",
-    "MountedUnit",
-    "UnitVoting",
-    "UnitVotingState",
-    "VoteEvent",
-    "VotedImu",
-    "VotingRule",
-    "VotingState",
-    "checked_directions",
-    "fused_drift",
-    "fused_noise",
-    "fused_uncertainty",
-    "isolable_axes",
-    "parity_matrix",
-    "told_events",
-    "vote_units",
-]
-
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 

@@ -13,18 +13,6 @@ from strapdown.errors import DataError
 from strapdown.sensors.triad_errors import triad_of
 from strapdown.tables import ACCEL, GYRO
 
-__all__ = [
-    "GyroBiasCourse",
-    "RestStretch",
-    "find_rests",
-    "find_rests_of_every_grade",
-    "find_shaking_rests",
-    "gyro_bias_at",
-    "gyro_bias_from_rests",
-    "without_gyro_bias",
-]
-
-
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 Indices = NDArray[np.int64]

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-__all__ = ["RangeLimits", "find_limits"]
 
 # A crash saturates a sensor for tens of milliseconds; a longer flat stretch is a rest.
 LONGEST_FLAT = 0.5  # s

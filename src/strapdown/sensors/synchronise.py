@@ -28,16 +28,6 @@ from strapdown.sensors.unit_clocks import (
 from strapdown.sensors.unmeasured import with_filled_axes, with_gyro
 from strapdown.tables import ACCEL, GYRO, SAMPLINGS
 
-__all__ = [
-    "METHODS",
-    "SynchronisedUnit",
-    "SynchronisedUnits",
-    "check_options",
-    "compare_sizes",
-    "synchronise",
-]
-
-
 Array = NDArray[np.float64]
 
 LEAST_STAMPS = 8

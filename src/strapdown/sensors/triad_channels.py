@@ -16,7 +16,6 @@ from strapdown.tables.checks import check_rows, check_time
 
 Array = NDArray[np.float64]
 
-__all__ = ["AxisGroup", "TriadChannels", "triad_channels"]
 
 LEAST_SAMPLES = 6
 # Mean magnitude of the specific force at rest that indicates g as unit, and one without gravity.

@@ -13,9 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 from strapdown.errors import ConfigError, Finding
 from strapdown.tables.checks import is_number
 
-__all__ = ["NAMED_AXES", "axes_letters", "check_axes_matrix", "report_transposed"]
-
-
 Triad = tuple[float, float, float]
 Matrix = tuple[Triad, Triad, Triad]
 # Accepted input for a triad.

@@ -17,15 +17,6 @@ from strapdown.sensors.error_chain import Seed, child
 from strapdown.sensors.triad_errors import Matrix, Triad, TriadErrors, TriadLike, triad_of
 from strapdown.tables.checks import is_number
 
-__all__ = [
-    "STATED_KEYS",
-    "BiasDrift",
-    "ImuUncertainty",
-    "stated_imu",
-    "stated_uncertainty",
-]
-
-
 # Known properties of the range, not standard deviations; they may be infinite.
 FACTS = ("full_scale", "quantization", "bandwidth")
 WHERE_ZERO_IS_NOTHING = ("full_scale", "bandwidth")

@@ -27,17 +27,6 @@ from strapdown.sensors.saturation import RangeLimits, find_limits
 from strapdown.sensors.triad_channels import OVER_RANGE, AxisGroup, TriadChannels
 from strapdown.sensors.triad_errors import check_sd
 
-__all__ = [
-    "TriadAtStamps",
-    "UnitClock",
-    "allowed_stamps",
-    "at_rows",
-    "clocks_by_correlation",
-    "clocks_by_trigger",
-    "onto_stamps",
-]
-
-
 Array = NDArray[np.float64]
 
 # Trigger and correlation disagree if they differ by more standard deviations than this.

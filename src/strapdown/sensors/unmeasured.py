@@ -17,16 +17,6 @@ from strapdown.tables import ACCEL, GYRO
 
 Array = NDArray[np.float64]
 
-__all__ = [
-    "AXES",
-    "TURNS",
-    "assumed_findings",
-    "axis_names",
-    "unmeasured_axes",
-    "unmeasured_turns",
-    "with_filled_axes",
-    "with_gyro",
-]
 
 AXES = ("forward", "right", "down")
 TURNS = ("roll", "pitch", "heading")

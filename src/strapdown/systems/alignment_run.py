@@ -31,7 +31,8 @@ from strapdown.prefilter.prefilter import LOW_RATE
 from strapdown.progress import Progress, silent
 from strapdown.rotation import within_half_turn
 from strapdown.sensors.health_log import LEAST_SAMPLES
-from strapdown.sensors.imu_health import ChannelFault, check_imu_channels
+from strapdown.sensors.health_log import ChannelFault
+from strapdown.sensors.imu_health import check_imu_channels
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.alignment_source import AlignmentSource, read_alignment_source
 from strapdown.systems.one_thread import one_thread
