@@ -222,9 +222,9 @@ def _figure(entry: Any, place: str, documents: Mapping[str, Any], path: Path) ->
     if bool(source) == bool(assumed):
         raise _bad(path, place, "sensors.figure-source-or-reason")
     if source:
-        if source not in documents:
+        if not isinstance(source, str) or source not in documents:
             raise _bad(
-                path, place, "sensors.no-source", source=source, word=source, known=documents
+                path, place, "sensors.no-source", source=source, word=str(source), known=documents
             )
         where = entry.get("place", "")
         source = f"{documents[source]}, {where}" if where else str(documents[source])

@@ -305,14 +305,18 @@ def stated_uncertainty(
                 "sensors.states-same", quantity=f"uncertainty, {name}", said=said[attribute]
             )
         factor = key.factor / (math.sqrt(3.0) if key.spread == "bound" else 1.0)
-        one = isinstance(given, int | float)
-        values[attribute] = given * factor if one else tuple(factor * x for x in given)  # type: ignore[operator,union-attr]
+        values[attribute] = _scaled(given, factor, f"uncertainty, {name}")
         said[attribute] = name
     if sensor is not None:
         return uncertainty_of(sensor, triad, **values)
     known = {f.name for f in fields(TriadUncertainty)}
     assert set(values) <= known
     return replace(TriadUncertainty(), **values)
+
+
+def _scaled(given: Stated, factor: float, quantity: str) -> Stated:
+    numbers = _numbers(given, quantity)
+    return numbers[0] * factor if is_number(given) else tuple(factor * x for x in numbers)
 
 
 # Uncertainty of gyros and accelerometers together: a data sheet with overrides.
@@ -363,8 +367,7 @@ def _stated_drift(triad: str, stated: Mapping[str, Stated], base: BiasDrift | No
     for name, given in stated.items():
         factor = KEYS[triad][name].factor
         if _quantity(triad, name) == "bias_instability":
-            one = isinstance(given, int | float)
-            sd = given * factor if one else tuple(factor * x for x in given)  # type: ignore
+            sd = _scaled(given, factor, f"{triad}, {name}")
         elif isinstance(given, int | float):
             time = float(given) * factor
         else:

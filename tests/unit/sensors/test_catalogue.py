@@ -204,3 +204,18 @@ def test_the_manual_lists_every_sensor_as_its_file_says():
             f"{len(sensor.sources) - assumed} / {assumed} |"
         )
         assert wanted in rows
+
+
+@pytest.mark.parametrize("source", ['["ds"]', "{a = 1}", "7"])
+def test_a_source_that_is_no_text_is_refused_by_file_and_key(tmp_path, source):
+    path = tmp_path / "own.toml"
+    path.write_text(
+        'title = "a"\nclass = "phone"\nsummary = "b"\n[sources]\nds = "c"\n'
+        f"[gyro]\nbias_bound_deg_per_s = {{ value = 1, source = {source} }}\n"
+    )
+    with pytest.raises(ConfigError) as error:
+        load_sensor(path)
+    finding = error.value.finding
+    assert (finding.code, finding.file) == ("sensors.no-source", "own.toml")
+    assert finding.quantity == "gyro.bias_bound_deg_per_s"
+    assert finding.remedy

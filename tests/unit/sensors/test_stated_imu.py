@@ -67,3 +67,13 @@ def test_what_is_missing_or_unknown(gyro, accel, quantity, what):
         stated_imu(None, gyro, accel)
     assert error.value.finding.quantity == quantity
     assert error.value.finding.remedy
+
+
+@pytest.mark.parametrize("given", ["a", None, ["a", "b", "c"]])
+def test_a_value_that_is_no_number_is_refused_with_its_key(given):
+    for key in ("bias_sd_ug", "bias_instability_ug"):
+        with pytest.raises(ConfigError) as error:
+            stated_imu(None, GYRO, {**ACCEL, key: given})
+        assert error.value.finding.code == "sensors.uncertainty-not-a-number"
+        assert error.value.finding.quantity == f"accel, {key}"
+        assert error.value.finding.remedy
