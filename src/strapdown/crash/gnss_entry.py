@@ -34,7 +34,6 @@ from strapdown.frames import geodetic_from_ned, place_difference
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NavigationRun, NorthEastDown, run_mechanization
 from strapdown.nav_state import NavState
-from strapdown.sensors.borrowed_gyro import turned_uncertainty
 from strapdown.sensors.triad_errors import finite, triple
 from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.tables import (
@@ -316,8 +315,8 @@ def start_from_gnss(
         window=given.window,
         antenna=tuple(float(a - p) for a, p in zip(given.antenna, point, strict=True)),
         priors=EntryPriors(
-            gyro=turned_uncertainty(unit.gyro.uncertainty, C_vs),
-            accel=turned_uncertainty(unit.accelerometers[0].uncertainty, C_vs),
+            gyro=unit.gyro.uncertainty.turned(C_vs),
+            accel=unit.accelerometers[0].uncertainty.turned(C_vs),
             **given.priors,
         ),
     )

@@ -14,7 +14,7 @@ import numpy as np
 from strapdown.constants import GYRO_UNITS, STANDARD_GRAVITY
 from strapdown.errors import ConfigError
 from strapdown.sensors.error_chain import child
-from strapdown.sensors.triad_errors import ImuErrors, Matrix, Triad, TriadErrors
+from strapdown.sensors.triad_errors import ImuErrors, Triad, TriadErrors, matrix_of, triad_of
 
 FOLDER = Path(__file__).with_suffix("")
 #: Names of the sensors supplied with strapdown; listing them reads no file content.
@@ -188,7 +188,7 @@ def _triad(
             continue
         if key.quantity in errors or key.quantity in spreads:
             raise _bad(path, place, "sensors.quantity-stated-twice")
-        size = _si(figure, key)
+        size = triad_of([x * key.factor for x in figure.value])
         if key.spread != "value":
             spreads[key.quantity] = Spread(key.spread, size)
         elif key.quantity in ("correlation_time", "bandwidth", "jitter"):
@@ -228,13 +228,7 @@ def _figure(entry: Any, place: str, documents: Mapping[str, Any], path: Path) ->
             )
         where = entry.get("place", "")
         source = f"{documents[source]}, {where}" if where else str(documents[source])
-    x, y, z = (float(n) for n in numbers)
-    return Figure(place, (x, y, z), source, str(assumed))
-
-
-def _si(figure: Figure, key: Key) -> Triad:
-    x, y, z = figure.value
-    return (x * key.factor, y * key.factor, z * key.factor)
+    return Figure(place, triad_of(numbers), source, str(assumed))
 
 
 def _unit(
@@ -248,13 +242,10 @@ def _unit(
         rows = []
         for axis in range(3):
             place = child(seed, DRAW_SEED, triad, k, axis)
-            generator = np.random.Generator(np.random.PCG64(place))
-            draw = (
-                generator.standard_normal(3)
-                if spread.kind == "sd"
-                else generator.uniform(-1.0, 1.0, 3)
-            )
-            rows.append(spread.size[axis] * draw)
+            draw = np.random.Generator(np.random.PCG64(place))
+            normal = spread.kind == "sd"
+            unit = draw.standard_normal(3) if normal else draw.uniform(-1.0, 1.0, 3)
+            rows.append(spread.size[axis] * unit)
         values.update(_placed(quantity, np.array(rows)))
     return replace(nominal, **values)
 
@@ -273,21 +264,13 @@ def _placed(quantity: str, rows: np.ndarray[Any, Any]) -> dict[str, Any]:
     if quantity == "misalignment":
         matrix = rows.copy()
         np.fill_diagonal(matrix, 0.0)
-        return {quantity: _matrix(matrix)}
+        return {quantity: matrix_of(matrix)}
     if quantity == "g_sensitivity":
-        return {quantity: _matrix(rows)}
+        return {quantity: matrix_of(rows)}
     if quantity == "nonlinearity":
         # Second and third order share the bound, so that their sum stays within it.
-        return {
-            "nonlinearity_2": tuple(0.5 * rows[:, 0]),
-            "nonlinearity_3": tuple(0.5 * rows[:, 1]),
-        }
+        return {f"nonlinearity_{k + 2}": tuple(0.5 * rows[:, k]) for k in (0, 1)}
     return {quantity: tuple(rows[:, 0])}
-
-
-def _matrix(rows: np.ndarray[Any, Any]) -> Matrix:
-    first, second, third = (tuple(float(x) for x in row) for row in rows)
-    return (first, second, third)  # type: ignore[return-value]
 
 
 def _known(table: Mapping[str, Any], known: Any, path: Path, prefix: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.sensors.triad_errors import FARTHEST, ZERO, Triad, check_sd, finite, triple
 from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.tables import ACCEL, GYRO, SAMPLINGS, find_gaps
-from strapdown.tables.checks import check_rows, check_time, is_number
+from strapdown.tables.checks import check_rows, check_time, index_of
 
 Array = NDArray[np.float64]
 
@@ -163,14 +164,14 @@ class CrashUnit:
         ):
             raise _wrong_type("accelerometers", given, self.name)
         object.__setattr__(self, "accelerometers", tuple(given))
-        if not (self.gyro is None or isinstance(self.gyro, RecordedTriad)):
-            raise _wrong_type("gyro", self.gyro, self.name)
-        if not (self.assumed is None or isinstance(self.assumed, Assumed)):
-            raise _wrong_type("assumed", self.assumed, self.name)
-        if not isinstance(self.mounting, Mounting):
-            raise _wrong_type("mounting", self.mounting, self.name)
-        if not (self.trigger is None or is_number(self.trigger)):
-            raise _wrong_type("trigger", self.trigger, self.name)
+        for name, kind in (
+            ("gyro", RecordedTriad | None),
+            ("assumed", Assumed | None),
+            ("mounting", Mounting),
+            ("trigger", Real | None),
+        ):
+            if not isinstance(getattr(self, name), kind):
+                raise _wrong_type(name, getattr(self, name), self.name)
 
 
 def _wrong_type(quantity: str, given: object, unit: object) -> ConfigError:
@@ -216,7 +217,7 @@ def check_unit(unit: CrashUnit) -> UnitArrays:
         raise DataError("sensors.no-gyro-path-needs-turning", file=unit.name, quantity="gyro")
     forces = tuple(_values(unit, triad, ACCEL) for triad in unit.accelerometers)
     rates = _values(unit, unit.gyro, GYRO)
-    time = _stamps(unit.accelerometers[0])
+    time = index_of(unit.accelerometers[0].table)
     samplings = set()
     for triad in (*unit.accelerometers, unit.gyro):
         _same_stamps(unit, triad, time)
@@ -252,18 +253,14 @@ def _values(unit: CrashUnit, triad: RecordedTriad, columns: list[str]) -> Array:
         raise DataError(
             "sensors.too-few-samples-of-unit", file=source, quantity="time", count=len(triad.table)
         )
-    check_time(_stamps(triad), source)
+    check_time(index_of(triad.table), source)
     values = np.ascontiguousarray(triad.table[columns].to_numpy(dtype=np.float64))
     check_rows(values, columns, source)
     return values
 
 
-def _stamps(triad: RecordedTriad) -> Array:
-    return np.asarray(triad.table.index.to_numpy(), dtype=np.float64)
-
-
 def _same_stamps(unit: CrashUnit, triad: RecordedTriad, time: Array) -> None:
-    own = _stamps(triad)
+    own = index_of(triad.table)
     slack = SAME_STAMP * float(np.median(np.diff(time)))
     if own.size == time.size and float(np.abs(own - time).max()) <= slack:
         return
@@ -376,7 +373,7 @@ class Assumed:
     def sd_of(self, name: str) -> Triad:
         """Return ``turn_sd_deg`` or ``delta_v_sd`` as three numbers; zeros where it is None."""
         value: Triad | None = getattr(self, name)
-        return (0.0, 0.0, 0.0) if value is None else value
+        return ZERO if value is None else value
 
 
 def assumed_shapes(time: Array, over: tuple[float, float], sampling: str) -> Array:

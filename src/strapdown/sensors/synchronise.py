@@ -7,14 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.sensors.borrowed_gyro import check_lenders, turned_gyro
-from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
+from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
 from strapdown.sensors.low_pass import time_constant
 from strapdown.sensors.triad_channels import TriadChannels, triad_channels
 from strapdown.sensors.triad_errors import finite
+from strapdown.sensors.uncertainty import FEELS
 from strapdown.sensors.unit_clocks import (
     TriadAtStamps,
     UnitChannels,
@@ -31,6 +32,8 @@ from strapdown.tables import ACCEL, GYRO, SAMPLINGS
 Array = NDArray[np.float64]
 
 LEAST_STAMPS = 8
+# Methods of resampling that hide saturation in the values.
+HIDING = ("decimated", "averaged")
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,47 +204,39 @@ def synchronise(
             there = at_rows(lent.gyro, own, rate)
             gyro = turned_gyro(there, lender.mounting, u.unit.mounting)
             gyro_sd = math.hypot(clock.sd, lent.time_sd)
-        done[u.unit.name] = _made(u.unit, clock, tuple(triads), gyro, lender, gyro_sd)
+        made = replace(
+            u.unit,
+            accelerometers=tuple(_marked(a) for a in triads),
+            gyro=None if gyro is None else _marked(gyro),
+            trigger=0.0,
+            trigger_sd=clock.sd,
+            lender=lender,
+        )
+        done[u.unit.name] = SynchronisedUnit(
+            with_gyro(made),
+            tuple(triads),
+            gyro,
+            clock.offset,
+            clock.sd,
+            clock.how,
+            None if lender is None else lender.name,
+            gyro_sd,
+        )
     ordered = tuple(done[u.name] for u in units)
-    findings += end_findings([(u.unit.name, _own(u)) for u in ordered])
-    findings += clipped_findings([(u.unit.name, _last(u)) for u in ordered])
+    own_gyros = [() if u.gyro is None or u.lender else (u.gyro,) for u in ordered]
+    for u, own_gyro in zip(ordered, own_gyros, strict=True):
+        findings += end_findings(u.unit.name, (*u.accelerometers, *own_gyro))
+    for u, own_gyro in zip(ordered, own_gyros, strict=True):
+        # The widest range and the unit's own gyro: no wider range replaces them.
+        findings += clipped_findings(u.unit.name, (*u.accelerometers[-1:], *own_gyro))
     if cut:
         findings += cut_findings([s for own in spans.values() for s in own], time)
     return SynchronisedUnits(ordered, time, rate, reference, zero_sd, tuple(findings))
 
 
-def _made(
-    unit: CrashUnit,
-    clock: UnitClock,
-    accelerometers: tuple[TriadAtStamps, ...],
-    gyro: TriadAtStamps | None,
-    lender: CrashUnit | None,
-    gyro_time_sd: float,
-) -> SynchronisedUnit:
-    made = replace(
-        unit,
-        accelerometers=tuple(_marked(a) for a in accelerometers),
-        gyro=None if gyro is None else _marked(gyro),
-        trigger=0.0,
-        trigger_sd=clock.sd,
-        lender=lender,
-    )
-    return SynchronisedUnit(
-        with_gyro(made),
-        accelerometers,
-        gyro,
-        clock.offset,
-        clock.sd,
-        clock.how,
-        None if lender is None else lender.name,
-        gyro_time_sd,
-    )
-
-
 def _marked(at: TriadAtStamps) -> RecordedTriad:
     """Mark held samples of a record where a low-pass hides saturation in the values."""
-    hidden = at.method in ("decimated", "averaged")
-    return replace(at.triad, held=at.clipped) if hidden else at.triad
+    return replace(at.triad, held=at.clipped) if at.method in HIDING else at.triad
 
 
 def _parts(u: UnitChannels) -> list[tuple[TriadChannels, RecordedTriad, list[str]]]:
@@ -316,13 +311,58 @@ def _stamps(spans: list[tuple[str, float, float]], rate: float) -> Array:
     return np.arange(first, last + 1) / rate
 
 
-def _own(u: SynchronisedUnit) -> tuple[TriadAtStamps, ...]:
-    return (*u.accelerometers, *(() if u.gyro is None or u.lender else (u.gyro,)))
+# Gyro of another unit on the same rigid body, rotated into the borrower's axes.
 
 
-def _last(u: SynchronisedUnit) -> tuple[TriadAtStamps, ...]:
-    """The widest accelerometer range and the unit's own gyro: no wider range replaces them."""
-    return (*u.accelerometers[-1:], *(() if u.gyro is None or u.lender else (u.gyro,)))
+def check_lenders(units: dict[str, CrashUnit]) -> None:
+    """Check that every borrowed gyro exists.
+
+    ConfigError: a unit borrows from itself, from an unknown unit, or from one without a gyro.
+    """
+    for unit in units.values():
+        if unit.gyro is not None or unit.gyro_from is None:
+            continue
+        having = [u.name for u in units.values() if u.gyro is not None]
+        if unit.gyro_from not in units:
+            raise ConfigError(
+                "sensors.lender-unknown" if having else "sensors.mounted-lender-unknown",
+                quantity="gyro_from",
+                name=unit.name,
+                gyro_from=unit.gyro_from,
+                word=unit.gyro_from,
+                known=having,
+            )
+        if units[unit.gyro_from].gyro is None:
+            raise ConfigError(
+                "sensors.lender-without-gyro" if having else "sensors.mounted-lender-without-gyro",
+                quantity="gyro_from",
+                name=unit.name,
+                gyro_from=unit.gyro_from,
+                having=having,
+            )
+
+
+def turned_gyro(lent: TriadAtStamps, lender: Mounting, borrower: Mounting) -> TriadAtStamps:
+    """Rotate a gyro through both mountings into the borrower's sensor axes.
+
+    `lent`: in the lender's sensor axes. Returns ``ω_b = C_vb^T C_va ω_a``. Standard deviations are
+    rotated as for independent axes, ``sd_b² = (C ∘ C) sd_a²``. The range of an axis is the least of
+    the contributing ranges, and the axis is clipped where one of those is.
+    """
+    C_ba = borrower.C_vs.T @ lender.C_vs
+    square = C_ba**2
+    feels = np.abs(C_ba) > FEELS
+    table = lent.triad.table
+    turned = pd.DataFrame(table[GYRO].to_numpy() @ C_ba.T, index=table.index, columns=GYRO)
+    turned.attrs = dict(table.attrs)
+    return TriadAtStamps(
+        RecordedTriad(turned, lent.triad.uncertainty.turned(C_ba), lent.triad.name),
+        np.sqrt(lent.noise_factor**2 @ square.T),
+        np.sqrt(lent.noise**2 @ square.T),
+        np.asarray((lent.clipped[:, None, :] & feels).any(axis=2)),
+        lent.whole,
+        lent.method,
+    )
 
 
 # Findings about records resampled to common stamps.
@@ -332,55 +372,47 @@ def _last(u: SynchronisedUnit) -> tuple[TriadAtStamps, ...]:
 WORTH_A_WORD = 0.1  # s
 
 
-def end_findings(
-    units: Sequence[tuple[str, Sequence[TriadAtStamps]]],
-) -> list[Finding]:
+def end_findings(unit: str, parts: Sequence[TriadAtStamps]) -> list[Finding]:
     """Report samples near the ends of a record, where the low-pass extrapolated it."""
     found = []
-    for name, parts in units:
-        for t in parts:
-            if t.whole.all():
-                continue
-            inner, time = np.flatnonzero(t.whole), t.triad.table.index.to_numpy()
-            found.append(
-                Finding(
-                    "sensors.low-pass-at-ends" if inner.size else "sensors.low-pass-nowhere-whole",
-                    file=f"{name}, {t.triad.name}",
-                    quantity="time",
-                    begin=time[inner[0]] if inner.size else None,
-                    end=time[inner[-1]] if inner.size else None,
-                    noise_factor=float(t.noise_factor.max() / np.median(t.noise_factor)),
-                )
+    for t in parts:
+        if t.whole.all():
+            continue
+        inner, time = np.flatnonzero(t.whole), t.triad.table.index.to_numpy()
+        found.append(
+            Finding(
+                "sensors.low-pass-at-ends" if inner.size else "sensors.low-pass-nowhere-whole",
+                file=f"{unit}, {t.triad.name}",
+                quantity="time",
+                begin=time[inner[0]] if inner.size else None,
+                end=time[inner[-1]] if inner.size else None,
+                noise_factor=float(t.noise_factor.max() / np.median(t.noise_factor)),
             )
+        )
     return found
 
 
-def clipped_findings(
-    units: Sequence[tuple[str, Sequence[TriadAtStamps]]],
-) -> list[Finding]:
+def clipped_findings(unit: str, parts: Sequence[TriadAtStamps]) -> list[Finding]:
     """Report saturated samples where the low-pass hides them from later processing."""
     found = []
-    for name, parts in units:
-        for t in parts:
-            if t.method not in ("decimated", "averaged"):
-                continue
-            time = t.triad.table.index.to_numpy()
-            gyro = GYRO[0] in t.triad.table.columns
-            for k, column in enumerate(GYRO if gyro else ACCEL):
-                rows = np.flatnonzero(t.clipped[:, k])
-                if rows.size:
-                    found.append(
-                        Finding(
-                            "sensors.gyro-clipped-before-resampling"
-                            if gyro
-                            else "sensors.accel-clipped-before-resampling",
-                            file=f"{name}, {t.triad.name}",
-                            quantity=column,
-                            size=rows.size,
-                            time=time[rows[0]],
-                            time_2=time[rows[-1]],
-                        )
+    for t in parts:
+        if t.method not in HIDING:
+            continue
+        time = t.triad.table.index.to_numpy()
+        kind = "gyro" if GYRO[0] in t.triad.table.columns else "accel"
+        for k, axis in enumerate("xyz"):
+            rows = np.flatnonzero(t.clipped[:, k])
+            if rows.size:
+                found.append(
+                    Finding(
+                        f"sensors.{kind}-clipped-before-resampling",
+                        file=f"{unit}, {t.triad.name}",
+                        quantity=f"{kind}_{axis}",
+                        size=rows.size,
+                        time=time[rows[0]],
+                        time_2=time[rows[-1]],
                     )
+                )
     return found
 
 

@@ -154,23 +154,22 @@ class ImuErrors:
 
 def _plain(name: str, value: Any) -> float | Triad | Matrix:
     if name in TRIADS:
-        return _triad(value)
+        return triad_of((value,) * 3 if isinstance(value, int | float) else value)
     if name in ("misalignment", "g_sensitivity"):
-        first, second, third = value
-        return (triad_of(first), triad_of(second), triad_of(third))
+        return matrix_of(value)
     return float(value)
-
-
-def _triad(value: Any) -> Triad:
-    if isinstance(value, int | float):
-        return (float(value), float(value), float(value))
-    return triad_of(value)
 
 
 def triad_of(values: Any) -> Triad:
     """Three numbers as plain floats."""
     x, y, z = values
     return (float(x), float(y), float(z))
+
+
+def matrix_of(rows: Any) -> Matrix:
+    """Three rows of three numbers as plain floats."""
+    first, second, third = rows
+    return (triad_of(first), triad_of(second), triad_of(third))
 
 
 def _shape(name: str) -> str:

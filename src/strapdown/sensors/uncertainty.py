@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
@@ -14,9 +14,13 @@ from strapdown.constants import GYRO_UNITS
 from strapdown.errors import ConfigError
 from strapdown.sensors.catalogue import KEYS, Key, Sensor, Spread
 from strapdown.sensors.error_chain import Seed, child
-from strapdown.sensors.triad_errors import Matrix, Triad, TriadErrors, TriadLike, triad_of
+from strapdown.sensors.triad_errors import Triad, TriadErrors, TriadLike, matrix_of, triad_of
 from strapdown.tables.checks import is_number
 
+Array = NDArray[np.float64]
+
+# A component with a smaller share of an axis is not affected by that axis's range limit.
+FEELS = 1e-3
 # Known properties of the range, not standard deviations; they may be infinite.
 FACTS = ("full_scale", "quantization", "bandwidth")
 WHERE_ZERO_IS_NOTHING = ("full_scale", "bandwidth")
@@ -99,7 +103,22 @@ class TriadUncertainty:
         value: Triad = getattr(self, name)
         return value
 
-    def variance_by_input(self, value: NDArray[np.float64]) -> NDArray[np.float64]:
+    def mapped(self, sd: Callable[[Array], Array], full_scale: Array) -> TriadUncertainty:
+        """Map the standard deviations of the axes, (3,) to (3,), and replace the range."""
+        names = [f.name for f in fields(self) if f.name not in ("full_scale", "bandwidth")]
+        values: dict[str, Any] = {n: triad_of(sd(np.array(self.axis(n)))) for n in names}
+        return replace(self, full_scale=triad_of(full_scale), **values)
+
+    def turned(self, C: Array) -> TriadUncertainty:
+        """Rotate into other axes; `C` ((3, 3)) rotates vectors into them.
+
+        Standard deviations as for independent axes, ``sd² -> (C ∘ C) sd²``; the range of an axis is
+        the least of the contributing ranges.
+        """
+        limits = np.where(np.abs(C) > FEELS, np.array(self.full_scale), np.inf).min(axis=1)
+        return self.mapped(lambda sd: np.asarray(np.sqrt(C**2 @ np.square(sd))), limits)
+
+    def variance_by_input(self, value: Array) -> Array:
         """Return the error variance from scale factors and misalignments for a constant input.
 
         Parameters
@@ -257,12 +276,10 @@ class ImuUncertainty:
         accel = uncertainty_of(sensor, "accel")
         errors = sensor.imu_errors
         assert errors.accel is not None  # uncertainty_of has found it
-        return cls(gyro, accel, _drift(errors.gyro), _drift(errors.accel))
-
-
-def _drift(errors: TriadErrors) -> BiasDrift:
-    time = errors.correlation_time
-    return BiasDrift(errors.bias_instability, time if time > 0.0 else math.inf)
+        drifts = (
+            BiasDrift(e.bias_instability, e.correlation_time) for e in (errors.gyro, errors.accel)
+        )
+        return cls(gyro, accel, *drifts)
 
 
 # Uncertainty of a triad stated by the user, in the keys of the sensor catalogue.
@@ -309,9 +326,7 @@ def stated_uncertainty(
         said[attribute] = name
     if sensor is not None:
         return uncertainty_of(sensor, triad, **values)
-    known = {f.name for f in fields(TriadUncertainty)}
-    assert set(values) <= known
-    return replace(TriadUncertainty(), **values)
+    return TriadUncertainty(**values)
 
 
 def _scaled(given: Stated, factor: float, quantity: str) -> Stated:
@@ -393,8 +408,6 @@ def _require(triad: str, known: TriadUncertainty) -> None:
 # Random draw of one unit of a triad from its uncertainty.
 
 
-Array = NDArray[np.float64]
-
 # Keys of the quantities in the seed tree; a number is never reused for another quantity.
 BIAS, SCALE, MISALIGNMENT, G_SENSITIVITY, NONLINEARITY, RECTIFICATION = range(6)
 # The slope 1 + s + 2 n2 x must stay positive within the range, |x| <= 1; at 0.5 it vanishes.
@@ -412,41 +425,32 @@ def draw_errors(uncertainty: TriadUncertainty, seed: Seed, *streams: int) -> Tri
     low-pass are those of the uncertainty. ConfigError: the draw is not a valid sensor: a scale
     factor of -1 or less, or angles that sum to 1 rad.
     """
-    bias = _draws(uncertainty.axis("bias"), seed, *streams, BIAS)[:, 0]
-    scale = _draws(uncertainty.axis("scale"), seed, *streams, SCALE)[:, 0]
-    turned = _draws(uncertainty.axis("misalignment"), seed, *streams, MISALIGNMENT)
+
+    def draws(name: str, key: int) -> Array:
+        """Three numbers per axis, (3, 3), each axis with its own standard deviation."""
+        rows = np.empty((3, 3))
+        for axis, sd in enumerate(uncertainty.axis(name)):
+            generator = np.random.Generator(np.random.PCG64(child(seed, *streams, key, axis)))
+            rows[axis] = sd * generator.standard_normal(3)
+        return rows
+
+    scale = draws("scale", SCALE)[:, 0]
+    turned = draws("misalignment", MISALIGNMENT)
     np.fill_diagonal(turned, 0.0)
-    pulled = _draws(uncertainty.axis("g_sensitivity"), seed, *streams, G_SENSITIVITY)
-    bent = _draws(uncertainty.axis("nonlinearity_2"), seed, *streams, NONLINEARITY)[:, 0]
     most = MOST_NONLINEARITY * (1.0 + scale)
-    shaken = _draws(uncertainty.axis("vibration_rectification"), seed, *streams, RECTIFICATION)[
-        :, 0
-    ]
+    bent = np.clip(draws("nonlinearity_2", NONLINEARITY)[:, 0], -most, most)
     return TriadErrors(
         noise_density=uncertainty.noise_density,
-        bias=triad_of(bias),
+        bias=triad_of(draws("bias", BIAS)[:, 0]),
         scale=triad_of(scale),
-        misalignment=_matrix(turned),
-        g_sensitivity=_matrix(pulled),
-        nonlinearity_2=triad_of(np.clip(bent, -most, most)),
-        vibration_rectification=triad_of(shaken),
+        misalignment=matrix_of(turned),
+        g_sensitivity=matrix_of(draws("g_sensitivity", G_SENSITIVITY)),
+        nonlinearity_2=triad_of(bent),
+        vibration_rectification=triad_of(draws("vibration_rectification", RECTIFICATION)[:, 0]),
         quantization=uncertainty.quantization,
         full_scale=uncertainty.full_scale,
         bandwidth=uncertainty.bandwidth,
     )
-
-
-def _draws(sd: Triad, seed: Seed, *place: int) -> Array:
-    """Three numbers per axis, (3, 3), each axis with its own standard deviation."""
-    rows = np.empty((3, 3))
-    for axis in range(3):
-        generator = np.random.Generator(np.random.PCG64(child(seed, *place, axis)))
-        rows[axis] = sd[axis] * generator.standard_normal(3)
-    return rows
-
-
-def _matrix(rows: Array) -> Matrix:
-    return (triad_of(rows[0]), triad_of(rows[1]), triad_of(rows[2]))
 
 
 # Stated uncertainties of a crash recorder's triads.

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
-from strapdown.sensors.triad_errors import Triad
 from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.tables import ACCEL, GYRO
 
@@ -100,39 +99,30 @@ def assumed_findings(unit: CrashUnit) -> list[Finding]:
         if assumed.because
         else []
     )
-    absent = () if unit.gyro is None or unit.lender is not None else unit.gyro.absent
-    if absent:
-        kept = [
-            n for n, p in zip(TURNS, np.diagonal(unmeasured_turns(unit)), strict=True) if p > PART
-        ]
+    own = () if unit.gyro is None or unit.lender is not None else unit.gyro.absent
+    for absent, columns, directions, names, name in (
+        (own, GYRO, unmeasured_turns(unit), TURNS, "turn_sd_deg"),
+        (unit.accelerometers[0].absent, ACCEL, unmeasured_axes(unit), AXES, "delta_v_sd"),
+    ):
+        if not absent:
+            continue
+        kept = [n for n, p in zip(names, np.diagonal(directions), strict=True) if p > PART]
+        sds = [assumed.sd_of(name)[names.index(n)] for n in kept]
+        missing = [columns[k] for k in absent]
+        if columns is ACCEL:
+            code, quantity = "sensors.velocity-change-assumed", missing[0]
+        else:
+            code = "sensors.roll-assumed" if "roll" in kept else "sensors.turning-assumed"
+            quantity, missing = "gyro", ["gyro"] if len(absent) == 3 else missing
         found.append(
             Finding(
-                "sensors.roll-assumed" if "roll" in kept else "sensors.turning-assumed",
+                code,
                 severity="note",
                 file=unit.name,
-                quantity="gyro",
-                missing=["gyro"] if len(absent) == 3 else [GYRO[k] for k in absent],
-                sd=_said(assumed.sd_of("turn_sd_deg"), kept, TURNS),
-                axes=kept,
-                begin=assumed.over[0],
-                end=assumed.over[1],
-                because=because,
-            )
-        )
-    absent = unit.accelerometers[0].absent
-    if absent:
-        names = [ACCEL[k] for k in absent]
-        kept = [
-            n for n, p in zip(AXES, np.diagonal(unmeasured_axes(unit)), strict=True) if p > PART
-        ]
-        found.append(
-            Finding(
-                "sensors.velocity-change-assumed",
-                severity="note",
-                file=unit.name,
-                quantity=names[0],
-                missing=names,
-                sd=_said(assumed.sd_of("delta_v_sd"), kept, AXES),
+                quantity=quantity,
+                missing=missing,
+                # One number for all, where they are equal.
+                sd=sds[:1] if len(set(sds)) == 1 else sds,
                 axes=kept,
                 begin=assumed.over[0],
                 end=assumed.over[1],
@@ -158,25 +148,10 @@ def _filled(triad: RecordedTriad, columns: list[str]) -> RecordedTriad:
         table[columns[k]] = table[there] * 0.0
     table = table[[*columns, *(c for c in triad.table.columns if c not in columns)]]
     table.attrs = dict(triad.table.attrs)
-    u = triad.uncertainty
     keep = np.array([k not in absent for k in range(3)])
-
-    def left(name: str) -> Triad:
-        x, y, z = np.where(keep, u.axis(name), 0.0)
-        return float(x), float(y), float(z)
-
-    x, y, z = np.where(keep, u.axis("full_scale"), np.inf)
-    told = replace(
-        u,
-        full_scale=(float(x), float(y), float(z)),
-        noise_density=left("noise_density"),
-        bias=left("bias"),
-        scale=left("scale"),
-        misalignment=left("misalignment"),
-        nonlinearity_2=left("nonlinearity_2"),
-        g_sensitivity=left("g_sensitivity"),
-        vibration_rectification=left("vibration_rectification"),
-        quantization=left("quantization"),
+    told = triad.uncertainty.mapped(
+        lambda sd: np.where(keep, sd, 0.0),
+        np.where(keep, triad.uncertainty.axis("full_scale"), np.inf),
     )
     return replace(triad, table=table, uncertainty=told, absent=absent)
 
@@ -184,9 +159,3 @@ def _filled(triad: RecordedTriad, columns: list[str]) -> RecordedTriad:
 def _projection(C: Array, absent: Sequence[int]) -> Array:
     columns = C[:, list(absent)]
     return np.asarray(columns @ columns.T)
-
-
-def _said(sds: Triad, kept: Sequence[str], names: Sequence[str]) -> list[float]:
-    """Return one standard deviation for each axis that is kept, or one for all."""
-    numbers = [sds[names.index(n)] for n in kept]
-    return numbers[:1] if len(set(numbers)) == 1 else numbers

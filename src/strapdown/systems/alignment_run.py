@@ -30,8 +30,7 @@ from strapdown.prefilter import Prefilter, PrefilterReport
 from strapdown.prefilter.prefilter import LOW_RATE
 from strapdown.progress import Progress, silent
 from strapdown.rotation import within_half_turn
-from strapdown.sensors.health_log import LEAST_SAMPLES
-from strapdown.sensors.health_log import ChannelFault
+from strapdown.sensors.health_log import LEAST_SAMPLES, ChannelFault
 from strapdown.sensors.imu_health import check_imu_channels
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.alignment_source import AlignmentSource, read_alignment_source
