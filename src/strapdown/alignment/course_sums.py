@@ -58,7 +58,7 @@ def drive_sums(imu: pd.DataFrame, time: Array, means: Array, errors: Array) -> D
 
     `time` ((k,), s): of fixes, within the record. `means` ((6,)): of rate and force, about which
     errors in proportion to the input are counted. `errors`: the columns
-    `course_unknowns.OF_SENSORS`, which are subtracted.
+    `OF_SENSORS`, which are subtracted.
 
     With theta the rotation from the computed attitude to the true one,
     ``C_true = exp([theta x]) C``, and the true rate and force less by db and da than taken, it is

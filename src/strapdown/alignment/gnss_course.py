@@ -145,8 +145,8 @@ class GnssCourse(CoarseAlignment):
         slip = math.radians(self.sideslip_sd_deg)
         yaw_sd = math.hypot(slip, math.radians(self.mounting_yaw_sd_deg))
         model = CourseModel(self.reverse, yaw, yaw_sd, SLIP_SHARE * slip, self.axle_sd, antenna)
-        search = CourseSearch(imu, fixes, rests, site, sensors, model)
-        found = search.over()
+        means = imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64).mean(axis=0)
+        found = CourseFit(imu, means, fixes, rests, site, sensors, model).search()
         sd = np.sqrt(np.linalg.eigvalsh(found.covariance[3:5, 3:5])[-1])
         if not sd < LARGEST_TILT_SD:
             raise DataError(
@@ -217,7 +217,7 @@ class Found:
     """Current estimates of the least squares.
 
     `C` ((3, 3)): attitude at the end of the record. `velocity` ((3,), m/s): at the end. `errors`
-    (rad/s, m/s² and relative): of the sensors, the columns `course_unknowns.OF_SENSORS`; reading −
+    (rad/s, m/s² and relative): of the sensors, the columns `OF_SENSORS`; reading −
     truth. `covariance` ((39, 39)): as `Alignment.joint`. `fitted` ((k, 3), m/s): velocities at the
     fixes, north, east, down, near which courses are linear. `weight` ((k,)): weight of each fix.
     `scale`: factor of the scatter of the velocities over their stated one; at least 1. `onward`:
@@ -246,7 +246,7 @@ class Found:
 
 @dataclass(frozen=True, eq=False)
 class CourseFit:
-    """Least squares over the fixes of a part of a record that reaches to its end.
+    """Least squares over the fixes of a record, or of a part that reaches to its end.
 
     `imu`: of that part. `means` ((6,)): means of rate and force, at which the biases are estimated.
     `fixes`: in that part, two at least.
@@ -424,6 +424,92 @@ class CourseFit:
         gap = rest.rate - found.bias[:3] - C.T @ earth
         return gap, A, 1.0 / np.square(np.maximum(rest.sd, LEAST_RATE_SD))
 
+    def search(self) -> Found:
+        """Solve over increasing parts that end with the record, up to the whole.
+
+        Gross errors among the fixes are excluded.
+        """
+        fixes = self.fixes
+        end, begin = float(self.imu.index[-1]), float(fixes.time[0])
+        newest = fixes.time[-min(LEAST_FIXES, len(fixes.time))]
+        length = end - min(newest, fixes.time[-1] - LEAST_LENGTH)
+        bias, sd = self._bias_of_rests()
+        length = max(length, LINEAR / max(sd, 1e-12))
+        found = None
+        while True:
+            begin_here = max(end - length, begin)
+            fit = self._part(begin_here)
+            if found is None:
+                found = fit._guess(bias)
+            else:
+                older = len(fit.fixes.time) - len(found.weight)
+                errors = found.errors.copy()
+                errors[NOISE] = 0.0
+                found = replace(
+                    found,
+                    errors=errors,
+                    fitted=np.vstack([_smooth(fit.fixes)[:older], found.fitted]),
+                    weight=np.concatenate([_near_neighbours(fit.fixes)[:older], found.weight]),
+                )
+            found = _converged(fit, found, Huber())
+            if begin_here <= begin:
+                break
+            sd = float(np.sqrt(np.diagonal(found.covariance)[6:9].max()))
+            length = max(GROWTH * length, LINEAR / max(sd, 1e-12))
+        found = _converged(fit, found, Igg3())
+        if found.onward < MOST:
+            raise DataError(
+                "alignment.course-contradicts-forward",
+                file=fixes.source,
+                quantity="VN, VE",
+                count=len(fixes.time),
+                onward=1.0 - found.onward,
+            )
+        return found
+
+    def _bias_of_rests(self) -> tuple[Array, float]:
+        """Bias of the gyros from the rests, and the largest standard deviation."""
+        gyro, rate = self.sensors.gyro, np.zeros(3)
+        known = np.hypot(gyro.axis("bias"), self.sensors.gyro_drift.triad)
+        if self.rests:
+            best = min(self.rests, key=lambda rest: float(rest.sd.max()))
+            rate, known = best.rate, np.minimum(known, best.sd)
+        errors = np.zeros(OF_SENSORS.stop - OF_SENSORS.start)
+        errors[:3] = rate
+        return errors, float(known.max())
+
+    def _part(self, begin: float) -> CourseFit:
+        time = self.imu.index.to_numpy(dtype=np.float64)
+        fixes = self.fixes.only(self.fixes.time >= begin - 1e-9)
+        first = max(int(np.searchsorted(time, fixes.time[0], side="right")) - 1, 0)
+        for rest in self.rests:
+            first = min(first, max(int(np.searchsorted(time, rest.time)) - 1, 0))
+        part = self.imu.iloc[first:]
+        part.attrs = dict(self.imu.attrs)
+        return replace(self, imu=part, fixes=fixes)
+
+    def _guess(self, bias: Array) -> Found:
+        """Level by mean force minus acceleration from the velocities, heading by median course."""
+        fixes = self.fixes
+        sums = drive_sums(self.imu, fixes.time, bias[:6], bias)
+        check_forward(self.imu, fixes, sums, self.model.reverse)
+        first, last = _ends(fixes)
+        length = float(fixes.time[last].mean() - fixes.time[first].mean())
+        v0 = np.median(fixes.velocity[first], axis=0)
+        v1 = np.median(fixes.velocity[last], axis=0)
+        gained = sums.gained[first].mean(axis=0) - sums.gained[last].mean(axis=0)
+        force_n = (v1 - v0) / length - self.site.gravity
+        fast = np.flatnonzero(fixes.fast & (fixes.time >= fixes.time[-1] - HEADING_SPAN))
+        course = np.arctan2(fixes.velocity[fast, 1], fixes.velocity[fast, 0]) + self.model.yaw
+        heading = float(course[-1])
+        for _ in range(2):
+            back = _attitude(gained / length, force_n, heading) @ sums.turned[fast]
+            off = np.degrees(course - np.arctan2(back[:, 1, 0], back[:, 0, 0]))
+            heading += math.radians(_middle_turn(off))
+        C = _attitude(gained / length, force_n, heading)
+        nothing = np.zeros((len(HANDED), len(HANDED)))
+        return Found(C, v1, bias, nothing, _smooth(fixes), _near_neighbours(fixes), 1.0)
+
 
 def _solve(
     parts: list[tuple[Array, Array, Array]], sd: Array, errors: Array
@@ -475,104 +561,6 @@ CLEAR = 6.0
 MOST = 0.5
 # The heading is the median of the courses over this duration, s.
 HEADING_SPAN = 5.0
-
-
-@dataclass(frozen=True, eq=False)
-class CourseSearch:
-    """Search of the initial values for `course_fit.CourseFit`, over a whole record."""
-
-    imu: pd.DataFrame
-    fixes: CourseFixes
-    rests: tuple[RestRate, ...]
-    site: Site
-    sensors: ImuUncertainty
-    model: CourseModel
-
-    def over(self) -> Found:
-        """Solve over increasing parts that end with the record, up to the whole.
-
-        Returns gross errors among the fixes are excluded.
-        """
-        fixes = self.fixes
-        end, begin = float(self.imu.index[-1]), float(fixes.time[0])
-        newest = fixes.time[-min(LEAST_FIXES, len(fixes.time))]
-        length = end - min(newest, fixes.time[-1] - LEAST_LENGTH)
-        bias, sd = self._bias_of_rests()
-        means = self.imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64).mean(axis=0)
-        length = max(length, LINEAR / max(sd, 1e-12))
-        found = None
-        while True:
-            begin_here = max(end - length, begin)
-            part, fit = self._part(begin_here, means)
-            if found is None:
-                found = self._guess(part, fit.fixes, bias)
-            else:
-                older = len(fit.fixes.time) - len(found.weight)
-                errors = found.errors.copy()
-                errors[NOISE] = 0.0
-                found = replace(
-                    found,
-                    errors=errors,
-                    fitted=np.vstack([_smooth(fit.fixes)[:older], found.fitted]),
-                    weight=np.concatenate([_near_neighbours(fit.fixes)[:older], found.weight]),
-                )
-            found = _converged(fit, found, Huber())
-            if begin_here <= begin:
-                break
-            sd = float(np.sqrt(np.diagonal(found.covariance)[6:9].max()))
-            length = max(GROWTH * length, LINEAR / max(sd, 1e-12))
-        found = _converged(fit, found, Igg3())
-        if found.onward < MOST:
-            raise DataError(
-                "alignment.course-contradicts-forward",
-                file=fixes.source,
-                quantity="VN, VE",
-                count=len(fixes.time),
-                onward=1.0 - found.onward,
-            )
-        return found
-
-    def _bias_of_rests(self) -> tuple[Array, float]:
-        """Bias of the gyros from the rests, and the largest standard deviation."""
-        gyro, rate = self.sensors.gyro, np.zeros(3)
-        known = np.hypot(gyro.axis("bias"), self.sensors.gyro_drift.triad)
-        if self.rests:
-            best = min(self.rests, key=lambda rest: float(rest.sd.max()))
-            rate, known = best.rate, np.minimum(known, best.sd)
-        errors = np.zeros(OF_SENSORS.stop - OF_SENSORS.start)
-        errors[:3] = rate
-        return errors, float(known.max())
-
-    def _part(self, begin: float, means: Array) -> tuple[pd.DataFrame, CourseFit]:
-        time = self.imu.index.to_numpy(dtype=np.float64)
-        fixes = self.fixes.only(self.fixes.time >= begin - 1e-9)
-        first = max(int(np.searchsorted(time, fixes.time[0], side="right")) - 1, 0)
-        for rest in self.rests:
-            first = min(first, max(int(np.searchsorted(time, rest.time)) - 1, 0))
-        part = self.imu.iloc[first:]
-        part.attrs = dict(self.imu.attrs)
-        return part, CourseFit(part, means, fixes, self.rests, self.site, self.sensors, self.model)
-
-    def _guess(self, imu: pd.DataFrame, fixes: CourseFixes, bias: Array) -> Found:
-        """Level by mean force minus acceleration from the velocities, heading by median course."""
-        sums = drive_sums(imu, fixes.time, bias[:6], bias)
-        check_forward(imu, fixes, sums, self.model.reverse)
-        first, last = _ends(fixes)
-        length = float(fixes.time[last].mean() - fixes.time[first].mean())
-        v0 = np.median(fixes.velocity[first], axis=0)
-        v1 = np.median(fixes.velocity[last], axis=0)
-        gained = sums.gained[first].mean(axis=0) - sums.gained[last].mean(axis=0)
-        force_n = (v1 - v0) / length - self.site.gravity
-        fast = np.flatnonzero(fixes.fast & (fixes.time >= fixes.time[-1] - HEADING_SPAN))
-        course = np.arctan2(fixes.velocity[fast, 1], fixes.velocity[fast, 0]) + self.model.yaw
-        heading = float(course[-1])
-        for _ in range(2):
-            back = _attitude(gained / length, force_n, heading) @ sums.turned[fast]
-            off = np.degrees(course - np.arctan2(back[:, 1, 0], back[:, 0, 0]))
-            heading += math.radians(_middle_turn(off))
-        C = _attitude(gained / length, force_n, heading)
-        nothing = np.zeros((len(HANDED), len(HANDED)))
-        return Found(C, v1, bias, nothing, _smooth(fixes), _near_neighbours(fixes), 1.0)
 
 
 def left_out(fixes: CourseFixes, found: Found) -> tuple[Finding, ...]:

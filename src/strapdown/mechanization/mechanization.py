@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, NoReturn
+from typing import Any, ClassVar, NoReturn
 
 import numpy as np
 import pandas as pd
@@ -240,16 +240,7 @@ class Mechanization(ABC):
         made, why = self.advance_rows(state, rows, reference, earth, history)
         if why:
             at = len(rows) - 1 - made if backward else made
-            if not made:
-                refuse_start(
-                    float(state[self.alt_at]),
-                    self._speed(state),
-                    self.height_limits,
-                    self.largest_speed,
-                    increments.attrs.get("source"),
-                )
-            before = self._state_before(history[made - 1]) if made else None
-            refuse_step(why, at, increments, before, self.latitude_limit_deg)
+            self._refuse(why, at, increments, state, history[made - 1] if made else None)
         if backward:
             state[velocity] *= -1.0
             history[:] = history[::-1].copy()
@@ -286,89 +277,52 @@ class Mechanization(ABC):
     def _speed(self, row: Array) -> float:
         return float(np.linalg.norm(row[self.v_at : self.v_at + 3]))
 
-    def _state_before(self, row: Array) -> Finding:
-        return Finding(
-            "mechanization.state-before-step",
-            severity="note",
-            lat_deg=np.degrees(self.latitude(row)),
-            alt=row[self.alt_at],
-            speed=self._speed(row),
-        )
+    def _refuse(
+        self, why: int, step: int, increments: pd.DataFrame, state: Array, last: Array | None
+    ) -> NoReturn:
+        """Raise the error of a step (from 0) that a kernel refused.
 
-
-# Errors for a step that leaves the validity of a mechanization.
-
-
-def refuse_start(
-    alt: float,
-    speed: float,
-    height_limits: tuple[float, float],
-    largest_speed: float,
-    source: str | None,
-) -> None:
-    """Refuse a start outside of the limits.
-
-    `alt` (m). `speed` (m/s). `height_limits` (m). `largest_speed` (m/s). `source`: name for the
-    message. DivergenceError: the state is outside of the limits.
-    """
-    lowest, highest = height_limits
-    if speed > largest_speed or not lowest <= alt <= highest:
-        raise DivergenceError(
-            "mechanization.state-begin-high-outside-or",
-            file=source,
-            quantity="state",
-            alt=alt,
-            speed=speed,
-            lowest=lowest,
-            highest=highest,
-            largest_speed=largest_speed,
-        )
-
-
-def refuse_step(
-    why: int, step: int, increments: pd.DataFrame, before: Finding | None, latitude_limit_deg: float
-) -> NoReturn:
-    """Raise the error of a step that a kernel refused.
-
-    `why`: code by the kernel's `verdict`. `step`: row of the increments, from 0. `increments`: a
-    MotionIncrements table. `before`: finding on the state before it; None at the first step.
-    `latitude_limit_deg` (deg). DivergenceError: always.
-    """
-    time = float(increments.index[step])
-    row = increments.iloc[step]
-    source = increments.attrs.get("source")
-    if why == POLE:
-        raise DivergenceError(
-            "mechanization.first-step-near-pole"
-            if before is None
-            else "mechanization.step-near-pole",
-            file=source,
-            quantity="lat",
-            time=time,
-            step=step + 1,
-            latitude_limit_deg=latitude_limit_deg,
-            before=before,
-        )
-    if why == LEAP:
-        raise DivergenceError(
-            "mechanization.first-step-too-far" if before is None else "mechanization.step-too-far",
-            file=source,
-            quantity="state",
-            time=time,
-            step=step + 1,
-            at_row=row["dt"],
-            largest_turn=LARGEST_TURN,
-            before=before,
-        )
-    raise DivergenceError(
-        "mechanization.first-step-diverges" if before is None else "mechanization.step-diverges",
-        file=source,
-        quantity="state",
-        time=time,
-        step=step + 1,
-        increments=[f"{name} {row[name]:.4g}" for name in MOTION],
-        before=before,
-    )
+        `why`: code by the kernel's `verdict`. `state`: at the start. `last`: the row before the
+        step; None at the first step.
+        """
+        source = increments.attrs.get("source")
+        if last is None:
+            alt, speed = float(state[self.alt_at]), self._speed(state)
+            lowest, highest = self.height_limits
+            if speed > self.largest_speed or not lowest <= alt <= highest:
+                raise DivergenceError(
+                    "mechanization.state-begin-high-outside-or",
+                    file=source,
+                    quantity="state",
+                    alt=alt,
+                    speed=speed,
+                    lowest=lowest,
+                    highest=highest,
+                    largest_speed=self.largest_speed,
+                )
+            before = None
+        else:
+            before = Finding(
+                "mechanization.state-before-step",
+                severity="note",
+                lat_deg=np.degrees(self.latitude(last)),
+                alt=last[self.alt_at],
+                speed=self._speed(last),
+            )
+        row = increments.iloc[step]
+        first = "first-" if last is None else ""
+        data: dict[str, Any]
+        if why == POLE:
+            code, quantity = f"mechanization.{first}step-near-pole", "lat"
+            data = {"latitude_limit_deg": self.latitude_limit_deg}
+        elif why == LEAP:
+            code, quantity = f"mechanization.{first}step-too-far", "state"
+            data = {"at_row": row["dt"], "largest_turn": LARGEST_TURN}
+        else:
+            code, quantity = f"mechanization.{first}step-diverges", "state"
+            data = {"increments": [f"{name} {row[name]:.4g}" for name in MOTION]}
+        data |= {"time": float(increments.index[step]), "step": step + 1, "before": before}
+        raise DivergenceError(code, file=source, quantity=quantity, data=data)
 
 
 #: Height options: free (by the sensors), held, damped by a reference.

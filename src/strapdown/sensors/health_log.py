@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown.errors import DataError, Finding
 from strapdown.sensors.rest import MAX_ACCEL_SD, MAX_GYRO_SD, QUIET_FACTOR, QUIET_QUANTILE, ROUNDING
-from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
+from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import check_columns, check_time, index_of, source_of, values_of
 
@@ -108,13 +108,13 @@ class HealthLog:
         kind = self.names[channel].split("_")[0]
         return [k for k, name in enumerate(self.names) if name.startswith(kind)]
 
-    def stated(self, channel: int) -> tuple[TriadUncertainty, int] | None:
-        """Stated uncertainty of a channel: its triad and the axis in it."""
+    def stated(self, channel: int, attribute: str, otherwise: float = 0.0) -> float:
+        """Stated value of a channel, an attribute of `TriadUncertainty`."""
         if self.sensors is None:
-            return None
+            return otherwise
         name = self.names[channel]
         triad = self.sensors.gyro if name in GYRO else self.sensors.accel
-        return triad, "xyz".index(name[-1])
+        return triad.axis(attribute)["xyz".index(name[-1])]
 
     def quiet(self) -> Mask:
         """Blocks in which each channel is as quiet as in its quietest, (blocks, channels).

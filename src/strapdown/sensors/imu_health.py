@@ -46,9 +46,7 @@ def find_saturated(log: HealthLog) -> list[ChannelFault]:
         # Two samples do not form a flat top, nor does a channel that is constant.
         if known.sum() < 3:
             continue
-        stated = log.stated(k)
-        full = np.inf if stated is None else stated[0].axis("full_scale")[stated[1]]
-        step = 0.0 if stated is None else stated[0].axis("quantization")[stated[1]]
+        full, step = log.stated(k, "full_scale", np.inf), log.stated(k, "quantization")
         values = log.values[k, known]
         if float(values.min()) == float(values.max()):
             continue
@@ -210,7 +208,9 @@ def find_noisy(log: HealthLog) -> list[ChannelFault]:
         slack = NOISE_FACTOR * (1.0 + _quantile(log, LASTING) * math.sqrt(1.0 / b.samples))
         limit = np.full(noise.shape, np.inf)
         reason = np.zeros(noise.size, dtype=np.int64)
-        stated = _stated(log, k)
+        stated = log.stated(k, "noise_density") * math.sqrt(log.rate)
+        if stated:
+            stated = math.hypot(stated, log.stated(k, "quantization") / math.sqrt(12.0))
         if stated > 0.0:
             limit[rest] = slack * stated
         fellows = [j for j in log.triad(k) if b.valid[rest, j].all()] if rest.any() else []
@@ -274,15 +274,6 @@ def _quantile(log: HealthLog, together: int) -> float:
     # The noise of a block and of the median block both have a relative error of 1/√n: √2 in the
     # ratio.
     return -math.sqrt(2.0) * NormalDist().inv_cdf(chance ** (1.0 / together))
-
-
-def _stated(log: HealthLog, k: int) -> float:
-    found = log.stated(k)
-    if found is None:
-        return 0.0
-    triad, axis = found
-    white = triad.axis("noise_density")[axis] * math.sqrt(log.rate)
-    return math.hypot(white, triad.axis("quantization")[axis] / math.sqrt(12.0)) if white else 0.0
 
 
 def _relative(log: HealthLog) -> Array:
@@ -406,11 +397,11 @@ def find_stuck(log: HealthLog) -> list[ChannelFault]:
     sums = np.concatenate([np.zeros((len(same), 1)), np.cumsum(same, axis=1)], axis=1)
     faults = []
     for k in range(len(log.names)):
-        faults += _channel(log, k, sums)
+        faults += _stuck_runs(log, k, sums)
     return faults
 
 
-def _channel(log: HealthLog, k: int, sums: Array) -> list[ChannelFault]:
+def _stuck_runs(log: HealthLog, k: int, sums: Array) -> list[ChannelFault]:
     n = log.time.size
     starts, lengths = equal_runs(log.values[k])
     whole = int(lengths.max()) >= n - int((~np.isfinite(log.values[k])).sum())
@@ -423,7 +414,8 @@ def _channel(log: HealthLog, k: int, sums: Array) -> list[ChannelFault]:
         longest_by_chance(_around(sums[k], a, b, n), n, log.false_alarm), max(tail, LEAST_RUN)
     )
     for other in log.triad(k):
-        if other != k and not log.wrong[other].all() and not _constant(sums[other], n):
+        constant = bool(sums[other, n] >= n - 1)
+        if other != k and not log.wrong[other].all() and not constant:
             # Pairs within the run, without its first sample.
             shared = (sums[other, b] - sums[other, a + 1]) / np.maximum(b - a - 1, 1)
             limit = np.maximum(limit, longest_by_chance(shared, n, log.false_alarm))
@@ -453,10 +445,6 @@ def _around(sums: Array, a: NDArray[np.int64], b: NDArray[np.int64], n: int) -> 
     least = 1.0 / np.maximum(pairs, 1)
     bound = np.minimum(share + SHARE_SLACK * np.sqrt(np.maximum(share, least) * least), 1.0)
     return np.asarray(np.where(pairs > LEAST_RUN, bound, 0.0))
-
-
-def _constant(sums: Array, n: int) -> bool:
-    return bool(sums[n] >= n - 1)
 
 
 def _others_live(sums: Array, k: int, a: int, b: int) -> bool:
@@ -533,7 +521,9 @@ def find_jumps(log: HealthLog) -> list[ChannelFault]:
             where = _where(log, k, at + SIDE, step)
             if where is None or (name in GYRO and _turned(log, k, at, step)):
                 continue
-            faults.append(_jump_fault(log, k, where, step, limit))
+            kind = "gyro" if name in GYRO else "accelerometer"
+            code, span = f"sensors.{kind}-zero-jumps", (where, log.time.size - 1)
+            faults.append(log.fault(k, "jump", span, abs(step), limit, code, step=step))
     return _until_next(log, faults)
 
 
@@ -563,8 +553,7 @@ def _usual(size: Array, still: Mask, at: int, false_alarm: float) -> float:
 
 def _quantum(log: HealthLog, k: int) -> float:
     """Output quantization step where the noise is smaller, so that means do not average it."""
-    stated = log.stated(k)
-    step = 0.0 if stated is None else stated[0].axis("quantization")[stated[1]]
+    step = log.stated(k, "quantization")
     if step == 0.0:
         part = log.values[k, : 20 * log.blocks.samples]
         distinct = np.unique(part[np.isfinite(part)])
@@ -648,12 +637,6 @@ def _where(log: HealthLog, k: int, block: int, step: float) -> int | None:
     if (near[1] - near[0]) > ABRUPT * (whole[1] - whole[0]) and step < 0.0:
         return None
     return a + at
-
-
-def _jump_fault(log: HealthLog, k: int, at: int, step: float, limit: float) -> ChannelFault:
-    name = log.names[k]
-    code = "sensors.gyro-zero-jumps" if name in GYRO else "sensors.accelerometer-zero-jumps"
-    return log.fault(k, "jump", (at, log.time.size - 1), abs(step), limit, code, step=step)
 
 
 def _until_next(log: HealthLog, faults: list[ChannelFault]) -> list[ChannelFault]:

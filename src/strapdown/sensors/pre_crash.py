@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -211,22 +212,16 @@ def in_axes(rest: RestStretch, C: Array) -> RestStretch:
     `C` ((3, 3)): rotates vectors into the other axes. Standard deviations are rotated as for
     independent axes.
     """
-
-    def mean(v: tuple[float, float, float] | None) -> tuple[float, float, float] | None:
-        return None if v is None else triad_of(C @ np.asarray(v))
-
-    def sd(v: tuple[float, float, float] | None) -> tuple[float, float, float] | None:
-        return None if v is None else triad_of(np.sqrt(C**2 @ np.asarray(v) ** 2))
-
-    return replace(
-        rest,
-        gyro_mean=triad_of(C @ np.asarray(rest.gyro_mean)),
-        gyro_sd=triad_of(np.sqrt(C**2 @ np.asarray(rest.gyro_sd) ** 2)),
-        accel_mean=mean(rest.accel_mean),
-        gyro_mean_sd=sd(rest.gyro_mean_sd),
-        accel_sd=sd(rest.accel_sd),
-        accel_mean_sd=sd(rest.accel_mean_sd),
-    )
+    values: dict[str, Any] = {}
+    for kind in ("gyro", "accel"):
+        for name in (f"{kind}_mean", f"{kind}_sd", f"{kind}_mean_sd"):
+            v = getattr(rest, name)
+            if v is not None:
+                sd = name.endswith("_sd")
+                values[name] = triad_of(
+                    np.sqrt(C**2 @ np.asarray(v) ** 2) if sd else C @ np.asarray(v)
+                )
+    return replace(rest, **values)
 
 
 # A unit after preparation: common clock, vehicle axes, one range, biases removed.

@@ -574,8 +574,12 @@ class UnitVoting:
             [fused_noise(self.gyro, rates.used), fused_noise(self.accel, forces.used)]
         )
         events = [
-            *told_events(rates, time, columns[0], "rad/s", state.gyro.samples),
-            *told_events(forces, time, columns[1], "m/s²", state.accel.samples),
+            _event(e, time, names_of, unit, before)
+            for vote, names_of, unit, before in (
+                (rates, columns[0], "rad/s", state.gyro.samples),
+                (forces, columns[1], "m/s²", state.accel.samples),
+            )
+            for e in vote.events
         ]
         return UnitVotingState(gyro_state, accel_state, (float(time[-1]),)), VotedImu(
             imu,
@@ -735,27 +739,19 @@ class VoteEvent:
     finding: Finding
 
 
-def told_events(
-    vote: AxisVote, time: Array, columns: Sequence[str], unit: str, before: int
-) -> list[VoteEvent]:
-    """Convert the events of a vote to findings; `before` samples preceded the chunk."""
-    return [_event(e, time, columns, unit, before) for e in vote.events]
-
-
 def _event(
     event: AxisEvent, time: Array, columns: Sequence[str], unit: str, before: int
 ) -> VoteEvent:
+    """Convert an event of a vote to a finding; `before` samples preceded the chunk."""
     channels = tuple(columns[k] for k in event.axes)
     when = float(time[event.row])
     step = float(time[1] - time[0]) if time.size > 1 else 0.0
     since = float(time[event.since]) if event.since >= 0 else float(time[0] + event.since * step)
-    code = {
-        "readmitted": "sensors.channel-readmitted",
-        "excluded": "sensors.channel-excluded",
-        "disagree": "sensors.channels-disagree",
-    }[event.kind]
     if event.kind == "excluded" and len(channels) > 1:
         code = "sensors.unit-excluded"
+    else:
+        plural = "s" if event.kind == "disagree" else ""
+        code = f"sensors.channel{plural}-{event.kind}"
     finding = Finding(
         code,
         row=before + event.row + 1,

@@ -420,33 +420,25 @@ def gyro_bias_from_rests(rests: Sequence[RestStretch]) -> GyroBiasCourse:
     if (np.diff(time) <= 0.0).any():
         raise DataError("sensors.rests-not-order-time", quantity="gyro bias")
     mean = np.array([r.gyro_mean for r in rests], dtype=np.float64)
-    sd = np.maximum(np.array([_mean_sd(r) for r in rests]), LEAST_SD)
+    # A rest made directly may have no sd of its mean; that of its samples is larger.
+    sds = [r.gyro_sd if r.gyro_mean_sd is None else r.gyro_mean_sd for r in rests]
+    sd = np.maximum(np.array(sds), LEAST_SD)
     weight = sd**-2.0
     average = (weight * mean).sum(axis=0) / weight.sum(axis=0)
     average_sd = weight.sum(axis=0) ** -0.5
-    if len(rests) == 1:
-        return GyroBiasCourse(
-            _floats(time),
-            _triples(mean),
-            _triples(sd),
-            *_triples([average, average_sd]),
-            *[None] * 3,
-        )
-    scatter = np.sqrt((weight * (mean - average) ** 2).sum(axis=0) / (len(rests) - 1))
-    drift, drift_sd = _slope(time, mean, weight)
-    average_sd = average_sd * np.maximum(1.0, scatter)
+    course: list[Triple | None] = [None] * 3
+    if len(rests) > 1:
+        scatter = np.sqrt((weight * (mean - average) ** 2).sum(axis=0) / (len(rests) - 1))
+        course = [triad_of(x) for x in (*_slope(time, mean, weight), scatter)]
+        average_sd = average_sd * np.maximum(1.0, scatter)
     return GyroBiasCourse(
-        _floats(time),
-        _triples(mean),
-        _triples(sd),
-        *_triples([average, average_sd]),
-        *_triples([drift, drift_sd, scatter]),
+        tuple(time.tolist()),
+        tuple(triad_of(row) for row in mean),
+        tuple(triad_of(row) for row in sd),
+        triad_of(average),
+        triad_of(average_sd),
+        *course,
     )
-
-
-def _mean_sd(rest: RestStretch) -> tuple[float, float, float]:
-    # A rest made directly may have no sd of its mean; that of its samples is larger.
-    return rest.gyro_sd if rest.gyro_mean_sd is None else rest.gyro_mean_sd
 
 
 def _slope(time: Array, mean: Array, weight: Array) -> tuple[Array, Array]:
@@ -460,14 +452,6 @@ def _slope(time: Array, mean: Array, weight: Array) -> tuple[Array, Array]:
         left = mean - level - slope * from_middle
         sd = sd * np.maximum(1.0, np.sqrt((weight * left**2).sum(axis=0) / (len(time) - 2)))
     return slope, sd
-
-
-def _floats(values: Array) -> tuple[float, ...]:
-    return tuple(float(v) for v in values)
-
-
-def _triples(rows: ArrayLike) -> tuple[tuple[float, float, float], ...]:
-    return tuple((float(x), float(y), float(z)) for x, y, z in np.asarray(rows))
 
 
 def gyro_bias_at(course: GyroBiasCourse, time: ArrayLike) -> Array:
