@@ -11,18 +11,8 @@ if TYPE_CHECKING:
     from strapdown.alignment.fine import FineAlignment, FineResult
     from strapdown.alignment.two_vector import TwoVector
 
-__all__ = [
-    "FineAlignment",
-    "FineResult",
-    "Site",
-    "TwoVector",
-]
+__all__ = ["FineAlignment", "FineResult", "Site", "TwoVector"]
 
 load_on_first_use(
-    __name__,
-    {
-        "alignment": "Site",
-        "fine": "FineAlignment FineResult",
-        "two_vector": "TwoVector",
-    },
+    __name__, {"alignment": "Site", "fine": "FineAlignment FineResult", "two_vector": "TwoVector"}
 )

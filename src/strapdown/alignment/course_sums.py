@@ -163,7 +163,6 @@ def _rate(turned: Array, stamps: Array, time: Array) -> Array:
 
 # Velocities of the fixes of a drive, and the fixes with a valid course.
 
-
 #: Lower bound of the standard deviation of a velocity, m/s.
 LEAST_SD = 1e-6
 
@@ -267,7 +266,6 @@ def course_fixes(
 
 # Gyro means while the fixes of a drive show the vehicle stationary.
 
-
 #: A velocity within so many standard deviations counts as zero, or one below any driving speed.
 CLEAR, CREEP = 4.0, 0.1
 #: A shorter rest, s, determines the bias less well than the fixes of the drive.
@@ -336,18 +334,12 @@ def _while_slow(
 
 # Unknowns of the least squares of a drive, in the order of their columns.
 
-
 #: Stretches of a record with a noise of their own: the sum of white noise is known at their ends.
 STRETCHES: Final = 24
 
 # At the end of the record: velocity, rotation from the computed attitude to the true one, biases of
 # gyros and accelerometers.
-END_VELOCITY, TURN, GYRO_BIAS, ACCEL_BIAS = (
-    slice(0, 3),
-    slice(3, 6),
-    slice(6, 9),
-    slice(9, 12),
-)
+END_VELOCITY, TURN, GYRO_BIAS, ACCEL_BIAS = (slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12))
 ASKED: Final = 12
 # Errors of gyros in proportion to rates and to forces, of accelerometers in proportion to forces,
 # elements (i, j) of axis i by input j; and of both in each stretch alone, (stretch, axis).

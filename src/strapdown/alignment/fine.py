@@ -326,7 +326,6 @@ def _within(increments: pd.DataFrame, imu: pd.DataFrame) -> pd.DataFrame:
 
 # Epochs of a fine alignment: start, and propagation from one to the next.
 
-
 # Tilt and heading before the filter: much more than a coarse alignment leaves, which comes from the
 # same rests and biases and so adds no information to the filter's own.
 WIDER = 10.0
@@ -422,7 +421,6 @@ def initial_covariance(filter_: ErrorFilter, coarse: Alignment, standing: Standi
 
 # Lower bounds of the heading uncertainty of a stationary body, where errors are too large for it.
 
-
 #: Fraction of the least standard deviation below which a heading is a false claim. Rocking, which
 #: points the drifts in other directions, gains less.
 CLAIMED = 0.7
@@ -487,7 +485,6 @@ def refuse_false_claims(result: FineResult, site: Site) -> None:
 
 # Error messages on the record of a fine alignment that fails.
 
-
 GAPS = ("mechanization.gap-before-body-did-not", "mechanization.gap-body-did-not-known")
 
 
@@ -522,7 +519,6 @@ def telling_record(imu: pd.DataFrame) -> Iterator[None]:
 
 # Findings of a fine alignment.
 
-
 #: Code of the finding of a rocking body: harmless, if the coarse alignment allows it.
 ROCKS = "alignment.body-rocks"
 #: Code of the finding of a bias beyond the data sheet; data `sensor`.
@@ -542,12 +538,7 @@ INCONSISTENT = 3.0
 
 def fine_findings(result: FineResult, site: Site) -> tuple[Finding, ...]:
     """Report assumptions that do not hold, and quantities that the sensors could not determine."""
-    return (
-        *_north(result, site),
-        *_stands(result),
-        *_fits(result),
-        *_biases(result),
-    )
+    return (*_north(result, site), *_stands(result), *_fits(result), *_biases(result))
 
 
 def _north(result: FineResult, site: Site) -> Iterator[Finding]:
@@ -635,7 +626,6 @@ def _biases(result: FineResult) -> Iterator[Finding]:
 
 
 # Result of a fine alignment, epoch by epoch.
-
 
 BIASES = tuple(f"{sensor}_bias_{axis}" for sensor in ("gyro", "accel") for axis in "xyz")
 #: Columns of the history: degrees, rad/s and m/s², and the standard deviation of each.

@@ -177,7 +177,6 @@ class GnssCourse(CoarseAlignment):
 
 # Attitude, velocity and biases at the end of a drive, by least squares over its fixes.
 
-
 # Errors of velocity and attitude are estimate − truth, of sensors truth − estimate.
 SIGN = np.where(OF_SENSORS.start > HANDED, 1.0, -1.0)
 # Prior standard deviations of an unknown velocity, m/s, and of an unknown attitude, rad.
@@ -637,7 +636,6 @@ def _attitude(force_b: Array, force_n: Array, heading: float) -> Array:
 
 
 # Check that a vehicle drives along its forward axis.
-
 
 #: A slope of more standard deviations is significant.
 CLEAR_SLOPE = 5.0

@@ -309,12 +309,7 @@ def fit_inertially(sums: InertialSums, site: Site) -> InertialFit:
     gain = np.concatenate([gain3, gain5[3:]]).reshape(5, DEGREES, 3)
     change = np.einsum("kdi,di->k", gain[3:], measured - known)
     return InertialFit(
-        C_nb,
-        measured,
-        known,
-        float(change[0]),
-        float(change[1]),
-        _response(sums, gain, C_nb),
+        C_nb, measured, known, float(change[0]), float(change[1]), _response(sums, gain, C_nb)
     )
 
 
@@ -372,7 +367,6 @@ def _response(sums: InertialSums, gain: Array, C_nb: Array) -> Response:
 
 
 # Rotation of a body against the local level, or mismatch of the gyros' vertical and the latitude.
-
 
 BLOCKS = 10
 

@@ -195,7 +195,6 @@ def _disturbed(
 
 # Attitude errors for a force known in both frames and a stated heading.
 
-
 #: Beyond this pitch, deg, heading and roll axes coincide to within a minute of arc.
 STEEPEST = 89.9
 
@@ -216,10 +215,7 @@ def error_of_force_and_heading(
     """
     if not abs(pitch_deg) <= STEEPEST:
         raise DataError(
-            "alignment.pitch-vertical",
-            file=source,
-            quantity="pitch",
-            pitch_deg=pitch_deg,
+            "alignment.pitch-vertical", file=source, quantity="pitch", pitch_deg=pitch_deg
         )
     steep, heading = np.tan(np.radians(pitch_deg)), np.radians(heading_deg)
     row = np.array([steep * np.cos(heading), steep * np.sin(heading), 1.0])

@@ -67,7 +67,6 @@ def _own(bias: Triad, density: Triad, drift: BiasDrift, length: float) -> Array:
 
 # Means over parts of a record, and a test of their scatter against the noise of the sensors.
 
-
 #: Scatter less probable than this is not noise.
 CHANCE = 1e-6
 

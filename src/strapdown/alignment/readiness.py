@@ -139,9 +139,7 @@ def readiness(
 
 
 def _row(
-    align: Callable[[pd.DataFrame], Alignment],
-    piece: pd.DataFrame,
-    reference: pd.DataFrame | None,
+    align: Callable[[pd.DataFrame], Alignment], piece: pd.DataFrame, reference: pd.DataFrame | None
 ) -> list[object]:
     nothing: list[object] = [np.nan] * 10
     try:
@@ -158,7 +156,6 @@ def _row(
 
 
 # Unobservable errors of a stationary body, and rotations of the body that make them observable.
-
 
 # Duration of a turn by hand or by a vehicle, and step of the prediction.
 TURN_TIME, STEP = 20.0, 0.1  # s
@@ -288,13 +285,7 @@ def _forecast(result: FineResult, site: Site, name: str, turn: Array, rest: floa
     for _ in range(max(1, math.floor(rest / result.interval))):
         time = state.time + STEP * np.arange(1.0, each + 1)
         state, _ = settled_epoch(
-            filter_,
-            state,
-            np.asarray(time),
-            rows,
-            home,
-            result.standing,
-            tuple(result.innovations),
+            filter_, state, np.asarray(time), rows, home, result.standing, tuple(result.innovations)
         )
     after = alignment_of(filter_, state)
     assert after.gyro_bias_sd is not None and after.accel_bias_sd is not None

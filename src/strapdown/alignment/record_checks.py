@@ -69,12 +69,7 @@ def check_gravity(force: Array, source: str | None) -> tuple[Finding, ...]:
     if not force[2] > 0.5 * size:
         return ()
     return (
-        Finding(
-            "alignment.force-points-down",
-            file=source,
-            quantity="accel_z",
-            force=force[2],
-        ),
+        Finding("alignment.force-points-down", file=source, quantity="accel_z", force=force[2]),
     )
 
 
@@ -139,7 +134,6 @@ def _gaps(time: Array, source: str | None) -> tuple[Finding, ...]:
 
 # Outliers in a record to be aligned.
 
-
 #: Share of the steps from sample to sample that are taken as usual, and the factor on them from
 #: which a step is an outlier: 36 standard deviations of white noise, 10 times the steepest of a
 #: swing.
@@ -178,7 +172,6 @@ def outlier_findings(values: Array, columns: list[str], source: str | None) -> t
 
 
 # Check against GNSS that a vehicle was stationary.
-
 
 #: A velocity of more standard deviations is significant.
 CLEAR = 5.0
@@ -229,7 +222,6 @@ def still_by_gnss(
 
 
 # Check that the gyros can find north, and compare their latitude with the site's.
-
 
 #: A heading with a larger standard deviation, rad, counts as unknown: a uniform one has 1.81.
 LARGEST_SD = 1.0
@@ -307,10 +299,7 @@ def latitude_findings(
     if abs(measured_deg) > 90.0 + CONTRADICTION * sd_deg:
         return (
             Finding(
-                "alignment.no-latitude-fits",
-                file=source,
-                quantity="latitude",
-                lat_deg=site.lat_deg,
+                "alignment.no-latitude-fits", file=source, quantity="latitude", lat_deg=site.lat_deg
             ),
         )
     return (

@@ -104,11 +104,7 @@ def velocity_observation(
     H = np.zeros((rows, filter_.model.physical_size))
     H[:, 3 : 3 + rows] = np.eye(rows)
     return Observation(
-        "velocity",
-        level[V_L : V_L + rows],
-        H,
-        standing.velocity[:rows] ** 2,
-        _labels("m/s")[:rows],
+        "velocity", level[V_L : V_L + rows], H, standing.velocity[:rows] ** 2, _labels("m/s")[:rows]
     )
 
 

@@ -373,7 +373,6 @@ def fir_decimation(
 
 # Interpolation by polynomials through the six nearest samples, with the noise gain.
 
-
 POINTS = 6
 
 

@@ -207,12 +207,7 @@ def _refine(one: EvenSignal, two: EvenSignal, delay: float, coarse: float) -> De
 
 
 def _least_squares(
-    one: EvenSignal,
-    two: EvenSignal,
-    delay: float,
-    coarse: float,
-    width: float,
-    noise: Array | None,
+    one: EvenSignal, two: EvenSignal, delay: float, coarse: float, width: float, noise: Array | None
 ) -> tuple[Delay, Array | None]:
     """Fit the delay, a gain and constants from the nearest sample on; estimate the noise.
 

@@ -80,7 +80,6 @@ def bandwidth(
 
 # Slope of a sampled signal from a polynomial through a few neighbors, with its exact noise.
 
-
 # Rows solved at once: a few megabytes.
 CHUNK = 20_000
 LEAST_SAMPLES = 3

@@ -647,7 +647,6 @@ def _run(
 
 # Test at the end of the C file: a vector with its attitudes, and a filter for a pipe.
 
-
 _TEST = """\
 #ifdef ATTITUDE_TEST
 #include <float.h>

@@ -136,7 +136,6 @@ class Expressions:
 
 # C types of the names in the specialized kernels, and function prototypes.
 
-
 # Up to this number results are returned through pointers, otherwise in one array.
 POINTERS = 4
 
@@ -397,7 +396,6 @@ class _Body(Expressions):
 
 
 # Layout of comments, statements and numbers in the C file.
-
 
 WIDTH = 100
 

@@ -301,7 +301,6 @@ def _large_turns(increments: pd.DataFrame) -> tuple[Finding, ...]:
 
 # Navigation sample by sample, as it runs on a device or live.
 
-
 # Looked up once: attribute lookup is a significant part of a call of a microsecond.
 _ndarray = np.ndarray
 

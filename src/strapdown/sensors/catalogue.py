@@ -292,7 +292,6 @@ def _bad(path: Path, key: str, code: str, **values: Any) -> ConfigError:
 
 # Keys that a sensor file may contain, with their units.
 
-
 DEG = GYRO_UNITS["deg/s"]
 DEG_H = GYRO_UNITS["deg/h"]
 G = STANDARD_GRAVITY

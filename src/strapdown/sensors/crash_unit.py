@@ -185,7 +185,6 @@ def _wrong_type(quantity: str, given: object, unit: object) -> ConfigError:
 
 # Requirements that a crash unit must meet before processing.
 
-
 # Stamps that agree to within this fraction of a step are equal.
 SAME_STAMP = 1e-3
 
@@ -294,7 +293,6 @@ def _gaps(unit: CrashUnit, time: Array) -> tuple[Finding, ...]:
 
 
 # Assumed motion of a vehicle on unmeasured axes, and its uncertainty.
-
 
 #: Names of the two time profiles, in the order of `assumed_shapes`, for the names of unknowns.
 SHAPES = ("by the end", "on the way")

@@ -158,10 +158,7 @@ def intervals(time: Array) -> Array:
 def jitter(errors: TriadErrors, steps: Array, seed: Seed) -> Array:
     """Delay of each sampling instant after its stamp, (n,), s.
 
-    Raises
-    ------
-    ConfigError
-        The standard deviation is more than a tenth of an interval.
+    ConfigError: the standard deviation is more than a tenth of an interval.
     """
     shortest = float(steps.min())
     if errors.jitter > MOST_JITTER * shortest:
@@ -281,7 +278,6 @@ def _known_drift(errors: TriadErrors, t: Array, steps: Array, mean: bool) -> Arr
 
 # Transfer curve of one sensor axis, scale factor and nonlinearity, and its inverse.
 
-
 # Each step at least halves the bracket and at best squares the error; a double has 53 bits.
 MOST_ITERATIONS = 60
 
@@ -289,18 +285,9 @@ MOST_ITERATIONS = 60
 def transfer(x: Array, scale: float, second: float, third: float, full: float) -> Array:
     """Output of an axis for a given input.
 
-    Parameters
-    ----------
-    x : ndarray, (n,), u
-    scale, second, third : float
-        From `TriadErrors`: ``y/F = (1 + scale) x/F + second (x/F)² + third (x/F)³`` up to full
-        scale, ``|x| <= F``, and linear along the tangent beyond, so that the inverse is unique.
-    full : float, u
-        F.
-
-    Returns
-    -------
-    ndarray, (n,), u
+    `x` ((n,), u). `scale`, `second`, `third`: from `TriadErrors`:
+    ``y/F = (1 + scale) x/F + second (x/F)² + third (x/F)³`` up to full scale, ``|x| <= F``, and
+    linear along the tangent beyond, so that the inverse is unique. `full` (u): F. Returns (n,), u.
     """
     if second == 0.0 and third == 0.0:
         return x * (1.0 + scale)
@@ -358,12 +345,8 @@ SERIES_LIMIT = 0.1
 def child(seed: Seed, *place: int) -> np.random.SeedSequence:
     """Return the child seed at a path below another seed.
 
-    Parameters
-    ----------
-    seed : int or SeedSequence
-        A SeedSequence is not changed.
-    *place : int
-        Path, numbered as by successive calls of ``SeedSequence.spawn``.
+    `seed` (int or SeedSequence): a SeedSequence is not changed. `*place`: path, numbered as by
+    successive calls of ``SeedSequence.spawn``.
     """
     root = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
     return np.random.SeedSequence(root.entropy, spawn_key=(*root.spawn_key, *place))

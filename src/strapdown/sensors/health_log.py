@@ -212,11 +212,7 @@ def intervals_of(flags: Mask, join: int = 0) -> list[tuple[int, int]]:
         return []
     apart = starts[1:] - ends[:-1] - 1 > join
     return list(
-        zip(
-            starts[np.r_[True, apart]].tolist(),
-            ends[np.r_[apart, True]].tolist(),
-            strict=True,
-        )
+        zip(starts[np.r_[True, apart]].tolist(), ends[np.r_[apart, True]].tolist(), strict=True)
     )
 
 

@@ -69,7 +69,6 @@ def find_saturated(log: HealthLog) -> list[ChannelFault]:
 
 # Consistency of the means at rest with gravity and the Earth's rate.
 
-
 # Consecutive stationary blocks required for a mean.
 LEAST_REST = 3
 
@@ -164,7 +163,6 @@ def _sd(log: HealthLog, columns: list[str], mean: Array, size: float, duration: 
 
 
 # Channels noisier than their data sheet, their neighbors or their own past.
-
 
 # In data sheets that state noise by axis, one axis has twice that of another, and units differ from
 # one another by half.
@@ -350,7 +348,6 @@ def _fault(
 
 # Stuck or dead channels: one value repeated for longer than the noise allows.
 
-
 # Samples about a run from which the fraction of repetitions is estimated.
 AROUND = 256
 LEAST_RUN = 10  # samples
@@ -468,7 +465,6 @@ def _stuck_fault(log: HealthLog, k: int, a: int, b: int, limit: float) -> Channe
 
 
 # Level jumps of a channel while the body is stationary.
-
 
 # Blocks averaged before and after the block in which a step may lie.
 SIDE = 3
@@ -675,11 +671,7 @@ class HealthTest:
 #: In this order, because noise and level are defined only for valid samples.
 TESTS: dict[str, HealthTest] = {
     "missing": HealthTest(
-        "no number",
-        "any NaN",
-        "none: it is seen, not concluded",
-        find_missing,
-        True,
+        "no number", "any NaN", "none: it is seen, not concluded", find_missing, True
     ),
     "stuck": HealthTest(
         "repeats a reading, or is dead",

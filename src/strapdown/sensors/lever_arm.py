@@ -130,11 +130,7 @@ def move_imu(
     alpha, omega = slope.slope_of(gyro), slope.value_of(gyro)
     force = imu[ACCEL].to_numpy(dtype=np.float64) + lever_matrix(alpha, omega) @ r
     moved = imu_table(
-        time,
-        gyro,
-        force,
-        sampling=str(imu.attrs["sampling"]),
-        source=imu.attrs.get("source"),
+        time, gyro, force, sampling=str(imu.attrs["sampling"]), source=imu.attrs.get("source")
     )
     noise = _covariances(gyro_noise, time.size)
     return MovedImu(moved, r, alpha, _added(slope, omega, r, noise), slope.bandwidth, slope)

@@ -226,7 +226,6 @@ def in_axes(rest: RestStretch, C: Array) -> RestStretch:
 
 # A unit after preparation: common clock, vehicle axes, one range, biases removed.
 
-
 # In `PreparedUnit.bias_from`: bias from gravity in the stated attitude.
 FROM_GRAVITY = -1
 

@@ -210,7 +210,6 @@ def _check(
 
 # Whether two ranges of one unit measure the same motion along the same axes.
 
-
 # Rows of the regression with a larger standard deviation are inconclusive.
 MOST_SD = 0.1
 # A larger deviation from the unit matrix means swapped or inverted axes, not a scale factor.
@@ -256,10 +255,7 @@ def _correlation(left: Array) -> Array:
 
 
 def agreement_findings(
-    unit: CrashUnit,
-    data: UnitArrays,
-    limits: Sequence[RangeLimits],
-    noise: Sequence[Array],
+    unit: CrashUnit, data: UnitArrays, limits: Sequence[RangeLimits], noise: Sequence[Array]
 ) -> list[Finding]:
     """Find ranges with swapped or inverted axes, or that are never both unsaturated.
 
@@ -327,7 +323,6 @@ def _in_g(ratio: float) -> bool:
 
 
 # Bias of a high range from the range below it.
-
 
 LEAST_BIAS_SAMPLES = 5
 # If the input does not vary over a good part of a quantization step, averaging does not help (the

@@ -165,14 +165,7 @@ class AxisErrors:
     @classmethod
     def of(cls, parts: Sequence[tuple[TriadUncertainty, BiasDrift, int]]) -> AxisErrors:
         """Collect axis ``part[2]`` of each triad."""
-        names = (
-            "noise_density",
-            "bias",
-            "scale",
-            "misalignment",
-            "g_sensitivity",
-            "quantization",
-        )
+        names = ("noise_density", "bias", "scale", "misalignment", "g_sensitivity", "quantization")
         columns = {n: np.array([t.axis(n)[k] for t, _, k in parts]) for n in names}
         drift = np.array([d.triad[k] for _, d, k in parts])
         time = np.array([d.correlation_time for _, d, _ in parts])
@@ -648,9 +641,7 @@ class UnitVoting:
 
 
 def vote_units(
-    units: Sequence[MountedUnit],
-    tables: Mapping[str, pd.DataFrame],
-    rule: VotingRule | None = None,
+    units: Sequence[MountedUnit], tables: Mapping[str, pd.DataFrame], rule: VotingRule | None = None
 ) -> VotedImu:
     """Vote over a whole log.
 
@@ -680,7 +671,6 @@ def vote_units(
 
 
 # One of several inertial units on a body: its errors and its orientation.
-
 
 # Tolerance for a mounting matrix to be a rotation.
 ROTATION = 1e-6

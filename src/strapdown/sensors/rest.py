@@ -268,7 +268,6 @@ def of_one_bias(rests: list[RestStretch]) -> tuple[RestStretch, ...]:
 
 # Stationary but vibrating: a parked car with people in it, a sensor on a running machine.
 
-
 # Vibration about one attitude leaves half-second means constant; driving does not. In a car at 2 to
 # 14 m/s on streets and in one on a motorway, no window of 4 s had means that scatter by less than
 # 0.33 deg/s and 0.084 m/s² (root of the summed variances of the axes). In a parked car with people
@@ -387,7 +386,6 @@ def _apart(rests: list[RestStretch], imu: pd.DataFrame) -> tuple[RestStretch, ..
 
 
 # Gyro bias over a log, from its rests.
-
 
 # In a noise-free simulation the means are exact to rounding.
 LEAST_SD = 1e-12  # rad/s

@@ -367,7 +367,6 @@ def turned_gyro(lent: TriadAtStamps, lender: Mounting, borrower: Mounting) -> Tr
 
 # Findings about records resampled to common stamps.
 
-
 # A shorter omitted part of a record is not reported.
 WORTH_A_WORD = 0.1  # s
 
@@ -450,7 +449,6 @@ def cut_findings(spans: Sequence[tuple[str, float, float]], time: Array) -> list
 
 
 # Consistency of the units of one vehicle: names, options, sizes of the measurements.
-
 
 METHODS = ("trigger", "correlation")
 # Rates on one rigid body differ by this factor if one is in deg/s.

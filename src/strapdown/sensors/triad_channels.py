@@ -106,10 +106,7 @@ def triad_channels(unit: CrashUnit, triad: RecordedTriad, columns: list[str]) ->
     groups, findings = _groups(source, stamps, values, columns)
     judge = _judge_force if columns == ACCEL else _judge_rate
     return TriadChannels(
-        source,
-        groups,
-        str(sampling),
-        (*findings, *judge(source, unit, triad, groups)),
+        source, groups, str(sampling), (*findings, *judge(source, unit, triad, groups))
     )
 
 
@@ -246,10 +243,7 @@ def _judge_force(
             )
         found.append(
             Finding(
-                "sensors.specific-force-in-g-or-bias",
-                file=source,
-                quantity="accel",
-                length=length,
+                "sensors.specific-force-in-g-or-bias", file=source, quantity="accel", length=length
             )
         )
     elif length < NO_GRAVITY:

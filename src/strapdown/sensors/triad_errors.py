@@ -36,13 +36,7 @@ TRIADS = (
     "warm_up",
     "vibration_rectification",
 )
-NOT_NEGATIVE = (
-    "noise_density",
-    "bias_instability",
-    "random_walk",
-    "quantization",
-    "jitter",
-)
+NOT_NEGATIVE = ("noise_density", "bias_instability", "random_walk", "quantization", "jitter")
 POSITIVE = ("correlation_time", "full_scale", "bandwidth", "warm_up_time")
 
 
@@ -239,7 +233,6 @@ def _refused(name: str, code: str, **values: Any) -> ConfigError:
 
 # Validation of user input: three numbers, or one.
 
-
 #: Largest distance between two points of a road vehicle; a larger position is in mm.
 FARTHEST = 30.0  # m
 
@@ -288,7 +281,7 @@ Array = NDArray[np.float64]
 #: Unit designs by name. Chernodarov (2009): with its (1,4) set to -Θz, the printed matrix of (1) is
 #: that of ``2 dq/dt = q (0, ω)`` for ``ω = (-Θy, Θx, Θz)``: gyros rotated by 90° about z.
 NAMED_AXES: dict[str, tuple[tuple[float, float, float], ...]] = {
-    "chernodarov-2009": ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+    "chernodarov-2009": ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 }
 #: Tolerance of ``M M'`` about 1: cosines with three decimals, but no misalignment.
 ROUNDING = 2e-3

@@ -148,7 +148,6 @@ def _numbers(given: Any, name: str) -> tuple[float, ...]:
 
 # Unit-to-unit uncertainty from a data sheet, as standard deviations.
 
-
 TRIADS = ("gyro", "accel")
 # Quantities of a data sheet, and the attributes of `TriadUncertainty` for their spread.
 SPREADS = {
@@ -407,7 +406,6 @@ def _require(triad: str, known: TriadUncertainty) -> None:
 
 # Random draw of one unit of a triad from its uncertainty.
 
-
 # Keys of the quantities in the seed tree; a number is never reused for another quantity.
 BIAS, SCALE, MISALIGNMENT, G_SENSITIVITY, NONLINEARITY, RECTIFICATION = range(6)
 # The slope 1 + s + 2 n2 x must stay positive within the range, |x| <= 1; at 0.5 it vanishes.
@@ -468,10 +466,6 @@ def crash_priors(rate: float = 200.0) -> dict[str, TriadUncertainty]:
     if not (math.isfinite(rate) and rate > 0.0):
         raise ConfigError("sensors.rate-not-positive", quantity="rate", rate=rate)
     return {
-        "accel": TriadUncertainty(
-            bias=0.2,
-            scale=0.02,
-            noise_density=0.4 / math.sqrt(rate),
-        ),
+        "accel": TriadUncertainty(bias=0.2, scale=0.02, noise_density=0.4 / math.sqrt(rate)),
         "gyro": TriadUncertainty(bias=0.3 * GYRO_UNITS["deg/s"]),
     }
