@@ -44,12 +44,15 @@ _COMPARE: dict[type[ast.cmpop], str] = {
 _UNARY, _ATOM = 14, 20
 
 
-class Expressions:
-    """Translate the expressions of one function."""
+class _Body:
+    """Translate one function."""
 
-    def __init__(self, kinds: Kinds, function: Function) -> None:
+    def __init__(self, kinds: Translator, function: Function) -> None:
         self.all, self.function = kinds, function
         self.types = kinds.types(function)
+        own = set(stored(function.body)) - set(function.parameters)
+        loops = {name_of(n.target) for n in walk(function.body) if isinstance(n, ast.For)}
+        self.declare_at = first_uses(function.body, own - loops)
 
     def text(self, node: ast.expr, places: list[str] | None = None, over: int = 0) -> str:
         """Write an expression, in parentheses where it binds more weakly than `over`."""
@@ -64,7 +67,8 @@ class Expressions:
         if isinstance(node, ast.Attribute) and node.attr == "pi":
             return "PI", _ATOM
         if isinstance(node, ast.Subscript):
-            self._note_size(node)
+            if name_of(node.value) == "state":
+                self.all.state_size = max(self.all.state_size, 1 + self.highest(node.slice))
             return f"{self.text(node.value)}[{self.text(node.slice)}]", _ATOM
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
             return f"-{self.text(node.operand, over=_UNARY)}", _UNARY
@@ -105,10 +109,6 @@ class Expressions:
             return text
         return f"{macro}({', '.join(arguments)})"
 
-    def _note_size(self, node: ast.Subscript) -> None:
-        if name_of(node.value) == "state":
-            self.all.state_size = max(self.all.state_size, 1 + self.highest(node.slice))
-
     def highest(self, node: ast.expr) -> int:
         """Return the highest value that an index can have."""
         if isinstance(node, ast.Constant) and isinstance(node.value, int):
@@ -133,135 +133,7 @@ class Expressions:
             return 0  # up to a count, which is bound by what was written before
         return range(*(int(b) for b in bounds))[-1]
 
-
-# C types of the names in the specialized kernels, and function prototypes.
-
-# Up to this number results are returned through pointers, otherwise in one array.
-POINTERS = 4
-
-
-class Kinds:
-    """C types of all names in the required functions.
-
-    `state_size`: count of state numbers that the functions written so far use.
-    """
-
-    def __init__(self, kernels: Kernels) -> None:
-        self.kernels = kernels
-        self.state_size = 0
-        self._types: dict[str, dict[str, str]] = {}
-        self._returns: dict[str, str] = {}
-        self._changed: dict[str, set[str]] = {}
-        for function in kernels.functions:  # callees precede their callers
-            self._changed[function.name] = set(self._written(function))
-            self._type_arrays(function)
-        for function in reversed(kernels.functions):
-            self._type_arguments(function)
-
-    def types(self, function: Function) -> dict[str, str]:
-        """Return the type of each name: 'real_t', 'int', or 'array'."""
-        return self._types.setdefault(function.name, {})
-
-    def changes(self, name: str, parameter: str) -> bool:
-        """Whether a function writes into an array argument."""
-        return parameter in self._changed[name]
-
-    def _written(self, function: Function) -> Iterator[str]:
-        for node in walk(function.body):
-            if isinstance(node, ast.Subscript) and isinstance(node.ctx, ast.Store):
-                yield name_of(node.value)
-            elif isinstance(node, ast.Call) and (other := self.callee(node)):
-                for parameter, argument in zip(other.parameters, node.args, strict=True):
-                    if parameter in self._changed[other.name]:
-                        yield name_of(argument)
-
-    def callee(self, node: ast.expr) -> Function | None:
-        """Return the kernel that an expression calls."""
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-            return self.kernels.named(node.func.id)
-        return None
-
-    def _type_arrays(self, function: Function) -> None:
-        """Find arrays: names with an index here, or passed to an array parameter."""
-        types = self.types(function)
-        for node in walk(function.body):
-            if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name):
-                types[node.value.id] = "array"
-            elif isinstance(node, ast.Call) and (other := self.callee(node)):
-                for parameter, argument in zip(other.parameters, node.args, strict=True):
-                    if self.types(other).get(parameter) == "array":
-                        types[name_of(argument)] = "array"
-
-    def _type_arguments(self, function: Function) -> None:
-        """Find the types of the locals, then of the parameters of called functions."""
-        types = self.types(function)
-        for node in walk(function.body):
-            if isinstance(node, ast.For):
-                types[name_of(node.target)] = "int"
-        for node in walk(function.body):
-            if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
-                types.setdefault(node.targets[0].id, self.kind(node.value, types))
-        for node in walk(function.body):
-            other = self.callee(node) if isinstance(node, ast.expr) else None
-            if other and isinstance(node, ast.Call):
-                for parameter, argument in zip(other.parameters, node.args, strict=True):
-                    self.types(other).setdefault(parameter, self.kind(argument, types))
-            if isinstance(node, ast.Return) and node.value is not None:
-                self._returns[function.name] = self.kind(node.value, types)
-
-    def kind(self, node: ast.expr, types: dict[str, str]) -> str:
-        """Return the type of an expression."""
-        if isinstance(node, ast.Name):
-            span = self.kernels.span(node.id)
-            return "int" if span and isinstance(span[0], int) else types.get(node.id, "real_t")
-        if isinstance(node, ast.Constant):
-            return "int" if isinstance(node.value, int) else "real_t"
-        if isinstance(node, ast.Compare | ast.BoolOp):
-            return "int"
-        if isinstance(node, ast.BinOp):
-            both = {self.kind(node.left, types), self.kind(node.right, types)}
-            return "int" if both == {"int"} and not isinstance(node.op, ast.Div) else "real_t"
-        if isinstance(node, ast.Call):
-            name = plain_name(node.func)
-            return "int" if name == "int" else self._returns.get(name, "real_t")
-        return "real_t"
-
-    def returns(self, function: Function) -> str:
-        """Return the result type of a C function: one number, or void."""
-        return self._returns.get(function.name, "real_t") if function.results == 1 else "void"
-
-    def prototype(self, function: Function) -> str:
-        """Return the prototype of a function, on one line."""
-        types, arguments = self.types(function), []
-        for p in function.parameters:
-            if types.get(p) == "array":
-                const = "" if self.changes(function.name, p) else "const "
-                arguments.append(f"{const}real_t *{p}".replace(" ", TIE))
-            else:
-                arguments.append(f"{types.get(p, 'real_t')}{TIE}{p}")
-        if function.results > POINTERS:
-            arguments.append(f"real_t{TIE}out[{function.results}]")
-        elif function.results > 1:
-            arguments += [f"real_t{TIE}*out{i + 1}" for i in range(function.results)]
-        return f"static {self.returns(function)} {function.name}({', '.join(arguments)})"
-
-
-class Translator(Kinds):
-    """Translate the required functions."""
-
-    def function(self, function: Function) -> list[str]:
-        """Return the lines of a function's definition."""
-        return _Body(self, function).lines()
-
-
-class _Body(Expressions):
-    """Translate the statements of one function."""
-
-    def __init__(self, kinds: Kinds, function: Function) -> None:
-        super().__init__(kinds, function)
-        own = set(stored(function.body)) - set(function.parameters)
-        loops = {name_of(n.target) for n in walk(function.body) if isinstance(n, ast.For)}
-        self.declare_at = first_uses(function.body, own - loops)
+    # --- statements -----------------------------------------------------------------------
 
     def lines(self) -> list[str]:
         out = comment(self.function.doc) if self.function.doc else []
@@ -393,6 +265,122 @@ class _Body(Expressions):
             names = ["out"] if many else [f"out{i + 1}" for i in range(results)]
             out = wrapped(f"{self.text(value, names)};", indent)
         return out if last else [*out, f"{indent}return;"]
+
+
+# C types of the names in the specialized kernels, and function prototypes.
+
+# Up to this number results are returned through pointers, more of them in one array.
+POINTERS = 4
+
+
+class Translator:
+    """Translate the required functions, with the C types of all their names.
+
+    `state_size`: count of state numbers that the functions written so far use.
+    """
+
+    def __init__(self, kernels: Kernels) -> None:
+        self.kernels = kernels
+        self.state_size = 0
+        self._types: dict[str, dict[str, str]] = {}
+        self._returns: dict[str, str] = {}
+        self._changed: dict[str, set[str]] = {}
+        for function in kernels.functions:  # callees precede their callers
+            self._changed[function.name] = set(self._written(function))
+            self._type_arrays(function)
+        for function in reversed(kernels.functions):
+            self._type_arguments(function)
+
+    def types(self, function: Function) -> dict[str, str]:
+        """Return the type of each name: 'real_t', 'int', or 'array'."""
+        return self._types.setdefault(function.name, {})
+
+    def changes(self, name: str, parameter: str) -> bool:
+        """Whether a function writes into an array argument."""
+        return parameter in self._changed[name]
+
+    def _written(self, function: Function) -> Iterator[str]:
+        for node in walk(function.body):
+            if isinstance(node, ast.Subscript) and isinstance(node.ctx, ast.Store):
+                yield name_of(node.value)
+            elif isinstance(node, ast.Call) and (other := self.callee(node)):
+                for parameter, argument in zip(other.parameters, node.args, strict=True):
+                    if parameter in self._changed[other.name]:
+                        yield name_of(argument)
+
+    def callee(self, node: ast.expr) -> Function | None:
+        """Return the kernel that an expression calls."""
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            return self.kernels.named(node.func.id)
+        return None
+
+    def _type_arrays(self, function: Function) -> None:
+        """Find arrays: names with an index here, or passed to an array parameter."""
+        types = self.types(function)
+        for node in walk(function.body):
+            if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name):
+                types[node.value.id] = "array"
+            elif isinstance(node, ast.Call) and (other := self.callee(node)):
+                for parameter, argument in zip(other.parameters, node.args, strict=True):
+                    if self.types(other).get(parameter) == "array":
+                        types[name_of(argument)] = "array"
+
+    def _type_arguments(self, function: Function) -> None:
+        """Find the types of the locals, then of the parameters of called functions."""
+        types = self.types(function)
+        for node in walk(function.body):
+            if isinstance(node, ast.For):
+                types[name_of(node.target)] = "int"
+        for node in walk(function.body):
+            if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
+                types.setdefault(node.targets[0].id, self.kind(node.value, types))
+        for node in walk(function.body):
+            other = self.callee(node) if isinstance(node, ast.expr) else None
+            if other and isinstance(node, ast.Call):
+                for parameter, argument in zip(other.parameters, node.args, strict=True):
+                    self.types(other).setdefault(parameter, self.kind(argument, types))
+            if isinstance(node, ast.Return) and node.value is not None:
+                self._returns[function.name] = self.kind(node.value, types)
+
+    def kind(self, node: ast.expr, types: dict[str, str]) -> str:
+        """Return the type of an expression."""
+        if isinstance(node, ast.Name):
+            span = self.kernels.span(node.id)
+            return "int" if span and isinstance(span[0], int) else types.get(node.id, "real_t")
+        if isinstance(node, ast.Constant):
+            return "int" if isinstance(node.value, int) else "real_t"
+        if isinstance(node, ast.Compare | ast.BoolOp):
+            return "int"
+        if isinstance(node, ast.BinOp):
+            both = {self.kind(node.left, types), self.kind(node.right, types)}
+            return "int" if both == {"int"} and not isinstance(node.op, ast.Div) else "real_t"
+        if isinstance(node, ast.Call):
+            name = plain_name(node.func)
+            return "int" if name == "int" else self._returns.get(name, "real_t")
+        return "real_t"
+
+    def returns(self, function: Function) -> str:
+        """Return the result type of a C function: one number, or void."""
+        return self._returns.get(function.name, "real_t") if function.results == 1 else "void"
+
+    def prototype(self, function: Function) -> str:
+        """Return the prototype of a function, on one line."""
+        types, arguments = self.types(function), []
+        for p in function.parameters:
+            if types.get(p) == "array":
+                const = "" if self.changes(function.name, p) else "const "
+                arguments.append(f"{const}real_t *{p}".replace(" ", TIE))
+            else:
+                arguments.append(f"{types.get(p, 'real_t')}{TIE}{p}")
+        if function.results > POINTERS:
+            arguments.append(f"real_t{TIE}out[{function.results}]")
+        elif function.results > 1:
+            arguments += [f"real_t{TIE}*out{i + 1}" for i in range(function.results)]
+        return f"static {self.returns(function)} {function.name}({', '.join(arguments)})"
+
+    def function(self, function: Function) -> list[str]:
+        """Return the lines of a function's definition."""
+        return _Body(self, function).lines()
 
 
 # Layout of comments, statements and numbers in the C file.
