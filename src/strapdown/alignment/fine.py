@@ -203,9 +203,12 @@ class FineAlignment:
         state = filter_.begin(start, initial_covariance(filter_, coarse, standing))
         epochs = Epochs(filter_)
         epochs.add(state, {})
-        run = settled(filter_, state, time, rows, ends, home, standing, self.observe)
-        for after, seen in run:
-            state = after
+        at = 0
+        for end in ends.tolist():
+            state, seen = settled_epoch(
+                filter_, state, time[at:end], rows[at:end], home, standing, self.observe
+            )
+            at = end
             epochs.add(state, seen)
             if progress is not None:
                 progress((state.time - begin) / (float(time[-1]) - begin))
@@ -360,31 +363,6 @@ def settled_epoch(
     state, _, several = filter_.observe(state, others)
     seen |= {one.name: (one, of) for one, of in zip(others, several, strict=True)}
     return state, seen
-
-
-def settled(
-    filter_: ErrorFilter,
-    state: FilterState,
-    time: Array,
-    rows: Array,
-    ends: NDArray[np.int64],
-    home: NavState,
-    standing: Standing,
-    observe: tuple[str, ...],
-) -> Iterator[tuple[FilterState, Seen]]:
-    """Process the epochs of a rest.
-
-    `time` ((k,), s): ends of the steps. `rows` ((k, 10)): motion increments. `ends`: number of
-    steps before the end of each epoch. `home`: the position of alignment and the attitude of rest.
-    Yields `state`; `seen`: by name, each observation and its innovations.
-    """
-    at = 0
-    for end in ends.tolist():
-        state, seen = settled_epoch(
-            filter_, state, time[at:end], rows[at:end], home, standing, observe
-        )
-        yield state, seen
-        at = end
 
 
 def epoch_ends(begin: float, time: Array, interval: float) -> NDArray[np.int64]:

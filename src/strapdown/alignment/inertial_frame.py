@@ -90,7 +90,7 @@ class InertialFrame(CoarseAlignment):
         source = source_of(imu)
         findings = [*check_record(imu)]
         sums = sum_inertially(imu)
-        findings += check_gravity(_mean_force(sums), source)
+        findings += check_gravity(sums.node_velocity.sum(axis=0) / sums.length, source)
         fit = fit_inertially(sums, site)
         noise = residual_noise(sums, fit, sensors)
         own = _own_covariance(sums, fit, sensors)
@@ -99,7 +99,17 @@ class InertialFrame(CoarseAlignment):
         sd = np.sqrt(np.maximum(np.diagonal(whole), 0.0))
         _refuse_travel(noise, sd, imu, site, findings)
         if noise.significant:
-            findings.append(_left_over(noise, sd[2], sums.length, source))
+            findings.append(
+                Finding(
+                    "alignment.unexplained-slow-motion",
+                    file=source,
+                    quantity="accel",
+                    ratio=noise.ratio,
+                    length=sums.length,
+                    sway=noise.sway,
+                    sd_deg=np.degrees(sd[2]),
+                )
+            )
         findings += still_by_gnss(gnss, imu, site, float(sd[2]))
         findings += turn_findings(sums, fit.C_nb, site, sensors, source)
         findings += gravity_findings(fit.gravity_change, float(sd[4]), source)
@@ -123,10 +133,6 @@ class InertialFrame(CoarseAlignment):
             measured_latitude_sd_deg=measured_sd,
             findings=tuple(findings),
         )
-
-
-def _mean_force(sums: InertialSums) -> Array:
-    return np.asarray(sums.node_velocity.sum(axis=0) / sums.length)
 
 
 def _own_covariance(
@@ -174,18 +180,6 @@ def _refuse_travel(
         sway=noise.sway,
         ratio=noise.ratio,
         sd_deg=np.degrees(sd[2]),
-    )
-
-
-def _left_over(noise: ResidualNoise, sd: float, length: float, source: str | None) -> Finding:
-    return Finding(
-        "alignment.unexplained-slow-motion",
-        file=source,
-        quantity="accel",
-        ratio=noise.ratio,
-        length=length,
-        sway=noise.sway,
-        sd_deg=np.degrees(sd),
     )
 
 

@@ -18,7 +18,6 @@ from strapdown.alignment.mean_errors import (
     force_covariance,
     gravity_change,
     of_mean,
-    unexplained,
 )
 from strapdown.alignment.record_checks import check_gravity, check_record, gravity_findings
 from strapdown.errors import ConfigError, DataError, Finding
@@ -155,17 +154,24 @@ def level_at_rest(
     q_nb = rotation.quaternion_from_euler([roll, pitch, heading_deg])
     C_nb = rotation.dcm_from_quaternion(q_nb)
     force = force_covariance(sensors, means.length, means.whole_force)
-    loud = unexplained(
-        means.force, means.length, sensors.accel.axis("noise_density"), sensors.accel_drift
-    )
+    turning, loud = means.scatter(sensors)
     swing = np.zeros((3, 3))
-    turning = unexplained(
-        means.rate, means.length, sensors.gyro.axis("noise_density"), sensors.gyro_drift
-    )
     if loud > 1.0 or turning > 1.0:
         force = force + (of_mean(means.force) if loud > 1.0 else 0.0)
         swing = excursion(imu, sensors.gyro.axis("noise_density"))
-        findings.append(_disturbed(means.length, loud, turning, swing, source))
+        findings.append(
+            Finding(
+                "alignment.specific-force-scatters",
+                file=source,
+                quantity="accel",
+                blocks=BLOCKS,
+                length=means.length / BLOCKS,
+                loud=loud,
+                turning=turning,
+                in_bound=True,
+                swing_deg=np.degrees(np.sqrt(np.trace(swing))),
+            )
+        )
     change = gravity_change(means.whole_force, force, site.gravity)
     findings += gravity_findings(*change, source)
     by_force, by_heading = error_of_force_and_heading(-site.gravity, pitch, heading_deg, source)

@@ -85,6 +85,14 @@ class BlockMeans:
     whole_rate: Array
     whole_force: Array
 
+    def scatter(self, sensors: ImuUncertainty) -> tuple[float, float]:
+        """Scatter of the rate and of the force beyond their noise, as `unexplained`."""
+        gyro, accel = sensors.gyro.axis("noise_density"), sensors.accel.axis("noise_density")
+        return (
+            unexplained(self.rate, self.length, gyro, sensors.gyro_drift),
+            unexplained(self.force, self.length, accel, sensors.accel_drift),
+        )
+
 
 def block_means(imu: pd.DataFrame, blocks: int) -> BlockMeans:
     """Average an Imu table as a whole and by parts.

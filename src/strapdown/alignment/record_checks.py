@@ -253,7 +253,8 @@ def north_findings(
             told=told,
             largest_sd_deg=np.degrees(LARGEST_SD),
             lat_deg=site.lat_deg,
-            rounded=_rounded(across * DEG_PER_HOUR),
+            # A rounding error counts as zero.
+            rounded=f"{east:.3g}" if (east := across * DEG_PER_HOUR) > 1e-9 else "0",
             bias=bias * DEG_PER_HOUR,
         )
     if abs(site.lat_deg) <= HIGH_LATITUDE:
@@ -278,11 +279,6 @@ def seems_in_deg_per_s(rate: Array, site: Site) -> bool:
     """
     size, earth = (float(np.sqrt(x @ x)) for x in (rate, site.earth_rate))
     return abs(size / earth / float(np.degrees(1.0)) - 1.0) < 0.1
-
-
-def _rounded(rate: float) -> str:
-    """A rate in deg/h; a rounding error counts as zero."""
-    return f"{rate:.3g}" if rate > 1e-9 else "0"
 
 
 def latitude_findings(

@@ -19,7 +19,6 @@ from strapdown.alignment.mean_errors import (
     gravity_change,
     of_mean,
     rate_covariance,
-    unexplained,
 )
 from strapdown.alignment.record_checks import (
     CONTRADICTION,
@@ -92,12 +91,7 @@ class TwoVector(CoarseAlignment):
         rate = C_nb @ rate_covariance(sensors, means.length, means.whole_rate, means.whole_force)
         force = C_nb @ force_covariance(sensors, means.length, means.whole_force)
         rate, force = rate @ C_nb.T, force @ C_nb.T
-        loud_rate = unexplained(
-            means.rate, means.length, sensors.gyro.axis("noise_density"), sensors.gyro_drift
-        )
-        loud_force = unexplained(
-            means.force, means.length, sensors.accel.axis("noise_density"), sensors.accel_drift
-        )
+        loud_rate, loud_force = means.scatter(sensors)
         swing = np.zeros((3, 3))
         if loud_rate > 1.0:
             rate = rate + of_mean(means.rate @ C_nb.T)
@@ -109,8 +103,16 @@ class TwoVector(CoarseAlignment):
         covariance = by_force @ force @ by_force.T + by_rate @ rate @ by_rate.T + swing
         heading_sd = float(np.sqrt(covariance[2, 2]))
         if loud_rate > 1.0 or loud_force > 1.0:
-            findings.append(_disturbed(means, site, loud_rate, loud_force, swing, source))
-            _refuse_motion(findings[-1], heading_sd, source)
+            disturbed = _disturbed(means, site, loud_rate, loud_force, swing, source)
+            findings.append(disturbed)
+            if heading_sd > LARGEST_SD:
+                raise DataError(
+                    "alignment.heading-lost",
+                    file=source,
+                    quantity=disturbed.quantity,
+                    reason=disturbed,
+                    sd_deg=np.degrees(heading_sd),
+                )
         findings += north_findings(site, heading_sd, sensors, source)
         findings += still_by_gnss(gnss, imu, site, heading_sd)
         turned = C_nb @ means.whole_force
@@ -183,18 +185,6 @@ def _check_rate(
     if size > 2.0 * earth + CONTRADICTION * sd:
         raise DataError(contradicts)
     return (contradicts,)
-
-
-def _refuse_motion(disturbed: Finding, heading_sd: float, source: str | None) -> None:
-    """Refuse motion that makes north unobservable."""
-    if heading_sd > LARGEST_SD:
-        raise DataError(
-            "alignment.heading-lost",
-            file=source,
-            quantity=disturbed.quantity,
-            reason=disturbed,
-            sd_deg=np.degrees(heading_sd),
-        )
 
 
 def _latitude(means: BlockMeans, site: Site, rate: Array, force: Array) -> tuple[float, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -194,7 +194,14 @@ def mean_samples(
     _check_within(np.r_[at - length, at], low, start + (n - 1) * step, step)
     until = np.clip((at - start) / step, -before / step, n - 1.0)
     since = np.clip((at - length - start) / step, -before / step, n - 1.0)
-    share = _area_under_step if sampling == "mean" else _area_under_hat
+
+    def share(u: Array) -> Array:
+        """Integral to u of the unit step of a mean, or of the triangle between samples."""
+        if sampling == "mean":
+            return np.asarray(np.clip(u + 1.0, 0.0, 1.0))
+        v = np.clip(u, -1.0, 1.0)
+        return np.asarray(0.5 + v - 0.5 * v * np.abs(v))
+
     width = math.ceil(length / step) + 3
 
     def weigh(rows: slice) -> tuple[LocalWeights, Flags]:
@@ -208,17 +215,6 @@ def mean_samples(
     return in_blocks(channels, len(at), width, weigh, marked)
 
 
-def _area_under_hat(u: Array) -> Array:
-    """Integrate from -1 to u the triangle that interpolates between samples."""
-    v = np.clip(u, -1.0, 1.0)
-    return np.asarray(0.5 + v - 0.5 * v * np.abs(v))
-
-
-def _area_under_step(u: Array) -> Array:
-    """Integrate to u the unit step function of a mean over the step before its stamp."""
-    return np.asarray(np.clip(u + 1.0, 0.0, 1.0))
-
-
 def in_blocks(
     channels: Array,
     m: int,
@@ -229,16 +225,14 @@ def in_blocks(
     """Compute and apply weights by blocks of outputs, to limit memory."""
     values, noise = np.empty((m, channels.shape[1])), np.empty(m)
     whole, touched = np.empty(m, dtype=bool), np.zeros(values.shape, dtype=bool)
-    for rows in _slices(m, max(1, BLOCK // (width * channels.shape[1]))):
+    size = max(1, BLOCK // (width * channels.shape[1]))
+    for k in range(0, m, size):
+        rows = slice(k, min(k + size, m))
         local, whole[rows] = weigh(rows)
         values[rows], noise[rows] = local.apply(channels), local.noise_factor
         if marked is not None:
             touched[rows] = local.any_of(marked)
     return Resampled(values, noise, whole, touched)
-
-
-def _slices(m: int, size: int) -> Iterator[slice]:
-    return (slice(k, min(k + size, m)) for k in range(0, m, size))
 
 
 def _check_within(at: Array, low: float, high: float, step: float) -> None:

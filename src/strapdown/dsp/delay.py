@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,15 +120,11 @@ def find_delay(
     rival = next((int(k) for k in peaks[1:] if _apart(score, best, int(k))), None)
     runner_up = 0.0 if rival is None else float(score[rival])
     found = _refine(one, two, float(delays[best]), float(score[best]))
-    result = Delay(
-        found.delay,
-        found.sd,
-        found.correlation,
-        runner_up,
-        math.nan if rival is None else float(delays[rival]),
-        rival is not None and repeats(float(score[best]), runner_up),
-        found.gain,
-        found.shared,
+    result = replace(
+        found,
+        runner_up=runner_up,
+        runner_up_delay=math.nan if rival is None else float(delays[rival]),
+        ambiguous=rival is not None and repeats(float(score[best]), runner_up),
     )
     if result.correlation < LEAST_CORRELATION:
         raise DataError(

@@ -221,8 +221,10 @@ def _check_start(start: NavState, begin: float, increments: pd.DataFrame) -> Non
         )
 
 
-def _check_joints(increments: pd.DataFrame, dt: Array) -> None:
-    """Refuse a time interval between two steps without an increment."""
+def _refuse_holes(increments: pd.DataFrame, longest: float) -> None:
+    """Refuse a gap between two steps, and a step that is too long."""
+    check_longest_step(longest)
+    dt = increments["dt"].to_numpy(dtype=np.float64)
     ends = increments.index.to_numpy(dtype=np.float64)
     between = np.diff(ends) - dt[1:]
     if between.size and between.max() > LOST * dt.min():
@@ -238,23 +240,16 @@ def _check_joints(increments: pd.DataFrame, dt: Array) -> None:
                 ends_2=ends[at] + between[at],
                 size=holes.size,
             )
-
-
-def _refuse_holes(increments: pd.DataFrame, longest: float) -> None:
-    check_longest_step(longest)
-    dt = increments["dt"].to_numpy(dtype=np.float64)
-    _check_joints(increments, dt)
     long = np.flatnonzero(dt > longest)
     if long.size:
         row = int(long[0])
-        end = float(increments.index[row])
         raise DataError(
             "mechanization.gap-body-did-not-known",
             file=increments.attrs.get("source"),
             quantity="dt",
             dt=dt[row],
-            end=end - dt[row],
-            end_2=end,
+            end=float(ends[row] - dt[row]),
+            end_2=float(ends[row]),
             size=long.size,
             dt_2=float(dt.max()),
         )

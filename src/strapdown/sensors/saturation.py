@@ -140,8 +140,6 @@ def _least_step(y: Array) -> float:
 
 def _scatter(y: Array) -> float:
     """Sample-to-sample standard deviation, from the median of second differences."""
-    if y.size < LEAST_FLAT:
-        return 0.0
     # The second difference of three independent samples has sqrt(6) times the standard deviation of
     # one, and the median of its absolute value is 0.6745 of that.
     return float(np.median(np.abs(np.diff(y, 2)))) / (0.6745 * math.sqrt(6.0))
