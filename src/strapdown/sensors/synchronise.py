@@ -223,12 +223,12 @@ def synchronise(
             gyro_sd,
         )
     ordered = tuple(done[u.name] for u in units)
-    own_gyros = [() if u.gyro is None or u.lender else (u.gyro,) for u in ordered]
-    for u, own_gyro in zip(ordered, own_gyros, strict=True):
-        findings += end_findings(u.unit.name, (*u.accelerometers, *own_gyro))
-    for u, own_gyro in zip(ordered, own_gyros, strict=True):
+    own_gyros = [() if s.gyro is None or s.lender else (s.gyro,) for s in ordered]
+    for s, own_gyro in zip(ordered, own_gyros, strict=True):
+        findings += end_findings(s.unit.name, (*s.accelerometers, *own_gyro))
+    for s, own_gyro in zip(ordered, own_gyros, strict=True):
         # The widest range and the unit's own gyro: no wider range replaces them.
-        findings += clipped_findings(u.unit.name, (*u.accelerometers[-1:], *own_gyro))
+        findings += clipped_findings(s.unit.name, (*s.accelerometers[-1:], *own_gyro))
     if cut:
         findings += cut_findings([s for own in spans.values() for s in own], time)
     return SynchronisedUnits(ordered, time, rate, reference, zero_sd, tuple(findings))
