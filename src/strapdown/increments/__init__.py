@@ -2,12 +2,13 @@
 
 from strapdown.increments.angle import increments_from_imu
 from strapdown.increments.motion import (
+    IncrementStream,
+    IncrementStreamState,
     MotionAccuracy,
     imu_from_increments,
     motion_accuracy,
     motion_increments,
 )
-from strapdown.increments.stream import IncrementStream, IncrementStreamState
 
 __all__ = [
     "IncrementStream",

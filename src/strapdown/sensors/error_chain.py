@@ -24,7 +24,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.errors import ConfigError, DataError
-from strapdown.sensors.low_pass import low_pass, mean_of_filtered
 from strapdown.sensors.triad_errors import Triad, TriadErrors
 from strapdown.tables import SAMPLINGS
 
@@ -220,7 +219,6 @@ def _through_filter(errors: TriadErrors, t: Array, u: Array, steps: Array, mean:
 def _held(edges: Array, u: Array, bandwidth: float) -> Array:
     """Filter output at the end of each step, with the input held within the step."""
     from strapdown._kernels.signals import first_order
-    from strapdown.sensors.low_pass import time_constant
 
     h = np.diff(edges) / time_constant(bandwidth)
     out = np.empty_like(u)
@@ -274,6 +272,51 @@ def _known_drift(errors: TriadErrors, t: Array, steps: Array, mean: bool) -> Arr
             left *= np.divide(np.expm1(h), h, out=np.ones_like(h), where=h > 0.0)
         drift += np.outer(left, errors.axis("warm_up"))
     return np.asarray(drift, dtype=np.float64)
+
+
+# Single-pole low-pass for samples with variable spacing.
+
+
+def time_constant(bandwidth: float) -> float:
+    """Time constant in s of a single pole with its -3 dB point at `bandwidth` Hz."""
+    return 1.0 / (2.0 * math.pi * bandwidth)
+
+
+def low_pass(time: Array, values: Array, bandwidth: float) -> Array:
+    """Apply the low-pass, exactly for an input linear between samples.
+
+    `time` ((n,), s). `values` ((n, 3)). `bandwidth`: -3 dB frequency; with infinity the output
+    equals the input. Returns (n, 3): output at the stamps, settled at the first value before the
+    first stamp. With ``h = dt/τ`` and ``a = exp(-h)``, a step goes from y0 to
+    ``a y0 + ((1-a)/h - a) u0 + (1 - (1-a)/h) u1``, the solution of ``τ y' = u - y`` for u linear in
+    between.
+    """
+    if math.isinf(bandwidth):
+        return values
+    from strapdown._kernels.signals import first_order
+
+    h = np.diff(time) / time_constant(bandwidth)
+    a = np.exp(-h)
+    held = -np.expm1(-h) / h
+    drive = (held - a)[:, None] * values[:-1] + (1.0 - held)[:, None] * values[1:]
+    out = np.empty_like(values)
+    out[0] = values[0]
+    first_order(a, np.ascontiguousarray(drive), np.ascontiguousarray(values[0]), out[1:])
+    return out
+
+
+def mean_of_filtered(ends: Array, mean: Array, steps: Array, bandwidth: float) -> Array:
+    """Mean of the filter output over each step, from the mean of its input.
+
+    ``τ y' = u - y`` integrated over a step: ``mean(y) = mean(u) - τ (y1 - y0)/dt``.
+
+    `ends` ((n, 3)): output at the end of each step; before the first step the filter is settled at
+    its mean. `mean` ((n, 3)): mean of the input over each step. `steps` ((n,), s).
+    """
+    before = np.vstack([ends[:1], ends[:-1]])
+    return np.asarray(
+        mean - time_constant(bandwidth) * (ends - before) / steps[:, None], dtype=np.float64
+    )
 
 
 # Transfer curve of one sensor axis, scale factor and nonlinearity, and its inverse.

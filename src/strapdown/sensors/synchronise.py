@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
-from strapdown.sensors.low_pass import time_constant
+from strapdown.sensors.error_chain import time_constant
 from strapdown.sensors.triad_channels import TriadChannels, triad_channels
 from strapdown.sensors.triad_errors import finite
 from strapdown.sensors.uncertainty import FEELS

@@ -22,7 +22,7 @@ from strapdown.dsp.delay import Delay, EvenSignal, find_delay
 from strapdown.dsp.samples import even_step
 from strapdown.errors import DataError, Finding
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
-from strapdown.sensors.low_pass import time_constant
+from strapdown.sensors.error_chain import time_constant
 from strapdown.sensors.saturation import RangeLimits, find_limits
 from strapdown.sensors.triad_channels import OVER_RANGE, AxisGroup, TriadChannels
 from strapdown.sensors.triad_errors import check_sd

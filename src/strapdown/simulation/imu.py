@@ -10,8 +10,14 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError
-from strapdown.sensors.error_chain import Seed, apply, child, jitter
-from strapdown.sensors.low_pass import mean_of_filtered, time_constant
+from strapdown.sensors.error_chain import (
+    Seed,
+    apply,
+    child,
+    jitter,
+    mean_of_filtered,
+    time_constant,
+)
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation.motion import Motion
 from strapdown.tables import SAMPLINGS, attitude_table, imu_table

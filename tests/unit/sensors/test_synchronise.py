@@ -195,7 +195,7 @@ def test_correlation_finds_clocks_that_nothing_states():
 
 def test_correlation_takes_off_the_lag_of_a_part_s_own_low_pass():
     """A single pole of 100 Hz is 1.59 ms late."""
-    from strapdown.sensors.low_pass import low_pass
+    from strapdown.sensors.error_chain import low_pass
 
     unit = lab(shift=0.7, trigger=None)
     part = unit.accelerometers[0]

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from strapdown.sensors.low_pass import time_constant
+from strapdown.sensors.error_chain import time_constant
 from strapdown.simulation import (
     CrashMotion,
     ImuErrors,
