@@ -198,14 +198,8 @@ class CourseFixes:
 
     def only(self, rows: NDArray[np.bool_]) -> CourseFixes:
         """Select fixes."""
-        return CourseFixes(
-            self.time[rows],
-            self.velocity[rows],
-            self.sd[rows],
-            self.fast[rows],
-            self.row[rows],
-            self.source,
-        )
+        parts = (self.time, self.velocity, self.sd, self.fast, self.row)
+        return CourseFixes(*(part[rows] for part in parts), self.source)
 
 
 def course_fixes(

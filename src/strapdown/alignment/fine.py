@@ -137,10 +137,6 @@ class FineAlignment:
             A MotionIncrements table that covers the record, as a pre-filter makes it; formed of
             `imu`, if not given.
 
-        Returns
-        -------
-        FineResult
-
         Raises
         ------
         DataError

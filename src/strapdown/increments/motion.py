@@ -262,10 +262,6 @@ def motion_accuracy(
     samples, interpolation
         As `motion_increments`.
 
-    Returns
-    -------
-    MotionAccuracy
-
     Raises
     ------
     ConfigError

@@ -95,10 +95,6 @@ class Sensor:
         seed : int
             Identifies the unit. Bias, scale factor, misalignment, g-sensitivity and nonlinearity
             are drawn within the data-sheet limits, each axis from its own stream.
-
-        Returns
-        -------
-        ImuErrors
         """
         gyro = _unit(self.imu_errors.gyro, self.spreads.get("gyro", {}), seed, 0)
         accel = self.imu_errors.accel
@@ -114,10 +110,6 @@ def load_sensor(name: str | Path) -> Sensor:
     ----------
     name : str or Path
         One of `SENSORS`, or the path of a file that ends in ``.toml``.
-
-    Returns
-    -------
-    Sensor
 
     Raises
     ------

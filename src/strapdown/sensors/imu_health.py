@@ -791,10 +791,6 @@ def check_imu_channels(
         Probability that a sound channel fails one test over the whole record, for limits set by
         chance (`TESTS`).
 
-    Returns
-    -------
-    ImuHealth
-
     Raises
     ------
     DataError

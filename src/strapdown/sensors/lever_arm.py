@@ -100,10 +100,6 @@ def move_imu(
         Delay of the gyro relative to the accelerometer: the difference of the group delays of their
         filters, ``1 / (2 pi bandwidth)`` for a single pole.
 
-    Returns
-    -------
-    MovedImu
-
     Notes
     -----
     ``f_P = f_S + dω/dt × r + ω × (ω × r)``. The correction is linear in r: with the same window, S

@@ -324,10 +324,6 @@ class AxisVoting:
             For gyros the specific force, for their g-sensitivity; for accelerometers the rate, for
             units apart (`VotingRule.apart`); in body axes.
 
-        Returns
-        -------
-        VotingState, AxisVote
-
         Raises
         ------
         DataError
@@ -409,18 +405,9 @@ class AxisVoting:
 
     def _facts(self) -> Array:
         e = self.errors
-        return np.ascontiguousarray(
-            [
-                e.noise_density**2,
-                e.bias**2,
-                e.drift**2,
-                e.correlation_time,
-                e.scale**2,
-                e.misalignment**2,
-                e.g_sensitivity**2,
-                e.quantization**2 / 12.0,
-            ]
-        )
+        first = [e.noise_density**2, e.bias**2, e.drift**2, e.correlation_time]
+        by_input = [e.scale**2, e.misalignment**2, e.g_sensitivity**2]
+        return np.ascontiguousarray([*first, *by_input, e.quantization**2 / 12.0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -521,10 +508,6 @@ class UnitVoting:
         tables : mapping of str to DataFrame
             Imu tables by unit name, in the unit's own axes, with the same stamps; NaN values are
             ignored.
-
-        Returns
-        -------
-        UnitVotingState, VotedImu
 
         Raises
         ------
@@ -651,10 +634,6 @@ def vote_units(
     tables : mapping of str to DataFrame
         As in `UnitVoting.advance`; the rate is the mean rate of the first.
     rule : VotingRule, optional
-
-    Returns
-    -------
-    VotedImu
 
     Raises
     ------

@@ -191,7 +191,8 @@ def synchronise(
         if not cut:
             own = _stamps([*spans[u.unit.name], *(spans[borrowed] if borrowed else ())], rate)
         for channels, triad, columns in _parts(u):
-            late = clock.offset + _delay(triad)
+            # The low-pass before the sampler delays slow signals by its time constant.
+            late = clock.offset + time_constant(triad.uncertainty.bandwidth)
             at, said = onto_stamps(channels, triad, columns, late, own, rate, sampling, attenuation)
             triads.append(at)
             findings += said
@@ -246,12 +247,6 @@ def _parts(u: UnitChannels) -> list[tuple[TriadChannels, RecordedTriad, list[str
     return parts
 
 
-def _delay(triad: RecordedTriad) -> float:
-    """Delay of the low-pass before the sampler for slow signals, s."""
-    bandwidth = triad.uncertainty.bandwidth
-    return 0.0 if math.isinf(bandwidth) else time_constant(bandwidth)
-
-
 def _triads(u: UnitChannels) -> tuple[TriadChannels, ...]:
     return (*u.accelerometers, *(() if u.gyro is None else (u.gyro,)))
 
@@ -286,8 +281,9 @@ def _spans(
 ) -> list[tuple[str, float, float]]:
     """Interval each triad of a unit can supply: name, first and last common instant."""
     return [
-        (channels.source, *allowed_stamps(channels, clock.offset + _delay(triad), rate, sampling))
+        (channels.source, *allowed_stamps(channels, late, rate, sampling))
         for channels, triad, _ in _parts(u)
+        for late in (clock.offset + time_constant(triad.uncertainty.bandwidth),)
     ]
 
 
@@ -472,32 +468,16 @@ def check_options(
     twice = sorted({n for n in names if names.count(n) > 1})
     if twice:
         raise ConfigError("sensors.two-units-called", quantity="name", twice=twice[0])
-    if method not in METHODS:
-        raise ConfigError(
-            "sensors.no-way-synchronise",
-            quantity="method",
-            method=method,
-            word=str(method),
-            known=METHODS,
-        )
-    if sampling not in SAMPLINGS:
-        raise ConfigError(
-            "sensors.common-sampling-unknown",
-            quantity="sampling",
-            sampling=sampling,
-            word=str(sampling),
-            known=SAMPLINGS,
-        )
     if not (finite(rate) and rate > 0.0):
         raise ConfigError("sensors.common-rate-not-positive", quantity="rate", rate=rate)
-    if reference is not None and reference not in names:
-        raise ConfigError(
-            "sensors.reference-unit-not-among",
-            quantity="reference",
-            reference=reference,
-            word=reference,
-            known=names,
-        )
+    for quantity, given, known, code in (
+        ("method", method, METHODS, "sensors.no-way-synchronise"),
+        ("sampling", sampling, SAMPLINGS, "sensors.common-sampling-unknown"),
+        ("reference", reference, (None, *names), "sensors.reference-unit-not-among"),
+    ):
+        if given not in known:
+            data = {quantity: given, "word": str(given), "known": [k for k in known if k]}
+            raise ConfigError(code, quantity=quantity, data=data)
 
 
 def check_rate(rate: float, steps: Sequence[float]) -> None:

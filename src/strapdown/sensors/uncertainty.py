@@ -262,10 +262,6 @@ class ImuUncertainty:
         sensor : Sensor
             With gyros and accelerometers.
 
-        Returns
-        -------
-        ImuUncertainty
-
         Raises
         ------
         ConfigError
@@ -355,7 +351,7 @@ def stated_imu(
     drifts: dict[str, BiasDrift] = {}
     for triad, stated in (("gyro", gyro), ("accel", accel)):
         slow = {
-            k: v for k, v in stated.items() if k in KEYS[triad] and _quantity(triad, k) in DRIFT
+            k: v for k, v in stated.items() if k in KEYS[triad] and KEYS[triad][k].quantity in DRIFT
         }
         fixed = {k: v for k, v in stated.items() if k not in slow}
         try:
@@ -371,19 +367,15 @@ def stated_imu(
     return ImuUncertainty(triads["gyro"], triads["accel"], drifts["gyro"], drifts["accel"])
 
 
-def _quantity(triad: str, key: str) -> str:
-    return KEYS[triad][key].quantity
-
-
 def _stated_drift(triad: str, stated: Mapping[str, Stated], base: BiasDrift | None) -> BiasDrift:
     drift = base or BiasDrift()
     sd, time = drift.sd, drift.correlation_time
     for name, given in stated.items():
-        factor = KEYS[triad][name].factor
-        if _quantity(triad, name) == "bias_instability":
-            sd = _scaled(given, factor, f"{triad}, {name}")
+        key = KEYS[triad][name]
+        if key.quantity == "bias_instability":
+            sd = _scaled(given, key.factor, f"{triad}, {name}")
         elif isinstance(given, int | float):
-            time = float(given) * factor
+            time = float(given) * key.factor
         else:
             raise ConfigError("sensors.time-belongs-all-axes", quantity=f"{triad}, {name}")
     return BiasDrift(sd, time if time > 0.0 else math.inf)

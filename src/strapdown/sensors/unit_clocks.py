@@ -138,8 +138,7 @@ def _lag(u: UnitChannels, what: str) -> float:
     """Delay of the part's own low-pass for slow signals: the time constant of its single pole."""
     triad = u.unit.gyro if what == RATES else u.unit.accelerometers[-1]
     assert triad is not None
-    bandwidth = triad.uncertainty.bandwidth
-    return time_constant(bandwidth) if 0.0 < bandwidth < math.inf else 0.0
+    return time_constant(triad.uncertainty.bandwidth)
 
 
 def _delay(reference: UnitChannels, u: UnitChannels) -> tuple[Delay, str]:
