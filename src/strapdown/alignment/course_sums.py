@@ -287,7 +287,7 @@ def rest_rates(
 
     A gyro cannot distinguish a stationary vehicle from one on a straight road; the fixes can.
 
-    Returns empty if no fix lies in a rest.
+    Empty if no fix lies in a rest.
     """
     speed = np.hypot(fixes.velocity[:, 0], fixes.velocity[:, 1])
     slow = speed <= np.maximum(CLEAR * fixes.sd[:, :2].max(axis=1), CREEP)

@@ -400,7 +400,7 @@ def turn_findings(
 ) -> tuple[Finding, ...]:
     """Report a rotation about the vertical; parameters as of `heading_rate`.
 
-    Returns one, if the rate is more than five standard deviations from zero. It does no harm to an
+    One finding, if the rate is more than five standard deviations from zero. It does no harm to an
     inertial-frame alignment of a body that turned; it does if the body was stationary.
     """
     rate, sd = heading_rate(sums, C_nb, site, sensors)

@@ -51,7 +51,7 @@ class Levelling(CoarseAlignment):
         Raises
         ------
         DataError
-            As `rest_level.level_at_rest`.
+            As `level_at_rest`.
         """
         found = level_at_rest(self.name, imu, site, sensors, 0.0, UNKNOWN_HEADING)
         unknown = Finding(
@@ -112,7 +112,7 @@ class KnownHeading(CoarseAlignment):
         Raises
         ------
         DataError
-            As `rest_level.level_at_rest`.
+            As `level_at_rest`.
         """
         found = level_at_rest(
             self.name, imu, site, sensors, self.heading_deg, math.radians(self.sd_deg)
@@ -138,12 +138,12 @@ def level_at_rest(
 ) -> Alignment:
     """Level a stationary record.
 
-    `method`: to be named in the result. `heading_deg` (deg). `heading_sd` (rad). Returns at the
-    last sample. Scatter of the force beyond noise, and the angles by which the body swings, are
-    included in the covariance, with a finding. DataError: as `record_checks.check_record` and
+    `method`: to be named in the result. `heading_deg` (deg). `heading_sd` (rad). The result holds
+    at the last sample. Scatter of the force beyond noise, and the angles by which the body swings,
+    are included in the covariance, with a finding. DataError: as `record_checks.check_record` and
     `check_gravity`; the body points to the zenith or the nadir.
 
-    `levelling.level` takes gravity as vertical; above the ellipsoid its north component is
+    `rotation.level` takes gravity as vertical; above the ellipsoid its north component is
     ``8e-9 alt sin(2 lat)`` m/s², a microradian of tilt at 1200 m, which is neglected.
     """
     source = source_of(imu)

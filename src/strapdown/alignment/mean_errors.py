@@ -97,8 +97,8 @@ class BlockMeans:
 def block_means(imu: pd.DataFrame, blocks: int) -> BlockMeans:
     """Average an Imu table as a whole and by parts.
 
-    `blocks`: parts of equal time; those without a sample are left out. Returns each sample is
-    weighted by its time interval.
+    `blocks`: parts of equal time; those without a sample are left out. Each sample is weighted by
+    its time interval.
     """
     time = imu.index.to_numpy(dtype=np.float64)
     values = imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64)

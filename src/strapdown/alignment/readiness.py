@@ -394,7 +394,7 @@ def carried_attitude(alignment: Alignment, imu: pd.DataFrame, site: Site) -> pd.
     """Propagate an attitude over its own record.
 
     `alignment`: at an instant of the record; its gyro bias, if any, is subtracted. `imu`: Imu table
-    of a body that stays at its position. Returns attitude table:
+    of a body that stays at its position. The result is an Attitude table:
     ``q_nb(t) = q_n(t)n(T) q_nb(T) q_b(T)b(t)``, the body's rotation in inertial space by the gyros
     and that of the level by the Earth's rate. One sample of a mean rate has no step before it and
     takes the start of the first whole interval. DataError: the instant of the alignment is not in

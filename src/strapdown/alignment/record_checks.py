@@ -27,8 +27,8 @@ ROUNDING = 1e-12
 def check_record(imu: pd.DataFrame) -> tuple[Finding, ...]:
     """Check an Imu table before alignment.
 
-    Returns outliers, gaps. DataError: as `tables.check_imu`; accelerometers are missing, there are
-    fewer than 20 samples, or a channel does not change at all while others do.
+    Reports outliers and gaps. DataError: as `tables.check_imu`; accelerometers are missing, there
+    are fewer than 20 samples, or a channel does not change at all while others do.
     """
     check_imu(imu)
     source = source_of(imu)
@@ -52,7 +52,7 @@ def check_record(imu: pd.DataFrame) -> tuple[Finding, ...]:
 def check_gravity(force: Array, source: str | None) -> tuple[Finding, ...]:
     """Check that a mean specific force is that of gravity.
 
-    `force` ((3,), m/s²). `source`: of the record, for messages. Returns if the body is upside down.
+    `force` ((3,), m/s²). `source`: of the record, for messages. Reports a body that is upside down.
     DataError: its length is not within 20 % of 9.8 m/s².
     """
     size = float(np.sqrt(force @ force))
@@ -76,7 +76,7 @@ def check_gravity(force: Array, source: str | None) -> tuple[Finding, ...]:
 def gravity_findings(change: float, sd: float, source: str | None) -> tuple[Finding, ...]:
     """Compare the magnitude of a mean specific force with the gravity of the site.
 
-    `change`: measured minus the site's, relative. `sd`: its standard deviation. Returns one, if it
+    `change`: measured minus the site's, relative. `sd`: its standard deviation. One finding, if it
     is more than five standard deviations.
     """
     if not abs(change) > CONTRADICTION * sd:
@@ -144,7 +144,7 @@ FACTOR = 10.0
 def outlier_findings(values: Array, columns: list[str], source: str | None) -> tuple[Finding, ...]:
     """Find jumps beyond noise and rocking.
 
-    `values` ((n, k)). `columns`: their names. Returns at most one, of the channel that jumps most,
+    `values` ((n, k)). `columns`: their names. At most one finding, of the channel that jumps most,
     with the row of its largest jump. A channel whose usual step is zero (a coarse converter) is not
     judged.
     """
@@ -183,7 +183,7 @@ def still_by_gnss(
     """Refuse a steady motion, which inertial sensors cannot distinguish from rest.
 
     `gnss`: Gnss table; no check if not given. `heading_sd` (rad): stated standard deviation; an
-    error that is small against it is accepted. Returns one, if the vehicle moves and the heading
+    error that is small against it is accepted. One finding, if the vehicle moves and the heading
     uncertainty covers the error. DataError: the vehicle moves, and the error of the heading found
     as if stationary exceeds its standard deviation: the level of a vehicle that goes north rotates
     like one on an Earth that rotates faster about east, by ``v_N/(R w cos(lat))``.
@@ -236,9 +236,9 @@ def north_findings(
 ) -> tuple[Finding, ...]:
     """Report the standard deviation of north.
 
-    `sd` (rad): of the heading. `source`: of the record, for messages. Returns where the latitude is
-    high. DataError: the standard deviation exceeds 1 rad, or the position is so close to a pole
-    that it is not finite.
+    `sd` (rad): of the heading. `source`: of the record, for messages. Reports a high latitude.
+    DataError: the standard deviation exceeds 1 rad, or the position is so close to a pole that it
+    is not finite.
     """
     rate = site.earth_rate
     size, across = float(np.sqrt(rate @ rate)), float(abs(rate[0]))
@@ -286,8 +286,8 @@ def latitude_findings(
 ) -> tuple[Finding, ...]:
     """Compare the latitude measured by the sensors with the site's.
 
-    `measured_deg`, `sd_deg` (deg): from the angle between gravity and the Earth's rate. Returns
-    one, if they differ by more than five standard deviations.
+    `measured_deg`, `sd_deg` (deg): from the angle between gravity and the Earth's rate. One
+    finding, if they differ by more than five standard deviations.
     """
     off = measured_deg - site.lat_deg
     if not abs(off) > CONTRADICTION * sd_deg:

@@ -46,7 +46,7 @@ class Resampled:
 class LowPassDesign:
     """A windowed sinc low-pass, symmetric about each output stamp.
 
-    `passband`, `stopband`: up to `passband` the gain is 1, and from `stopband` on 0, both to
+    `passband`, `stopband` (Hz): up to `passband` the gain is 1, and from `stopband` on 0, both to
     `ripple`. `attenuation` (dB): attenuation of the stopband. `reach` (s): half the length of the
     kernel. `beta`: shape parameter of the Kaiser window.
     """
@@ -83,13 +83,12 @@ def low_pass_design(
 ) -> LowPassDesign:
     """Design the anti-aliasing low-pass for a lower rate.
 
-    `step` (s): sampling interval. `rate`: output rate. The stopband begins at its Nyquist
+    `step` (s): sampling interval. `rate` (Hz): output rate. The stopband begins at its Nyquist
     frequency. `passband`: end of the passband, as a fraction of that Nyquist frequency. The
     kernel's length grows as ``1/(1 - passband)``: at 0.5 and 80 dB it reaches 10.9 output steps to
-    either side. `attenuation` (dB): 40 to 150. Returns by Kaiser (1974): Oppenheim & Schafer,
-    Discrete-Time Signal Processing, 3rd edition, Eqs. (7.75) and (7.76), with five decibels in
-    reserve. ConfigError: an option is out of its range, or the output is not slower than the
-    samples.
+    either side. `attenuation` (dB): 40 to 150. By Kaiser (1974): Oppenheim & Schafer, Discrete-Time
+    Signal Processing, 3rd edition, Eqs. (7.75) and (7.76), with five decibels in reserve.
+    ConfigError: an option is out of its range, or the output is not slower than the samples.
     """
     step = positive_step(step)
     if not (math.isfinite(rate) and 0.0 < rate <= (1.0 + 1e-9) / step):
@@ -125,9 +124,9 @@ def decimate(
     `values` ((n,) or (n, k)). `start`, `step` (s): stamp of the first sample, and the sampling
     interval. `stamps` ((m,), s): anywhere in the record, at any ratio of rates; they need not be
     even. `design`: from `low_pass_design`. `marked` ((n, k)): samples to trace: `Resampled.touched`
-    marks the outputs that they contribute to. Returns each output is a weighted sum of samples,
-    with the kernel centered at its stamp (zero delay) and weights that sum to 1. Within `reach` of
-    the ends the record is padded by its point mirror, which preserves constants and straight lines.
+    marks the outputs that they contribute to. Each output is a weighted sum of samples, with the
+    kernel centered at its stamp (zero delay) and weights that sum to 1. Within `reach` of the ends
+    the record is padded by its point mirror, which preserves constants and straight lines.
     DataError: a sample or stamp is not finite, a stamp lies outside the record, or the record is
     shorter than the reach of the kernel.
     """
@@ -174,8 +173,8 @@ def mean_samples(
     interval. `stamps` ((m,), s). `length` (s): length of the intervals; at least one step of the
     samples. `sampling` ({'instantaneous', 'mean'}): whether a sample is the value at its stamp,
     linear in between (trapezoids), or the mean over the step that ends there. `marked` ((n, k)): as
-    in `decimate`. Returns integrals over consecutive intervals add up to the integral of the whole,
-    to rounding. The gain at f is ``sinc(f length)``, times ``sinc²(f step)`` for the trapezoids: a
+    in `decimate`. Integrals over consecutive intervals add up to the integral of the whole, to
+    rounding. The gain at f is ``sinc(f length)``, times ``sinc²(f step)`` for the trapezoids: a
     mean is only a weak low-pass. It belongs to the middle of the interval. ConfigError: `sampling`
     is unknown, or the intervals are shorter than a step. DataError: a sample or stamp is not
     finite, or an interval does not lie in the record.
@@ -376,7 +375,7 @@ def interpolate(
     """Interpolate samples to stamps.
 
     `time` ((n,), s): increasing, any spacing. `values` ((n,) or (n, k)). `stamps` ((m,), s): within
-    the record. `marked` ((n, k)): as in `decimation.decimate`. Returns the polynomial of degree 5
+    the record. `marked` ((n, k)): as in `decimate`. Returns the polynomial of degree 5
     through the six nearest samples, one-sided near the ends: exact for polynomials up to that
     degree, and at the samples. Midway between even samples the gain at f is
     ``150/128 cos x - 25/128 cos 3x + 3/128 cos 5x`` with ``x = π f step``: 0.9990 at an eighth of
@@ -446,8 +445,8 @@ def interpolated_means(
     """Average `interpolate` over intervals that end at stamps (three-point Gauss quadrature).
 
     `time`, `values`, `stamps`, `marked`: as in `interpolate`; the intervals lie within the record.
-    `length` (s): length of the intervals, at most two steps of the samples. Returns exact for
-    polynomials up to degree 5.
+    `length` (s): length of the intervals, at most two steps of the samples. Exact for polynomials
+    up to degree 5.
     """
     t, channels = as_channels(time, "time")[:, 0], as_channels(values)
     at = as_channels(stamps, "stamps")[:, 0]

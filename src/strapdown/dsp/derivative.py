@@ -51,7 +51,7 @@ def slope_response(weights: Array, offset: Array, frequency: Array) -> NDArray[n
     """Compute the response of slope weights relative to the true derivative of a sine.
 
     `weights` ((w,), 1/s). `offset` ((w,), s): stamp of each sample minus the stamp of the slope.
-    `frequency` ((k,)): above zero. Returns (k,).
+    `frequency` ((k,), Hz): above zero. Returns (k,).
     """
     omega = 2.0 * np.pi * frequency
     return np.asarray(np.exp(1j * np.outer(omega, offset)) @ weights / (1j * omega))
@@ -62,7 +62,7 @@ def bandwidth(
 ) -> float:
     """Find the frequency up to which the magnitude of a response is within a loss of 1.
 
-    `response`: response at frequencies (k,), Hz. `highest`: nyquist frequency of the samples.
+    `response`: response at frequencies (k,), Hz. `highest` (Hz): Nyquist frequency of the samples.
     `parts`: number of steps of the search grid.
     """
     grid = np.linspace(0.0, highest, parts)[1:]
@@ -92,10 +92,10 @@ class LocalSlope:
     """Weights that give values and slopes of a signal from its samples.
 
     `first` ((n,)): first sample of each row's window. `slope`, `value` ((n, w)): weights of the
-    samples of the window: of the slope, in 1/s, and of the value. `bandwidth`: frequency at which
-    the slope in the middle of a record has fallen to 1/√2 of the true one (for a delayed signal:
-    deviates by as much). The delay is zero there: the window is symmetric. `window` (s): from the
-    first to the last sample of a window.
+    samples of the window: of the slope, in 1/s, and of the value. `bandwidth` (Hz): frequency at
+    which the slope in the middle of a record has fallen to 1/√2 of the true one (for a delayed
+    signal: deviates by as much). The delay is zero there: the window is symmetric. `window` (s):
+    from the first to the last sample of a window.
     """
 
     first: NDArray[np.int64]
@@ -139,10 +139,10 @@ def local_slope(time: Array, *, window: float | None = None, delay: float = 0.0)
     `time` ((n,), s): increasing stamps, any spacing. `window` (s): length of a window; seven
     samples if not given, at least three. The degree is four with seven samples or more, and two
     otherwise. `delay` (s): delay of the signal: value and slope are taken this much after each
-    stamp. Returns with equal steps, the Savitzky-Golay filter. White noise of standard deviation s
-    becomes ``s sqrt(sum(slope²))``. Without delay the values are the samples themselves. DataError:
-    fewer than three samples. ConfigError: the window is not positive, or the delay is longer than
-    half the window.
+    stamp. With equal steps, the Savitzky-Golay filter. White noise of standard deviation s becomes
+    ``s sqrt(sum(slope²))``. Without delay the values are the samples themselves. DataError: fewer
+    than three samples. ConfigError: the window is not positive, or the delay is longer than half
+    the window.
 
     Errors of the slope, for steps h: a parabola through five samples, ``17/30 h²`` times the third
     derivative; degree four through seven samples, ``-131/630 h⁴`` times the fifth. For a pulse of

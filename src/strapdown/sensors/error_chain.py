@@ -285,7 +285,7 @@ def time_constant(bandwidth: float) -> float:
 def low_pass(time: Array, values: Array, bandwidth: float) -> Array:
     """Apply the low-pass, exactly for an input linear between samples.
 
-    `time` ((n,), s). `values` ((n, 3)). `bandwidth`: -3 dB frequency; with infinity the output
+    `time` ((n,), s). `values` ((n, 3)). `bandwidth` (Hz): -3 dB frequency; with infinity the output
     equals the input. Returns (n, 3): output at the stamps, settled at the first value before the
     first stamp. With ``h = dt/τ`` and ``a = exp(-h)``, a step goes from y0 to
     ``a y0 + ((1-a)/h - a) u0 + (1 - (1-a)/h) u1``, the solution of ``τ y' = u - y`` for u linear in
@@ -311,7 +311,8 @@ def mean_of_filtered(ends: Array, mean: Array, steps: Array, bandwidth: float) -
     ``τ y' = u - y`` integrated over a step: ``mean(y) = mean(u) - τ (y1 - y0)/dt``.
 
     `ends` ((n, 3)): output at the end of each step; before the first step the filter is settled at
-    its mean. `mean` ((n, 3)): mean of the input over each step. `steps` ((n,), s).
+    its mean. `mean` ((n, 3)): mean of the input over each step. `steps` ((n,), s). `bandwidth`
+    (Hz).
     """
     before = np.vstack([ends[:1], ends[:-1]])
     return np.asarray(

@@ -28,7 +28,7 @@ class MovedImu:
     `imu`: Imu table; the rates are those given. `lever_arm` ((3,), m): from the original to the new
     point, body axes. `angular_acceleration` ((n, 3), rad/s²). `added` ((n, 3, 3), (m/s²)²):
     covariance that gyro noise adds to each sample. Neighboring samples are correlated: `slope` has
-    the weights. `bandwidth`: bandwidth of the angular acceleration; for faster rotation the
+    the weights. `bandwidth` (Hz): bandwidth of the angular acceleration; for faster rotation the
     correction is too small. `slope`: differentiation filter used.
     """
 
@@ -142,7 +142,7 @@ def move_unit(
     """Move a prepared unit from its position to a point of the vehicle.
 
     `point` ((3,), m): in vehicle axes from the vehicle's origin. `window`, `gyro_delay`: as
-    `move_imu`. Returns in vehicle axes.
+    `move_imu`. The result is in vehicle axes.
     """
     noise = prepared.gyro_noise_covariance
     place = triple(point, "point", "sensors.point-not-three-numbers")

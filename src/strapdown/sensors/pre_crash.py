@@ -63,10 +63,10 @@ def find_pre_crash_rest(
     used. `moving_at_impact`: a vehicle that moves at the impact was not stationary just before: a
     quiet stretch up to the impact is then coasting, grade ``steady``. False for a vehicle struck
     while stationary. `accel_noise`, `gyro_noise` (m/s² and rad/s): stated standard deviation of a
-    sample of an axis: a lower limit of the noise. Returns of grade ``still``: the longest that
-    ended within a minute before the impact, else the latest. Otherwise ``steady``: no rotation and
-    constant specific force for at least 40 ms. An inertial sensor cannot distinguish constant
-    velocity from rest, nor constant acceleration from a tilt. None if the record has neither.
+    sample of an axis: a lower limit of the noise. Of grade ``still``: the longest that ended within
+    a minute before the impact, else the latest. Otherwise ``steady``: no rotation and constant
+    specific force for at least 40 ms. An inertial sensor cannot distinguish constant velocity from
+    rest, nor constant acceleration from a tilt. None if the record has neither.
 
     The gyro selects the candidates (`sensors.rest.find_rests`). Because a gyro does not sense a car
     driving off, each candidate is divided where the mean specific force changes by more than 50
@@ -188,10 +188,9 @@ def gyro_bias_from(
 
     `rest`: in the axes of the gyro. `stated` (rad/s): prior standard deviation of the bias.
     `steady_rate` (rad/s): standard deviation of the vehicle's rate over a ``steady`` stretch: 0.6
-    deg/s is a bend of 1.5 km radius at 15 m/s. Returns without a stretch, zero with the stated sd.
-    At rest, the mean and its sd; the Earth's rate, up to 7.3e-5 rad/s, is part of the bias and is
-    included in the sd. Over a steady stretch the mean and the stated bias are weighted by their
-    variances.
+    deg/s is a bend of 1.5 km radius at 15 m/s. Without a stretch, zero with the stated sd. At rest,
+    the mean and its sd; the Earth's rate, up to 7.3e-5 rad/s, is part of the bias and is included
+    in the sd. Over a steady stretch the mean and the stated bias are weighted by their variances.
     """
     if rest is None:
         return BiasEstimate((0.0, 0.0, 0.0), stated)

@@ -64,13 +64,13 @@ def merge_ranges(
     `time` ((n,), s). `values` ((n, 3), u): as recorded, in order of increasing range, all at the
     same stamps in the same axes. `limits`: from `saturation.find_limits`. `noise` ((n, 3), u):
     standard deviation of each sample. `bias` ((3,), u): subtracted from each range after the
-    saturation test, so that the ranges join without a step. `bandwidth`: bandwidth of the low-pass
-    before each sampler. `margin`: fraction of full scale from its end at which a range is left.
-    `hysteresis`: fraction of full scale by which a range must be further inside before it is used
-    again, so that noise about the threshold does not cause repeated switching. `fade` (s): length
-    of the cross-fade, on the side where both ranges are clear; zero for none. DataError: a value is
-    not finite, time does not increase, or shapes disagree. ConfigError: margins are not within [0,
-    1), or the fade is negative.
+    saturation test, so that the ranges join without a step. `bandwidth` (Hz): bandwidth of the
+    low-pass before each sampler. `margin`: fraction of full scale from its end at which a range is
+    left. `hysteresis`: fraction of full scale by which a range must be further inside before it is
+    used again, so that noise about the threshold does not cause repeated switching. `fade` (s):
+    length of the cross-fade, on the side where both ranges are clear; zero for none. DataError: a
+    value is not finite, time does not increase, or shapes disagree. ConfigError: margins are not
+    within [0, 1), or the fade is negative.
 
     Each axis is treated separately. The higher range is also used for the sample before an
     excursion, and afterwards for one sample and for five time constants ``1 / (2 pi bandwidth)``,
@@ -259,8 +259,8 @@ def agreement_findings(
 ) -> list[Finding]:
     """Find ranges with swapped or inverted axes, or that are never both unsaturated.
 
-    `noise` ((n, 3), m/s²). Returns empty if the motion is insufficient: gravity alone is, because
-    the bias of the higher range may be as large.
+    `noise` ((n, 3), m/s²). Empty if the motion is insufficient: gravity alone is, because the bias
+    of the higher range may be as large.
     """
     found: list[Finding] = []
     for j in range(1, len(limits)):

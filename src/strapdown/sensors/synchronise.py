@@ -483,7 +483,8 @@ def check_options(
 def check_rate(rate: float, steps: Sequence[float]) -> None:
     """Raise if the common rate far exceeds that of every record.
 
-    `steps` (s): of the records. ConfigError: the rate is more than ten times that of the fastest.
+    `rate` (Hz). `steps` (s): of the records. ConfigError: the rate is more than ten times that of
+    the fastest.
     """
     fastest = 1.0 / min(steps)
     if rate > MOST_FASTER * fastest:
@@ -501,7 +502,7 @@ def compare_sizes(
 ) -> list[Finding]:
     """Compare measurements of one rigid body to detect wrong units of measurement.
 
-    Returns for specific forces that differ by a factor of about 9.8. DataError: rates differ by a
+    Findings for specific forces that differ by a factor of about 9.8. DataError: rates differ by a
     factor of about 57, though equal everywhere on the body.
     """
     turning = [(gyro.source, _spread(gyro)) for gyro, _ in units if gyro is not None]

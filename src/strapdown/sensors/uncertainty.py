@@ -164,11 +164,11 @@ def uncertainty_of(sensor: Sensor, triad: str, **overrides: TriadLike) -> TriadU
     """Convert a catalogue sensor to the uncertainty of one of its units.
 
     `triad` ({'gyro', 'accel'}). `**overrides`: attributes of `TriadUncertainty`, in its units, that
-    replace the data sheet's, for example from a calibration. Returns a standard deviation of the
-    data sheet is used unchanged; a bound is divided by √3 (uniform distribution). The bound of a
-    nonlinearity is assigned entirely to its second order: the third has zero mean, and a data sheet
-    does not separate them. Drifts within a record (bias instability, random walk, trend) are not
-    included. ConfigError: the sensor lacks that triad, or an override is not one of the attributes.
+    replace the data sheet's, for example from a calibration. A standard deviation of the data sheet
+    is used unchanged; a bound is divided by √3 (uniform distribution). The bound of a nonlinearity
+    is assigned entirely to its second order: the third has zero mean, and a data sheet does not
+    separate them. Drifts within a record (bias instability, random walk, trend) are not included.
+    ConfigError: the sensor lacks that triad, or an override is not one of the attributes.
     """
     if triad not in TRIADS or not any(f.key.startswith(f"{triad}.") for f in sensor.sources):
         raise ConfigError(
@@ -408,12 +408,12 @@ def draw_errors(uncertainty: TriadUncertainty, seed: Seed, *streams: int) -> Tri
     """Draw the errors of one unit.
 
     `seed` (int or SeedSequence): identifies the unit. `*streams`: path below the seed, where one
-    seed serves several triads. Returns all draws are normal and independent. Each quantity and axis
-    has its own stream, so setting one spread to zero does not change the other draws. The second
-    order of the curve is limited to 0.49 of the slope, so that the inverse is unique; this takes
-    effect only for standard deviations of tenths of full scale. Noise, range, quantization and
-    low-pass are those of the uncertainty. ConfigError: the draw is not a valid sensor: a scale
-    factor of -1 or less, or angles that sum to 1 rad.
+    seed serves several triads. All draws are normal and independent. Each quantity and axis has its
+    own stream, so setting one spread to zero does not change the other draws. The second order of
+    the curve is limited to 0.49 of the slope, so that the inverse is unique; this takes effect only
+    for standard deviations of tenths of full scale. Noise, range, quantization and low-pass are
+    those of the uncertainty. ConfigError: the draw is not a valid sensor: a scale factor of -1 or
+    less, or angles that sum to 1 rad.
     """
 
     def draws(name: str, key: int) -> Array:
@@ -449,11 +449,11 @@ def draw_errors(uncertainty: TriadUncertainty, seed: Seed, *streams: int) -> Tri
 def crash_priors(rate: float = 200.0) -> dict[str, TriadUncertainty]:
     """Return the error model of a merged consumer-grade crash recorder.
 
-    `rate`: sample rate for which the specific force noise per sample is stated. Returns ``accel``:
-    bias 0.2 m/s² (Tadic and Vukajlovic 2016, section 3: the low-g parts' own), scale factor 2 %,
-    noise 0.4 m/s² per sample. ``gyro``: bias 0.3 deg/s. All are standard deviations of every axis.
-    All other errors are zero, and the range is unlimited. Scale, noise and gyro bias are chosen;
-    the paper gives no values. ConfigError: the rate is not positive.
+    `rate` (Hz): sample rate for which the specific force noise per sample is stated. Returns
+    ``accel``: bias 0.2 m/s² (Tadic and Vukajlovic 2016, section 3: the low-g parts' own), scale
+    factor 2 %, noise 0.4 m/s² per sample. ``gyro``: bias 0.3 deg/s. All are standard deviations of
+    every axis. All other errors are zero, and the range is unlimited. Scale, noise and gyro bias
+    are chosen; the paper gives no values. ConfigError: the rate is not positive.
     """
     if not (math.isfinite(rate) and rate > 0.0):
         raise ConfigError("sensors.rate-not-positive", quantity="rate", rate=rate)

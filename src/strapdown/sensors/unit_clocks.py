@@ -226,8 +226,8 @@ def allowed_stamps(
 ) -> tuple[float, float]:
     """First and last common stamp that a triad can supply.
 
-    `offset` (s): unit's stamp minus common time. `sampling` ({'instantaneous', 'mean'}): of the
-    output.
+    `offset` (s): unit's stamp minus common time. `rate` (Hz). `sampling` ({'instantaneous',
+    'mean'}): of the output.
     """
     lows, highs = [], []
     for g in channels.groups:
@@ -260,9 +260,10 @@ def onto_stamps(
     """Resample a triad to common stamps.
 
     `triad`: triad that `channels` belong to. `offset` (s): unit's stamp minus common time. `stamps`
-    ((n,), s): on the common clock, within `allowed_stamps`. `sampling` ({'instantaneous', 'mean'}).
-    `attenuation` (dB): attenuation of aliased signals, for instantaneous output. DataError: faster
-    samples are not evenly spaced, or the record is shorter than the low-pass.
+    ((n,), s): on the common clock, within `allowed_stamps`. `rate` (Hz). `sampling`
+    ({'instantaneous', 'mean'}). `attenuation` (dB): attenuation of aliased signals, for
+    instantaneous output. DataError: faster samples are not evenly spaced, or the record is shorter
+    than the low-pass.
     """
     n = len(stamps)
     values, factor, noise = (np.empty((n, 3)) for _ in range(3))
@@ -305,7 +306,7 @@ def onto_stamps(
 def at_rows(triad: TriadAtStamps, stamps: Array, rate: float) -> TriadAtStamps:
     """The same triad at some of its stamps.
 
-    `stamps` ((m,), s): consecutive, among those of the triad. `rate`: of both.
+    `stamps` ((m,), s): consecutive, among those of the triad. `rate` (Hz): of both.
     """
     table = triad.triad.table
     first = round((stamps[0] - float(table.index[0])) * rate)

@@ -28,10 +28,10 @@ PART = 0.1
 def with_filled_axes(unit: CrashUnit) -> CrashUnit:
     """Fill missing axes with zeros where an assumption is given for them.
 
-    Returns its triads list those axes in `absent`, with zero stated errors. The gravity component
-    is added where the attitude at rest is known (`prepare_unit`). A unit without missing axes, or
-    without `assumed`, is returned unchanged. DataError: its ranges miss different axes, or an
-    accelerometer has no axis.
+    Its triads list those axes in `absent`, with zero stated errors. The gravity component is added
+    where the attitude at rest is known (`prepare_unit`). A unit without missing axes, or without
+    `assumed`, is returned unchanged. DataError: its ranges miss different axes, or an accelerometer
+    has no axis.
     """
     if unit.assumed is None:
         return unit
