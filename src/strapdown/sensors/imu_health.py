@@ -653,61 +653,14 @@ LOWEST, HIGHEST = -500.0, 9000.0  # m
 ANOMALY = 0.005  # m/s²
 
 
-@dataclass(frozen=True)
-class HealthTest:
-    """One test of the channels of a log.
-
-    `limit`: reference with which a channel is compared. `false_alarm`: source of its false-alarm
-    rate. `takes_out`: whether later tests exclude the samples that it found.
-    """
-
-    title: str
-    limit: str
-    false_alarm: str
-    find: Callable[[HealthLog], list[ChannelFault]]
-    takes_out: bool
-
-
-#: In this order, because noise and level are defined only for valid samples.
-TESTS: dict[str, HealthTest] = {
-    "missing": HealthTest(
-        "no number", "any NaN", "none: it is seen, not concluded", find_missing, True
-    ),
-    "stuck": HealthTest(
-        "repeats a reading, or is dead",
-        "length of a run, from its share of repetitions and the tail of its runs",
-        "P where repetitions are independent, or their runs have an exponential tail",
-        find_stuck,
-        True,
-    ),
-    "saturated": HealthTest(
-        "at the end of its range",
-        "stated full scale; or a flat top that jumps leave",
-        "none at the stated end; a flat top as `saturation.find_limits`",
-        find_saturated,
-        True,
-    ),
-    "noisy": HealthTest(
-        "noisier than it may be, or with outliers",
-        "3 times the data sheet, its triad at rest, or its own past; three blocks of 1 s",
-        "below P for sound sensors that differ by less than 3",
-        find_noisy,
-        True,
-    ),
-    "jump": HealthTest(
-        "its zero steps while nothing moves",
-        "tail of the record's own changes of the mean, quantile of its noise, stated drift",
-        "P where changes at rest have an exponential tail; less where they are normal",
-        find_jumps,
-        True,
-    ),
-    "implausible": HealthTest(
-        "at rest neither gravity nor the Earth's rate",
-        "quantile of the stated bias, scale factor, misalignment",
-        "P by construction, where the data sheet holds",
-        find_implausible,
-        False,
-    ),
+#: Tests by kind, in this order, because noise and level are defined only for valid samples.
+TESTS: dict[str, Callable[[HealthLog], list[ChannelFault]]] = {
+    "missing": find_missing,
+    "stuck": find_stuck,
+    "saturated": find_saturated,
+    "noisy": find_noisy,
+    "jump": find_jumps,
+    "implausible": find_implausible,
 }
 
 
@@ -820,10 +773,11 @@ def check_imu_channels(
         raise ConfigError("sensors.no-gravity", quantity="gravity", gravity=gravity)
     log = health_log(imu, sensors, (least, most), false_alarm)
     faults: list[ChannelFault] = []
-    for test in TESTS.values():
-        found = test.find(log)
+    for kind, find in TESTS.items():
+        found = find(log)
         faults += found
-        if found and test.takes_out:
+        # Later tests exclude the samples; an implausible mean excludes none.
+        if found and kind != "implausible":
             wrong = log.wrong.copy()
             for fault in found:
                 wrong[log.names.index(fault.channel), fault.first : fault.last + 1] = True
