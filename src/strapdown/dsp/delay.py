@@ -57,7 +57,7 @@ class Delay:
     standard deviation, from the residuals, their correlation in time, and the slopes.
     `correlation`: correlation coefficient at the delay. `runner_up`, `runner_up_delay` (s): the
     next best peak; 0 and NaN where there is only one. `ambiguous`: whether the next best peak fits
-    about as well. `gain`: second record divided by the first. `shared` (s): length of the overlap.
+    about as well. `gain`: second record divided by the first.
     """
 
     delay: float
@@ -67,7 +67,6 @@ class Delay:
     runner_up_delay: float
     ambiguous: bool
     gain: float
-    shared: float
 
 
 def find_delay(
@@ -217,7 +216,7 @@ def _least_squares(
     shape = CubicSpline(one.time, one.values)
     slope = CubicSpline(two.time, two.values)(two.time, 1)
     at, limit = delay, (1.5 + 3.0 * width) * one.step
-    nothing = Delay(delay, math.inf, coarse, 0.0, math.nan, False, 1.0, 0.0)
+    nothing = Delay(delay, math.inf, coarse, 0.0, math.nan, False, 1.0)
     for _ in range(STEPS):
         inside = (two.time - at >= one.time[0]) & (two.time - at <= one.time[-1])
         if inside.sum() < LEAST_SAMPLES:
@@ -244,7 +243,7 @@ def _least_squares(
     felt = gaussian_filter1d(gain * dx, width, axis=0, truncate=TRUNCATE, mode="constant")
     white = float(((felt**2).sum(axis=0) * noise).sum())
     sd = math.sqrt(max(_variance(gain * dx, residual, width), white)) / energy
-    found = Delay(at, sd, max(common, coarse), 0.0, math.nan, False, gain, len(t) * two.step)
+    found = Delay(at, sd, max(common, coarse), 0.0, math.nan, False, gain)
     return found, noise
 
 
