@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -198,8 +198,8 @@ class CourseFixes:
 
     def only(self, rows: NDArray[np.bool_]) -> CourseFixes:
         """Select fixes."""
-        parts = (self.time, self.velocity, self.sd, self.fast, self.row)
-        return CourseFixes(*(part[rows] for part in parts), self.source)
+        names = ("time", "velocity", "sd", "fast", "row")
+        return replace(self, **{name: getattr(self, name)[rows] for name in names})
 
 
 def course_fixes(
