@@ -121,21 +121,10 @@ class GnssCourse(CoarseAlignment):
         gnss: pd.DataFrame | None = None,
         antenna: Antenna = Antenna(),  # noqa: B008
     ) -> Alignment:
-        """As `CoarseAlignment.align`, with velocity and biases.
+        """As `CoarseAlignment.align`, with velocity and biases; `antenna`: where and when it measures.
 
-        Parameters
-        ----------
-        imu, site, sensors, gnss
-            As there.
-        antenna : Antenna
-            Where and when the receiver measures.
-
-        Raises
-        ------
-        DataError
-            The Gnss table is missing or has fewer than two fixes with a velocity within the
-            record, the vehicle is too slow, or the uncertainty of the accelerometers is too large
-            for a level.
+        DataError: the Gnss table is missing or has fewer than two fixes with a velocity within the
+        record, the vehicle is too slow, or the accelerometers are too uncertain for a level.
         """
         findings = check_record(imu)
         slowest, widest = self.least_speed, math.radians(self.largest_sd_deg)

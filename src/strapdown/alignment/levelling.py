@@ -46,13 +46,7 @@ class Levelling(CoarseAlignment):
         sensors: ImuUncertainty,
         gnss: pd.DataFrame | None = None,
     ) -> Alignment:
-        """As `CoarseAlignment.align`; heading 0 is a placeholder.
-
-        Raises
-        ------
-        DataError
-            As `level_at_rest`.
-        """
+        """As `CoarseAlignment.align`; heading 0 is a placeholder."""
         found = level_at_rest(self.name, imu, site, sensors, 0.0, UNKNOWN_HEADING)
         unknown = Finding(
             "alignment.heading-not-known",
@@ -107,13 +101,7 @@ class KnownHeading(CoarseAlignment):
         sensors: ImuUncertainty,
         gnss: pd.DataFrame | None = None,
     ) -> Alignment:
-        """As `CoarseAlignment.align`.
-
-        Raises
-        ------
-        DataError
-            As `level_at_rest`.
-        """
+        """As `CoarseAlignment.align`."""
         found = level_at_rest(
             self.name, imu, site, sensors, self.heading_deg, math.radians(self.sd_deg)
         )

@@ -75,12 +75,8 @@ class TwoVector(CoarseAlignment):
     ) -> Alignment:
         """As `CoarseAlignment.align`.
 
-        Raises
-        ------
-        DataError
-            The record has no accelerometer, a dead channel, a value that is not finite or too
-            few samples; its force is not gravity, or its rate not the Earth's; or the standard
-            deviation of the heading exceeds 1 rad.
+        DataError: the record is unusable, its force is not gravity, its rate is not the Earth's, or the
+        standard deviation of the heading exceeds 1 rad.
         """
         findings = [*check_record(imu)]
         source = source_of(imu)
