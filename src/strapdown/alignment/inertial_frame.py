@@ -80,8 +80,8 @@ class InertialFrame(CoarseAlignment):
     ) -> Alignment:
         """As `CoarseAlignment.align`; at the first sample with ``at="start"``.
 
-        DataError: the record is unusable, its force is not gravity, the body traveled, or the standard
-        deviation of the heading exceeds 1 rad.
+        DataError: the record is unusable, its force is not gravity, the body traveled, or the
+        standard deviation of the heading exceeds 1 rad.
         """
         source = source_of(imu)
         findings = [*check_record(imu)]

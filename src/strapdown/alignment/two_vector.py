@@ -75,8 +75,8 @@ class TwoVector(CoarseAlignment):
     ) -> Alignment:
         """As `CoarseAlignment.align`.
 
-        DataError: the record is unusable, its force is not gravity, its rate is not the Earth's, or the
-        standard deviation of the heading exceeds 1 rad.
+        DataError: the record is unusable, its force is not gravity, its rate is not the Earth's, or
+        the standard deviation of the heading exceeds 1 rad.
         """
         findings = [*check_record(imu)]
         source = source_of(imu)
