@@ -121,7 +121,7 @@ class GnssCourse(CoarseAlignment):
         gnss: pd.DataFrame | None = None,
         antenna: Antenna = Antenna(),  # noqa: B008
     ) -> Alignment:
-        """As `CoarseAlignment.align`, with velocity and biases; `antenna`: where the receiver measures.
+        """As `CoarseAlignment.align`, with velocity, biases, and the receiver's `antenna`.
 
         DataError: the Gnss table is missing or has fewer than two fixes with a velocity within the
         record, the vehicle is too slow, or the accelerometers are too uncertain for a level.
