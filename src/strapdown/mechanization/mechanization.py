@@ -50,7 +50,8 @@ class Mechanization(ABC):
     each of the three poles of that loop, 1 to 1000, however often references come.
     `latitude_limit_deg` (deg): North is not used beyond it: a run stops. A wander azimuth has no
     such limit. `largest_speed` (m/s): above it the state is taken to have diverged. `height_limits`
-    (m): outside these limits a run stops, too. ConfigError: an option is unknown or outside its range.
+    (m): outside these limits a run stops, too. ConfigError: an option is unknown or outside its
+    range.
     """
 
     ellipsoid: str = "wgs84"
