@@ -269,7 +269,7 @@ class _Body:
 
 # C types of the names in the specialized kernels, and function prototypes.
 
-# Up to this number results are returned through pointers, more of them in one array.
+# Up to this number results are returned through pointers, otherwise in one array.
 POINTERS = 4
 
 
