@@ -280,7 +280,7 @@ class TestAnswers:
         (kind,) = found.main.types
         assert kind.name == "front"
         assert kind.roll is None
-        assert "rolled over cannot be told" in kind.reason
+        assert "rolled over cannot be determined" in kind.reason
 
     def test_an_impact_along_an_assumed_axis_is_no_event(self):
         # All of it to the side, where the unit has no accelerometer.
