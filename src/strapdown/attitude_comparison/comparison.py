@@ -484,7 +484,7 @@ def _gyro_bias(
             f"{longest.end - longest.start:.4g} s of rest in {other.name}",
         )
     elif choice == "none":
-        return imu, {"rad_per_s": None, "from": "not removed: nothing was asked for"}, ()
+        return imu, {"rad_per_s": None, "from": "not removed, not requested"}, ()
     elif choice in ("rest", "rests"):
         if not rests:
             raise DataError(

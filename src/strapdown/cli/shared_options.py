@@ -81,7 +81,7 @@ class LogFlags:
         float | None,
         typer.Option(
             metavar="HZ",
-            help="Samples a second of a log without a time column.",
+            help="Sample rate in Hz, for logs without a time column.",
             rich_help_panel=LOG_PANEL,
         ),
     ] = None
@@ -193,7 +193,7 @@ def folder_to_make(name: str) -> Any:
 
 Force = Annotated[
     bool,
-    typer.Option("--force", help="Replace a result that is there.", rich_help_panel=OUT_PANEL),
+    typer.Option("--force", help="Overwrite an existing result.", rich_help_panel=OUT_PANEL),
 ]
 
 

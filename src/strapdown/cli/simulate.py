@@ -32,7 +32,7 @@ def simulate(
         float | None,
         typer.Option(
             metavar="HZ",
-            help="Samples a second (100; of a crash each recorder's own).",
+            help="Sample rate in Hz (100; for a crash that of each recorder).",
             rich_help_panel=RUN_PANEL,
         ),
     ] = None,

@@ -225,7 +225,7 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
         )
         for key, value in stated.items():
             page.key(key, toml_value(value) or "")
-        told.append(f"{triad}s shake far beyond the data sheet: {key} {list(value)}")
+        told.append(f"vibration of the {triad}s far exceeds the data sheet: {key} {list(value)}")
     for block, stated in made.table.get("states", {}).items():
         page.table(
             f"[states.{block}]",
@@ -356,14 +356,14 @@ def _aids(page: Page, made: Proposal, folder: Path, foot: bool) -> list[str]:
         began = made.table["log"].get("from_s")
         if began is not None and began > index_of(made.imu)[0]:
             return [f"it moves where it begins; its first stance, at {began:.6g} s, is the start"]
-        return [f"it stands for the first {made.rest:.3g} s"]
+        return [f"stationary for the first {made.rest:.3g} s"]
     if made.gnss is None:
         return []
     time, own = index_of(made.gnss), index_of(made.imu)
     within = int(((time >= own[0]) & (time <= own[-1])).sum())
     told = [f"{made.gnss.attrs['source']}: {within} of {len(time)} fixes within the log"]
     if made.rest >= 1.0:
-        told.append(f"it stands for the first {made.rest:.4g} s, by the fixes")
+        told.append(f"stationary for the first {made.rest:.4g} s, by the fixes")
     return told
 
 
@@ -571,7 +571,7 @@ def on_foot(made: Proposal) -> Proposal:
     }
     where = "The heading is counted from where the unit then points: north of the answer is there"
     how = (
-        f"it stands for the first {rest:.3g} s: levelled by half of that. {where}, unless you "
+        f"stationary for the first {rest:.3g} s: leveled over half of that. {where}, unless you "
         "state another"
     )
     findings = made.findings
