@@ -352,7 +352,7 @@ def low_passed(
         h = (steps / tau)[:, None]
         a = np.exp(-h)
         held = -np.expm1(-h) / h
-        # As `sensors.low_pass.low_pass` does between samples.
+        # As `error_chain.low_pass` does between samples.
         drive[:] = (held - a) * values[:-1] + (1.0 - held) * values[1:]
     else:
         out[:1] = quantity(instants[:1])
