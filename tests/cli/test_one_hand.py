@@ -16,8 +16,8 @@ from strapdown.cli.shared_options import LOG_PANEL, OUT_PANEL, LogFlags
 
 ROOT = get_command(app)
 COMMANDS = {
-    **{name: one for name, one in ROOT.commands.items() if not hasattr(one, "commands")},
-    **{f"init {name}": one for name, one in ROOT.commands["init"].commands.items()},
+    **{name: ROOT.get_command(None, name) for name in ROOT.list_commands(None) if name != "init"},
+    **{f"init {n}": one for n, one in ROOT.get_command(None, "init").commands.items()},
 }
 READS_A_LOG = ("attitude", "align", "navigate", "init align", "init navigate")
 TABULAR = {"attitude", "align", "navigate", "coast", "crash", "simulate", "verify", "modules"}

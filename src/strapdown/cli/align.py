@@ -2,20 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from strapdown.cli.shared_options import (
-    RUN_PANEL,
-    WITH_PANEL,
+    LOG_FLAGS,
+    Height,
     LogFlags,
+    Longitude,
     OutFlags,
+    Sensor,
+    as_flag,
     folder_to_make,
+    log_keys,
+    module_of_flag,
+    refuse_beside_file,
+    running,
     spread,
+    with_what,
 )
+from strapdown.errors import ConfigError
+
+if TYPE_CHECKING:
+    from strapdown.config.alignment import AlignmentSpec
+    from strapdown.progress import Progress
+    from strapdown.systems.alignment_run import AlignmentResult
 
 EPILOG = (
     "Example: strapdown align log.csv --lat 55.75 --lon 37.62 --alt 150 --sensor fog-1000\n\n"
@@ -28,64 +43,47 @@ MOST = 6  # findings on the terminal
 class AlignFlags:
     """Position, sensor and method of an alignment."""
 
-    lat: Annotated[
-        float | None,
-        typer.Option(metavar="DEG", help="Latitude, north positive.", rich_help_panel=WITH_PANEL),
-    ] = None
-    lon: Annotated[
-        float | None,
-        typer.Option(metavar="DEG", help="Longitude, east positive.", rich_help_panel=WITH_PANEL),
-    ] = None
-    alt: Annotated[
-        float | None,
-        typer.Option(
-            metavar="M", help="Height over the ellipsoid (0).", rich_help_panel=WITH_PANEL
-        ),
-    ] = None
-    sensor: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME|FILE",
-            help="How good the sensors are: a sensor of the catalogue (strapdown modules), or a "
-            ".toml file of your own.",
-            rich_help_panel=WITH_PANEL,
-        ),
-    ] = None
+    lat: Annotated[float | None, with_what("DEG", "Latitude, north positive.")] = None
+    lon: Longitude = None
+    alt: Height = None
+    sensor: Sensor = None
     method: Annotated[
         str,
-        typer.Option(
-            metavar="NAME",
-            help="Coarse alignment, with options after a colon: inertial_frame (the body may "
+        running(
+            "NAME",
+            "Coarse alignment, with options after a colon: inertial_frame (the body may "
             "rock), two_vector, levelling, known_heading:heading_deg=90,sd_deg=1, gnss_course "
             "(inertial_frame).",
             show_default=False,
-            rich_help_panel=RUN_PANEL,
         ),
     ] = "inertial_frame"
-    coarse_only: Annotated[
-        bool,
-        typer.Option(
-            "--coarse-only", help="No fine alignment after it.", rich_help_panel=RUN_PANEL
-        ),
-    ] = False
+    coarse_only: Annotated[bool, running(None, "No fine alignment after it.", "--coarse-only")] = (
+        False
+    )
     gnss: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FIXES",
-            help="Fixes of a satellite receiver, for --method gnss_course.",
-            rich_help_panel=RUN_PANEL,
-        ),
+        Path | None, running("FIXES", "Fixes of a satellite receiver, for --method gnss_course.")
     ] = None
     prefilter: Annotated[
         str,
-        typer.Option(
-            metavar="NAME",
-            help="Pre-filter of the samples, with options after a colon: "
-            "robust_fir:rate_hz=100 (none).",
+        running(
+            "NAME",
+            "Pre-filter of the samples, with options after a colon: robust_fir:rate_hz=100 (none).",
             show_default=False,
-            rich_help_panel=RUN_PANEL,
         ),
     ] = "none"
+
+
+#: Flags by key path of the specification.
+FLAGS = {
+    "site, lat_deg": "--lat",
+    "site, lon_deg": "--lon",
+    "site, alt_m": "--alt",
+    "sensors, sensor": "--sensor",
+    "gnss, path": "--gnss",
+    "coarse, kind": "--method",
+    "prefilter, kind": "--prefilter",
+    **LOG_FLAGS,
+}
 
 
 @spread
@@ -111,11 +109,13 @@ def align(
     time.
     """
     from strapdown.api.alignment import run_specified
-    from strapdown.bundle.seal import check_destination, write_timing
-    from strapdown.cli.align_options import refuse_beside_file, spec_of_flags
-    from strapdown.cli.align_tables import print_alignment
-    from strapdown.cli.console import WORDS, Stopwatch, print_findings, print_seal, progress
-    from strapdown.cli.result_folder import default_folder, refuse_result, source_name
+    from strapdown.cli.console import WORDS, print_findings, print_seal
+    from strapdown.cli.result_folder import (
+        default_folder,
+        refuse_result,
+        run_and_save,
+        source_name,
+    )
     from strapdown.config.alignment import AlignmentSpec
 
     given: dict[str, Any] = {
@@ -128,23 +128,92 @@ def align(
     refuse_result(source, "log")
     own = source.suffix.lower() == ".toml"
     if own:
-        refuse_beside_file(source, given)
+        refuse_beside_file(source, given, FLAGS)
         WORDS.set("file")
     asked = AlignmentSpec.read(source) if own else None
-    folder = out or default_folder(source, "align", None if asked is None else source_name(asked))
-    check_destination(folder, write.force)
-    with progress(write.quiet or write.json) as show:
-        report = Stopwatch(show)
+
+    def compute(report: Progress) -> AlignmentResult:
         spec = spec_of_flags(source, given) if asked is None else asked
-        result = run_specified(spec, source if own else None, report)
-        seal = result.save(folder, force=write.force, progress=report)
-        report.stop()
-        write_timing(seal, report.seconds)
-    if write.json:
-        typer.echo((seal.path / "align.json").read_text(encoding="utf-8"), nl=False)
-        return
-    if write.quiet:
-        return
-    print_alignment(result)
-    print_findings(result.findings, MOST)
-    print_seal(seal, "report.html")
+        return run_specified(spec, source if own else None, report)
+
+    folder = out or default_folder(source, "align", None if asked is None else source_name(asked))
+    done = run_and_save(compute, folder, write, "align.json")
+    if done is not None:
+        result, seal = done
+        print_alignment(result)
+        print_findings(result.findings, MOST)
+        print_seal(seal, "report.html")
+
+
+def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
+    """Return the specification by the flags; the position may come from the log.
+
+    Raises
+    ------
+    ConfigError
+        A value is invalid or missing; the message names the flag.
+    DataError
+        The log cannot be read.
+    """
+    from strapdown.api.alignment import specify_alignment
+    from strapdown.api.reading import ImuFile
+    from strapdown.config.alignment import LogTable
+    from strapdown.config.spec import specify
+
+    site = {"lat_deg": given["lat"], "lon_deg": given["lon"], "alt_m": given["alt"]}
+    keys = log_keys(given)
+    try:
+        table = specify(LogTable, path=str(log), **keys)
+        return specify_alignment(
+            ImuFile(table, given["axes"]),
+            site={key: float(value) for key, value in site.items() if value is not None},
+            sensor=given["sensor"],
+            coarse=module_of_flag(given["method"] or "inertial_frame"),
+            fine=not given["coarse_only"],
+            gnss=None if given["gnss"] is None else str(given["gnss"]),
+            prefilter=module_of_flag(given["prefilter"] or "none"),
+            called=lambda argument: f"--{argument}",
+        )
+    except ConfigError as error:
+        raise as_flag(error, _flag) from None
+
+
+def _flag(place: str) -> str:
+    if flag := FLAGS.get(place) or FLAGS.get(f"log, {place}"):
+        return flag
+    # A path that names a flag already is kept.
+    said = [part for part in place.split(", ") if part.startswith("--")]
+    if said:
+        return said[-1]
+    stage, _, rest = place.partition(", ")
+    flag = FLAGS.get(f"{stage}, kind")
+    return place if flag is None else f"{flag}, {rest}" if rest else flag
+
+
+def print_alignment(result: AlignmentResult) -> None:
+    """Print the result of an alignment, and its limits."""
+    from strapdown.cli.console import console, print_block
+    from strapdown.report import alignment_document as tables
+    from strapdown.report.alignment_trust import trust
+    from strapdown.report.values import spaced
+
+    out = console()
+    site = result.site
+    out.print(
+        f"{result.source.name}: {result.source.what}, "
+        f"{float(result.imu.index[-1] - result.imu.index[0]):.6g} s at {site.lat_deg:.5f}°, "
+        f"{site.lon_deg:.5f}°"
+    )
+    for block in (
+        tables.answer_table(result),
+        tables.readiness_table(result),
+        tables.bias_table(result),
+    ):
+        if block is not None:
+            print_block(block)
+    out.print(spaced(tables.headline(result)), style="bold")
+    found = trust(result)
+    style = {"trusted": "green", "reserve": "yellow", "distrusted": "bold red"}[found.verdict]
+    out.print(spaced(found.sentence), style=style)
+    for head, text in tables.limits(result):
+        out.print(spaced(f"  - {head}: {text}"))

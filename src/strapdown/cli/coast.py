@@ -2,31 +2,63 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from strapdown.cli.shared_options import (
-    RUN_PANEL,
+    BEGIN,
+    END,
+    LENGTH,
     OutFlags,
+    as_flag,
     folder_to_make,
-    part_from,
-    part_long,
-    part_to,
+    module_of_flag,
+    options,
+    running,
     spread,
 )
+from strapdown.errors import ConfigError
+
+if TYPE_CHECKING:
+    from strapdown.config.coast import CoastSpec
+    from strapdown.progress import Progress
+    from strapdown.systems.outage_run import CoastResult
 
 EPILOG = (
     "Example: strapdown coast adis16470 --outage 60 --speed 15 --with no_slip\n\n"
     "Example: strapdown coast drive-navigate --outage 30 (a folder of strapdown navigate)"
 )
-_WHAT, _START, _WHERE = (
-    "Motion, for a sensor",
-    "Initial standard deviations, for a sensor",
-    "Instants, for a navigation run",
-)
+moving = options("Motion, for a sensor")
+starting = options("Initial standard deviations, for a sensor")
+during = options("Instants, for a navigation run")
+
+#: Flags by key path of the specification.
+FLAGS = {
+    "outage_s": "--outage",
+    "places": "--places",
+    "at_s": "--at",
+    "from_s": "--from",
+    "to_s": "--to",
+    "duration_s": "--duration",
+    "sensor": "SENSOR|BUNDLE",
+    "motion, speed_m_per_s": "--speed",
+    "motion, to_speed_m_per_s": "--to-speed",
+    "motion, turn_rate_deg_per_s": "--turn-rate",
+    "motion, heading_deg": "--heading",
+    "motion, lat_deg": "--lat",
+    "start, aided_s": "--aided",
+    "start, fix_position_sd_m": "--fix-sd",
+    "start, position_sd_m": "--position-sd",
+    "start, velocity_sd_m_per_s": "--velocity-sd",
+    "start, tilt_sd_deg": "--tilt-sd",
+    "start, heading_sd_deg": "--heading-sd",
+    "start, gyro_bias_sd_deg_per_h": "--gyro-bias-sd",
+    "start, accel_bias_sd_ug": "--accel-bias-sd",
+}
 
 
 @dataclass(frozen=True)
@@ -34,34 +66,16 @@ class MotionFlags:
     """Motion of a sensor, by key of its table."""
 
     speed_m_per_s: Annotated[
-        float | None,
-        typer.Option(
-            "--speed", metavar="M/S", help="It goes so fast (0: it stands).", rich_help_panel=_WHAT
-        ),
+        float | None, moving("M/S", "It goes so fast (0: it stands).", "--speed")
     ] = None
     to_speed_m_per_s: Annotated[
-        float | None,
-        typer.Option(
-            "--to-speed",
-            metavar="M/S",
-            help="To which it comes over the outage.",
-            rich_help_panel=_WHAT,
-        ),
+        float | None, moving("M/S", "To which it comes over the outage.", "--to-speed")
     ] = None
     turn_rate_deg_per_s: Annotated[
-        float | None,
-        typer.Option(
-            "--turn-rate", metavar="DEG/S", help="It turns, to the right.", rich_help_panel=_WHAT
-        ),
+        float | None, moving("DEG/S", "It turns, to the right.", "--turn-rate")
     ] = None
-    heading_deg: Annotated[
-        float | None,
-        typer.Option("--heading", metavar="DEG", help="Where it goes (45).", rich_help_panel=_WHAT),
-    ] = None
-    lat_deg: Annotated[
-        float | None,
-        typer.Option("--lat", metavar="DEG", help="Latitude (45).", rich_help_panel=_WHAT),
-    ] = None
+    heading_deg: Annotated[float | None, moving("DEG", "Where it goes (45).", "--heading")] = None
+    lat_deg: Annotated[float | None, moving("DEG", "Latitude (45).", "--lat")] = None
 
 
 @dataclass(frozen=True)
@@ -70,60 +84,32 @@ class StartFlags:
 
     aided_s: Annotated[
         float | None,
-        typer.Option(
+        starting(
+            "S",
+            "So long a drive with fixes before it (600); 0: what an alignment leaves.",
             "--aided",
-            metavar="S",
-            help="So long a drive with fixes before it (600); 0: what an alignment leaves.",
-            rich_help_panel=_START,
         ),
     ] = None
     fix_position_sd_m: Annotated[
-        float | None,
-        typer.Option(
-            "--fix-sd",
-            metavar="M",
-            help="Of these fixes, one a second (1.5).",
-            rich_help_panel=_START,
-        ),
+        float | None, starting("M", "Of these fixes, one a second (1.5).", "--fix-sd")
     ] = None
     position_sd_m: Annotated[
         float | None,
-        typer.Option(
-            "--position-sd",
-            metavar="M",
-            help="In place of what that leaves, each axis; so the following.",
-            rich_help_panel=_START,
+        starting(
+            "M", "In place of what that leaves, each axis; so the following.", "--position-sd"
         ),
     ] = None
-    velocity_sd_m_per_s: Annotated[
-        float | None,
-        typer.Option("--velocity-sd", metavar="M/S", help="Each axis.", rich_help_panel=_START),
-    ] = None
-    tilt_sd_deg: Annotated[
-        float | None,
-        typer.Option("--tilt-sd", metavar="DEG", help="Roll and pitch.", rich_help_panel=_START),
-    ] = None
-    heading_sd_deg: Annotated[
-        float | None,
-        typer.Option("--heading-sd", metavar="DEG", help="Heading.", rich_help_panel=_START),
-    ] = None
+    velocity_sd_m_per_s: Annotated[float | None, starting("M/S", "Each axis.", "--velocity-sd")] = (
+        None
+    )
+    tilt_sd_deg: Annotated[float | None, starting("DEG", "Roll and pitch.", "--tilt-sd")] = None
+    heading_sd_deg: Annotated[float | None, starting("DEG", "Heading.", "--heading-sd")] = None
     gyro_bias_sd_deg_per_h: Annotated[
-        float | None,
-        typer.Option(
-            "--gyro-bias-sd",
-            metavar="DEG/H",
-            help="Gyro biases after alignment or aiding.",
-            rich_help_panel=_START,
-        ),
+        float | None, starting("DEG/H", "Gyro biases after alignment or aiding.", "--gyro-bias-sd")
     ] = None
     accel_bias_sd_ug: Annotated[
         float | None,
-        typer.Option(
-            "--accel-bias-sd",
-            metavar="UG",
-            help="Accelerometer biases after alignment or aiding, µg.",
-            rich_help_panel=_START,
-        ),
+        starting("UG", "Accelerometer biases after alignment or aiding, µg.", "--accel-bias-sd"),
     ] = None
 
 
@@ -133,20 +119,16 @@ class OutageFlags:
 
     at_s: Annotated[
         float | None,
-        typer.Option(
-            "--at",
-            metavar="S",
-            help="The outage begins at this stamp of the log; even places, if not given.",
-            rich_help_panel=_WHERE,
+        during(
+            "S", "The outage begins at this stamp of the log; even places, if not given.", "--at"
         ),
     ] = None
-    places: Annotated[
-        int | None,
-        typer.Option(metavar="N", help="So many outages, evenly (10).", rich_help_panel=_WHERE),
+    places: Annotated[int | None, during("N", "So many outages, evenly (10).")] = None
+    from_s: Annotated[
+        float | None, during("S", BEGIN.format("where the filter has settled"), "--from")
     ] = None
-    from_s: Annotated[float | None, part_from("where the filter has settled", _WHERE)] = None
-    to_s: Annotated[float | None, part_to(_WHERE)] = None
-    duration_s: Annotated[float | None, part_long(_WHERE)] = None
+    to_s: Annotated[float | None, during("S", END, "--to")] = None
+    duration_s: Annotated[float | None, during("S", LENGTH, "--duration")] = None
 
 
 @spread
@@ -162,23 +144,16 @@ def coast(
     ],
     *,
     outage: Annotated[
-        float,
-        typer.Option(
-            metavar="S",
-            help="How long nothing aids it (60).",
-            show_default=False,
-            rich_help_panel=RUN_PANEL,
-        ),
+        float, running("S", "How long nothing aids it (60).", show_default=False)
     ] = 60.0,
     motion: MotionFlags,
     keep: Annotated[
         list[str] | None,
-        typer.Option(
-            "--with",
-            metavar="AID",
-            help="An aid that stays, with options after a colon: no_slip, odometer, "
+        moving(
+            "AID",
+            "An aid that stays, with options after a colon: no_slip, odometer, "
             "zero_velocity, zero_rate:sd_deg_per_s=0.1; again for another.",
-            rich_help_panel=_WHAT,
+            "--with",
         ),
     ] = None,
     start: StartFlags,
@@ -192,41 +167,109 @@ def coast(
     uses the filter's own state, and compares the prediction with the measured drifts.
     """
     from strapdown.api.alignment import run_outage
-    from strapdown.bundle.seal import check_destination, write_timing
-    from strapdown.cli.coast_options import coast_of_flags
-    from strapdown.cli.coast_tables import print_coast
-    from strapdown.cli.console import WORDS, Stopwatch, print_findings, print_seal, progress
-    from strapdown.cli.result_folder import default_folder, source_name
+    from strapdown.cli.console import WORDS, print_findings, print_seal
+    from strapdown.cli.result_folder import default_folder, run_and_save, source_name
     from strapdown.report.coast import read_coasting_run
     from strapdown.systems.inputs import check_part
 
     check_part(run.from_s, run.to_s, run.duration_s)
     navigation, file = read_coasting_run(source)
     named = None if navigation is None or file is None else source_name(navigation)
-    folder = out or default_folder(source, "coast", named)
-    check_destination(folder, write.force)
-    with progress(write.quiet or write.json) as show:
-        report = Stopwatch(show)
+    tables = {"motion": asdict(motion), "start": asdict(start)}
+
+    def compute(report: Progress) -> CoastResult:
         spec = coast_of_flags(
-            source,
-            outage,
-            navigation is not None,
-            motion=asdict(motion),
-            start=asdict(start),
-            keep=keep or [],
-            run=asdict(run),
+            source, outage, navigation is not None, tables, keep or [], asdict(run)
         )
         if navigation is not None:
             WORDS.set("file")
-        result = run_outage(spec, navigation, file, report)
-        seal = result.save(folder, force=write.force, progress=report)
-        report.stop()
-        write_timing(seal, report.seconds)
-    if write.json:
-        typer.echo((seal.path / "coast.json").read_text(encoding="utf-8"), nl=False)
-        return
-    if write.quiet:
-        return
-    print_coast(result)
-    print_findings(result.findings)
-    print_seal(seal, "report.html")
+        return run_outage(spec, navigation, file, report)
+
+    folder = out or default_folder(source, "coast", named)
+    done = run_and_save(compute, folder, write, "coast.json")
+    if done is not None:
+        result, seal = done
+        print_coast(result)
+        print_findings(result.findings)
+        print_seal(seal, "report.html")
+
+
+def coast_of_flags(
+    source: str,
+    outage: float,
+    of_run: bool,
+    tables: Mapping[str, Mapping[str, Any]],
+    keep: Sequence[str],
+    run: Mapping[str, Any],
+) -> CoastSpec:
+    """Return the specification by the flags.
+
+    `of_run`: whether `source` is a navigation run, which states motion and start itself. `tables`,
+    `run`: by key, None where not given. `keep`: remaining measurements, as given. ConfigError: a
+    value is invalid, or belongs to the other kind of source; the message names the flag.
+    """
+    from strapdown.config.coast import CoastSpec
+    from strapdown.config.spec import specify
+
+    stated = {
+        name: {key: value for key, value in table.items() if value is not None}
+        for name, table in tables.items()
+    }
+    places = {key: value for key, value in run.items() if value is not None}
+    # Flags of the other kind of source.
+    if of_run:
+        others = [FLAGS[f"{name}, {key}"] for name, table in stated.items() for key in table]
+        others += ["--with"] if keep else []
+    else:
+        others = [FLAGS[key] for key in places]
+    if others and of_run:
+        raise ConfigError("cli.motion-option-of-run", file=Path(source).name, quantity=others[0])
+    if others:
+        raise ConfigError("cli.record-option-of-sensor", quantity=others[0])
+    parts = [key for key in ("from_s", "to_s", "duration_s") if key in places]
+    if "at_s" in places and parts:
+        raise ConfigError("cli.part-beside-at", quantity=FLAGS[parts[0]])
+    aiding: dict[str, Any] = {}
+    for text in keep:
+        module = module_of_flag(text)
+        kind = module.pop("kind")
+        if kind in aiding:
+            raise ConfigError("cli.aid-repeated", quantity="--with", kind=kind)
+        aiding[kind] = module
+    sensor = str(Path(source).absolute()) if source.lower().endswith(".toml") else source
+    table = {
+        "outage_s": outage,
+        "sensor": None if of_run else sensor,
+        **stated,
+        "aiding": aiding,
+        **run,
+    }
+    try:
+        return specify(CoastSpec, **table)
+    except ConfigError as error:
+        raise as_flag(error, _flag) from None
+
+
+def _flag(place: str) -> str:
+    return FLAGS.get(place, "--with" if place.startswith("aiding") else place)
+
+
+def print_coast(result: CoastResult) -> None:
+    """Print the predicted drift, its sources, and the measured drifts."""
+    from strapdown.cli.console import console, print_block
+    from strapdown.report import coast_words as words
+    from strapdown.report.coast_document import budget_table, drift_table, time_table
+    from strapdown.report.values import spaced
+
+    out = console()
+    out.print(spaced(f"{result.name}: {result.what}; {words.motion_words(result)}"))
+    out.print(spaced(f"At the start: {words.start_words(result)}"))
+    if result.stays:
+        out.print(f"Aids that stay: {', '.join(result.stays)}")
+    for block in (time_table(result), budget_table(result), drift_table(result)):
+        if block is not None:
+            print_block(block)
+    out.print(spaced(words.headline(result)), style="bold")
+    out.print(spaced(words.remedy(result)), style="yellow")
+    if words.inside_words(result):
+        out.print(spaced(words.inside_words(result)))

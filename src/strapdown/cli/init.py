@@ -12,14 +12,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from strapdown.cli.shared_options import (
-    OUT_PANEL,
-    RUN_PANEL,
-    WITH_PANEL,
+    SENSOR,
     LogFlags,
     Quiet,
     Verbose,
     log_keys,
+    running,
     spread,
+    with_what,
+    writing,
 )
 from strapdown.errors import ConfigError
 
@@ -45,17 +46,10 @@ app = typer.Typer(
 
 
 def _file_to_write(name: str) -> Any:
-    return typer.Option(
-        metavar="FILE",
-        help=f"File to write ({name}).",
-        rich_help_panel=OUT_PANEL,
-        show_default=False,
-    )
+    return writing("FILE", f"File to write ({name}).", show_default=False)
 
 
-Force = Annotated[
-    bool, typer.Option("--force", help="Replace a file that is there.", rich_help_panel=OUT_PANEL)
-]
+Force = Annotated[bool, writing(None, "Replace a file that is there.", "--force")]
 
 
 @app.callback(epilog=EPILOG)
@@ -163,28 +157,13 @@ def navigate(
             metavar="LOG", help="A log of gyros and accelerometers.", show_default=False
         ),
     ],
-    gnss: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FIXES", help="Fixes of a satellite receiver.", rich_help_panel=WITH_PANEL
-        ),
-    ] = None,
+    gnss: Annotated[Path | None, with_what("FIXES", "Fixes of a satellite receiver.")] = None,
     sensor: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAME|FILE",
-            help="How good the sensors are: a sensor of the catalogue (strapdown modules), or a "
-            ".toml file of your own; the nearest by noise, if not given.",
-            rich_help_panel=WITH_PANEL,
-        ),
+        with_what("NAME|FILE", f"{SENSOR[:-1]}; the nearest by noise, if not given."),
     ] = None,
     foot: Annotated[
-        bool,
-        typer.Option(
-            "--foot",
-            help="It is of a unit on a shoe: zero velocity at its stances.",
-            rich_help_panel=RUN_PANEL,
-        ),
+        bool, running(None, "It is of a unit on a shoe: zero velocity at its stances.", "--foot")
     ] = False,
     *,
     flags: LogFlags,

@@ -11,23 +11,13 @@ import os
 import signal
 import sys
 import threading
+from importlib import import_module
 from typing import Any, NoReturn
 
 import typer
+from typer.core import TyperGroup
 
 from strapdown import __version__
-from strapdown.cli import (
-    align,
-    attitude,
-    coast,
-    crash,
-    demo,
-    init,
-    modules,
-    navigate,
-    simulate,
-    verify,
-)
 from strapdown.cli.console import WORDS, logged
 from strapdown.errors import Finding, StrapdownError
 
@@ -39,8 +29,53 @@ EXIT_CODES = (
     "diverged; 6 verify found a change."
 )
 
+#: Modules of the commands, in the order of the help.
+COMMANDS = (
+    "attitude",
+    "align",
+    "navigate",
+    "coast",
+    "init",
+    "crash",
+    "simulate",
+    "verify",
+    "modules",
+    "demo",
+)
+
+
+class Commands(TyperGroup):
+    """Commands, each imported when it is run or listed."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the names of all commands."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return a command, or None; then all are there, so that similar names are proposed."""
+        for name in [cmd_name] if cmd_name in COMMANDS else COMMANDS:
+            self.commands[name] = self.commands.get(name) or _command(name)
+        return self.commands.get(cmd_name)
+
+
+def _command(name: str) -> Any:
+    module = import_module(f"strapdown.cli.{name}")
+    own: typer.Typer | None = getattr(module, "app", None)
+    one = own or typer.Typer(rich_markup_mode="rich", add_completion=False)
+    if own is None:
+        one.command(name, epilog=module.EPILOG)(getattr(module, name))
+    for command in one.registered_commands:
+        # Line breaks of a docstring would wrap the help twice.
+        text = inspect.getdoc(command.callback) or ""
+        command.help = "\n\n".join(part.replace("\n", " ") for part in text.split("\n\n"))
+    made = typer.main.get_group(one) if own else typer.main.get_command(one)
+    made.name = name
+    return made
+
+
 app = typer.Typer(
     name="strapdown",
+    cls=Commands,
     help="From an inertial sensor log to an answer that you can trust.",
     epilog=EXIT_CODES,
     no_args_is_help=True,
@@ -64,23 +99,6 @@ def main(
 ) -> None:
     """From an inertial sensor log to an answer that you can trust."""
     WORDS.set("cli")
-
-
-app.command("attitude", epilog=attitude.EPILOG)(attitude.attitude)
-app.command("align", epilog=align.EPILOG)(align.align)
-app.command("navigate", epilog=navigate.EPILOG)(navigate.navigate)
-app.command("coast", epilog=coast.EPILOG)(coast.coast)
-app.add_typer(init.app, name="init")
-app.command("crash", epilog=crash.EPILOG)(crash.crash)
-app.command("simulate", epilog=simulate.EPILOG)(simulate.simulate)
-app.command("verify", epilog=verify.EPILOG)(verify.verify)
-app.command("modules", epilog=modules.EPILOG)(modules.modules)
-app.command("demo", epilog=demo.EPILOG)(demo.demo)
-
-# Line breaks of a docstring would wrap the help twice.
-for command in (*app.registered_commands, *init.app.registered_commands):
-    told = inspect.getdoc(command.callback) or ""
-    command.help = "\n\n".join(part.replace("\n", " ") for part in told.split("\n\n"))
 
 
 #: Number of new objects before a garbage collection.

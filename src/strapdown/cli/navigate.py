@@ -2,136 +2,113 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from strapdown.cli.shared_options import (
-    RUN_PANEL,
-    WITH_PANEL,
+    LOG_FLAGS,
+    Height,
     LogFlags,
+    Longitude,
     OutFlags,
+    Sensor,
+    as_flag,
+    flag_of,
     folder_to_make,
+    log_keys,
+    refuse_beside_file,
+    running,
     spread,
+    with_what,
 )
+from strapdown.errors import ConfigError
+
+if TYPE_CHECKING:
+    from strapdown.bundle.seal import Seal
+    from strapdown.config.navigation import NavigationSpec
+    from strapdown.live.replay import Replay
+    from strapdown.progress import Progress
+    from strapdown.systems.navigation_run import NavigationRun
 
 EPILOG = (
     "Example: strapdown navigate log.csv --gnss fixes.csv --sensor adis16470\n\n"
     "Example: strapdown navigate navigate.toml (strapdown init navigate LOG writes one)"
 )
+#: Flags by key path of the specification.
+FLAGS = {
+    "site, lat_deg": "--lat",
+    "site, lon_deg": "--lon",
+    "site, alt_m": "--alt",
+    "sensors, sensor": "--sensor",
+    "coarse, heading_deg": "--heading",
+    "aiding, gnss, path": "--gnss",
+    "aiding, gnss, lever_arm_m": "--lever-arm",
+    "truth, path": "--truth",
+    "control_points, path": "--points",
+    "smoother, kind": "--smooth",
+    **LOG_FLAGS,
+}
 
 
 @dataclass(frozen=True)
 class NavigateFlags:
     """Measurements, start and mode of a navigation run."""
 
-    gnss: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FIXES", help="Fixes of a satellite receiver.", rich_help_panel=WITH_PANEL
-        ),
-    ] = None
+    gnss: Annotated[Path | None, with_what("FIXES", "Fixes of a satellite receiver.")] = None
     lever_arm: Annotated[
         str | None,
-        typer.Option(
-            metavar="X,Y,Z",
-            help="Of its antenna from the sensors, forward, right, down, m (0,0,0).",
-            rich_help_panel=WITH_PANEL,
-        ),
+        with_what("X,Y,Z", "Of its antenna from the sensors, forward, right, down, m (0,0,0)."),
     ] = None
-    sensor: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME|FILE",
-            help="How good the sensors are: a sensor of the catalogue (strapdown modules), or a "
-            ".toml file of your own.",
-            rich_help_panel=WITH_PANEL,
-        ),
-    ] = None
-    lat: Annotated[
-        float | None,
-        typer.Option(
-            metavar="DEG", help="Latitude at the start, without fixes.", rich_help_panel=WITH_PANEL
-        ),
-    ] = None
-    lon: Annotated[
-        float | None,
-        typer.Option(metavar="DEG", help="Longitude, east positive.", rich_help_panel=WITH_PANEL),
-    ] = None
-    alt: Annotated[
-        float | None,
-        typer.Option(
-            metavar="M", help="Height over the ellipsoid (0).", rich_help_panel=WITH_PANEL
-        ),
-    ] = None
+    sensor: Sensor = None
+    lat: Annotated[float | None, with_what("DEG", "Latitude at the start, without fixes.")] = None
+    lon: Longitude = None
+    alt: Height = None
     heading: Annotated[
         float | None,
-        typer.Option(
-            metavar="DEG",
-            help="Initial heading, if neither gyros nor course determine it.",
-            rich_help_panel=WITH_PANEL,
-        ),
+        with_what("DEG", "Initial heading, if neither gyros nor course determine it."),
     ] = None
-    truth: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="A trajectory to compare with.", rich_help_panel=WITH_PANEL
-        ),
-    ] = None
+    truth: Annotated[Path | None, with_what("FILE", "A trajectory to compare with.")] = None
     points: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Control points (time, north, east) to score the path by, after the origin and "
+        with_what(
+            "FILE",
+            "Control points (time, north, east) to score the path by, after the origin and "
             "heading that fit best.",
-            rich_help_panel=WITH_PANEL,
         ),
     ] = None
     smooth: Annotated[
         bool,
-        typer.Option(
+        running(
+            None,
+            "Smooth the run: estimate every state from all measurements (RTS).",
             "--smooth",
-            help="Smooth the run: estimate every state from all measurements (RTS).",
-            rich_help_panel=RUN_PANEL,
         ),
     ] = False
     pace: Annotated[
         str | None,
-        typer.Option(
-            metavar="N|max",
-            help="Replay the record sample by sample, N times as fast as recorded, and report "
+        running(
+            "N|max",
+            "Replay the record sample by sample, N times as fast as recorded, and report "
             "the latency of each sample.",
-            rich_help_panel=RUN_PANEL,
         ),
     ] = None
     live: Annotated[
         str | None,
-        typer.Option(
-            metavar="-|udp://HOST:PORT",
-            help="Take samples as they come, as lines of standard input or of datagrams, by the "
+        running(
+            "-|udp://HOST:PORT",
+            "Take samples as they come, as lines of standard input or of datagrams, by the "
             "file of a run.",
-            rich_help_panel=RUN_PANEL,
         ),
     ] = None
     every: Annotated[
-        float,
-        typer.Option(
-            metavar="S",
-            help="With --live: a line of the state so often (1).",
-            show_default=False,
-            rich_help_panel=RUN_PANEL,
-        ),
+        float, running("S", "With --live: a line of the state so often (1).", show_default=False)
     ] = 1.0
     lines: Annotated[
-        str,
-        typer.Option(
-            metavar="json|csv",
-            help="With --live: as what (json).",
-            show_default=False,
-            rich_help_panel=RUN_PANEL,
-        ),
+        str, running("json|csv", "With --live: as what (json).", show_default=False)
     ] = "json"
 
 
@@ -152,18 +129,19 @@ def navigate(
 ) -> None:
     """Find position, velocity and attitude over a record, by inertial sensors and measurements."""
     from strapdown.api.navigation import smoothed_too
-    from strapdown.bundle.seal import check_destination, write_latency, write_timing
-    from strapdown.cli.align_options import flag_of, refuse_beside_file
-    from strapdown.cli.console import WORDS, Stopwatch, print_seal, progress
-    from strapdown.cli.navigate_options import FLAGS, navigation_of_flags
-    from strapdown.cli.navigate_tables import print_navigation
-    from strapdown.cli.result_folder import default_folder, refuse_result, source_name
+    from strapdown.bundle.seal import check_destination, write_latency
+    from strapdown.cli.console import WORDS, print_seal
+    from strapdown.cli.result_folder import (
+        default_folder,
+        refuse_result,
+        run_and_save,
+        source_name,
+    )
     from strapdown.config.navigation import NavigationSpec
-    from strapdown.live.replay import Replay, parse_pace
     from strapdown.systems.navigation_run import run_navigation
 
     refuse_result(source, "log")
-    played = None
+    played: Replay | None = None
     if flags.pace is not None:
         from strapdown.live.replay import Replay, parse_pace
 
@@ -179,45 +157,94 @@ def navigate(
     asked = NavigationSpec.read(source) if own else None
     if asked is not None and flags.smooth:
         asked = smoothed_too(asked)
-    folder = out or default_folder(
-        source, "navigate", None if asked is None else source_name(asked)
-    )
-    check_destination(folder, write.force)
+    named = None if asked is None else source_name(asked)
+    folder = out or default_folder(source, "navigate", named)
     if live is not None:
         from strapdown.cli.navigate_live import navigate_live
 
+        check_destination(folder, write.force)
         refused = {flag_of(name): value for name, value in given.items()}
-        navigate_live(
-            source,
-            live,
-            folder,
-            lines=lines,
-            every=every,
-            force=write.force,
-            quiet=write.quiet,
-            given={**refused, "--pace": pace, "--json": write.json or None},
-        )
+        refused |= {"--pace": pace, "--json": write.json or None}
+        navigate_live(source, live, folder, write, lines=lines, every=every, given=refused)
         return
-    with progress(write.quiet or write.json) as show:
-        report = Stopwatch(show)
+
+    def compute(report: Progress) -> NavigationRun:
         report("looking through", 0.01)
         spec = navigation_of_flags(source, given) if asked is None else asked
         drive: dict[str, Any] = {} if played is None else {"drive": played}
-        result = run_navigation(spec, source if own else None, report, **drive)
-        seal = result.save(folder, force=write.force, progress=report)
-        report.stop()
-        write_timing(seal, report.seconds)
-        latency = None if played is None else played.tape.latency()
-        if latency is not None:
-            write_latency(seal, {"pace": pace, **latency.told()})
-    if write.json:
-        typer.echo((seal.path / "navigation.json").read_text(encoding="utf-8"), nl=False)
-        return
-    if write.quiet:
-        return
-    print_navigation(result, result.findings, verbose=write.verbose)
-    if latency is not None:
-        from strapdown.cli.latency_table import print_latency
+        return run_navigation(spec, source if own else None, report, **drive)
 
-        print_latency(latency, f"played, pace {pace}")
-    print_seal(seal, "report.html")
+    def latency(seal: Seal) -> None:
+        found = None if played is None else played.tape.latency()
+        if found is not None:
+            write_latency(seal, {"pace": pace, **found.told()})
+
+    done = run_and_save(compute, folder, write, "navigation.json", latency)
+    if done is not None:
+        from strapdown.cli.navigate_tables import print_latency, print_navigation
+
+        result, seal = done
+        print_navigation(result, result.findings, verbose=write.verbose)
+        found = None if played is None else played.tape.latency()
+        if found is not None:
+            print_latency(found, f"played, pace {pace}")
+        print_seal(seal, "report.html")
+
+
+def navigation_of_flags(log: Path, given: Mapping[str, Any]) -> NavigationSpec:
+    """Return the specification by the flags, completed from the log and the fixes.
+
+    Raises
+    ------
+    ConfigError
+        A value is invalid or missing; the message names the flag.
+    DataError
+        A file cannot be read.
+    """
+    from strapdown.api.navigation import specify_navigation
+    from strapdown.api.reading import ImuFile
+    from strapdown.config.alignment import LogTable
+    from strapdown.config.spec import specify
+
+    aids: dict[str, dict[str, Any]] = {}
+    if given["gnss"] is not None:
+        arm = given["lever_arm"]
+        aids["gnss"] = {"kind": "gnss", "path": str(given["gnss"])}
+        aids["gnss"] |= {} if arm is None else {"lever_arm_m": _arm(arm)}
+    elif given["lever_arm"] is not None:
+        raise ConfigError("cli.lever-arm-without-receiver", quantity="--lever-arm")
+    start = {
+        "lat_deg": given["lat"],
+        "lon_deg": given["lon"],
+        "alt_m": given["alt"],
+        "heading_deg": given["heading"],
+    }
+    further = {
+        "truth": given["truth"] and {"path": str(given["truth"])},
+        "control_points": given["points"] and {"path": str(given["points"])},
+        "smoother": given["smooth"] and {"kind": "rts"},
+    }
+    try:
+        table = specify(LogTable, path=str(log), **log_keys(given))
+        return specify_navigation(
+            ImuFile(table, given["axes"]),
+            aids,
+            sensor=given["sensor"],
+            start={key: value for key, value in start.items() if value is not None},
+            options={name: table for name, table in further.items() if table},
+            called=lambda argument: f"--{argument}",
+        )
+    except ConfigError as error:
+        raise as_flag(error, _flag) from None
+
+
+def _flag(place: str) -> str:
+    return FLAGS.get(place) or FLAGS.get(f"log, {place}", place)
+
+
+def _arm(text: str) -> tuple[float, float, float]:
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError:
+        raise ConfigError("cli.bad-lever-arm", quantity="--lever-arm", text=text) from None
+    return x, y, z

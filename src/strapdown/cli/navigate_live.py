@@ -15,8 +15,8 @@ import typer
 from strapdown.bundle.reading import read_manifest
 from strapdown.bundle.seal import Seal, write_latency, write_timing
 from strapdown.cli.console import WORDS, Stopwatch, print_seal, progress
-from strapdown.cli.latency_table import print_latency
-from strapdown.cli.navigate_tables import print_navigation
+from strapdown.cli.navigate_tables import print_latency, print_navigation
+from strapdown.cli.shared_options import OutFlags
 from strapdown.config.navigation import NavigationSpec
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
 from strapdown.live.clock import MachineClock
@@ -24,18 +24,15 @@ from strapdown.live.run import LiveRun, live_spec, receive, result_of
 from strapdown.live.sources import open_source
 from strapdown.report.navigation import write_navigation
 
-__all__ = ["navigate_live"]
-
 
 def navigate_live(
     file: Path,
     where: str,
     folder: Path,
+    write: OutFlags,
     *,
     lines: str,
     every: float,
-    force: bool,
-    quiet: bool,
     given: Mapping[str, Any],
 ) -> None:
     """Navigate by lines, and write the bundle at their end.
@@ -50,9 +47,9 @@ def navigate_live(
         As `open_source`.
     folder : Path
         The bundle.
+    write : OutFlags
     lines, every
         As `StateLines`.
-    force, quiet : bool
     given : mapping
         Flags without a meaning here, by name; None where not given.
 
@@ -80,17 +77,17 @@ def navigate_live(
         open_source(where, clock, sys.stdin.buffer),
         clock,
         _write,
-        _warner(quiet),
+        _warner(write.quiet),
         lines,
         every,
     )
     if not len(live.got.samples):
         raise DataError("cli.no-sample", quantity="--live")
     with redirect_stdout(sys.stderr):
-        seal = _sealed(live, file, folder, received, force=force, quiet=quiet)
-        if not quiet and live.latency is not None:
+        seal = _sealed(live, file, folder, received, force=write.force, quiet=write.quiet)
+        if not write.quiet and live.latency is not None:
             print_latency(live.latency, where)
-        if not quiet:
+        if not write.quiet:
             print_seal(seal, "report.html")
     if live.error is not None:
         raise live.error

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from strapdown.cli.console import WORDS, console, print_block, print_findings
+from strapdown.cli.console import WORDS, console, print_block, print_findings, print_table
 from strapdown.errors import Finding
+from strapdown.live.latency import Latency
 from strapdown.report.alignment_trust import MOST_SAID
 from strapdown.report.document import TableBlock
 from strapdown.report.navigation_found import NavigationFound, examine, told_of
@@ -31,8 +32,6 @@ from strapdown.report.values import (
 from strapdown.report.verdict_words import terminal_lines
 from strapdown.rotation import within_half_turn
 from strapdown.systems.navigation_run import NavigationRun
-
-__all__ = ["print_navigation"]
 
 #: Most lines of the answer, of which the paths and the seal take the last four.
 LINES, PATHS = 40, 4
@@ -143,3 +142,18 @@ def _fitting(findings: Sequence[Finding], room: int, width: int) -> int:
         if used + (count + 1 < len(findings)) > room:
             return count
     return len(findings)
+
+
+def print_latency(latency: Latency, what: str) -> None:
+    """Print the latency from a sample to its state, and missed deadlines; `what` delivered them."""
+    times = [_ms(t) for t in (latency.median, latency.most, latency.largest)]
+    missed = "-" if latency.missed is None else str(latency.missed)
+    behind = "-" if latency.behind is None else _ms(latency.behind)
+    print_table(
+        ["sample to state, ms", "samples", "median", "99 %", "largest", "missed", "behind", ""],
+        [[what, str(latency.samples), *times, missed, behind, ""]],
+    )
+
+
+def _ms(seconds: float) -> str:
+    return f"{1e3 * seconds:.3f}"

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import typer
+
+from strapdown.cli.console import Stopwatch, progress
 from strapdown.errors import ConfigError, DataError, Finding
 
 if TYPE_CHECKING:
+    from strapdown.bundle.seal import Seal
+    from strapdown.cli.shared_options import OutFlags
     from strapdown.config.alignment import AlignmentSpec
     from strapdown.config.navigation import NavigationSpec
-
-__all__ = ["default_folder", "refuse_result", "source_name"]
 
 #: Suffixes of the folders of these commands.
 ENDINGS = ("align", "attitude", "coast", "crash", "navigate", "simulated")
@@ -100,3 +103,49 @@ def _hints(path: Path, command: str, manifest: Mapping[str, Any]) -> Iterator[Fi
     if own is not None:
         at = path / own["name"] if own["kept"] == "copy" else Path(own["name"])
         yield Finding("cli.hint-input", severity="note", role=own["role"], input=at)
+
+
+def run_and_save(
+    compute: Callable[[Stopwatch], Any],
+    folder: Path,
+    write: OutFlags,
+    answer: str,
+    *more: Callable[[Seal], None],
+) -> tuple[Any, Seal] | None:
+    """Run with progress, and save the result with the times of its stages.
+
+    Parameters
+    ----------
+    compute : callable
+        Returns a result with `save`; it reports its stages.
+    folder : Path
+    write : OutFlags
+    answer : str
+        File of the result that ``--json`` prints.
+    *more : callable
+        Write further files outside the seal.
+
+    Returns
+    -------
+    result, seal
+        None if the rest is not to be printed.
+
+    Raises
+    ------
+    ConfigError
+        The folder exists and must not be replaced; or as `compute`.
+    """
+    from strapdown.bundle.seal import check_destination, write_timing
+
+    check_destination(folder, write.force)
+    with progress(write.quiet or write.json) as show:
+        report = Stopwatch(show)
+        result = compute(report)
+        seal: Seal = result.save(folder, force=write.force, progress=report)
+        report.stop()
+        write_timing(seal, report.seconds)
+        for one in more:
+            one(seal)
+    if write.json:
+        typer.echo((seal.path / answer).read_text(encoding="utf-8"), nl=False)
+    return None if write.json or write.quiet else (result, seal)

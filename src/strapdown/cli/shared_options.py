@@ -11,28 +11,12 @@ import logging
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, fields, is_dataclass
 from functools import wraps
+from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
 import typer
 
-__all__ = [
-    "LOG_PANEL",
-    "OUT_PANEL",
-    "RUN_PANEL",
-    "WITH_PANEL",
-    "Json",
-    "LogFlags",
-    "OutFlags",
-    "Quiet",
-    "Verbose",
-    "WriteFlags",
-    "folder_to_make",
-    "log_keys",
-    "part_from",
-    "part_long",
-    "part_to",
-    "spread",
-]
+from strapdown.errors import ConfigError
 
 LOG_PANEL = "How to read the log"
 RUN_PANEL = "What to run"
@@ -40,104 +24,80 @@ WITH_PANEL = "Where, and with what"
 OUT_PANEL = "What to write"
 
 
-def part_from(else_from: str, panel: str) -> Any:
-    """The option ``--from``, with the default begin of a part."""
-    return typer.Option(
-        "--from",
-        metavar="S",
-        help=f"Begin at this stamp; {else_from}, if not given.",
-        rich_help_panel=panel,
-    )
+def options(panel: str) -> Callable[..., Any]:
+    """Return a maker of the options that the help lists together."""
+
+    def option(metavar: str | None, text: str, *flags: str, **more: Any) -> Any:
+        return typer.Option(*flags, metavar=metavar, help=text, rich_help_panel=panel, **more)
+
+    return option
 
 
-def part_to(panel: str) -> Any:
-    """The option ``--to``."""
-    return typer.Option(
-        "--to",
-        metavar="S",
-        help="End at this stamp; the last, if not given.",
-        rich_help_panel=panel,
-    )
+reading, running, with_what, writing = map(options, (LOG_PANEL, RUN_PANEL, WITH_PANEL, OUT_PANEL))
+BEGIN = "Begin at this stamp; {}, if not given."
+END = "End at this stamp; the last, if not given."
+LENGTH = "Length of the part to use, instead of --to."
+SENSOR = (
+    "How good the sensors are: a sensor of the catalogue (strapdown modules), or a .toml file of "
+    "your own."
+)
 
-
-def part_long(panel: str) -> Any:
-    """The option ``--duration``."""
-    return typer.Option(
-        "--duration",
-        metavar="S",
-        help="Length of the part to use, instead of --to.",
-        rich_help_panel=panel,
-    )
+Sensor = Annotated[str | None, with_what("NAME|FILE", SENSOR)]
+Longitude = Annotated[float | None, with_what("DEG", "Longitude, east positive.")]
+Height = Annotated[float | None, with_what("M", "Height over the ellipsoid (0).")]
 
 
 @dataclass(frozen=True)
 class LogFlags:
     """Part of a log to use, and how to read it."""
 
-    from_s: Annotated[float | None, part_from("the first", LOG_PANEL)] = None
-    to_s: Annotated[float | None, part_to(LOG_PANEL)] = None
-    duration: Annotated[float | None, part_long(LOG_PANEL)] = None
+    from_s: Annotated[float | None, reading("S", BEGIN.format("the first"), "--from")] = None
+    to_s: Annotated[float | None, reading("S", END, "--to")] = None
+    duration: Annotated[float | None, reading("S", LENGTH, "--duration")] = None
     rate: Annotated[
-        float | None,
-        typer.Option(
-            metavar="HZ",
-            help="Sample rate in Hz, for logs without a time column.",
-            rich_help_panel=LOG_PANEL,
-        ),
+        float | None, reading("HZ", "Sample rate in Hz, for logs without a time column.")
     ] = None
     sampling: Annotated[
         str | None,
-        typer.Option(
-            metavar="KIND",
-            help="instantaneous (the rate at the stamp) or mean (over the interval that ends "
-            "there).",
-            rich_help_panel=LOG_PANEL,
+        reading(
+            "KIND",
+            "instantaneous (the rate at the stamp) or mean (over the interval that ends there).",
         ),
     ] = None
     columns: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="Q=NAME",
-            help="time=t,gyro_x=wx,… ; a number counts columns from 1; gyro=NAME for an array of "
-            "three.",
-            rich_help_panel=LOG_PANEL,
+        reading(
+            "Q=NAME",
+            "time=t,gyro_x=wx,… ; a number counts columns from 1; gyro=NAME for an array of three.",
         ),
     ] = None
     gyro_unit: Annotated[
         str | None,
-        typer.Option(
-            metavar="UNIT",
-            help="rad/s, deg/s, …; of raw counts deg/s/131; rad, deg: increments.",
-            rich_help_panel=LOG_PANEL,
-        ),
+        reading("UNIT", "rad/s, deg/s, …; of raw counts deg/s/131; rad, deg: increments."),
     ] = None
     accel_unit: Annotated[
         str | None,
-        typer.Option(
-            metavar="UNIT",
-            help="m/s2, g, mg; -g or -m/s2 for the other sign (iOS); of raw counts g/16384; m/s: "
+        reading(
+            "UNIT",
+            "m/s2, g, mg; -g or -m/s2 for the other sign (iOS); of raw counts g/16384; m/s: "
             "increments.",
-            rich_help_panel=LOG_PANEL,
         ),
     ] = None
-    time_unit: Annotated[
-        str | None, typer.Option(metavar="UNIT", help="s, ms, us, ns.", rich_help_panel=LOG_PANEL)
-    ] = None
+    time_unit: Annotated[str | None, reading("UNIT", "s, ms, us, ns.")] = None
     axes: Annotated[
         str | None,
-        typer.Option(
-            metavar="X,Y,Z",
-            help="Sensor axes that point forward, right, down: 'x,-y,-z'; or where x, y, z point: "
+        reading(
+            "X,Y,Z",
+            "Sensor axes that point forward, right, down: 'x,-y,-z'; or where x, y, z point: "
             "forward-left-up.",
-            rich_help_panel=LOG_PANEL,
         ),
     ] = None
     repair: Annotated[
         bool,
-        typer.Option(
+        reading(
+            None,
+            "Leave out rows that cannot be used, undo a wrapped clock, and say so.",
             "--repair",
-            help="Leave out rows that cannot be used, undo a wrapped clock, and say so.",
-            rich_help_panel=LOG_PANEL,
         ),
     ] = False
 
@@ -183,18 +143,10 @@ def log_keys(given: Mapping[str, Any]) -> dict[str, Any]:
 
 def folder_to_make(name: str) -> Any:
     """The option ``--out`` of a command that creates a folder, with its default name."""
-    return typer.Option(
-        metavar="DIR",
-        help=f"Folder to make ({name}).",
-        rich_help_panel=OUT_PANEL,
-        show_default=False,
-    )
+    return writing("DIR", f"Folder to make ({name}).", show_default=False)
 
 
-Force = Annotated[
-    bool,
-    typer.Option("--force", help="Overwrite an existing result.", rich_help_panel=OUT_PANEL),
-]
+Force = Annotated[bool, writing(None, "Overwrite an existing result.", "--force")]
 
 
 def log_level(level: int) -> Callable[[bool], bool]:
@@ -210,30 +162,21 @@ def log_level(level: int) -> Callable[[bool], bool]:
 
 Quiet = Annotated[
     bool,
-    typer.Option(
-        "--quiet",
-        "-q",
-        help="Print nothing but errors.",
-        rich_help_panel=OUT_PANEL,
-        callback=log_level(logging.ERROR),
-    ),
+    writing(None, "Print nothing but errors.", "--quiet", "-q", callback=log_level(logging.ERROR)),
 ]
 Verbose = Annotated[
     bool,
-    typer.Option(
+    writing(
+        None,
+        "Print each stage with its duration, which reader took which file, and all tables.",
         "--verbose",
         "-v",
-        help="Print each stage with its duration, which reader took which file, and all tables.",
-        rich_help_panel=OUT_PANEL,
         callback=log_level(logging.INFO),
     ),
 ]
 
 
-Json = Annotated[
-    bool,
-    typer.Option("--json", help="Print the result as JSON alone.", rich_help_panel=OUT_PANEL),
-]
+Json = Annotated[bool, writing(None, "Print the result as JSON alone.", "--json")]
 
 
 @dataclass(frozen=True)
@@ -296,3 +239,98 @@ def spread(command: Callable[..., None]) -> Callable[..., None]:
     told.__signature__ = inspect.Signature(laid_out)
     told.__annotations__ = {p.name: p.annotation for p in laid_out}
     return run
+
+
+# --- flags as keys of a specification --------------------------------------------------
+
+#: How a log is read; common to all commands.
+LOG_FLAGS = {
+    "axes, axes": "--axes",
+    "log, from_s": "--from",
+    "log, to_s": "--to",
+    "log, duration_s": "--duration",
+    "log, sampling": "--sampling",
+    "log, rate_hz": "--rate",
+    "log, columns": "--columns",
+    "log, repair": "--repair",
+    "log, gyro_unit": "--gyro-unit",
+    "log, accel_unit": "--accel-unit",
+    "log, time_unit": "--time-unit",
+}
+
+
+def refuse_beside_file(
+    source: Path,
+    given: Mapping[str, Any],
+    flags: Mapping[str, str],
+) -> None:
+    """Refuse options beside a configuration file, and name the key for each.
+
+    Parameters
+    ----------
+    source : Path
+    given : mapping
+        By flag, None where not given.
+    flags : mapping
+        Flags by key path of the specification.
+
+    Raises
+    ------
+    ConfigError
+    """
+    written = [name for name, value in given.items() if value is not None]
+    if not written:
+        return
+    flag = flag_of(written[0])
+    place = next((place for place, name in flags.items() if name == flag), None)
+    if place is None:
+        raise ConfigError("cli.option-beside-file", file=source.name, quantity=flag)
+    table, key = place.rsplit(", ", 1)
+    entry = f'{key} = "rts"' if flag == "--smooth" else key
+    table = table.replace(", ", ".")
+    raise ConfigError(
+        "cli.option-of-key-beside-file", file=source.name, quantity=flag, entry=entry, table=table
+    )
+
+
+def flag_of(name: str) -> str:
+    """The flag of a parameter of a command."""
+    return "--" + name.removesuffix("_s").replace("_", "-")
+
+
+def as_flag(error: ConfigError, flag: Callable[[str], str]) -> ConfigError:
+    """Return the error, or each of several, with the option instead of the key path.
+
+    Parameters
+    ----------
+    error : ConfigError
+    flag : callable
+        Flag of a key path of a specification.
+    """
+    if error.finding.code == "config.several":
+        faults = [f.replace(quantity=flag(f.quantity or "")) for f in error.finding.data["faults"]]
+        return error.replaced(faults=faults)
+    return error.replaced(quantity=flag(error.finding.quantity or ""))
+
+
+def module_of_flag(text: str) -> dict[str, Any]:
+    """A kind with its options: ``robust_fir:rate_hz=100,passband=0.4``."""
+    kind, _, rest = text.partition(":")
+    out: dict[str, Any] = {"kind": kind.strip()}
+    for part in (p for p in rest.split(",") if p.strip()):
+        key, equals, value = (piece.strip() for piece in part.partition("="))
+        if not equals or not value:
+            raise ConfigError("cli.bad-module-option", quantity=kind, part=part)
+        out[key] = _value(value)
+    return out
+
+
+def _value(text: str) -> Any:
+    if text in ("true", "false"):
+        return text == "true"
+    for form in (int, float):
+        try:
+            return form(text)
+        except ValueError:
+            continue
+    return text

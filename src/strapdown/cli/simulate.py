@@ -7,13 +7,7 @@ from typing import Annotated
 
 import typer
 
-from strapdown.cli.shared_options import (
-    OUT_PANEL,
-    RUN_PANEL,
-    OutFlags,
-    folder_to_make,
-    spread,
-)
+from strapdown.cli.shared_options import OutFlags, folder_to_make, running, spread, writing
 
 EPILOG = "Example: strapdown simulate alexiev-fig4 --rate 100 --format all --out fig4"
 
@@ -29,51 +23,35 @@ def simulate(
         ),
     ],
     rate: Annotated[
-        float | None,
-        typer.Option(
-            metavar="HZ",
-            help="Sample rate in Hz (100; for a crash that of each recorder).",
-            rich_help_panel=RUN_PANEL,
-        ),
+        float | None, running("HZ", "Sample rate in Hz (100; for a crash that of each recorder).")
     ] = None,
     sampling: Annotated[
         str | None,
-        typer.Option(
-            metavar="KIND",
-            help="instantaneous (the rate at the stamp) or mean (over the interval that ends "
+        running(
+            "KIND",
+            "instantaneous (the rate at the stamp) or mean (over the interval that ends "
             "there); instantaneous, if not given.",
-            rich_help_panel=RUN_PANEL,
         ),
     ] = None,
     formats: Annotated[
         str | None,
-        typer.Option(
+        writing(
+            "F",
+            "csv, npz, h5, mat (joined by commas), or all (csv); of a crash csv, mme.",
             "--format",
-            metavar="F",
-            help="csv, npz, h5, mat (joined by commas), or all (csv); of a crash csv, mme.",
-            rich_help_panel=OUT_PANEL,
         ),
     ] = None,
-    seed: Annotated[
-        int | None,
-        typer.Option(metavar="N", help="Of the simulated errors (0).", rich_help_panel=RUN_PANEL),
-    ] = None,
+    seed: Annotated[int | None, running("N", "Of the simulated errors (0).")] = None,
     sensor: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAME|FILE",
-            help="The errors are those of a unit of this sensor of the catalogue (strapdown "
+        running(
+            "NAME|FILE",
+            "The errors are those of a unit of this sensor of the catalogue (strapdown "
             "modules), or of a .toml file of your own; the scenario's own, if not given.",
-            rich_help_panel=RUN_PANEL,
         ),
     ] = None,
     units: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAMES",
-            help="Recorders of a crash, joined by commas, or all (IMU1,IMU2).",
-            rich_help_panel=RUN_PANEL,
-        ),
+        str | None, running("NAMES", "Recorders of a crash, joined by commas, or all (IMU1,IMU2).")
     ] = None,
     *,
     out: Annotated[Path | None, folder_to_make("NAME-simulated")] = None,

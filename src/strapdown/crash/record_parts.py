@@ -15,7 +15,7 @@ from strapdown.constants import ACCEL_UNITS, GYRO_UNITS, STANDARD_GRAVITY, TIME_
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.clocks import EPOCH
 from strapdown.formats.columns import read_name, unit_of
-from strapdown.formats.crash_record import FACTORS, CrashChannel, CrashRecord, factor_of
+from strapdown.formats.crash_record import FACTORS, CrashChannel, CrashRecord, crash_factor
 from strapdown.formats.crash_samples import last_midnight, mean_accelerations_of
 from strapdown.formats.inference.conclusion import (
     THRESHOLD,
@@ -345,7 +345,7 @@ def table_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skippe
         if raw.dtype.kind in "iu" and raw.size and abs(int(raw[0])) > FAR:
             origins[name] = float(raw[0])
             raw = raw.astype(np.int64) - np.int64(raw[0])
-        factor = factor_of(channel.quantity, channel.unit)
+        factor = crash_factor(channel.quantity, channel.unit)
         columns[name] = raw.astype(np.float64)
         if factor is not None and channel.quantity != "time":
             columns[name] /= factor

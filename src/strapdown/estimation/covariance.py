@@ -62,10 +62,10 @@ class CovarianceForm(ABC):
         """Return the state of ``Phi P Phi' + Q``.
 
         `state` ((n, n)). `Phi` ((n, n)). `Q` ((n, n)): symmetric, positive semidefinite to
-        rounding; of any rank.
+        rounding; of any rank. DataError: shapes that do not fit, or a predicted variance that is
+        negative or not finite.
         """
 
-    @abstractmethod
     def update(
         self,
         state: Array,
@@ -80,8 +80,30 @@ class CovarianceForm(ABC):
         `state` ((n, n)). `x` ((n,)): estimate before. `z` ((l,)). `H` ((l, n)). `R` ((l,)):
         variances of observations that are independent of each other. `rule` (or a sequence of
         them): weighting of the observations, one rule for all or one for each; full weight if not
-        given. Returns `state` ((n, n)); `x` ((n,)).
+        given. Returns `state` ((n, n)); `x` ((n,)). DataError: shapes that do not fit, or an
+        observation that is not finite.
         """
+        z, H, R = contiguous(z, H, R)
+        state, x = own(state), own(x)
+        check_observations(x, z, H, R)
+        if rule is not None:
+            expect, take = self._halves()
+            work = np.empty((4, len(x)))
+            seen = take_by_rule(expect, take, (state, state[0]), x, (z, H, R), rule, work)
+            return state, x, seen
+        told = np.ones((3, len(z)))
+        bad = self._take_all(state, x, z, H, R, told)
+        if bad >= 0:
+            raise bad_observation(bad, told[0, bad], told[1, bad], R)
+        return state, x, Innovations(told[0], told[1], told[2])
+
+    @abstractmethod
+    def _halves(self) -> tuple[Callable[..., tuple[float, float]], Callable[..., None]]:
+        """Kernels that expect an observation and take it."""
+
+    @abstractmethod
+    def _take_all(self, state: Array, x: Array, *observations: Array) -> int:
+        """Update in place with z, H, R and a record; the index of an invalid one, or -1."""
 
     def epoch(
         self,
@@ -378,36 +400,13 @@ class Plain(CovarianceForm):
             raise bad_prediction(row, Phi, Q)
         return out
 
-    def update(
-        self,
-        state: Array,
-        x: Array,
-        z: Array,
-        H: Array,
-        R: Array,
-        rule: UpdateRule | Sequence[UpdateRule] | None = None,
-    ) -> tuple[Array, Array, Innovations]:
-        """Update with the observations of an epoch; see `CovarianceForm.update`.
-
-        DataError: shapes that do not fit, or an observation that is not finite.
-        """
+    def _halves(self) -> tuple[Callable[..., tuple[float, float]], Callable[..., None]]:
         kernels = _kernels()
-        z, H, R = contiguous(z, H, R)
-        P, x = own(state), own(x)
-        check_observations(x, z, H, R)
-        if rule is not None:
-            take = kernels.joseph_take if self._joseph else kernels.plain_take
-            work = np.empty((3, len(x)))
-            return (
-                P,
-                x,
-                take_by_rule(kernels.dense_expect, take, (P, P[0]), x, (z, H, R), rule, work),
-            )
-        told = np.ones((3, len(z)))
-        bad = kernels.dense_update(P, x, z, H, R, self._joseph, told)
-        if bad >= 0:
-            raise bad_observation(bad, told[0, bad], told[1, bad], R)
-        return P, x, Innovations(told[0], told[1], told[2])
+        return kernels.dense_expect, kernels.joseph_take if self._joseph else kernels.plain_take
+
+    def _take_all(self, state: Array, x: Array, *observations: Array) -> int:
+        *zhr, told = observations
+        return int(_kernels().dense_update(state, x, *zhr, self._joseph, told))
 
     def matrix(self, state: Array) -> Array:
         """Return P: the state."""
@@ -465,32 +464,11 @@ class BiermanThornton(CovarianceForm):
             raise bad_prediction(row, Phi, Q)
         return out
 
-    def update(
-        self,
-        state: Array,
-        x: Array,
-        z: Array,
-        H: Array,
-        R: Array,
-        rule: UpdateRule | Sequence[UpdateRule] | None = None,
-    ) -> tuple[Array, Array, Innovations]:
-        """Update with the observations of an epoch; see `CovarianceForm.update`.
+    def _halves(self) -> tuple[Callable[..., tuple[float, float]], Callable[..., None]]:
+        return _kernels().ud_expect, _kernels().ud_take
 
-        DataError: shapes that do not fit, or an observation that is not finite.
-        """
-        kernels = _kernels()
-        z, H, R = contiguous(z, H, R)
-        ud, x = own(state), own(x)
-        check_observations(x, z, H, R)
-        if rule is not None:
-            expect, take = kernels.ud_expect, kernels.ud_take
-            work = np.empty((4, len(x)))
-            return ud, x, take_by_rule(expect, take, (ud, ud[0]), x, (z, H, R), rule, work)
-        told = np.ones((3, len(z)))
-        bad = kernels.ud_update(ud, x, z, H, R, told)
-        if bad >= 0:
-            raise bad_observation(bad, told[0, bad], told[1, bad], R)
-        return ud, x, Innovations(told[0], told[1], told[2])
+    def _take_all(self, state: Array, x: Array, *observations: Array) -> int:
+        return int(_kernels().ud_update(state, x, *observations))
 
     def matrix(self, state: Array) -> Array:
         """Return ``U D U'``."""

@@ -218,7 +218,6 @@ RECEIVERS = ("live_gnss_ublox", "live_gnss_qcom")
 COLUMNS = 6
 #: From this value on UTC is in ms: as seconds it would be in the year 5138.
 IN_MS = 1e11
-AGAIN = "get the segment again from its source"
 
 
 def detect_fixes(path: Path) -> bool:

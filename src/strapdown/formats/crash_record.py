@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from strapdown.constants import ACCEL_UNITS, GYRO_UNITS, TIME_UNITS
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.formats.columns import UNIT_OF
-from strapdown.formats.columns import unit_of as plain_unit_of
+from strapdown.formats.columns import UNIT_OF, unit_of
 from strapdown.tables import SAMPLINGS
 
 __all__ = [
@@ -28,10 +27,10 @@ __all__ = [
     "attributes_of",
     "check_attributes",
     "clean",
-    "factor_of",
+    "crash_factor",
+    "crash_unit",
     "state_unit",
     "unique",
-    "unit_of",
 ]
 
 
@@ -245,18 +244,18 @@ _UNIT_OF = {
 }
 
 
-def unit_of(text: str) -> tuple[str, str] | None:
+def crash_unit(text: str) -> tuple[str, str] | None:
     """Parse a unit as written in a file.
 
     `text`: as ``m/(s*s)``, ``G's``, ``km/h``, ``[deg/s]``. Returns (str, str) or None, the
     quantity, a key of `FACTORS`, and the unit, a key of its table; None if the unit is unknown.
     """
     plain = text.lower().replace(" ", "").strip("[]\t")
-    unit = _UNIT_OF.get(plain) or _UNIT_OF.get(plain.strip("()")) or plain_unit_of(plain)
+    unit = _UNIT_OF.get(plain) or _UNIT_OF.get(plain.strip("()")) or unit_of(plain)
     return (_QUANTITY[unit], unit) if unit in _QUANTITY else None
 
 
-def factor_of(quantity: str, unit: str) -> float | None:
+def crash_factor(quantity: str, unit: str) -> float | None:
     """Return the factor to SI, or None if the quantity does not have the unit."""
     return FACTORS.get(quantity, {}).get(unit)
 
@@ -270,7 +269,7 @@ def state_unit(text: str, quantity: str, key: str = "unit") -> str:
     known = FACTORS[quantity]
     if text in known:
         return text
-    found = unit_of(text)
+    found = crash_unit(text)
     if found is None or found[0] != quantity:
         raise ConfigError(
             "io.crash-unit-of-other-quantity" if found else "io.crash-unit-unknown",

@@ -17,7 +17,7 @@ from strapdown.formats.crash_record import (
     QUANTITIES,
     CrashChannel,
     CrashRecord,
-    factor_of,
+    crash_factor,
     state_unit,
 )
 from strapdown.formats.crash_samples import Clock, last_midnight, seconds_of
@@ -559,7 +559,7 @@ def triad_factor(
 
 def _known(channel: CrashChannel) -> bool:
     """Whether the values are in SI units already."""
-    return factor_of(channel.quantity, channel.unit) is not None
+    return crash_factor(channel.quantity, channel.unit) is not None
 
 
 def _evident(

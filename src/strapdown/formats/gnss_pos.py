@@ -36,7 +36,6 @@ _TO_UTC = {"UTC": 0.0, "JST": -9.0 * 3600.0}
 _HEAD = re.compile(r"%\s*(GPST|UTC|JST)\b[\s,;\t]*(.*)", re.I)
 _DAYS_OF_1980 = 3657  # from 1970-01-01 to 1980-01-06
 _XYZ = ["x-ecef(m)", "y-ecef(m)", "z-ecef(m)"]
-_AGAIN = "write it again with RTKLIB, as lat/lon/height over the ellipsoid"
 
 
 def detect(path: Path) -> bool:

@@ -22,8 +22,8 @@ from strapdown.bundle.reading import read_manifest, unsealed_changes
 from strapdown.bundle.seal import MANIFEST, Seal, sha256
 from strapdown.bundle.writing import machine, versions
 from strapdown.config import CrashSimulationSpec, SimulateSpec, TrajectorySpec
-from strapdown.config.changed_options import changed_options
 from strapdown.config.crash_case import CaseSpec
+from strapdown.config.reading import changed_options
 from strapdown.errors import DataError, StrapdownError
 from strapdown.formats import read_raw
 from strapdown.report.alignment import rerun_alignment

@@ -6,7 +6,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.errors import DataError
 from strapdown.rotation import within_half_turn
 from strapdown.tables.checks import (
     EULER,
@@ -17,7 +16,6 @@ from strapdown.tables.checks import (
     checked_values,
     joined,
     source_of,
-    values_of,
 )
 
 Array = NDArray[np.float64]
@@ -155,30 +153,3 @@ def check_trajectory_error(table: pd.DataFrame) -> None:
         A column is missing, a value is not finite, or time does not advance.
     """
     checked_values(table, TRAJECTORY_ERROR)
-
-
-def check_trajectory_sd(table: pd.DataFrame) -> None:
-    """Check a TrajectoryError table that holds standard deviations.
-
-    Parameters
-    ----------
-    table : DataFrame
-        Further columns are ignored.
-
-    Raises
-    ------
-    DataError
-        As `check_trajectory_error`, or a value is negative.
-    """
-    check_trajectory_error(table)
-    values = values_of(table, TRAJECTORY_ERROR)
-    negative = values < 0.0
-    if negative.any():
-        row, column = (int(i) for i in np.argwhere(negative)[0])
-        raise DataError(
-            "tables.standard-deviation-negative",
-            file=table.attrs.get("source"),
-            row=row + 1,
-            quantity=TRAJECTORY_ERROR[column],
-            values=values[row, column],
-        )

@@ -11,7 +11,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from good_case import read
 
-from strapdown.config.changed_options import changed_options
+from strapdown.config.reading import changed_options
 
 
 def changed(spec, **values):

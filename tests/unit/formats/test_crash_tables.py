@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from strapdown.errors import ConfigError, DataError
-from strapdown.formats.crash_record import FACTORS, clean, state_unit, unique, unit_of
+from strapdown.formats.crash_record import FACTORS, clean, crash_unit, state_unit, unique
 from strapdown.formats.crash_records import CRASH_READERS, read_crash_record
 from strapdown.formats.crash_samples import mean_acceleration, mean_accelerations_of
 from strapdown.formats.crash_table import read_channel_name
@@ -83,14 +83,14 @@ def test_a_name_against_its_unit_is_told():
     ],
 )
 def test_units_by_their_definitions(text, quantity, si):
-    found = unit_of(text)
+    found = crash_unit(text)
     assert found is not None
     assert found[0] == quantity
     assert FACTORS[quantity][found[1]] == pytest.approx(si, rel=1e-15)
 
 
 def test_a_unit_of_something_else_is_refused():
-    assert unit_of("furlong") is None
+    assert crash_unit("furlong") is None
     with pytest.raises(
         ConfigError,
         match="'deg/s' is a unit of rate",

@@ -66,7 +66,7 @@ def test_each_flag_is_an_option_of_attitude():
 
     from strapdown.cli.main import app
 
-    command = typer.main.get_command(app).commands["attitude"]
+    command = typer.main.get_command(app).get_command(None, "attitude")
     options = {o for p in command.params for o in p.opts}
     flags = {i.flag for s in range(20) for i in infer_signals(make(s)[0])} - {""}
     assert "--gyro-unit" in flags

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from strapdown.cli.align_options import spec_of_flags
+from strapdown.cli.align import spec_of_flags
 from strapdown.errors import ConfigError, DataError
 from strapdown.report.alignment_charts import attitude_chart
 from strapdown.report.alignment_document import headline, key_figures, limits
