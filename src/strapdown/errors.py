@@ -241,20 +241,9 @@ class DivergenceError(StrapdownError):
 def nearest(word: str, known: Iterable[str], also: Iterable[str] = ()) -> str:
     """Return a sentence that helps with an unknown name.
 
-    Parameters
-    ----------
-    word : str
-        What was not understood.
-    known : iterable of str
-        The words that would have been.
-    also : iterable of str
-        Further such words, too many to be listed.
-
-    Returns
-    -------
-    str
-        ``"did you mean 'x'? Known: a, b, c"``, or the list alone when nothing
-        is near.
+    `word`: what was not understood. `known`: the words that would have been. `also`: further such
+    words, too many to be listed. Returns ``"did you mean 'x'? Known: a, b, c"``, or the list alone
+    when nothing is near.
     """
     words = list(known)
     close = difflib.get_close_matches(str(word), [*words, *also], n=1, cutoff=0.5)

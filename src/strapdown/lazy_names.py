@@ -14,12 +14,8 @@ __all__ = ["load_on_first_use"]
 def load_on_first_use(package: str, homes: Mapping[str, str]) -> None:
     """Let a package export names of its modules without importing these.
 
-    Parameters
-    ----------
-    package : str
-        ``__name__`` of the package that calls this.
-    homes : mapping of str to str
-        Module within the package, and the names that it gives, separated by spaces.
+    `package`: ``__name__`` of the package that calls this. `homes`: module within the package, and
+    the names that it gives, separated by spaces.
     """
     module = sys.modules[package]
     module.__dict__["_homes"] = {

@@ -33,23 +33,9 @@ _log.addHandler(logging.NullHandler())
 def plugin(kind: str, name: str, base: type) -> Any | None:
     """Find one plug-in by its name.
 
-    Parameters
-    ----------
-    kind : str
-        A key of `GROUPS`.
-    name : str
-    base : type
-        Required type: a subclass, or an instance.
-
-    Returns
-    -------
-    object or None
-        None if no distribution offers the name.
-
-    Raises
-    ------
-    ConfigError
-        It cannot be loaded, or is something else; the message names its distribution.
+    `kind`: a key of `GROUPS`. `base`: required type: a subclass, or an instance. None if no
+    distribution offers the name. ConfigError: it cannot be loaded, or is something else; the
+    message names its distribution.
     """
     for point in entry_points(group=GROUPS[kind]):
         if point.name == name:
@@ -60,18 +46,8 @@ def plugin(kind: str, name: str, base: type) -> Any | None:
 def plugins(kind: str, base: type) -> tuple[dict[str, Any], tuple[Finding, ...]]:
     """Load every plug-in of a kind.
 
-    Parameters
-    ----------
-    kind : str
-        A key of `GROUPS`.
-    base : type
-
-    Returns
-    -------
-    found : dict
-        Plug-ins by name.
-    findings : tuple of Finding
-        One of each that cannot be used.
+    `kind`: a key of `GROUPS`. Returns `found`: plug-ins by name; `findings`: one of each that
+    cannot be used.
     """
     found: dict[str, Any] = {}
     findings: list[Finding] = []

@@ -12,12 +12,8 @@ __all__ = ["named_paths", "names_file", "resolved", "with_paths"]
 def names_file(key: str, value: Any) -> bool:
     """Whether a value of a configuration is the path of an input.
 
-    Parameters
-    ----------
-    key : str
-        Name of the field.
-    value : object
-        A path; for a sensor, a file path with its suffix, or a name of the catalogue.
+    `key`: name of the field. `value`: a path; for a sensor, a file path with its suffix, or a name
+    of the catalogue.
     """
     if not isinstance(value, str):
         return False
@@ -38,12 +34,7 @@ def named_paths(value: Any) -> Iterator[str]:
 def with_paths(value: Any, change: Callable[[str], str]) -> Any:
     """Return a configuration with every path of an input replaced.
 
-    Parameters
-    ----------
-    value : object
-        The configuration, or a part.
-    change : callable
-        Maps a path to its replacement.
+    `value`: the configuration, or a part. `change`: maps a path to its replacement.
     """
     if isinstance(value, dict):
         return {
@@ -57,11 +48,6 @@ def with_paths(value: Any, change: Callable[[str], str]) -> Any:
 def resolved(value: Any, root: Path) -> Any:
     """Return a configuration with the paths of copied inputs made absolute.
 
-    Parameters
-    ----------
-    value : object
-        From a manifest.
-    root : Path
-        Folder of the bundle.
+    `value`: from a manifest. `root`: folder of the bundle.
     """
     return with_paths(value, lambda path: str(root / path))

@@ -18,18 +18,7 @@ KEPT = ("copy", "reference")
 def read_manifest(bundle: Path) -> dict[str, Any]:
     """Read the manifest of a bundle.
 
-    Parameters
-    ----------
-    bundle : Path
-
-    Returns
-    -------
-    dict
-
-    Raises
-    ------
-    DataError
-        The manifest is missing or damaged.
+    DataError: the manifest is missing or damaged.
     """
     path = bundle / MANIFEST
     if not bundle.exists():
@@ -86,16 +75,8 @@ def _refuse_unsealed_paths(manifest: dict[str, Any]) -> None:
 def unsealed_changes(bundle: Path, manifest: dict[str, Any]) -> list[str]:
     """List the files of a bundle that differ from the seal.
 
-    Parameters
-    ----------
-    bundle : Path
-    manifest : dict
-        From `read_manifest`.
-
-    Returns
-    -------
-    list of str
-        One sentence per file: changed, missing, or not in the manifest.
+    `manifest`: from `read_manifest`. Returns one sentence per file: changed, missing, or not in the
+    manifest.
     """
     changes = []
     expected: set[str] = {MANIFEST, *UNSEALED}

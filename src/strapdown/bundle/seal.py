@@ -113,15 +113,7 @@ def files_of(root: Path) -> list[str]:
 def check_destination(out: Path, force: bool) -> None:
     """Refuse a folder that must not be written.
 
-    Parameters
-    ----------
-    out : Path
-    force : bool
-        Allow a bundle, or an empty folder, to be replaced.
-
-    Raises
-    ------
-    ConfigError
+    `force`: allow a bundle, or an empty folder, to be replaced.
     """
     if not out.exists():
         _refuse_unwritable(out)
@@ -149,13 +141,7 @@ def write_timing(
 ) -> None:
     """Write the times of a run beside its bundle's seal.
 
-    Parameters
-    ----------
-    seal : Seal
-    seconds : dict of str to float
-        Stage to seconds.
-    sample_ns : dict of str to dict, optional
-        Algorithm to nanoseconds per sample in each precision.
+    `seconds`: stage to seconds. `sample_ns`: algorithm to nanoseconds per sample in each precision.
     """
     timing: dict[str, Any] = {"seconds": {stage: round(t, 4) for stage, t in seconds.items()}}
     if sample_ns:
@@ -166,11 +152,7 @@ def write_timing(
 def write_latency(seal: Seal, latency: Mapping[str, Any]) -> None:
     """Write the latency of the samples beside the bundle's seal.
 
-    Parameters
-    ----------
-    seal : Seal
-    latency : mapping
-        As JSON.
+    `latency`: as JSON.
     """
     (seal.path / LATENCY).write_text(to_json(latency), encoding="utf-8", newline="\n")
 

@@ -42,30 +42,12 @@ def write_bundle(
 ) -> Iterator[Path]:
     """Write a bundle atomically.
 
-    Parameters
-    ----------
-    out : Path
-        Folder to create. An existing one is replaced only if `force` is set and it is empty or a
-        bundle itself.
-    command : str
-        Command that can repeat the run.
-    configuration : dict
-        The resolved configuration; paths of inputs are replaced by those in or from the bundle.
-    inputs : sequence of InputFiles
-        Copied if they total at most 64 MiB, otherwise referred to by path.
-    force : bool
-    seals : list of Seal
-        The seal is appended when the bundle is complete.
-
-    Yields
-    ------
-    Path
-        An empty folder; its content at the end of the block becomes the bundle.
-
-    Raises
-    ------
-    ConfigError
-        `out` exists and must not be replaced.
+    `out`: folder to create. An existing one is replaced only if `force` is set and it is empty or a
+    bundle itself. `command`: command that can repeat the run. `configuration`: the resolved
+    configuration; paths of inputs are replaced by those in or from the bundle. `inputs`: copied if
+    they total at most 64 MiB, otherwise referred to by path. `seals`: the seal is appended when the
+    bundle is complete. Yields an empty folder; its content at the end of the block becomes the
+    bundle. ConfigError: `out` exists and must not be replaced.
     """
     out = out.absolute()
     check_destination(out, force)
@@ -120,21 +102,8 @@ def make_manifest(
 ) -> dict[str, Any]:
     """Create the manifest of a finished folder, and copy its inputs into it.
 
-    Parameters
-    ----------
-    folder : Path
-        Its files are the outputs.
-    command, configuration, inputs
-        As for `write_bundle`.
-
-    Returns
-    -------
-    dict
-
-    Raises
-    ------
-    DataError
-        An input has changed since it was read.
+    `folder`: its files are the outputs. `command`, `configuration`, `inputs`: as for
+    `write_bundle`. DataError: an input has changed since it was read.
     """
     outputs = [
         {"name": name, "sha256": sha256(folder / name), "bytes": (folder / name).stat().st_size}
@@ -245,10 +214,7 @@ def versions() -> dict[str, str]:
 def source_digest() -> str:
     """SHA-256 of the sources and data of this package, as installations of a version may differ.
 
-    Returns
-    -------
-    str
-        Of the name and the content of each file except compiled ones, in order of names.
+    Of the name and the content of each file except compiled ones, in order of names.
     """
     root = Path(__file__).parents[1]
     digest = hashlib.sha256()

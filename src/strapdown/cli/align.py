@@ -148,12 +148,8 @@ def align(
 def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
     """Return the specification by the flags; the position may come from the log.
 
-    Raises
-    ------
-    ConfigError
-        A value is invalid or missing; the message names the flag.
-    DataError
-        The log cannot be read.
+    ConfigError: a value is invalid or missing; the message names the flag. DataError: the log
+    cannot be read.
     """
     from strapdown.api.alignment import specify_alignment
     from strapdown.api.reading import ImuFile

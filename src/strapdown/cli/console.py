@@ -188,15 +188,8 @@ def print_table(
 ) -> None:
     """Print a table.
 
-    Parameters
-    ----------
-    columns : sequence of str
-    rows : sequence of sequence of str
-    text : sequence of int, optional
-        Left-aligned columns of text; the first and the last if not given. The others are
-        right-aligned numbers, which are never wrapped.
-    strong : container of int
-        Highlighted rows.
+    `text`: left-aligned columns of text; the first and the last if not given. The others are
+    right-aligned numbers, which are never wrapped. `strong` (container of int): highlighted rows.
     """
     from rich.box import SIMPLE_HEAD
     from rich.table import Table

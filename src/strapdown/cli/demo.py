@@ -131,12 +131,7 @@ class DemoRun:
 def demo_runs(out: Path, data: Path) -> list[DemoRun]:
     """Return every run of the demonstration, in the order of its page.
 
-    Parameters
-    ----------
-    out : Path
-        Folder of the demonstration, as named in commands.
-    data : Path
-        Folder of the recordings.
+    `out`: folder of the demonstration, as named in commands. `data`: folder of the recordings.
     """
     from strapdown.report.demo_page import Shown
 

@@ -81,11 +81,7 @@ _PLUGINS: dict[str, tuple[str, type]] = {
 def listed_modules() -> tuple[tuple[Listed, ...], tuple[Finding, ...]]:
     """Return every list in printing order, including plug-ins.
 
-    Returns
-    -------
-    lists : tuple of Listed
-    findings : tuple of Finding
-        One for each unusable plug-in.
+    Returns `findings`: one for each unusable plug-in.
     """
     lists: list[Listed] = []
     findings: list[Finding] = []

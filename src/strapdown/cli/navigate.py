@@ -194,12 +194,8 @@ def navigate(
 def navigation_of_flags(log: Path, given: Mapping[str, Any]) -> NavigationSpec:
     """Return the specification by the flags, completed from the log and the fixes.
 
-    Raises
-    ------
-    ConfigError
-        A value is invalid or missing; the message names the flag.
-    DataError
-        A file cannot be read.
+    ConfigError: a value is invalid or missing; the message names the flag. DataError: a file cannot
+    be read.
     """
     from strapdown.api.navigation import specify_navigation
     from strapdown.api.reading import ImuFile

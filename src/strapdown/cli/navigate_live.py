@@ -39,26 +39,10 @@ def navigate_live(
 
     Standard output holds the states only; all else goes to standard error.
 
-    Parameters
-    ----------
-    file : Path
-        The configuration.
-    where : str
-        As `open_source`.
-    folder : Path
-        The bundle.
-    write : OutFlags
-    lines, every
-        As `StateLines`.
-    given : mapping
-        Flags without a meaning here, by name; None where not given.
-
-    Raises
-    ------
-    ConfigError
-        The configuration is missing, or a flag without a meaning here is given.
-    StrapdownError
-        The error that ended the run; the bundle holds the run up to it, if navigation had begun.
+    `file`: the configuration. `where`: as `open_source`. `folder`: the bundle. `lines`, `every`: as
+    `StateLines`. `given`: flags without a meaning here, by name; None where not given. ConfigError:
+    the configuration is missing, or a flag without a meaning here is given. StrapdownError: the
+    error that ended the run; the bundle holds the run up to it, if navigation had begun.
     """
     flag = next((name for name, value in given.items() if value is not None), None)
     if flag is not None or file.suffix.lower() != ".toml":

@@ -56,13 +56,8 @@ def print_navigation(
 ) -> None:
     """Print the final state of a run, its uncertainty, the verdict, and findings.
 
-    Parameters
-    ----------
-    result : NavigationRun
-    findings : sequence of Finding
-        Printed on the error stream, as many as there is room for.
-    verbose : bool
-        Print also the start's and the sensors' tables, every caution and every finding.
+    `findings`: printed on the error stream, as many as there is room for. `verbose`: print also the
+    start's and the sensors' tables, every caution and every finding.
     """
     out = console()
     found = examine(told_of(result))

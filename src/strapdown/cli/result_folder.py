@@ -24,19 +24,10 @@ ENDINGS = ("align", "attitude", "coast", "crash", "navigate", "simulated")
 def default_folder(source: str | Path, ending: str, named: str | None = None) -> Path:
     """Return the default folder of a result.
 
-    Parameters
-    ----------
-    source : str or Path
-        Argument of the command: a log, a configuration, a folder, a name.
-    ending : str
-        Suffix by the command.
-    named : str, optional
-        Name of the subject, if `source` is named after a command, such as ``navigate.toml``.
-
-    Returns
-    -------
-    Path
-        ``drive-navigate`` for ``drive.csv``, and for its ``navigate.toml``; without repeated words.
+    `source`: argument of the command: a log, a configuration, a folder, a name. `ending`: suffix by
+    the command. `named`: name of the subject, if `source` is named after a command, such as
+    ``navigate.toml``. Returns ``drive-navigate`` for ``drive.csv``, and for its ``navigate.toml``;
+    without repeated words.
     """
     path = Path(source)
     whole = path.resolve() if path.name in ("", ".", "..") else path
@@ -62,16 +53,8 @@ def source_name(spec: AlignmentSpec | NavigationSpec) -> str:
 def refuse_result(source: str | Path, wanted: str) -> None:
     """Refuse a result folder given as the input of a command.
 
-    Parameters
-    ----------
-    source : str or Path
-    wanted : str
-        Expected input, in words.
-
-    Raises
-    ------
-    ConfigError
-        It is one; the message names its command, and what can be done with it.
+    `wanted`: expected input, in words. ConfigError: it is one; the message names its command, and
+    what can be done with it.
     """
     from strapdown.bundle import read_manifest
 
@@ -114,26 +97,10 @@ def run_and_save(
 ) -> tuple[Any, Seal] | None:
     """Run with progress, and save the result with the times of its stages.
 
-    Parameters
-    ----------
-    compute : callable
-        Returns a result with `save`; it reports its stages.
-    folder : Path
-    write : OutFlags
-    answer : str
-        File of the result that ``--json`` prints.
-    *more : callable
-        Write further files outside the seal.
-
-    Returns
-    -------
-    result, seal
-        None if the rest is not to be printed.
-
-    Raises
-    ------
-    ConfigError
-        The folder exists and must not be replaced; or as `compute`.
+    `compute`: returns a result with `save`; it reports its stages. `answer`: file of the result
+    that ``--json`` prints. `*more`: write further files outside the seal. Returns result and
+    seal, or None if the rest is not to be printed. ConfigError: the folder exists and must not be
+    replaced; or as `compute`.
     """
     from strapdown.bundle.seal import check_destination, write_timing
 

@@ -109,19 +109,8 @@ class LogFlags:
 def log_keys(given: Mapping[str, Any]) -> dict[str, Any]:
     """Keys of a configuration's ``[log]`` by the flags.
 
-    Parameters
-    ----------
-    given : mapping
-        As `LogFlags.given`; other entries are ignored.
-
-    Returns
-    -------
-    dict
-
-    Raises
-    ------
-    ConfigError
-        A column name or the part of the log is invalid.
+    `given`: as `LogFlags.given`; other entries are ignored. ConfigError: a column name or the part
+    of the log is invalid.
     """
     from strapdown.formats.columns import parse_column_option
     from strapdown.systems.inputs import check_part
@@ -201,15 +190,8 @@ class OutFlags:
 def spread(command: Callable[..., None]) -> Callable[..., None]:
     """Expand the option sets of a command into separate flags.
 
-    Parameters
-    ----------
-    command : callable
-        Some of its parameters are of a dataclass whose fields are options.
-
-    Returns
-    -------
-    callable
-        The same command with a parameter for each option instead of the set.
+    `command`: some of its parameters are of a dataclass whose fields are options. Returns the same
+    command with a parameter for each option instead of the set.
     """
     hints = get_type_hints(command, include_extras=True)
     hints.pop("return", None)
@@ -266,17 +248,7 @@ def refuse_beside_file(
 ) -> None:
     """Refuse options beside a configuration file, and name the key for each.
 
-    Parameters
-    ----------
-    source : Path
-    given : mapping
-        By flag, None where not given.
-    flags : mapping
-        Flags by key path of the specification.
-
-    Raises
-    ------
-    ConfigError
+    `given`: by flag, None where not given. `flags`: flags by key path of the specification.
     """
     written = [name for name, value in given.items() if value is not None]
     if not written:
@@ -301,11 +273,7 @@ def flag_of(name: str) -> str:
 def as_flag(error: ConfigError, flag: Callable[[str], str]) -> ConfigError:
     """Return the error, or each of several, with the option instead of the key path.
 
-    Parameters
-    ----------
-    error : ConfigError
-    flag : callable
-        Flag of a key path of a specification.
+    `flag`: flag of a key path of a specification.
     """
     if error.finding.code == "config.several":
         faults = [f.replace(quantity=flag(f.quantity or "")) for f in error.finding.data["faults"]]

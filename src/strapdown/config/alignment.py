@@ -296,10 +296,7 @@ class AlignmentSpec(FileSpec):
 def sensors_of(spec: Any) -> ImuUncertainty:
     """Sensor uncertainty of the specification of an alignment or a navigation run.
 
-    Raises
-    ------
-    ConfigError
-        The sensor is unknown or incomplete.
+    ConfigError: the sensor is unknown or incomplete.
     """
     stated: SensorsTable = spec.sensors
     sensor = None if stated.sensor is None else load_sensor(stated.sensor)

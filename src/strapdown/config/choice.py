@@ -104,10 +104,7 @@ class _Made(Spec):
     def make(self, **given: Any) -> Any:
         """Create the module; None for an empty slot.
 
-        Parameters
-        ----------
-        **given
-            Fields that the chain fills, of this module and of those in it.
+        `**given`: fields that the chain fills, of this module and of those in it.
         """
         if self.entry is None:
             return None

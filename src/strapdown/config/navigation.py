@@ -535,10 +535,7 @@ def _named(name: Any, aid: Any) -> Any:
 def make_filter(spec: NavigationSpec, sensors: ImuUncertainty) -> ErrorFilter:
     """Create the filter of a specification, without measurement states.
 
-    Raises
-    ------
-    ConfigError
-        A module refuses an option, or a state has no size.
+    ConfigError: a module refuses an option, or a state has no size.
     """
     options = spec.filter.make(ellipsoid=spec.ellipsoid)
     tables = {name: getattr(spec.states, name) for name in STATED_STATES}

@@ -42,17 +42,9 @@ class FileSpec(Spec):
     def checked(cls, table: Mapping[str, Any], file: TomlFile | None = None) -> Self:
         """Create a specification from plain data, as from a command or a sealed folder.
 
-        Parameters
-        ----------
-        table : mapping
-        file : TomlFile, optional
-            The file that it was read from, for the lines of messages.
-
-        Raises
-        ------
-        ConfigError
-            Keys are unknown or missing, values do not fit, or contradict each other: all of them,
-            each with its key and a remedy.
+        `file`: the file that it was read from, for the lines of messages. ConfigError: keys are
+        unknown or missing, values do not fit, or contradict each other: all of them, each with its
+        key and a remedy.
         """
         return cls._checked(table, table if file is None else file.table, file)
 
@@ -205,20 +197,9 @@ LARGEST = 50_000_000
 def beside_sealed_case(case: Path, key: KeyPath, given: str) -> Path | None:
     """Find the copy of a file that a case names, where the case is itself a copy.
 
-    Parameters
-    ----------
-    case : Path
-        As ``FOLDER/inputs/case/case.toml``.
-    key : tuple
-        Of the value in the case.
-    given : str
-        The value.
-
-    Returns
-    -------
-    Path or None
-        None if the case is not in a sealed folder, or the folder has no copy for this key with
-        this file name.
+    `case`: as ``FOLDER/inputs/case/case.toml``. `key`: of the value in the case. `given`: the
+    value. None if the case is not in a sealed folder, or the folder has no copy for this
+    key with this file name.
     """
     home = case.absolute().parent
     if home.parent.name != "inputs":

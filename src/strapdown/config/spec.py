@@ -273,13 +273,8 @@ _MISFITS = {
 def faults_of(error: ValidationError, form: type[Spec], written: Mapping[str, Any]) -> list[Fault]:
     """Convert the errors of a validation.
 
-    Parameters
-    ----------
-    error : ValidationError
-    form : type
-        The specification.
-    written : mapping
-        The table as the user wrote it: its own values, in its own units, are shown.
+    `form`: the specification. `written`: the table as the user wrote it: its own values, in its own
+    units, are shown.
     """
     errors = error.errors(include_url=False)
     faulty = {one["loc"][:end] for one in errors for end in range(len(one["loc"]))}
@@ -509,14 +504,8 @@ def refusal(
 ) -> ConfigError:
     """Return all faults as one error.
 
-    Parameters
-    ----------
-    faults : sequence of Fault
-        One or more.
-    table : mapping
-        As the user wrote it.
-    file : TomlFile, optional
-        Its lines, in whose order the faults are listed; without it they are located by keys alone.
+    `faults`: one or more. `table`: as the user wrote it. `file`: its lines, in whose order the
+    faults are listed; without it they are located by keys alone.
     """
     found = [_located(one, table, file) for one in faults]
     if len(found) == 1:

@@ -75,14 +75,7 @@ class TomlFile:
 def read_toml(path: Path) -> TomlFile:
     """Read a file written by a user.
 
-    Parameters
-    ----------
-    path : Path
-
-    Raises
-    ------
-    ConfigError
-        The file is missing, cannot be read, or is not TOML; the message names the line.
+    ConfigError: the file is missing, cannot be read, or is not TOML; the message names the line.
     """
     text = _text(path)
     try:
@@ -203,23 +196,11 @@ _SCALAR = re.compile(r"[^,\]}#\n]*")
 def key_lines(text: str) -> dict[KeyPath, list[int]]:
     r"""Find the lines of all keys, tables and elements.
 
-    Parameters
-    ----------
-    text : str
-        TOML that `tomllib` reads, with ``\n`` at the ends of its lines. For other text, the keys
-        up to the first error.
-
-    Returns
-    -------
-    dict
-        By path, the lines from 1 on which it is written: more than one for a duplicate key or a
-        reopened table. A table that only contains others and is not written itself, such as ``a``
-        of ``[a.b]``, has the line of its first member.
-
-    Raises
-    ------
-    RecursionError
-        The text is nested too deeply.
+    `text`: TOML that `tomllib` reads, with ``\n`` at the ends of its lines. For other text, the
+    keys up to the first error. Returns by path, the lines from 1 on which it is written: more than
+    one for a duplicate key or a reopened table. A table that only contains others and is not
+    written itself, such as ``a`` of ``[a.b]``, has the line of its first member. RecursionError:
+    the text is nested too deeply.
     """
     scan = _Scan(text)
     scan.document()

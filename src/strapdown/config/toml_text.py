@@ -33,10 +33,7 @@ LONGEST = 300
 def string(text: str) -> str:
     """Return a TOML basic string.
 
-    Parameters
-    ----------
-    text : str
-        Any characters; unpaired surrogates, which UTF-8 cannot encode, become U+FFFD.
+    `text`: any characters; unpaired surrogates, which UTF-8 cannot encode, become U+FFFD.
     """
     return '"' + "".join(_escaped(c) for c in text) + '"'
 
@@ -145,12 +142,7 @@ class Page:
     def path(self, name: str, path: Path, folder: Path) -> None:
         """Add a key that names a file; its remark is above, so that lines do not move.
 
-        Parameters
-        ----------
-        name : str
-        path : Path
-        folder : Path
-            Folder of the file being written.
+        `folder`: folder of the file being written.
         """
         self.say("from the folder of this file, or whole")
         self.key(name, string(named_from(path, folder)))
@@ -160,15 +152,8 @@ class Page:
     ) -> None:
         """Add a key with its remark, on the same line if it fits, else above.
 
-        Parameters
-        ----------
-        name, value : str
-            The value as TOML.
-        remark : str
-        what : str
-            Short text for the list of open values; by default the remark.
-        check : str
-            Consequence of the value, for a user to confirm.
+        `name`, `value`: the value as TOML. `what`: short text for the list of open values; by
+        default the remark. `check`: consequence of the value, for a user to confirm.
         """
         text = f"{name} = {value}"
         remark = "".join(c if c.isprintable() else " " for c in remark)

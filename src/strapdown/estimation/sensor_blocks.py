@@ -64,19 +64,8 @@ ALL_TERMS = tuple(i + j for i in XYZ for j in XYZ)
 def gyro_bias(sd: TriadLike) -> SensorStates:
     """Return the constant bias of the gyros: three states.
 
-    Parameters
-    ----------
-    sd : triad, rad/s
-        One number for all axes, or three.
-
-    Returns
-    -------
-    SensorStates
-
-    Raises
-    ------
-    ConfigError
-        A standard deviation is negative or not finite.
+    `sd` (triad, rad/s): one number for all axes, or three. ConfigError: a standard deviation is
+    negative or not finite.
     """
     return _bias("gyro_bias", "rad/s", sd)
 
@@ -89,14 +78,7 @@ def accel_bias(sd: TriadLike) -> SensorStates:
 def gyro_drift(sd: TriadLike, correlation_time: float) -> SensorStates:
     """Return the varying part of the gyro bias within a record: stationary Gauss-Markov.
 
-    Parameters
-    ----------
-    sd : triad, rad/s
-    correlation_time : float, s
-
-    Returns
-    -------
-    SensorStates
+    `sd` (triad, rad/s). `correlation_time` (s).
     """
     return gauss_markov(_bias("gyro_drift", "rad/s", sd), correlation_time)
 
@@ -119,23 +101,11 @@ def accel_scale(sd: TriadLike) -> SensorStates:
 def gyro_misalignment(sd: TriadLike, terms: Sequence[str] = CROSS_TERMS) -> SensorStates:
     """Return the misalignments of gyros.
 
-    Parameters
-    ----------
-    sd : triad, rad
-        Of the terms of the sensors of x, of y and of z.
-    terms : sequence of str
-        Of ``xy xz yx yz zx zy``: ``xy`` is the part of the rate about y that the gyro of x feels.
-        Six, where the body axes are given by something else; ``("yx", "zx", "zy")`` where they
-        are those of this triad: x along its x, y in the plane of its x and y.
-
-    Returns
-    -------
-    SensorStates
-
-    Raises
-    ------
-    ConfigError
-        A standard deviation is negative or not finite, or the term does not exist.
+    `sd` (triad, rad): of the terms of the sensors of x, of y and of z. `terms`: of ``xy xz yx yz zx
+    zy``: ``xy`` is the part of the rate about y that the gyro of x feels. Six, where the body axes
+    are given by something else; ``("yx", "zx", "zy")`` where they are those of this triad: x along
+    its x, y in the plane of its x and y. ConfigError: a standard deviation is negative or not
+    finite, or the term does not exist.
     """
     return _by_terms("gyro_misalignment", "rad", sd, _known(terms), RATE)
 
@@ -148,14 +118,7 @@ def accel_misalignment(sd: TriadLike, terms: Sequence[str] = CROSS_TERMS) -> Sen
 def g_sensitivity(sd: TriadLike) -> SensorStates:
     """Return the g-sensitivity of gyros: nine states, ``xy`` of gyro x by the force along y.
 
-    Parameters
-    ----------
-    sd : triad, (rad/s)/(m/s²)
-        Of the terms of the gyros of x, of y and of z.
-
-    Returns
-    -------
-    SensorStates
+    `sd` (triad, (rad/s)/(m/s²)): of the terms of the gyros of x, of y and of z.
     """
     return _by_terms("g_sensitivity", "(rad/s)/(m/s²)", sd, ALL_TERMS, FORCE, sensor="gyro")
 
@@ -183,24 +146,8 @@ def mounting(sd: TriadLike) -> SensorStates:
 def unseen(name: str, labels: Sequence[str], unit: str, sd: Any) -> SensorStates:
     """Return constants without effect on the inertial sensors, as those of an aid.
 
-    Parameters
-    ----------
-    name : str
-        Of the block.
-    labels : sequence of str
-        One a state.
-    unit : str
-    sd : float or sequence of float
-        One number for all, or one a state.
-
-    Returns
-    -------
-    SensorStates
-
-    Raises
-    ------
-    ConfigError
-        A standard deviation is negative or not finite.
+    `name`: of the block. `labels`: one a state. `sd` (float or sequence of float): one number for
+    all, or one a state. ConfigError: a standard deviation is negative or not finite.
     """
     k = len(labels)
     nothing = np.zeros((COUPLING, 3, k))
@@ -217,16 +164,8 @@ def unseen(name: str, labels: Sequence[str], unit: str, sd: Any) -> SensorStates
 def random_walk(states: SensorStates, drive: TriadLike) -> SensorStates:
     """Return random walks.
 
-    Parameters
-    ----------
-    states : SensorStates
-    drive : float or triad, unit/√s
-        One number for all, or one a state.
-
-    Returns
-    -------
-    SensorStates
-        With a variance of ``sd² + drive² t``.
+    `drive` (float or triad, unit/√s): one number for all, or one a state. Returns with a variance
+    of ``sd² + drive² t``.
     """
     name, k = states.block.name, len(states.block)
     each = _as_many(drive, k, name)
@@ -236,22 +175,9 @@ def random_walk(states: SensorStates, drive: TriadLike) -> SensorStates:
 def gauss_markov(states: SensorStates, correlation_time: float) -> SensorStates:
     """Return stationary Gauss-Markov processes.
 
-    Parameters
-    ----------
-    states : SensorStates
-        Whose `sd` is that of the processes at every instant.
-    correlation_time : float, s
-        Autocorrelation ``exp(-|t| / correlation_time)``.
-
-    Returns
-    -------
-    SensorStates
-        Driven by ``sd √(2 / correlation_time)``.
-
-    Raises
-    ------
-    ConfigError
-        The time is not a positive number of seconds.
+    `states`: whose `sd` is that of the processes at every instant. `correlation_time` (s):
+    autocorrelation ``exp(-|t| / correlation_time)``. Returns driven by ``sd √(2 /
+    correlation_time)``. ConfigError: the time is not a positive number of seconds.
     """
     if not is_number(correlation_time) or not 0.0 < correlation_time < math.inf:
         raise ConfigError(
@@ -345,18 +271,8 @@ def resting_sd(sensors: ImuUncertainty, rate: ArrayLike, force: ArrayLike) -> tu
     Scale factors, misalignments and g-sensitivities are then a part of the bias: a rest cannot
     separate them.
 
-    Parameters
-    ----------
-    sensors : ImuUncertainty
-    rate : array_like, (3,), rad/s
-        Mean rate in body axes.
-    force : array_like, (3,), m/s²
-        Mean specific force in body axes.
-
-    Returns
-    -------
-    gyro, accel : ndarray, (3,), rad/s and m/s²
-        Standard deviations.
+    `rate` ((3,), rad/s): mean rate in body axes. `force` ((3,), m/s²): mean specific force in body
+    axes. Returns `gyro`, `accel` ((3,), rad/s and m/s²): standard deviations.
     """
     w, f = np.asarray(rate, dtype=np.float64), np.asarray(force, dtype=np.float64)
     sensitivity = np.asarray(sensors.gyro.axis("g_sensitivity")) * math.sqrt(float(f @ f))
@@ -370,16 +286,9 @@ def resting_states(
 ) -> tuple[SensorStates, SensorStates]:
     """Return the biases of a stationary body as states.
 
-    Parameters
-    ----------
-    sensors, rate, force
-        As `resting_sd`.
-
-    Returns
-    -------
-    gyro_bias, accel_bias : SensorStates
-        Random walks: over a time that is short against its correlation time a Gauss-Markov
-        process of deviation s is one, with the drive ``s sqrt(2 / correlation time)``.
+    `sensors`, `rate`, `force`: as `resting_sd`. Returns `gyro_bias`, `accel_bias`: random walks:
+    over a time that is short against its correlation time a Gauss-Markov process of deviation s is
+    one, with the drive ``s sqrt(2 / correlation time)``.
     """
     gyro, accel = resting_sd(sensors, rate, force)
     return (
@@ -427,24 +336,11 @@ def stated_states(
 ) -> tuple[SensorStates, ...]:
     """Return errors of sensors as states.
 
-    Parameters
-    ----------
-    sensors : ImuUncertainty
-        Standard deviation of each.
-    names : sequence of str, optional
-        Of `STATED_STATES`; if not given, biases and drifts as `standard_states`, and the scale
-        factors and misalignments with a stated size: without them the covariance of a body that
-        turns and accelerates is too small. A bias that is named without its drift is a random
-        walk that bounds both.
-
-    Returns
-    -------
-    tuple of SensorStates
-
-    Raises
-    ------
-    ConfigError
-        A block does not exist, one is named twice, or its size is not stated.
+    `sensors`: standard deviation of each. `names`: of `STATED_STATES`; if not given, biases and
+    drifts as `standard_states`, and the scale factors and misalignments with a stated size: without
+    them the covariance of a body that turns and accelerates is too small. A bias that is named
+    without its drift is a random walk that bounds both. ConfigError: a block does not exist, one is
+    named twice, or its size is not stated.
     """
     if names is None:
         known = [n for n in MOVING if any(_size(n, sensors))]
@@ -467,16 +363,7 @@ def stated_states(
 
 
 def states_that_are_stated(sensors: ImuUncertainty) -> tuple[str, ...]:
-    """Return those of `STATED_STATES` with a stated size: all that can be estimated.
-
-    Parameters
-    ----------
-    sensors : ImuUncertainty
-
-    Returns
-    -------
-    tuple of str
-    """
+    """Return those of `STATED_STATES` with a stated size: all that can be estimated."""
     return tuple(
         name
         for name, (triad, attribute, _, _) in STATED_STATES.items()
@@ -620,21 +507,8 @@ class StateProcess:
     def of(self, name: str, block: SensorStates | None) -> SensorStates:
         """Return a block with the stated values.
 
-        Parameters
-        ----------
-        name : str
-            Of `ERRORS_OF_SENSORS`.
-        block : SensorStates, optional
-            Block to be changed; None if only this process states it.
-
-        Returns
-        -------
-        SensorStates
-
-        Raises
-        ------
-        ConfigError
-            The size is not stated.
+        `name`: of `ERRORS_OF_SENSORS`. `block`: block to be changed; None if only this process
+        states it. ConfigError: the size is not stated.
         """
         if self.sd is not None:
             drifts = name.endswith("_drift")
@@ -671,15 +545,7 @@ def with_processes(
 ) -> tuple[SensorStates, ...]:
     """Return states with the stated values of some; additional ones come last.
 
-    Parameters
-    ----------
-    states : tuple of SensorStates
-    processes : mapping of str to StateProcess
-        By name of a block.
-
-    Returns
-    -------
-    tuple of SensorStates
+    `processes`: by name of a block.
     """
     there = {one.block.name for one in states}
     changed = [

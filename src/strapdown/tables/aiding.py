@@ -146,15 +146,8 @@ def barometer_from_pressure(
 def check_barometer(table: pd.DataFrame) -> None:
     """Check a Barometer table.
 
-    Parameters
-    ----------
-    table : DataFrame
-
-    Raises
-    ------
-    DataError
-        A column is missing, a value is not finite, time does not advance, a standard deviation is
-        not above zero, or a height is outside -2000 m to 50 000 m.
+    DataError: a column is missing, a value is not finite, time does not advance, a standard
+    deviation is not above zero, or a height is outside -2000 m to 50 000 m.
     """
     height = checked_values(table, ["height"], ["height_sd"])[:, 0]
     beyond = np.flatnonzero((height < LOWEST) | (height > HIGHEST))
@@ -214,15 +207,8 @@ def body_velocity_table(
 def check_body_velocity(table: pd.DataFrame) -> None:
     """Check a BodyVelocity table.
 
-    Parameters
-    ----------
-    table : DataFrame
-
-    Raises
-    ------
-    DataError
-        A column is missing, a value is not finite, time does not advance, a standard deviation is
-        not above zero, or a velocity is beyond 400 m/s.
+    DataError: a column is missing, a value is not finite, time does not advance, a standard
+    deviation is not above zero, or a velocity is beyond 400 m/s.
     """
     velocity = checked_values(table, BODY_VELOCITY[:3], BODY_VELOCITY[3:])
     beyond = np.argwhere(np.abs(velocity) > FASTEST)
@@ -283,16 +269,9 @@ def heading_table(
 def check_heading(table: pd.DataFrame) -> None:
     """Check a Heading table.
 
-    Parameters
-    ----------
-    table : DataFrame
-
-    Raises
-    ------
-    DataError
-        A column is missing, a value is not finite, time does not advance, a standard deviation is
-        not above zero or finite beyond 110 deg, a heading is beyond a turn, or all headings are
-        within a turn in rad and jump by one.
+    DataError: a column is missing, a value is not finite, time does not advance, a standard
+    deviation is not above zero or finite beyond 110 deg, a heading is beyond a turn, or all
+    headings are within a turn in rad and jump by one.
     """
     heading = checked_values(table, ["heading"], ["heading_sd"])[:, 0]
     sd = values_of(table, ["heading_sd"])[:, 0]
@@ -433,15 +412,8 @@ def odometer_from_distance(
 def check_odometer(table: pd.DataFrame) -> None:
     """Check an Odometer table.
 
-    Parameters
-    ----------
-    table : DataFrame
-
-    Raises
-    ------
-    DataError
-        A column is missing, a value is not finite, time does not advance, a standard deviation is
-        not above zero, or a speed is beyond 100 m/s.
+    DataError: a column is missing, a value is not finite, time does not advance, a standard
+    deviation is not above zero, or a speed is beyond 100 m/s.
     """
     speed = checked_values(table, ["speed"], ["speed_sd"])[:, 0]
     beyond = np.flatnonzero(np.abs(speed) > ODOMETER_FASTEST)

@@ -61,15 +61,8 @@ def attitude_table(time: ArrayLike, q_nb: ArrayLike, source: str | None = None) 
 def check_attitude(table: pd.DataFrame) -> None:
     """Check an Attitude table.
 
-    Parameters
-    ----------
-    table : DataFrame
-
-    Raises
-    ------
-    DataError
-        A column is missing, a value is not finite, time does not advance, or a quaternion's
-        norm is not 1 within 1 %.
+    DataError: a column is missing, a value is not finite, time does not advance, or a quaternion's
+    norm is not 1 within 1 %.
     """
     values = checked_values(table, QUATERNION + EULER)
     rotation.conjugate(values[:, : len(QUATERNION)])
@@ -116,14 +109,7 @@ def references_table(rows: Sequence[dict[str, object]], source: str | None = Non
 def check_references(table: pd.DataFrame) -> None:
     """Check a References table.
 
-    Parameters
-    ----------
-    table : DataFrame
-
-    Raises
-    ------
-    DataError
-        A column is missing, the kind is unknown, or a kind lacks what it needs.
+    DataError: a column is missing, the kind is unknown, or a kind lacks what it needs.
     """
     source = source_of(table)
     check_columns(table, REFERENCE, source)

@@ -73,11 +73,8 @@ def each_row(values: ArrayLike, time: ArrayLike, width: int | None = None) -> Ar
 def checked_values(table: pd.DataFrame, columns: Sequence[str], sd: Sequence[str] = ()) -> Array:
     """Return columns as floats, after checking columns, stamps, values, standard deviations.
 
-    Raises
-    ------
-    DataError
-        A column is missing, time does not advance, a value is not finite, or a standard deviation
-        is not above zero.
+    DataError: a column is missing, time does not advance, a value is not finite, or a standard
+    deviation is not above zero.
     """
     source = source_of(table)
     check_columns(table, [*columns, *sd], source)
@@ -175,10 +172,7 @@ def check_columns(table: pd.DataFrame, columns: Sequence[str], source: str | Non
 def source_of(table: object) -> str | None:
     """Return the name of a table's source for messages.
 
-    Raises
-    ------
-    DataError
-        The object is not a DataFrame.
+    DataError: the object is not a DataFrame.
     """
     if not isinstance(table, pd.DataFrame):
         raise DataError("tables.table-needed-kind", quantity="table", name=type(table).__name__)
@@ -285,16 +279,9 @@ class Gap:
 def find_gaps(time: ArrayLike) -> list[Gap]:
     """Find the steps that are far longer than the usual step of a record.
 
-    Parameters
-    ----------
-    time : array_like, (n,), s
-        Increasing stamps. A gap is a step of more than three times the step that 95 % of the
-        steps do not exceed, so that regular bursts, as of a phone over a network, are not gaps.
-
-    Returns
-    -------
-    list of Gap
-        In order of time.
+    `time` ((n,), s): increasing stamps. A gap is a step of more than three times the step that 95 %
+    of the steps do not exceed, so that regular bursts, as of a phone over a network, are not gaps.
+    Returns in order of time.
     """
     stamps = np.asarray(time, dtype=np.float64)
     steps = np.diff(stamps)

@@ -99,17 +99,10 @@ def gnss_table(
 def check_gnss(table: pd.DataFrame) -> None:
     """Check a Gnss table.
 
-    Parameters
-    ----------
-    table : DataFrame
-
-    Raises
-    ------
-    DataError
-        A column is missing, a value is not finite, time does not advance, a latitude is beyond
-        90 deg, a standard deviation is negative or not a number, a quality is unknown, or the
-        velocity disagrees with the positions but would agree in km/h or knots, with north and
-        east exchanged, or with latitude and longitude exchanged.
+    DataError: a column is missing, a value is not finite, time does not advance, a latitude is
+    beyond 90 deg, a standard deviation is negative or not a number, a quality is unknown, or the
+    velocity disagrees with the positions but would agree in km/h or knots, with north and east
+    exchanged, or with latitude and longitude exchanged.
     """
     source = source_of(table)
     check_columns(table, GNSS, source)

@@ -95,15 +95,8 @@ def imu_table(
 def check_imu(table: pd.DataFrame) -> None:
     """Check an Imu table.
 
-    Parameters
-    ----------
-    table : DataFrame
-
-    Raises
-    ------
-    DataError
-        A column is missing, a value is not finite, time does not advance, there are fewer
-        than two samples, or ``attrs["sampling"]`` is unknown.
+    DataError: a column is missing, a value is not finite, time does not advance, there are fewer
+    than two samples, or ``attrs["sampling"]`` is unknown.
     """
     source = source_of(table)
     check_columns(table, GYRO, source)
@@ -171,15 +164,8 @@ def increments_table(
 def check_increments(table: pd.DataFrame) -> None:
     """Check an Increments table.
 
-    Parameters
-    ----------
-    table : DataFrame
-
-    Raises
-    ------
-    DataError
-        A column is missing, a value is not finite, time does not advance, a step is not
-        positive, or a step begins before the one before it has ended.
+    DataError: a column is missing, a value is not finite, time does not advance, a step is not
+    positive, or a step begins before the one before it has ended.
     """
     checked_values(table, INCREMENTS)
     check_steps(table, source_of(table))
@@ -238,15 +224,8 @@ def motion_increments_table(
 def check_motion_increments(table: pd.DataFrame) -> None:
     """Check a MotionIncrements table.
 
-    Parameters
-    ----------
-    table : DataFrame
-
-    Raises
-    ------
-    DataError
-        A column is missing, a value is not finite, time does not advance, a step is not
-        positive, or a step begins before the one before it has ended.
+    DataError: a column is missing, a value is not finite, time does not advance, a step is not
+    positive, or a step begins before the one before it has ended.
     """
     checked_values(table, MOTION)
     check_steps(table, source_of(table))

@@ -82,15 +82,8 @@ def places_of(trajectory: pd.DataFrame) -> Array:
 def check_trajectory(table: pd.DataFrame) -> None:
     """Check a Trajectory table.
 
-    Parameters
-    ----------
-    table : DataFrame
-
-    Raises
-    ------
-    DataError
-        A column is missing, a value is not finite, time does not advance, or a latitude is
-        beyond 90 deg.
+    DataError: a column is missing, a value is not finite, time does not advance, or a latitude is
+    beyond 90 deg.
     """
     lat, lon = checked_values(table, TRAJECTORY)[:, :2].T
     check_latitude(lat, lon, source_of(table))
@@ -142,14 +135,7 @@ def trajectory_error_table(
 def check_trajectory_error(table: pd.DataFrame) -> None:
     """Check a TrajectoryError table that holds errors.
 
-    Parameters
-    ----------
-    table : DataFrame
-        Further columns are ignored.
-
-    Raises
-    ------
-    DataError
-        A column is missing, a value is not finite, or time does not advance.
+    `table`: further columns are ignored. DataError: a column is missing, a value is not finite, or
+    time does not advance.
     """
     checked_values(table, TRAJECTORY_ERROR)
