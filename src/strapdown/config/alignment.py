@@ -12,9 +12,9 @@ from strapdown.alignment.alignment import Site
 from strapdown.alignment.fine import FineAlignment
 from strapdown.alignment.stationary import home_of
 from strapdown.config.choice import NONE, ChoiceSpec, Kinds
-from strapdown.config.motions import AngleWaveSpec
 from strapdown.config.reading import FileSpec
 from strapdown.config.spec import (
+    AngleWaveSpec,
     Fault,
     FileName,
     NotNegative,

@@ -8,6 +8,7 @@ from pydantic import Field, StrictInt, model_validator
 
 from strapdown.config.reading import FileSpec
 from strapdown.config.spec import (
+    AngleWaveSpec,
     NotNegative,
     Number,
     Position,
@@ -19,14 +20,6 @@ from strapdown.config.spec import (
 )
 
 __all__ = ["KINDS", "MotionSpec", "TrajectorySpec"]
-
-
-class AngleWaveSpec(Spec):
-    """One sine component of an angle."""
-
-    amplitude_deg: Number
-    period_s: Positive
-    phase_deg: Number = 0.0
 
 
 class HeaveWaveSpec(Spec):

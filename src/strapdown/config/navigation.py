@@ -24,12 +24,12 @@ from strapdown.config.alignment import (
     source_faults,
 )
 from strapdown.config.choice import NONE, SLOTS, ChoiceSpec, Kinds
-from strapdown.config.motions import MotionSpec
 from strapdown.config.reading import FileSpec
 from strapdown.config.spec import (
     Angle,
     Fault,
     FileName,
+    Later,
     NotNegative,
     Number,
     OneOrThree,
@@ -119,7 +119,9 @@ def _refuse_empty(spans: tuple[Pair, ...], key: str) -> None:
 class NavigationSimulationTable(Spec):
     """A simulated drive, flight or voyage, with its sensors and receivers."""
 
-    motion: MotionSpec = Field(description='the motion, as kind = "car" and its keys')
+    motion: Annotated[Any, BeforeValidator(Later("strapdown.config.motions", "MotionSpec"))] = (
+        Field(description='the motion, as kind = "car" and its keys')
+    )
     rate_hz: Annotated[Positive, Field(le=MOST_SAMPLES)] = 100.0
     seed: StrictInt = Field(default=0, ge=0)
     sampling: Literal["instantaneous", "mean"] = "mean"

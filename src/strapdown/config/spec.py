@@ -14,6 +14,7 @@ import unicodedata
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
+from importlib import import_module
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar, get_args, get_origin
 
 from pydantic import (
@@ -22,6 +23,7 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    TypeAdapter,
     ValidationError,
     model_validator,
 )
@@ -34,10 +36,12 @@ from strapdown.errors import ConfigError, Finding
 
 __all__ = [
     "Angle",
+    "AngleWaveSpec",
     "At",
     "Channel",
     "Fault",
     "FileName",
+    "Later",
     "Latitude",
     "Longitude",
     "NotNegative",
@@ -389,7 +393,7 @@ def _wanted(form: type[Spec], path: KeyPath) -> Finding:
     found = fields_at(form, path)
     said = found[0].description if found else None
     meaning = f" ({said})" if said else ""
-    if found and any(_forms(found[0].annotation)):
+    if found and any(_forms_of(found[0])):
         header = _header(path)
         header = f"[[{header}]]" if get_origin(found[0].annotation) is tuple else f"[{header}]"
         return Finding("config.table-missing", header=header, meaning=meaning)
@@ -408,18 +412,41 @@ def _forms(annotation: Any) -> Iterator[type[Spec]]:
     """Specifications in an annotation: of a table, a list of tables, or a union."""
     if isinstance(annotation, type) and issubclass(annotation, Spec):
         yield annotation
-    for part in get_args(annotation):
-        if isinstance(part, BeforeValidator) and hasattr(part.func, "forms"):
-            yield from part.func.forms()
-        elif get_origin(annotation) is not Literal:
+    if get_origin(annotation) is not Literal:
+        for part in get_args(annotation):
             yield from _forms(part)
+    if isinstance(annotation, BeforeValidator) and hasattr(annotation.func, "forms"):
+        yield from annotation.func.forms()
 
 
 def _forms_of(one: FieldInfo) -> Iterator[type[Spec]]:
-    yield from _forms(one.annotation)
-    for part in one.metadata:
-        if isinstance(part, BeforeValidator) and hasattr(part.func, "forms"):
-            yield from part.func.forms()
+    for part in (one.annotation, *one.metadata):
+        yield from _forms(part)
+
+
+@dataclass(frozen=True)
+class Later:
+    """Validator of a table whose forms are imported when there is one.
+
+    Attributes
+    ----------
+    module, name : str
+        Module of the forms, and what it calls them: a form, or a union.
+    """
+
+    module: str
+    name: str
+
+    def __call__(self, value: Any) -> Any:
+        """Return the table as its form."""
+        return TypeAdapter(self._annotation()).validate_python(value)
+
+    def forms(self) -> Iterator[type[Spec]]:
+        """Yield the forms."""
+        return _forms(self._annotation())
+
+    def _annotation(self) -> Any:
+        return getattr(import_module(self.module), self.name)
 
 
 def fields_at(form: type[Spec], path: KeyPath) -> list[FieldInfo]:
@@ -458,7 +485,9 @@ def _tables(form: type[Spec], prefix: str = "") -> Iterator[tuple[str, type[Spec
     if not prefix:
         yield "the top of the file", form
     for name, one in form.model_fields.items():
-        for inner in dict.fromkeys(_forms(one.annotation)):
+        # Slots are not searched: their modules share keys with many others.
+        searched = _forms_of(one) if one.annotation is Any else _forms(one.annotation)
+        for inner in dict.fromkeys(searched):
             kind = get_origin(one.annotation)
             header = f"{prefix}{name}.NAME" if kind is dict else f"{prefix}{name}"
             yield (f"[[{header}]]" if kind is tuple else f"[{header}]"), inner
@@ -646,6 +675,14 @@ Channel = Annotated[
 ]
 #: One text where several are allowed.
 Several = BeforeValidator(lambda value: [value] if isinstance(value, str) else value)
+
+
+class AngleWaveSpec(Spec):
+    """One sine component of an angle."""
+
+    amplitude_deg: Number
+    period_s: Positive
+    phase_deg: Number = 0.0
 
 
 class Position(Spec):

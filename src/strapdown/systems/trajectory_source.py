@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown.config import TrajectorySpec, motions
+from strapdown.config.spec import AngleWaveSpec
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
 from strapdown.errors import ConfigError
 from strapdown.sensors.catalogue import load_sensor
@@ -243,7 +244,7 @@ def _waypoints(spec: motions.WaypointsSpec, ellipsoid: Ellipsoid) -> EarthMotion
     )
 
 
-def _angle_waves(waves: Iterable[motions.AngleWaveSpec]) -> tuple[Wave, ...]:
+def _angle_waves(waves: Iterable[AngleWaveSpec]) -> tuple[Wave, ...]:
     return tuple(Wave(w.amplitude_deg, w.period_s, w.phase_deg) for w in waves)
 
 
