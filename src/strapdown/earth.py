@@ -224,12 +224,7 @@ def transport_rate(
     (lat, height, north, east, _), leading = rows(
         lat_deg=lat_deg, alt=alt, v_n_north=north, v_n_east=east, v_n_down=down
     )
-    refuse(
-        np.abs(lat) >= 90.0,
-        lat,
-        "lat_deg",
-        "geodesy.no-direction-at-pole",
-    )
+    refuse(np.abs(lat) >= 90.0, lat, "lat_deg", "geodesy.no-direction-at-pole")
     velocities = np.column_stack([north, east])
     return _vectors(
         kernel.transport_rates, leading, np.radians(lat), height, velocities, ellipsoid.parameters()
@@ -275,19 +270,9 @@ def rows(**quantities: ArrayLike) -> tuple[list[Array], tuple[int, ...]]:
         column = np.ascontiguousarray(np.broadcast_to(array, leading).reshape(-1))
         refuse(~np.isfinite(column), column, name, "geodesy.not-finite")
         if name.startswith("lat"):
-            refuse(
-                np.abs(column) > 90.0,
-                column,
-                name,
-                "geodesy.latitude-beyond-pole",
-            )
+            refuse(np.abs(column) > 90.0, column, name, "geodesy.latitude-beyond-pole")
         elif name.startswith("lon"):
-            refuse(
-                np.abs(column) > 360.0,
-                column,
-                name,
-                "geodesy.longitude-beyond-turn",
-            )
+            refuse(np.abs(column) > 360.0, column, name, "geodesy.longitude-beyond-turn")
         elif name.startswith("alt"):
             refuse(
                 (column < _DEEPEST) | (column > _HIGHEST),
@@ -324,12 +309,7 @@ def refuse(bad: NDArray[np.bool_], values: Array, name: str, code: str, **data: 
 
 
 def _within_gravity(alt: Array) -> None:
-    refuse(
-        np.abs(alt) > _HIGHEST_GRAVITY,
-        alt,
-        "alt",
-        "geodesy.height-beyond-gravity",
-    )
+    refuse(np.abs(alt) > _HIGHEST_GRAVITY, alt, "alt", "geodesy.height-beyond-gravity")
 
 
 def _vectors(loop: Callable[..., Any], leading: tuple[int, ...], *columns: Array) -> Array:

@@ -232,9 +232,7 @@ class WaypointsSpec(Spec):
             raise refuse("waypoints", "config.waypoints-partly-timed")
         if not any(timed) and self.speed_m_per_s is None and not all(paced[1:]):
             raise refuse(
-                "waypoints",
-                "config.waypoint-without-time",
-                index=paced.index(False, 1) + 1,
+                "waypoints", "config.waypoint-without-time", index=paced.index(False, 1) + 1
             )
         return self
 

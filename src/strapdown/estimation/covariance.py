@@ -240,11 +240,7 @@ def checked_covariance(P: Array) -> Array:
     if np.abs(correlation - correlation.T).max() > tolerance:
         i, j = np.unravel_index(np.argmax(np.abs(correlation - correlation.T)), P.shape)
         raise _bad(
-            "estimation.covariance-not-symmetric",
-            i=i + 1,
-            j=j + 1,
-            value=P[i, j],
-            mirrored=P[j, i],
+            "estimation.covariance-not-symmetric", i=i + 1, j=j + 1, value=P[i, j], mirrored=P[j, i]
         )
     P = 0.5 * (P + P.T)
     lowest = float(np.linalg.eigvalsh(0.5 * (correlation + correlation.T))[0])

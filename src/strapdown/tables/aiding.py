@@ -18,6 +18,8 @@ from strapdown.tables.checks import (
     each_row,
     is_number,
     joined,
+    refuse_cell,
+    refuse_row,
     source_of,
     values_of,
 )
@@ -92,8 +94,8 @@ def barometer_table(
     DataError
         Shapes disagree, or as `check_barometer`.
     """
-    blocks = {"height": (height, None), "height_sd": (each_row(height_sd, time), None)}
-    table = joined(time, BAROMETER, source, **blocks)
+    sd = each_row(height_sd, time)
+    table = joined(time, BAROMETER, source, height=(height, None), height_sd=(sd, None))
     check_barometer(table)
     return table
 
@@ -132,13 +134,7 @@ def barometer_from_pressure(
             if LEAST_PRESSURE <= factor * middle <= MOST_PRESSURE:
                 code = other
                 break
-        raise DataError(
-            code,
-            file=source,
-            row=row + 1,
-            quantity="pressure_pa",
-            pressure=p[row],
-        )
+        raise DataError(code, file=source, row=row + 1, quantity="pressure_pa", pressure=p[row])
     spread = as_array(each_row(pressure_sd_pa, p), None, "pressure_sd_pa", source)
     return barometer_table(time, standard_height(p), -standard_slope(p) * spread, source)
 
@@ -150,18 +146,10 @@ def check_barometer(table: pd.DataFrame) -> None:
     deviation is not above zero, or a height is outside -2000 m to 50 000 m.
     """
     height = checked_values(table, ["height"], ["height_sd"])[:, 0]
-    beyond = np.flatnonzero((height < LOWEST) | (height > HIGHEST))
-    if beyond.size:
-        row = int(beyond[0])
-        raise DataError(
-            "tables.no-height-barometer"
-            if height[row] > HIGHEST
-            else "tables.no-height-barometer-2",
-            file=source_of(table),
-            row=row + 1,
-            quantity="height",
-            height=height[row],
-        )
+    beyond = (height < LOWEST) | (height > HIGHEST)
+    over = (height[beyond][:1] > HIGHEST).any()
+    code = "tables.no-height-barometer" if over else "tables.no-height-barometer-2"
+    refuse_row(beyond, code, source_of(table), "height", height=height)
 
 
 # BodyVelocity tables: velocity along the axes of an instrument, for example a Doppler sensor.
@@ -211,16 +199,8 @@ def check_body_velocity(table: pd.DataFrame) -> None:
     deviation is not above zero, or a velocity is beyond 400 m/s.
     """
     velocity = checked_values(table, BODY_VELOCITY[:3], BODY_VELOCITY[3:])
-    beyond = np.argwhere(np.abs(velocity) > FASTEST)
-    if len(beyond):
-        row, column = (int(i) for i in beyond[0])
-        raise DataError(
-            "tables.faster-than-such-instrument-measures",
-            file=source_of(table),
-            row=row + 1,
-            quantity=BODY_VELOCITY[column],
-            velocity=velocity[row, column],
-        )
+    code, columns = "tables.faster-than-such-instrument-measures", BODY_VELOCITY[:3]
+    refuse_cell(np.abs(velocity) > FASTEST, code, source_of(table), columns, velocity=velocity)
 
 
 # Heading tables: from a compass or the baseline of two antennas.
@@ -276,26 +256,10 @@ def check_heading(table: pd.DataFrame) -> None:
     heading = checked_values(table, ["heading"], ["heading_sd"])[:, 0]
     sd = values_of(table, ["heading_sd"])[:, 0]
     source = source_of(table)
-    beyond = np.flatnonzero(np.abs(heading) > 360.0)
-    if beyond.size:
-        row = int(beyond[0])
-        raise DataError(
-            "tables.heading-more-than-turn",
-            file=source,
-            row=row + 1,
-            quantity="heading",
-            heading=heading[row],
-        )
-    wide = np.flatnonzero(np.isfinite(sd) & (sd > MOST_SD))
-    if wide.size:
-        row = int(wide[0])
-        raise DataError(
-            "tables.standard-deviation-says-nothing-heading",
-            file=source,
-            row=row + 1,
-            quantity="heading_sd",
-            sd=sd[row],
-        )
+    beyond = np.abs(heading) > 360.0
+    refuse_row(beyond, "tables.heading-more-than-turn", source, "heading", heading=heading)
+    wide, code = np.isfinite(sd) & (sd > MOST_SD), "tables.standard-deviation-says-nothing-heading"
+    refuse_row(wide, code, source, "heading_sd", sd=sd)
     leaps = np.abs(np.diff(heading))
     in_radians = np.ptp(heading) <= 1.001 * TURN if len(heading) else False
     if in_radians and np.ptp(heading) > FILLED * TURN and leaps.max() > LEAPT * TURN:
@@ -416,15 +380,7 @@ def check_odometer(table: pd.DataFrame) -> None:
     deviation is not above zero, or a speed is beyond 100 m/s.
     """
     speed = checked_values(table, ["speed"], ["speed_sd"])[:, 0]
-    beyond = np.flatnonzero(np.abs(speed) > ODOMETER_FASTEST)
-    if beyond.size:
-        row = int(beyond[0])
-        raise DataError(
-            "tables.faster-than-wheel-rolls"
-            if np.abs(speed).max() < 3.6 * ODOMETER_FASTEST
-            else "tables.faster-than-wheel-rolls-2",
-            file=source_of(table),
-            row=row + 1,
-            quantity="speed",
-            speed=speed[row],
-        )
+    in_km_h = np.abs(speed).max(initial=0.0) < 3.6 * ODOMETER_FASTEST
+    code = "tables.faster-than-wheel-rolls" if in_km_h else "tables.faster-than-wheel-rolls-2"
+    beyond = np.abs(speed) > ODOMETER_FASTEST
+    refuse_row(beyond, code, source_of(table), "speed", speed=speed)

@@ -86,20 +86,33 @@ def checked_values(table: pd.DataFrame, columns: Sequence[str], sd: Sequence[str
     return values
 
 
+def refuse_row(
+    bad: NDArray[np.bool_], code: str, source: str | None, quantity: str, **values: Array
+) -> None:
+    """Raise `DataError` at the first row that is bad, with the values there."""
+    rows = np.flatnonzero(bad)
+    if rows.size:
+        k = int(rows[0])
+        at_row = {name: array[k] for name, array in values.items()}
+        raise DataError(code, file=source, row=k + 1, quantity=quantity, data=at_row)
+
+
+def refuse_cell(
+    bad: NDArray[np.bool_], code: str, source: str | None, columns: Sequence[str], **values: Array
+) -> None:
+    """Raise `DataError` at the first cell that is bad, row by row, with the values there."""
+    cells = np.argwhere(bad)
+    if len(cells):
+        row, column = (int(i) for i in cells[0])
+        at_cell = {name: array[row, column] for name, array in values.items()}
+        raise DataError(code, file=source, row=row + 1, quantity=columns[column], data=at_cell)
+
+
 def check_latitude(lat: Array, lon: Array, source: str | None) -> None:
     """Check that latitudes are within 90 deg."""
-    beyond = np.flatnonzero(np.abs(lat) > 90.0)
-    if beyond.size:
-        row = int(beyond[0])
-        raise DataError(
-            "tables.latitude-beyond-pole"
-            if np.all(np.abs(lon) <= 90.0)
-            else "tables.latitude-beyond-pole-2",
-            file=source,
-            row=row + 1,
-            quantity="lat",
-            lat=lat[row],
-        )
+    exchanged = np.all(np.abs(lon) <= 90.0)
+    code = "tables.latitude-beyond-pole" if exchanged else "tables.latitude-beyond-pole-2"
+    refuse_row(np.abs(lat) > 90.0, code, source, "lat", lat=lat)
 
 
 def check_rows(values: Array, columns: Sequence[str], source: str | None) -> None:
@@ -128,16 +141,7 @@ def check_rows(values: Array, columns: Sequence[str], source: str | None) -> Non
 def check_positive_sd(table: pd.DataFrame, columns: Sequence[str], source: str | None) -> None:
     """Check that standard deviations are above zero; infinite means not measured."""
     values = values_of(table, columns)
-    bad = ~(values > 0.0)
-    if bad.any():
-        row, column = (int(i) for i in np.argwhere(bad)[0])
-        raise DataError(
-            "tables.no-standard-deviation",
-            file=source,
-            row=row + 1,
-            quantity=columns[column],
-            values=values[row, column],
-        )
+    refuse_cell(~(values > 0.0), "tables.no-standard-deviation", source, columns, values=values)
 
 
 def check_time(time: Array, source: str | None) -> None:
@@ -214,17 +218,8 @@ def check_steps(table: pd.DataFrame, source: str | None) -> None:
     time, dt = index_of(table), values_of(table, ["dt"])[:, 0]
     # Resolution of stamps of epoch size.
     slack = 8.0 * float(np.spacing(np.abs(time).max(initial=1.0)))
-    overlap = np.flatnonzero((dt <= 0.0) | np.r_[False, time[1:] - dt[1:] < time[:-1] - slack])
-    if overlap.size:
-        row = int(overlap[0])
-        raise DataError(
-            "tables.step-ending-not-positive-or",
-            file=source,
-            row=row + 1,
-            quantity="dt",
-            dt=dt[row],
-            time=time[row],
-        )
+    overlap = (dt <= 0.0) | np.r_[False, time[1:] - dt[1:] < time[:-1] - slack]
+    refuse_row(overlap, "tables.step-ending-not-positive-or", source, "dt", dt=dt, time=time)
 
 
 # Column names.

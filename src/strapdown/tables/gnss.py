@@ -21,6 +21,8 @@ from strapdown.tables.checks import (
     each_row,
     index_of,
     joined,
+    refuse_cell,
+    refuse_row,
     source_of,
     values_of,
 )
@@ -111,34 +113,13 @@ def check_gnss(table: pd.DataFrame) -> None:
     check_rows(values_of(table, plain), plain, source)
     lat, lon = values_of(table, ["lat", "lon"]).T
     check_latitude(lat, lon, source)
-    _check_sd(table, source)
-    quality = values_of(table, ["quality"])[:, 0]
-    unknown = np.flatnonzero(~np.isin(quality, list(QUALITIES)))
-    if unknown.size:
-        row = int(unknown[0])
-        raise DataError(
-            "tables.quality-unknown",
-            file=source,
-            row=row + 1,
-            quantity="quality",
-            quality=quality[row],
-        )
-    _check_velocity_fits(table, source)
-
-
-def _check_sd(table: pd.DataFrame, source: str | None) -> None:
     columns = [*POSITION_SD, *VELOCITY_SD]
-    values = values_of(table, columns)
-    bad = ~(values >= 0.0)
-    if bad.any():
-        row, column = (int(i) for i in np.argwhere(bad)[0])
-        raise DataError(
-            "tables.no-standard-deviation-2",
-            file=source,
-            row=row + 1,
-            quantity=columns[column],
-            values=values[row, column],
-        )
+    sd = values_of(table, columns)
+    refuse_cell(~(sd >= 0.0), "tables.no-standard-deviation-2", source, columns, values=sd)
+    quality = values_of(table, ["quality"])[:, 0]
+    unknown = ~np.isin(quality, list(QUALITIES))
+    refuse_row(unknown, "tables.quality-unknown", source, "quality", quality=quality)
+    _check_velocity_fits(table, source)
 
 
 def _check_velocity_fits(table: pd.DataFrame, source: str | None) -> None:
