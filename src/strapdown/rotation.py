@@ -41,6 +41,7 @@ __all__ = [
     "dcm_from_rotation_vector",
     "euler_from_dcm",
     "euler_from_quaternion",
+    "euler_from_rotation_vector",
     "euler_sd",
     "level",
     "normalise",
@@ -50,6 +51,7 @@ __all__ = [
     "rotate",
     "rotation_angle",
     "rotation_vector_from_dcm",
+    "rotation_vector_from_euler",
     "rotation_vector_from_quaternion",
     "unit_rotation_angle",
     "within_half_turn",
@@ -337,6 +339,34 @@ def euler_from_dcm(dcm: ArrayLike) -> Array:
     ndarray, (..., 3), deg
     """
     return euler_from_quaternion(quaternion_from_dcm(dcm))
+
+
+def rotation_vector_from_euler(roll_pitch_heading: ArrayLike) -> Array:
+    """Rotation vector of 3-2-1 Euler angles, of length at most pi.
+
+    Parameters
+    ----------
+    roll_pitch_heading : array_like, (..., 3), deg
+
+    Returns
+    -------
+    ndarray, (..., 3), rad
+    """
+    return rotation_vector_from_quaternion(quaternion_from_euler(roll_pitch_heading))
+
+
+def euler_from_rotation_vector(rotation_vector: ArrayLike) -> Array:
+    """Return the 3-2-1 Euler angles of a rotation vector; ranges as in `euler_from_quaternion`.
+
+    Parameters
+    ----------
+    rotation_vector : array_like, (..., 3), rad
+
+    Returns
+    -------
+    ndarray, (..., 3), deg
+    """
+    return euler_from_quaternion(quaternion_from_rotation_vector(rotation_vector))
 
 
 def euler_sd(euler_deg: ArrayLike, covariance: ArrayLike) -> Array:

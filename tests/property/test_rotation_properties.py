@@ -87,9 +87,7 @@ def test_quaternion_to_euler_angles_and_back(q):
 @given(st.one_of(eulers, poles))
 def test_euler_angles_to_matrix_to_rotation_vector_and_back(angles):
     r = rotation.rotation_vector_from_dcm(rotation.dcm_from_euler(angles))
-    back = rotation.quaternion_from_euler(
-        rotation.euler_from_quaternion(rotation.quaternion_from_rotation_vector(r))
-    )
+    back = rotation.quaternion_from_euler(rotation.euler_from_rotation_vector(r))
     q = rotation.quaternion_from_euler(angles)
     # Seven kernels; degrees come in three times, from as much as 4 pi instead of 2 pi.
     assert turn(q, back) <= 7 * (KERNEL + math.pi * 8.5 * U) + 3 * 2 * DEGREES + ANGLE

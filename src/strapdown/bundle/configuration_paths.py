@@ -6,8 +6,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-__all__ = ["named_paths", "names_file", "resolved", "with_paths"]
-
 
 def names_file(key: str, value: Any) -> bool:
     """Whether a value of a configuration is the path of an input.

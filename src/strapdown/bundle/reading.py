@@ -10,8 +10,6 @@ from strapdown.bundle.configuration_paths import named_paths
 from strapdown.bundle.seal import MANIFEST, SCHEMA, UNSEALED, files_of, sha256
 from strapdown.errors import DataError
 
-__all__ = ["read_manifest", "unsealed_changes"]
-
 KEPT = ("copy", "reference")
 
 

@@ -12,25 +12,6 @@ from typing import Any
 
 from strapdown.errors import ConfigError
 
-__all__ = [
-    "LATENCY",
-    "MANIFEST",
-    "SCHEMA",
-    "TIMING",
-    "UNSEALED",
-    "InputFiles",
-    "Seal",
-    "check_destination",
-    "files_of",
-    "input_files",
-    "sensor_file",
-    "sha256",
-    "to_json",
-    "write_latency",
-    "write_timing",
-]
-
-
 MANIFEST = "manifest.json"
 TIMING = "timing.json"
 LATENCY = "latency.json"

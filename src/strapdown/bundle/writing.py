@@ -27,8 +27,6 @@ from strapdown.bundle.seal import (
 )
 from strapdown.errors import DataError
 
-__all__ = ["machine", "make_manifest", "source_digest", "versions", "write_bundle"]
-
 
 @contextmanager
 def write_bundle(

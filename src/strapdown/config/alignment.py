@@ -37,31 +37,6 @@ from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.triad_errors import NAMED_AXES, check_axes_matrix
 from strapdown.sensors.uncertainty import ImuUncertainty, stated_imu
 
-__all__ = [
-    "MOST_SAMPLES",
-    "NOT_BEFORE_FINE",
-    "STAGES",
-    "AlignmentSpec",
-    "AxesTable",
-    "CoarseSpec",
-    "EllipsoidName",
-    "FineSpec",
-    "GnssTable",
-    "LogTable",
-    "OutputTable",
-    "PrefilterSpec",
-    "ReferenceTable",
-    "SensorName",
-    "SensorsTable",
-    "SimulationTable",
-    "SiteTable",
-    "coarse_faults",
-    "sensor_faults",
-    "sensors_of",
-    "slot",
-    "source_faults",
-]
-
 Matrix = tuple[Triple, Triple, Triple]
 #: An hour at 4 kHz.
 MOST_SAMPLES = 1.5e7

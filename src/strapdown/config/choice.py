@@ -42,8 +42,6 @@ from strapdown.navigation.smoother import SMOOTHERS, Smoother
 from strapdown.plugins import WithPlugins
 from strapdown.prefilter import PREFILTERS, Prefilter
 
-__all__ = ["GIVEN", "NONE", "SLOTS", "UNITS", "ChoiceSpec", "Kinds", "Option", "Slot", "options_of"]
-
 #: Kind of an empty slot.
 NONE = "none"
 

@@ -10,8 +10,6 @@ from pydantic import BeforeValidator, Field, StrictInt, model_validator
 from strapdown.config.choice import ChoiceSpec, Kinds
 from strapdown.config.spec import FileName, NotNegative, Number, Positive, Spec, refuse
 
-__all__ = ["CoastMotionTable", "CoastSpec", "CoastStartTable"]
-
 #: Longest outage, s: predictions beyond a day are not meaningful.
 LONGEST = 86_400.0
 #: Measurements that can remain along a stated motion: each is evaluated at the true state.

@@ -30,18 +30,6 @@ from strapdown.config.spec import (
 )
 from strapdown.config.toml_file import shown
 
-__all__ = [
-    "AssumedSpec",
-    "CaseSpec",
-    "EntrySpec",
-    "OptionsSpec",
-    "PointSpec",
-    "ReferenceSpec",
-    "TriadSpec",
-    "UnitSpec",
-    "VehicleSpec",
-]
-
 
 def _number_or_words(value: Any) -> Any:
     if isinstance(value, str):

@@ -16,8 +16,6 @@ from strapdown.formats.columns import unit_of
 from strapdown.sensors.catalogue import KEYS, SENSORS, load_sensor
 from strapdown.sensors.uncertainty import SHEET_FACTS, SPREADS
 
-__all__ = ["case_faults"]
-
 fault = Fault.of
 
 

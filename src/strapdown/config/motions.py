@@ -19,8 +19,6 @@ from strapdown.config.spec import (
     refuse,
 )
 
-__all__ = ["KINDS", "MotionSpec", "TrajectorySpec"]
-
 
 class HeaveWaveSpec(Spec):
     """One sine component of the height, positive downward."""

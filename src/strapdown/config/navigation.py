@@ -58,30 +58,6 @@ from strapdown.navigation.measurements.measurement import Measurement, Tabulated
 from strapdown.navigation.navigator import with_states
 from strapdown.sensors.uncertainty import STATED_KEYS, ImuUncertainty
 
-__all__ = [
-    "STAGES",
-    "AidSpec",
-    "CoarseModeSpec",
-    "CommandTable",
-    "ControlPointsTable",
-    "FineModeSpec",
-    "GapsTable",
-    "LiveTable",
-    "NavigationOutputTable",
-    "NavigationSensorsTable",
-    "NavigationSimulationTable",
-    "NavigationSiteTable",
-    "NavigationSpec",
-    "ReceiverTable",
-    "StartTable",
-    "StateTable",
-    "TrustTable",
-    "TruthTable",
-    "WithholdTable",
-    "make_aids",
-    "make_filter",
-]
-
 
 class ReceiverTable(Spec):
     """A simulated GNSS receiver: the fixes of the measurement with its name."""

@@ -15,8 +15,6 @@ from strapdown.config.spec import Fault, Spec, faults_of, fields_at, refusal
 from strapdown.config.toml_file import KeyPath, TomlFile, place_of, read_toml, shown, shown_key
 from strapdown.errors import ConfigError, Finding
 
-__all__ = ["PLACEHOLDER", "FileSpec", "beside_sealed_case", "changed_options"]
-
 #: Value that only the user knows.
 PLACEHOLDER = "?"
 #: Above this number of open values they are counted, not listed.

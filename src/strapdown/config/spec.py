@@ -34,41 +34,6 @@ from strapdown.config.toml_file import KeyPath, TomlFile, place_of, shown, shown
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, Finding
 
-__all__ = [
-    "Angle",
-    "AngleWaveSpec",
-    "At",
-    "Channel",
-    "Fault",
-    "FileName",
-    "Later",
-    "Latitude",
-    "Longitude",
-    "NotNegative",
-    "Number",
-    "OneOrThree",
-    "Pair",
-    "Position",
-    "Positive",
-    "Several",
-    "Sizes",
-    "Spec",
-    "Triple",
-    "Word",
-    "Words",
-    "accepted_by",
-    "faults_of",
-    "fields_at",
-    "is_number",
-    "keys_of",
-    "missing",
-    "one_line",
-    "refusal",
-    "refuse",
-    "refused",
-    "specify",
-]
-
 # --- units of keys ------------------------------------------------------------------------
 
 #: By the unit ending of a field, the endings that a key may have, each with the number to multiply

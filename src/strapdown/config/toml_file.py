@@ -12,19 +12,6 @@ from typing import Any
 
 from strapdown.errors import ConfigError, Finding
 
-__all__ = [
-    "DEEPEST",
-    "LONGEST",
-    "KeyPath",
-    "TomlFile",
-    "key_lines",
-    "line_of",
-    "read_toml",
-    "shown",
-    "shown_key",
-]
-
-
 _PLACE = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)$")
 # Codes of common slips, by the pattern of a line that is not TOML.
 _SLIPS = (

@@ -9,19 +9,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-__all__ = [
-    "ASK",
-    "Asked",
-    "Page",
-    "array",
-    "inline",
-    "instant",
-    "named_from",
-    "number",
-    "plain",
-    "string",
-]
-
 #: Placeholder for a value that only the user knows.
 ASK = '"?"'
 WIDTH = 100

@@ -29,18 +29,6 @@ from strapdown.estimation.sensor_states import StateLayout
 from strapdown.mechanization.mechanization import Mechanization
 from strapdown.nav_state import NavState
 
-__all__ = [
-    "FilterState",
-    "Rules",
-    "biases_in_level",
-    "is_large",
-    "resting",
-    "rules_of_components",
-    "split_innovations",
-    "unlearnt_force",
-]
-
-
 Array = NDArray[np.float64]
 
 # Relative excess of a noise over its known part, so that the difference stays positive

@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 from strapdown.errors import ConfigError
 from strapdown.estimation.covariance import Innovations, Step
 
-__all__ = ["AdaptiveRule", "Scales"]
-
 
 @dataclass(frozen=True)
 class Influence(ABC):

@@ -14,8 +14,6 @@ from strapdown.estimation.robust import RobustUpdate
 
 Array = NDArray[np.float64]
 
-__all__ = ["SignalEpochs", "SignalFilter", "SignalState"]
-
 # Remainder of a change after so many time constants of the smoother.
 FORGOTTEN = 1e-4
 # Integral of 1/(1 + x^4)² from zero to infinity.
