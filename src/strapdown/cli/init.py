@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -27,8 +27,9 @@ from strapdown.errors import ConfigError
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from strapdown.config.alignment import LogTable
     from strapdown.config.toml_text import Asked
-    from strapdown.errors import Finding
+    from strapdown.progress import Progress
 
 EPILOG = "Example: strapdown init crash recorder.csv"
 ALIGN_EPILOG = "Example: strapdown init align log.imu, then strapdown align align.toml"
@@ -78,33 +79,15 @@ def crash(
     Each line states whether a value was found, is assumed, or is to be filled in ("?"). Then:
     strapdown crash case.toml
     """
-    from strapdown.cli.console import progress
-    from strapdown.cli.result_folder import refuse_result
     from strapdown.crash.template import draft_case, read_records
 
-    _check_free(out, "case.toml", force=force)
-    for record in records:
-        refuse_result(record, "record")
-    with progress(quiet) as report:
-        report("reading", 0.1)
+    def draft(folder: Path, report: Progress) -> Any:
         there = read_records(records)
         report("looking through", 0.5)
-        draft = draft_case(there, folder=out.absolute().parent)
-        _write_file(out, draft.text, "case.toml", force=force)
-    if quiet:
-        return
-    page = _say_found(draft.findings, draft.found)
-    if draft.left_out:
-        page.print("Left out", style="bold")
-        for gone in draft.left_out[:SHOWN]:
-            page.print(f"  {gone.path}, {gone.what}: {gone.why}")
-        if len(draft.left_out) > SHOWN:
-            page.print(f"  and {len(draft.left_out) - SHOWN} more: at the end of {out}")
-    page.print(f"\nWrote {out}")
-    _list(page, f'Only you know; put it in place of each "?" in {out}:', draft.asked)
-    _list(page, f"Is this so? If not, correct it in {out}:", draft.to_check)
-    page.print("\nLook at the lines that say 'assumed', too.")
-    page.print(f"\nThen   strapdown crash {out}")
+        return draft_case(there, folder=folder)
+
+    question = f"Is this so? If not, correct it in {out}:"
+    _propose("crash", records, draft, question, out, force=force, quiet=quiet)
 
 
 @app.command("align", epilog=ALIGN_EPILOG)
@@ -127,25 +110,12 @@ def align(
 
     Then: strapdown align align.toml
     """
-    from strapdown.cli.console import progress
-    from strapdown.cli.result_folder import refuse_result
-    from strapdown.config.alignment import LogTable
-    from strapdown.config.spec import specify
     from strapdown.systems.alignment_draft import draft_alignment
 
-    _check_free(out, "align.toml", force=force)
-    refuse_result(log, "log")
-    with progress(quiet) as report:
-        report("reading", 0.3)
-        table = specify(LogTable, path=str(log), **log_keys(flags.given()))
-        draft = draft_alignment(table, folder=out.absolute().parent, axes=flags.axes)
-        _write_file(out, draft.text, "align.toml", force=force)
-    if quiet:
-        return
-    page = _say_found(draft.findings, draft.found)
-    page.print(f"\nWrote {out}")
-    _list(page, f'Only you know; put it in place of each "?" in {out}:', draft.asked)
-    page.print(f"\nThen   strapdown align {out}")
+    def draft(folder: Path, _: Progress) -> Any:
+        return draft_alignment(_table(log, flags), folder=folder, axes=flags.axes)
+
+    _propose("align", [log], draft, "", out, force=force, quiet=quiet)
 
 
 @app.command("navigate", epilog=NAVIGATE_EPILOG)
@@ -176,45 +146,71 @@ def navigate(
 
     Then: strapdown navigate navigate.toml
     """
-    from strapdown.cli.console import progress
-    from strapdown.cli.result_folder import refuse_result
-    from strapdown.config.alignment import LogTable
-    from strapdown.config.spec import specify
     from strapdown.systems.navigation_draft import draft_navigation
 
-    _check_free(out, "navigate.toml", force=force)
-    refuse_result(log, "log")
-    table = specify(LogTable, path=str(log), **log_keys(flags.given()))
-    with progress(quiet) as report:
-        report("reading", 0.3)
-        draft = draft_navigation(
-            table,
-            folder=out.absolute().parent,
-            axes=flags.axes,
-            gnss=gnss,
-            sensor=sensor,
-            foot=foot,
+    def draft(folder: Path, _: Progress) -> Any:
+        return draft_navigation(
+            _table(log, flags), folder=folder, axes=flags.axes, gnss=gnss, sensor=sensor, foot=foot
         )
-        _write_file(out, draft.text, "navigate.toml", force=force)
+
+    question = f"Assumed; if it is not so, correct it in {out}:"
+    _propose("navigate", [log], draft, question, out, force=force, quiet=quiet)
+
+
+def _table(log: Path, flags: LogFlags) -> LogTable:
+    from strapdown.config.alignment import LogTable
+    from strapdown.config.spec import specify
+
+    return specify(LogTable, path=str(log), **log_keys(flags.given()))
+
+
+def _propose(
+    command: str,
+    records: Sequence[Path],
+    draft: Callable[[Path, Progress], Any],
+    question: str,
+    out: Path,
+    *,
+    force: bool,
+    quiet: bool,
+) -> None:
+    """Write the draft of a configuration, and print what was found and what the user must say.
+
+    `draft`: called with the folder of the file, and progress. `question`: above what the user is to
+    confirm; nothing is listed if empty.
+    """
+    from strapdown.cli.console import console, print_findings, progress
+    from strapdown.cli.result_folder import refuse_result
+
+    usual = "case.toml" if command == "crash" else f"{command}.toml"
+    _check_free(out, usual, force=force)
+    for record in records:
+        refuse_result(record, "record" if command == "crash" else "log")
+    with progress(quiet) as report:
+        report("reading", 0.1)
+        made = draft(out.absolute().parent, report)
+        _write_file(out, made.text, usual, force=force)
     if quiet:
         return
-    page = _say_found(draft.findings, draft.found)
-    page.print(f"\nWrote {out}")
-    _list(page, f'Only you know; put it in place of each "?" in {out}:', draft.asked)
-    _list(page, f"Assumed; if it is not so, correct it in {out}:", draft.to_check)
-    page.print(f"\nThen   strapdown navigate {out}")
-
-
-def _say_found(findings: Sequence[Finding], found: Sequence[str]) -> Console:
-    """Print the findings from the records; return the console for the rest."""
-    from strapdown.cli.console import console, print_findings
-
-    print_findings(findings)
+    print_findings(made.findings)
     page = console()
     page.print("Found", style="bold")
-    for line in found:
+    for line in made.found:
         page.print(f"  {line}")
-    return page
+    left_out = made.left_out if command == "crash" else ()
+    if left_out:
+        page.print("Left out", style="bold")
+        for gone in left_out[:SHOWN]:
+            page.print(f"  {gone.path}, {gone.what}: {gone.why}")
+        if len(left_out) > SHOWN:
+            page.print(f"  and {len(left_out) - SHOWN} more: at the end of {out}")
+    page.print(f"\nWrote {out}")
+    _list(page, f'Only you know; put it in place of each "?" in {out}:', made.asked)
+    if question:
+        _list(page, question, made.to_check)
+    if command == "crash":
+        page.print("\nLook at the lines that say 'assumed', too.")
+    page.print(f"\nThen   strapdown {command} {out}")
 
 
 def _list(page: Console, head: str, lines: Sequence[Asked]) -> None:
