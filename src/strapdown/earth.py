@@ -106,7 +106,8 @@ def gravity(lat_deg: ArrayLike, alt: ArrayLike, *, ellipsoid: Ellipsoid = WGS84)
     ellipsoid this is the same field continued inward, without the mass above.
     """
     (lat, height), leading = rows(lat_deg=lat_deg, alt=alt)
-    _within_gravity(height)
+    beyond = np.abs(height) > _HIGHEST_GRAVITY
+    refuse(beyond, height, "alt", "geodesy.height-beyond-gravity")
     return _vectors(kernel.gravities, leading, np.radians(lat), height, ellipsoid.parameters())
 
 
@@ -306,10 +307,6 @@ def refuse(bad: NDArray[np.bool_], values: Array, name: str, code: str, **data: 
         raise DataError(
             code, row=int(where[0]) + 1, quantity=name, value=values[where[0]].tolist(), **data
         )
-
-
-def _within_gravity(alt: Array) -> None:
-    refuse(np.abs(alt) > _HIGHEST_GRAVITY, alt, "alt", "geodesy.height-beyond-gravity")
 
 
 def _vectors(loop: Callable[..., Any], leading: tuple[int, ...], *columns: Array) -> Array:

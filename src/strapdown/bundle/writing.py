@@ -110,7 +110,8 @@ def make_manifest(
     ]
     for item in inputs:
         for file, digest in zip(item.files, item.digests, strict=True):
-            _refuse_changed(file, digest)
+            if not file.is_file() or sha256(file) != digest:
+                raise DataError("bundle.input-changed", file=file.name)
     kept, moved = _keep(folder, inputs)
     return {
         "schema": SCHEMA,
@@ -121,11 +122,6 @@ def make_manifest(
         "versions": versions(),
         "platform": machine(),
     }
-
-
-def _refuse_changed(file: Path, digest: str) -> None:
-    if not file.is_file() or sha256(file) != digest:
-        raise DataError("bundle.input-changed", file=file.name)
 
 
 def _keep(

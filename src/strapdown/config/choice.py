@@ -273,11 +273,6 @@ class Option:
     takes_class: bool = False
     group: type | None = None
 
-    @property
-    def has_default(self) -> bool:
-        """Whether the option may be omitted."""
-        return self.default is not MISSING
-
 
 @cache
 def options_of(module: type) -> tuple[Option, ...]:
@@ -289,10 +284,15 @@ def options_of(module: type) -> tuple[Option, ...]:
             continue
         hint = hints[one.name]
         default = one.default if one.default_factory is MISSING else one.default_factory()
-        slot = _slot_of(hint)
+        parts = _members(hint)
+        bases = [get_args(p)[0] if get_origin(p) is type else p for p in parts]
+        slot = next((slot for slot in SLOTS.values() if slot.base in bases), None)
         if slot is not None:
-            kind = default if default in (None, MISSING) else _kind_of(slot, default)
-            takes_class = any(get_origin(part) is type for part in _members(hint))
+            kind = default
+            if default not in (None, MISSING):
+                made = default if isinstance(default, type) else type(default)
+                kind = next((kind for kind, entry in slot.entries.items() if entry is made), None)
+            takes_class = any(get_origin(part) is type for part in parts)
             found.append(Option(one.name, slot.name, hint, kind, slot, takes_class))
         elif is_dataclass(hint) and isinstance(hint, type) and _all_plain(hint):
             found.append(Option(one.name, one.name, hint, default, group=hint))
@@ -303,11 +303,6 @@ def options_of(module: type) -> tuple[Option, ...]:
     return tuple(found)
 
 
-def _kind_of(slot: Slot, default: Any) -> str | None:
-    module = default if isinstance(default, type) else type(default)
-    return next((kind for kind, entry in slot.entries.items() if entry is module), None)
-
-
 def _unit(module: type, one: Field[Any]) -> str | None:
     own = UNITS.get(f"{module.__name__}.{one.name}")
     return one.metadata.get("unit") or own or UNITS.get(one.name)
@@ -315,11 +310,6 @@ def _unit(module: type, one: Field[Any]) -> str | None:
 
 def _members(hint: Any) -> tuple[Any, ...]:
     return get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
-
-
-def _slot_of(hint: Any) -> Slot | None:
-    bases = [get_args(p)[0] if get_origin(p) is type else p for p in _members(hint)]
-    return next((slot for slot in SLOTS.values() if slot.base in bases), None)
 
 
 def _plain(hint: Any) -> bool:

@@ -379,7 +379,11 @@ class NavigationSpec(FileSpec):
             out["aiding"] = aids = {name: _named(name, aid) for name, aid in aids.items()}
         simulation = out.get("simulation")
         if isinstance(simulation, Mapping) and isinstance(simulation.get("gnss", {}), Mapping):
-            free = [n for n, aid in (aids or {}).items() if _fixes_of(aid) and not aid.get("path")]
+            free = [
+                name
+                for name, aid in (aids or {}).items()
+                if isinstance(aid, Mapping) and aid.get("kind") == "gnss" and not aid.get("path")
+            ]
             own = simulation.get("gnss", {})
             receivers = {name: own.get(name, {}) for name in sorted({*free, *own})}
             out["simulation"] = {**simulation, "gnss": receivers}
@@ -494,10 +498,6 @@ class NavigationSpec(FileSpec):
             made.begin(start, np.zeros((made.model.physical_size,) * 2))
 
         yield from refused(("filter",), begin)
-
-
-def _fixes_of(aid: Any) -> bool:
-    return isinstance(aid, Mapping) and aid.get("kind") == "gnss"
 
 
 def _named(name: Any, aid: Any) -> Any:

@@ -262,11 +262,13 @@ def _changed(before: Any, after: Any, place: tuple[str, ...]) -> Iterator[str]:
             yield from _changed(before.get(key), after.get(key), inner)
     elif _is_tables(before) and _is_tables(after) and (before or after):
         yield from _changed_list(before, after, place)
-    elif not _is_same(before, after):
+    # Python treats True as 1; a configuration does not.
+    elif before != after or isinstance(before, bool) != isinstance(after, bool):
         where = ", ".join(place)
         # Tables are not written out.
         if before is None:
-            yield f"{where}: not there before{_now(after)}"
+            now = "" if isinstance(after, dict) else f", {_shown_value(after)} now"
+            yield f"{where}: not there before{now}"
         elif after is None:
             yield f"{where}: {_shown_value(before)} before, not there now"
         else:
@@ -304,17 +306,6 @@ def _by_name(tables: list[dict[str, Any]]) -> dict[str | int, dict[str, Any]] | 
 
 def _is_tables(given: Any) -> bool:
     return isinstance(given, list) and all(isinstance(part, dict) for part in given)
-
-
-def _is_same(before: Any, after: Any) -> bool:
-    # Python treats True as 1; a configuration does not.
-    if isinstance(before, bool) != isinstance(after, bool):
-        return False
-    return bool(before == after)
-
-
-def _now(value: Any) -> str:
-    return "" if isinstance(value, dict) else f", {_shown_value(value)} now"
 
 
 def _shown_value(given: Any) -> str:

@@ -431,7 +431,11 @@ def fields_at(form: type[Spec], path: KeyPath) -> list[FieldInfo]:
         ]
         if not here and forms:
             # The tag of a union, or no field.
-            forms = [of for of in forms if part in _tags(of)]
+            forms = [
+                of
+                for of in forms
+                if any(part in get_args(one.annotation) for one in of.model_fields.values())
+            ]
             if not forms:
                 return []
             continue
@@ -439,10 +443,6 @@ def fields_at(form: type[Spec], path: KeyPath) -> list[FieldInfo]:
         forms = [inner for one in here for inner in _forms_of(one)]
         named = bool(forms) and get_origin(here[0].annotation) is dict
     return found
-
-
-def _tags(form: type[Spec]) -> list[str]:
-    return [tag for one in form.model_fields.values() for tag in get_args(one.annotation)]
 
 
 def _tables(form: type[Spec], prefix: str = "") -> Iterator[tuple[str, type[Spec]]]:
@@ -592,10 +592,6 @@ def _filled(text: str) -> str:
     return text
 
 
-def _file_name(text: str) -> str:
-    return one_line(text, LONGEST_PATH, "config.unprintable-character-in-path")
-
-
 def is_number(value: Any) -> bool:
     """Whether a value is a finite number, and not true or false."""
     try:
@@ -632,7 +628,13 @@ Sizes = Annotated[OneOrThree, AfterValidator(_sizes)]
 #: One line of text, suitable for titles, tables and file names.
 Words = Annotated[str, AfterValidator(one_line)]
 Word = Annotated[Words, AfterValidator(_filled)]
-FileName = Annotated[str, AfterValidator(_filled), AfterValidator(_file_name)]
+FileName = Annotated[
+    str,
+    AfterValidator(_filled),
+    AfterValidator(
+        lambda text: one_line(text, LONGEST_PATH, "config.unprintable-character-in-path")
+    ),
+]
 #: Channels of some records are numbered.
 Channel = Annotated[
     Word,

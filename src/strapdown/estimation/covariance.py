@@ -249,11 +249,6 @@ def checked_covariance(P: Array) -> Array:
     return P
 
 
-def indefinite(row: int) -> DataError:
-    """Return the error to raise for a covariance that a factorization finds indefinite."""
-    return _bad("estimation.covariance-indefinite-in-row", i=row + 1)
-
-
 def _bad(code: str, **data: Any) -> DataError:
     return DataError(code, quantity="P", **data)
 
@@ -443,7 +438,7 @@ class BiermanThornton(CovarianceForm):
         P = checked_covariance(P)
         out = np.empty_like(P)
         if (row := _kernels().udu_factor(P, out)) >= 0:
-            raise indefinite(row)
+            raise _bad("estimation.covariance-indefinite-in-row", i=row + 1)
         return out
 
     def predict(self, state: Array, Phi: Array, Q: Array) -> Array:

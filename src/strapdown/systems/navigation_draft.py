@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import MISSING, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -277,7 +277,7 @@ def _options(page: Page, module: type, chosen: Mapping[str, Any]) -> None:
             page.say(f"{option.key} = {said}    of {', '.join(option.slot.entries)}")
         elif value is not None:
             page.say(f"{option.key} = {value}")
-        elif not option.has_default:
+        elif option.default is MISSING:
             page.key(option.key, ASK, f"only you know: {_WANTED.get(option.key, 'no default')}")
 
 

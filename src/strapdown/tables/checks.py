@@ -82,7 +82,8 @@ def checked_values(table: pd.DataFrame, columns: Sequence[str], sd: Sequence[str
     values = values_of(table, columns)
     check_rows(values, columns, source)
     if sd:
-        check_positive_sd(table, sd, source)
+        spread = values_of(table, sd)
+        refuse_cell(~(spread > 0.0), "tables.no-standard-deviation", source, sd, values=spread)
     return values
 
 
@@ -136,12 +137,6 @@ def check_rows(values: Array, columns: Sequence[str], source: str | None) -> Non
             count=rows.size,
             last_row=rows[-1] + 1,
         )
-
-
-def check_positive_sd(table: pd.DataFrame, columns: Sequence[str], source: str | None) -> None:
-    """Check that standard deviations are above zero; infinite means not measured."""
-    values = values_of(table, columns)
-    refuse_cell(~(values > 0.0), "tables.no-standard-deviation", source, columns, values=values)
 
 
 def check_time(time: Array, source: str | None) -> None:
