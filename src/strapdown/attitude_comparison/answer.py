@@ -472,7 +472,7 @@ def _worst(errors: Sequence[float | None]) -> float | None:
 
 
 def _reference_sd(grounds: Grounds) -> float:
-    """Standard deviation of the best reference point, if there is no truth."""
+    """Standard deviation of the best reference point; zero with a truth."""
     if grounds.truth is not None or grounds.references.empty:
         return 0.0
     return float(np.nan_to_num(grounds.references["sd"].to_numpy(dtype=np.float64)).min())

@@ -77,7 +77,7 @@ class Trials:
         for the answer), ``own_deg``, ``rms_deg``, ``final_deg``.
     ranking : DataFrame
         One row per algorithm, best first: ``algorithm``, ``mean_deg``, ``low_deg``, ``high_deg``
-        (95 % interval of the mean), ``luck`` (probability that the next one is no worse, from
+        (95 % interval of the mean), ``luck`` (probability that the next one is as good, from
         paired differences; NaN for the last).
     """
 
@@ -484,7 +484,7 @@ def gather(sweeps: Sequence[pd.DataFrame], names: Sequence[str]) -> Trials:
     -------
     Trials
         The interval of the mean is Student's; `luck` is the one-sided probability, by
-        Student's test of paired differences, that the next algorithm is in truth no worse.
+        Student's test of paired differences, that the next algorithm is in truth as good.
     """
     rows = []
     for name, sweep in zip(names, sweeps, strict=True):

@@ -439,7 +439,7 @@ class SeverityAnswer:
     Attributes
     ----------
     because : Finding or None
-        Why there is no risk.
+        Reason for a missing risk.
     """
 
     model: SeverityModel

@@ -163,7 +163,7 @@ def known_at(truth: pd.DataFrame, scored: Mask, stamps: Array) -> Known:
     -------
     Known
         A sample counts if a counting row of the truth has its time stamp, or if counting rows
-        on both sides are no further apart than three of the truth's usual steps.
+        on both sides are at most three usual steps of the truth apart.
     """
     rows = truth[scored]
     if rows.empty:

@@ -46,7 +46,7 @@ def join(
 ) -> RawLog:
     """Interpolate accelerometer and magnetometer to the stamps of the gyro.
 
-    Interpolation is linear; there is no extrapolation.
+    Interpolation is linear, without extrapolation.
 
     `logs`: one has the gyro. Their clocks have a common origin; units may differ. `name`: name of
     the result, for messages. `files`: every file that was read; by default those of the logs.

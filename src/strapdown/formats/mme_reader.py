@@ -68,7 +68,7 @@ def read(path: Path) -> CrashRecord:
     Raises
     ------
     DataError
-        There is no header, or more than one; there is no channel; or a header is damaged.
+        No header, several headers, no channel, or a damaged header.
     """
     head = _head(path)
     header = read_header(head)

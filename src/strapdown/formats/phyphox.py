@@ -45,7 +45,7 @@ def read(path: Path) -> RawLog:
     Raises
     ------
     DataError
-        A file is damaged, or there is no gyroscope.
+        A file is damaged, or the gyroscope is missing.
     """
     name = path.resolve().name
     members = [file_member(path)] if path.is_file() else []

@@ -42,7 +42,7 @@ def read(path: Path) -> RawLog:
     Raises
     ------
     DataError
-        The archive or a table is damaged, or there is no gyro.
+        The archive or a table is damaged, or the gyro is missing.
     """
     name = path.resolve().name
     members = members_of(path)

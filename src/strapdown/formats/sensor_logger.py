@@ -71,7 +71,7 @@ def read(path: Path) -> RawLog:
     Raises
     ------
     DataError
-        A file is damaged, or there is no gyroscope.
+        A file is damaged, or the gyroscope is missing.
     """
     name = path.resolve().name
     if path.suffix.lower() == ".json" and path.is_file():

@@ -1,7 +1,7 @@
 """Sensorstream IMU+GPS (Android, Axel Lorenz): its CSV files, or its UDP lines saved to a file.
 
 A line is a stamp in seconds and any subset of blocks: ``timestamp, id, v1, v2, v3, id, …``. A block
-has three values, or one for pressure and battery temperature. There is no header; a blank may
+has three values, or one for pressure and battery temperature. Files have no header; a blank may
 follow each comma.
 """
 

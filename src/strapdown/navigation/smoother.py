@@ -55,7 +55,7 @@ class RauchTungStriebel(Smoother):
     inverse, so that exactly known states do no harm.
 
     It is linear about the filter's own states: where the filter had large errors, as a heading
-    error of tens of degrees, the smoothed states of that time are no better than the linear model
+    error of tens of degrees, the smoothed states of that time are only as good as the linear model
     there. Outliers rejected by a rule stay rejected.
 
     Attributes

@@ -45,7 +45,7 @@ class Signals:
     time_unit : str or None
         If known.
     rate : float or None, Hz
-        If there are no stamps.
+        Without stamps.
     """
 
     stamps: NDArray[Any] | None

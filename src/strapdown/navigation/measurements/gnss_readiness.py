@@ -94,7 +94,7 @@ def check_fixes(table: pd.DataFrame) -> list[Finding]:
     Raises
     ------
     DataError
-        As `check_gnss`; there are no fixes; positions are in radians or minutes; they move
+        As `check_gnss`; fixes are missing; positions are in radians or minutes; they move
         faster than any vehicle.
     """
     check_gnss(table)
