@@ -62,7 +62,16 @@ def test_the_public_names_are_there():
         assert getattr(strapdown, name) is not None
 
 
-ROOMS = ("alignment", "crash", "dsp", "estimation", "evaluation", "navigation", "sensors")
+ROOMS = (
+    "alignment",
+    "crash",
+    "dsp",
+    "estimation",
+    "evaluation",
+    "navigation",
+    "sensors",
+    "simulation",
+)
 
 
 @pytest.mark.parametrize("room", ROOMS)

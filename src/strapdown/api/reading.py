@@ -18,12 +18,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from strapdown.config.alignment import AxesTable, LogTable
 from strapdown.config.spec import specify
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
 from strapdown.formats.gnss_files import GNSS_READERS, GnssOptions
 from strapdown.formats.gnss_files import read_gnss as read_gnss_table
-from strapdown.systems.alignment_source import body_record
 from strapdown.tables import ACCEL, GYRO, QUATERNION, imu_table
 
 if TYPE_CHECKING:
@@ -61,6 +59,9 @@ class ImuFile:
 
     def read(self) -> Imu:
         """Read the used part of the log into body axes and SI."""
+        from strapdown.config.alignment import AxesTable
+        from strapdown.systems.alignment_source import body_record
+
         recording, table, findings = body_record(self.log, AxesTable(axes=self.axes))
         imu = Imu(table)
         imu.attrs = {**table.attrs, "findings": findings, "readings": recording.readings}

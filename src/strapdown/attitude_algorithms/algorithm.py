@@ -84,6 +84,8 @@ class AttitudeAlgorithm(ABC):
         That source.
     width : int
         Number of elements of the state that are the attitude, the first ones.
+    variants : tuple of str
+        Names with options that ``--algorithms all`` stands for; empty: the name alone.
     advance_kernel, update_kernel : callable
         The compiled loops over many steps and for one sample.
     """
@@ -94,6 +96,7 @@ class AttitudeAlgorithm(ABC):
     source: ClassVar[str] = "Alexiev (2021)"
     summary: ClassVar[str]
     width: ClassVar[int] = 4
+    variants: ClassVar[tuple[str, ...]] = ()
     advance_kernel: ClassVar[Any]
     update_kernel: ClassVar[Callable[..., Any]]
 

@@ -41,6 +41,7 @@ class RotationVector(AttitudeAlgorithm):
     equations = ""
     source = "Bortz (1971), Miller (1983)"
     summary = "rotation vector of 1 to 4 increments, compensated for coning"
+    variants = tuple(f"rotvec:samples={n}" for n in (1, 2, 3, 4))
     advance_kernel = staticmethod(kernel.rotvec_advance)
     update_kernel = staticmethod(kernel.rotvec_update)
 

@@ -11,17 +11,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field, FiniteFloat
 
+from strapdown.attitude_algorithms import ALGORITHMS
 from strapdown.config import LogSpec, ScenarioSpec
 from strapdown.config.spec import Spec, specify
 from strapdown.errors import ConfigError
 from strapdown.systems.inputs import check_part
 
-__all__ = ["ALL_ALGORITHMS", "COMPARED", "AttitudeOptions", "AttitudeSpec", "refuse_no_rate"]
+__all__ = ["AttitudeOptions", "AttitudeSpec", "refuse_no_rate"]
 
-#: Algorithms that are compared by default.
-COMPARED = ("naive", "euler", "dcm", "quaternion", "rk4", "rotvec")
-#: Meaning of ``all``: Alexiev's four, Runge-Kutta, and 1 to 4 increments.
-ALL_ALGORITHMS = (*COMPARED[:5], *(f"rotvec:samples={n}" for n in (1, 2, 3, 4)))
+#: Algorithms that are compared by default: one of each.
+COMPARED = tuple(ALGORITHMS)
+#: Meaning of ``all``: the variants, too.
+ALL_ALGORITHMS = tuple(text for name, cls in ALGORITHMS.items() for text in cls.variants or (name,))
 
 AnySource = Annotated[ScenarioSpec | LogSpec, Field(discriminator="kind")]
 
@@ -55,8 +56,7 @@ class AttitudeOptions:
     ----------
     algorithms : sequence of str
         Names with options, as in ``quaternion:order=3`` (`attitude_algorithms.make_algorithm`),
-        plug-ins included; or ``all``: the paper's four, Runge-Kutta, and rotation vectors of 1 to
-        4 increments.
+        plug-ins included; or ``all``: each of `attitude_algorithms.ALGORITHMS`, with its variants.
     rates_hz : sequence of float
         Lower rates to try; the full rate and its halves, if empty.
     tolerance_deg : float

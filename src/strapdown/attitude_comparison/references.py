@@ -25,10 +25,8 @@ from strapdown.evaluation.reference_points import (
     score_references,
     tilt_references,
 )
-from strapdown.evaluation.second_log import SecondLog
 from strapdown.formats import read_log
 from strapdown.formats.recording import Recording
-from strapdown.peers import PEERS, align_heading, run_peers
 from strapdown.sensors.rest import RestStretch, find_rests
 from strapdown.tables import QUATERNION, THETA, attitude_table, find_gaps
 
@@ -416,6 +414,7 @@ def run_beside(
     """
     if not names:
         return ()
+    from strapdown.peers import PEERS, run_peers
 
     wanted = list(PEERS) if [n.lower() for n in names] == ["all"] else list(names)
     runs, found = run_peers(wanted, imu, q_nb, longest_s=LONGEST)
@@ -431,6 +430,7 @@ def run_beside(
 
 
 def _headed(attitude: pd.DataFrame, truth: pd.DataFrame) -> pd.DataFrame:
+    from strapdown.peers import align_heading
 
     inside = truth[(truth.index >= attitude.index[0]) & (truth.index <= attitude.index[-1])]
     if inside.empty:

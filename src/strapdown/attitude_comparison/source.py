@@ -20,7 +20,6 @@ from strapdown.formats import read_log
 from strapdown.formats.recording import Origin, Reading, ReadOptions
 from strapdown.increments import increments_from_imu
 from strapdown.sensors.catalogue import load_sensor
-from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
 from strapdown.tables import QUATERNION
 
 if TYPE_CHECKING:
@@ -62,6 +61,8 @@ def simulate_scenario(spec: ScenarioSpec) -> tuple[pd.DataFrame, pd.DataFrame]:
     ConfigError
         The scenario, the rate, the sampling or the sensor is unknown.
     """
+    from strapdown.simulation import find_scenario, simulate_imu
+
     return simulate_imu(
         find_scenario(spec.name).motion,
         scenario_errors(spec),
@@ -80,9 +81,9 @@ def scenario_errors(spec: ScenarioSpec) -> ImuErrors:
     ConfigError
         The scenario or the sensor is unknown.
     """
-    from strapdown.simulation import find_scenario
-
     if spec.sensor is None:
+        from strapdown.simulation.scenarios import find_scenario
+
         return find_scenario(spec.name).errors
     return load_sensor(spec.sensor).draw(spec.seed)
 
@@ -128,7 +129,7 @@ def read_source(spec: AttitudeSpec) -> Source:
 
 
 def _scenario(spec: ScenarioSpec) -> Source:
-    from strapdown.simulation import ImuErrors
+    from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
 
     scenario = find_scenario(spec.name)
     imu, truth = simulate_scenario(spec)

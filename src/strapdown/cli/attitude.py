@@ -37,16 +37,15 @@ class ComparisonFlags:
     """What to compare; the fields of `AttitudeOptions` as a person types them."""
 
     algorithms: Annotated[
-        str,
+        str | None,
         typer.Option(
             metavar="NAMES",
             help="Names joined by blanks or commas, with options after a colon: 'naive "
-            "euler:step=rk4 dcm:order=3 rotvec:samples=3'; or all (naive euler dcm quaternion rk4 "
-            "rotvec).",
-            show_default=False,
+            "euler:step=rk4 dcm:order=3 rotvec:samples=3'; or all, with variants. One of each "
+            "(strapdown modules) if not given.",
             rich_help_panel=RUN_PANEL,
         ),
-    ] = "naive euler dcm quaternion rk4 rotvec"
+    ] = None
     rates: Annotated[
         str | None,
         typer.Option(
@@ -244,8 +243,9 @@ def _options(compare: ComparisonFlags, log: LogFlags) -> AttitudeOptions:
 
     flags = asdict(compare)
     read = asdict(log)
+    if (algorithms := flags.pop("algorithms")) is not None:
+        flags["algorithms"] = _split(algorithms)
     return AttitudeOptions(
-        algorithms=_split(flags.pop("algorithms")),
         rates_hz=_numbers(flags.pop("rates")),
         reference=flags.pop("reference") or (),
         peers=(flags.pop("peers") or "").replace(",", " ").split(),

@@ -104,7 +104,6 @@ _MOVED = re.compile(
     rf"(?P<unit>mm|cm|m)\s+since\s+(?P<since>{INSTANT}){_SD}",
     re.IGNORECASE,
 )
-_HOW = "write '12.5 same place as 3.0', or '12.5 moved 0.30 0 0 m since 3.0 sd 0.01'"
 
 
 @dataclass(frozen=True)
@@ -273,13 +272,12 @@ def _between(place: PlaceReference, rests: Sequence[RestStretch]) -> tuple[int, 
     for at in (place.since, place.time):
         near = [max(r.start - at, at - r.end, 0.0) for r in rests]
         if not near or min(near) > NEAR_REST:
-            known = ", ".join(f"{r.start:.2f}-{r.end:.2f}" for r in rests) or "none was found"
             raise DataError(
                 "evaluation.names-no-rest-rests",
                 quantity="reference",
                 place=place,
                 at=at,
-                known=known,
+                known=[f"{r.start:.2f}-{r.end:.2f}" for r in rests] or ["none was found"],
             )
         found.append(int(np.argmin(near)))
     if found[0] == found[1]:

@@ -133,10 +133,6 @@ _FORMS = (
         re.I,
     ),
 )
-_HOW = (
-    "write one of: 'end same as start', '9.0 same as 5.0 sd 0.5', 'end 2 turns about z since "
-    "start', '12.5 roll 0 pitch 0 heading 90'"
-)
 
 
 def parse_reference(text: str, start: float, end: float) -> dict[str, object]:

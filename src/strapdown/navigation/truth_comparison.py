@@ -24,7 +24,6 @@ from strapdown.evaluation.trajectory_differences import (
 from strapdown.frames import q_ne
 from strapdown.navigation.record import NavigationRecord
 from strapdown.rotation import euler_sd
-from strapdown.simulation.earth_motion import EarthMotion
 from strapdown.tables import (
     EULER,
     GEODETIC,
