@@ -121,21 +121,7 @@ def memory(algorithm: AttitudeAlgorithm) -> int:
 
 
 def count_cost(algorithm: AttitudeAlgorithm, dt: ArrayLike | None = None) -> Cost:
-    """Count the operations of one sample of an algorithm.
-
-    Parameters
-    ----------
-    algorithm : AttitudeAlgorithm
-    dt : array_like, (n,), s, optional
-        Steps of the log: an algorithm may take another path for unequal steps. Those in its
-        middle are counted; equal steps, if not given.
-
-    Returns
-    -------
-    Cost
-        Operations of `operation_count`, weighed as `constants.CORTEX_M4F_CYCLES` does, and the
-        `memory`.
-    """
+    """Count the operations of one sample, averaged over steps `dt` in s from the middle of a log."""
     lengths = np.full(STEPS, 0.01) if dt is None else np.asarray(dt, dtype=np.float64)
     first = max(0, (len(lengths) - STEPS) // 2)
     middle = np.resize(lengths[first : first + STEPS], STEPS)
@@ -158,19 +144,7 @@ _ROUNDS = 5
 
 
 def time_algorithms(algorithms: Sequence[AttitudeAlgorithm]) -> pd.DataFrame:
-    """Measure the time of a sample, in double and in single precision.
-
-    Parameters
-    ----------
-    algorithms : sequence of AttitudeAlgorithm
-
-    Returns
-    -------
-    DataFrame
-        ``algorithm``, ``float64_ns``, ``float32_ns``: of one step in a batch of 20 000, the best
-        of five. A figure of this machine at this moment, which is why no sealed result holds
-        it.
-    """
+    """Measure the time of a sample in ns, double and single precision: best of five batches."""
     rng = np.random.default_rng(0)
     theta = rng.normal(0.0, 0.01, (_STEPS, 3))
     dt, change = np.full(_STEPS, 0.01), 0.1 * theta
@@ -203,20 +177,7 @@ Single = NDArray[np.float32]
 
 
 def single_increments(imu: pd.DataFrame, interpolation: str = "linear") -> tuple[Single, ...]:
-    """Form increments in single precision from rates that a device reads as floats.
-
-    Parameters
-    ----------
-    imu : DataFrame
-        An Imu table. The steps are differences of its stamps, rounded once: a device counts
-        its clock in whole numbers.
-    interpolation : {'linear', 'cubic'}
-
-    Returns
-    -------
-    dt, theta, dtheta : ndarray of float32
-        (n,) s, (n, 3) rad, (n, 3) rad.
-    """
+    """Single-precision increments, (n,) s, (n, 3) rad, (n, 3) rad, from rates read as floats."""
     kernel = single_precision("increments")
     dt = np.diff(imu.index.to_numpy(dtype=np.float64)).astype(np.float32)
     rate = np.ascontiguousarray(imu[GYRO].to_numpy(dtype=np.float32))
@@ -239,22 +200,7 @@ def single_kernel(algorithm: AttitudeAlgorithm) -> Any:
 def run_single(
     algorithm: AttitudeAlgorithm, increments: tuple[Single, ...], q_nb: ArrayLike
 ) -> Array:
-    """Run an algorithm with every operation in single precision.
-
-    Parameters
-    ----------
-    algorithm : AttitudeAlgorithm
-    increments : tuple of ndarray
-        From `single_increments`.
-    q_nb : array_like, (4,)
-        Attitude at the start, body to local level.
-
-    Returns
-    -------
-    ndarray, (n+1, 4)
-        Quaternions at the start and after each step, read from the algorithm's own numbers in
-        double precision.
-    """
+    """Quaternions, (n+1, 4), of an algorithm with every operation in single precision."""
     dt, theta, dtheta = increments
     state = algorithm.begin(rotation.normalise(q_nb)).astype(np.float32)
     first = state[None, : algorithm.width].astype(np.float64)

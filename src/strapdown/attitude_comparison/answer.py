@@ -68,7 +68,6 @@ class Evidence:
 
     Attributes
     ----------
-    algorithms : sequence of AttitudeAlgorithm
     costs : sequence of Cost
         In the same order.
     sweep : DataFrame
@@ -121,21 +120,9 @@ class Choice:
 
 
 def find_answer(evidence: Evidence, tolerance_deg: float) -> Answer:
-    """Choose the simplest algorithm and its lowest rate.
+    """Choose the algorithm of fewest cycles, and the lowest rate at which its largest error passes.
 
-    Parameters
-    ----------
-    evidence : Evidence
-    tolerance_deg : float
-        Limit of the largest error: against the truth at scored samples, and at every reference
-        point; without either, of the algorithm's own error.
-
-    Returns
-    -------
-    Answer
-        The simplest algorithm has the fewest cycles per sample; its rate is the lowest at which it
-        passes, as it does at every rate above. If none passes, the sentence states whether the
-        sensor or the rate is the limit, and which tolerance is met.
+    If none passes, the sentence states whether the sensor or the rate is the limit.
     """
     passing = choices(evidence, "error_deg", tolerance_deg)
     if passing:
@@ -150,20 +137,7 @@ def find_answer(evidence: Evidence, tolerance_deg: float) -> Answer:
 
 
 def choices(evidence: Evidence, column: str, limit: float, meaning: str = "drop") -> list[Choice]:
-    """Every algorithm that passes, with its lowest rate; simplest first.
-
-    Parameters
-    ----------
-    evidence : Evidence
-    column : str
-        Judged column of the sweep.
-    limit : float, deg
-    meaning : {'drop', 'sum'}
-
-    Returns
-    -------
-    list of Choice
-    """
+    """Every algorithm whose `column` of the sweep passes, with its lowest rate; simplest first."""
     found = []
     for cost in evidence.costs:
         cells = evidence.sweep[
@@ -401,26 +375,7 @@ def find_evidence(
     rests: tuple[RestStretch, ...],
     between_deg: float | None,
 ) -> Evidence:
-    """Gather the evidence for one source.
-
-    Parameters
-    ----------
-    grounds : Grounds
-    algorithms : sequence of AttitudeAlgorithm
-    costs : sequence of Cost
-        In the same order.
-    sweep : DataFrame
-        As `AttitudeComparison.sweep`.
-    bias : dict
-        As `AttitudeComparison.gyro_bias`.
-    rests : tuple of RestStretch
-    between_deg : float or None, deg
-        Possible effect of the rate between its stamps.
-
-    Returns
-    -------
-    Evidence
-    """
+    """Gather the evidence for one source."""
     return Evidence(
         algorithms=algorithms,
         costs=costs,
@@ -437,19 +392,7 @@ def find_evidence(
 
 
 def worst_evidence(evidence: Sequence[Evidence], sweep: pd.DataFrame) -> Evidence:
-    """Gather the evidence for several trials: the worst case.
-
-    Parameters
-    ----------
-    evidence : sequence of Evidence
-        Of each trial, over the same algorithms.
-    sweep : DataFrame
-        Of all trials (`sweep.worst_sweep`).
-
-    Returns
-    -------
-    Evidence
-    """
+    """Gather the evidence for several trials: the worst case."""
     sensors = [e.sensor for e in evidence if e.sensor is not None]
     return replace(
         evidence[0],

@@ -285,25 +285,7 @@ def _flat(share: Share) -> list[Any]:
 
 
 def run_comparison(spec: AttitudeSpec, progress: Progress = silent) -> AttitudeComparison:
-    """Run attitude algorithms over a log or a scenario and compare them with the known attitude.
-
-    Parameters
-    ----------
-    spec : AttitudeSpec
-    progress : callable, optional
-        Called with the name of a stage and the share that is done, 0 to 1.
-
-    Returns
-    -------
-    AttitudeComparison
-
-    Raises
-    ------
-    DataError
-        The log or a reference cannot be used.
-    ConfigError
-        An option is unknown, or not available for this log.
-    """
+    """Run attitude algorithms over a log or a scenario, and compare them with what is known."""
     specs = [spec.model_copy(update={"source": s, "also": ()}) for s in (spec.source, *spec.also)]
     judged = []
     for k, one in enumerate(specs):
@@ -534,20 +516,7 @@ def initial_attitude(
     findings: list[Finding],
     truth: pd.DataFrame | None = None,
 ) -> tuple[Array, dict[str, Any], float]:
-    """Initial attitude ``q_nb`` of a run, its description, and the start time in s.
-
-    Parameters
-    ----------
-    text : str
-        As `AttitudeOptions.initial`.
-    imu : DataFrame
-    rests : tuple of RestStretch
-        Of `imu`.
-    findings : list of Finding
-        A leveling upside down is appended.
-    truth : DataFrame, optional
-        An Attitude table.
-    """
+    """Initial attitude ``q_nb`` of a run, its description, and the start time in s."""
     name = imu.attrs.get("source")
     start = float(imu.index[0])
     at_rest = bool(rests) and rests[0].start - start <= 1.0 and rests[0].accel_mean is not None

@@ -87,29 +87,7 @@ def gather_references(
     rests: tuple[RestStretch, ...],
     levelled: bool,
 ) -> KnownReferences:
-    """Collect reference points from sentences, a scenario, and rests.
-
-    Parameters
-    ----------
-    spec : AttitudeSpec
-    source : Source
-    span : tuple of float, s
-        Meaning of the words start and end.
-    rests : tuple of RestStretch
-    levelled : bool
-        Whether the run starts leveled at the first rest, which then is not a reference.
-
-    Returns
-    -------
-    KnownReferences
-    ----------
-
-    Raises
-    ------
-    ConfigError, DataError
-        A sentence cannot be parsed, an instant lies outside the log, or rests are requested and
-        there are none with acceleration.
-    """
+    """Collect reference points; a rest that the run is leveled at is not one."""
     words = list(spec.references)
     whole = spec.from_s is spec.to_s is spec.duration_s is None
     if isinstance(spec.source, ScenarioSpec) and not words and whole:
@@ -151,26 +129,7 @@ class Second:
 
 
 def read_second(spec: AttitudeSpec, source: Source) -> tuple[Source, Second | None]:
-    """Read the log of a second sensor, if one is named, and align it with the first.
-
-    Parameters
-    ----------
-    spec : AttitudeSpec
-    source : Source
-
-    Returns
-    -------
-    source : Source
-        The part that both cover; with a truth, if the second log has one.
-    second : Second or None
-
-    Raises
-    ------
-    ConfigError
-        A truth was given, too.
-    DataError
-        The second log cannot be read or aligned with the first.
-    """
+    """Read the log of a second sensor, if one is named, and align it with the first."""
     if spec.reference_log_path is None:
         return source, None
     if spec.truth_path is not None:
@@ -206,22 +165,7 @@ def read_second(spec: AttitudeSpec, source: Source) -> tuple[Source, Second | No
 
 
 def truth_of_second(source: Source, second: Second, imu: pd.DataFrame, q_nb: Array) -> Source:
-    """Use the attitude by the second log's rates as the truth.
-
-    Parameters
-    ----------
-    source : Source
-    second : Second
-    imu : DataFrame
-        Samples of the first sensor, from the start of the run.
-    q_nb : ndarray, (4,)
-        Attitude there, from which the second log's rates are integrated.
-
-    Returns
-    -------
-    Source
-        With a truth, and a finding if the second log's own bias is unknown.
-    """
+    """Use the attitude by the second log's rates as the truth."""
     from strapdown.evaluation.second_log import truth_from_second_log
 
     rests = find_rests(second.recording.imu)
@@ -260,18 +204,7 @@ def passed_pole(run: AttitudeRun) -> bool:
 
 
 def truth_score(run: AttitudeRun, source: Source) -> list[Score]:
-    """Compare a run with the truth, if there is one.
-
-    Parameters
-    ----------
-    run : AttitudeRun
-    source : Source
-
-    Returns
-    -------
-    list of Score
-        One or none. Errors are rotation angles in deg over the scored samples.
-    """
+    """Compare a run with the truth, if there is one."""
     if source.truth is None or source.scored is None:
         return []
     errors = error_angles(run.attitude, source.truth[source.scored])
@@ -328,19 +261,7 @@ def judge_truth(source: Source, span: tuple[float, float]) -> list[Finding]:
 
 
 def judge_runs(runs: list[AttitudeRun], increments: pd.DataFrame) -> list[Finding]:
-    """Report unreliable parts of the runs or of their steps.
-
-    Parameters
-    ----------
-    runs : list of AttitudeRun
-        On the same samples.
-    increments : DataFrame
-        The Increments table of the runs.
-
-    Returns
-    -------
-    list of Finding
-    """
+    """Report unreliable parts of the runs or of their steps."""
     findings = []
     for run in runs:
         if passed_pole(run):
@@ -385,32 +306,9 @@ def run_beside(
     references: pd.DataFrame,
     findings: list[Finding],
 ) -> tuple[PeerRun, ...]:
-    """Run the named filters of other libraries, and compare them with the references.
+    """Run filters of other libraries, and compare them with the references.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Names of `peers.PEERS`, one filter as in ``ahrs:madgwick``, or ``all``.
-    source : Source
-        With the truth, if there is one.
-    imu : DataFrame
-        The used samples.
-    q_nb : ndarray, (4,)
-        Initial attitude.
-    references : DataFrame
-    findings : list of Finding
-        Skipped filters are appended.
-
-    Returns
-    -------
-    tuple of PeerRun
-        With an accelerometer alone a filter does not observe the heading: its heading is rotated
-        to the truth at the first scored instant, if there is one.
-
-    Raises
-    ------
-    ConfigError
-        A library is unknown, or not installed.
+    An accelerometer alone does not observe the heading: it is rotated to the truth's first one.
     """
     if not names:
         return ()

@@ -44,23 +44,7 @@ class Source:
 
 
 def simulate_scenario(spec: ScenarioSpec) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Return the samples of a scenario and its exact attitude.
-
-    Parameters
-    ----------
-    spec : ScenarioSpec
-        If it names a sensor, the errors of one of its units replace the scenario's own.
-
-    Returns
-    -------
-    imu, truth : DataFrame
-        Imu and Attitude tables on the same stamps.
-
-    Raises
-    ------
-    ConfigError
-        The scenario, the rate, the sampling or the sensor is unknown.
-    """
+    """Return the samples of a scenario and its exact attitude."""
     from strapdown.simulation import find_scenario, simulate_imu
 
     return simulate_imu(
@@ -74,13 +58,7 @@ def simulate_scenario(spec: ScenarioSpec) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 
 def scenario_errors(spec: ScenarioSpec) -> ImuErrors:
-    """Return the errors of a simulated scenario: its own, or those of a sensor's unit.
-
-    Raises
-    ------
-    ConfigError
-        The scenario or the sensor is unknown.
-    """
+    """Return the errors of a simulated scenario: its own, or those of a sensor's unit."""
     if spec.sensor is None:
         from strapdown.simulation.scenarios import find_scenario
 
@@ -103,13 +81,7 @@ def read_options(spec: LogSpec) -> ReadOptions:
 
 
 def read_source(spec: AttitudeSpec) -> Source:
-    """Read the log, or simulate the scenario, of a specification.
-
-    Raises
-    ------
-    DataError, ConfigError
-        The source cannot be used; the message names file, row and remedy.
-    """
+    """Read the log, or simulate the scenario, of a specification."""
     if isinstance(spec.source, ScenarioSpec):
         return _scenario(spec.source)
     recording = read_log(spec.source.path, read_options(spec.source))
@@ -159,17 +131,7 @@ def _scenario(spec: ScenarioSpec) -> Source:
 
 
 def describe(imu: pd.DataFrame, what: str, whole: pd.DataFrame) -> str:
-    """Describe the input in words: duration, rate, meaning of a row, and part.
-
-    Parameters
-    ----------
-    imu : DataFrame
-        The used part.
-    what : str
-        Name of the input.
-    whole : DataFrame
-        The whole log.
-    """
+    """Describe the input in words: duration, rate, meaning of a row, and part."""
     length = float(imu.index[-1] - imu.index[0])
     rate = (len(imu) - 1) / length
     kind = {

@@ -100,7 +100,6 @@ class Grounds:
         Of the rates between their stamps.
     references : DataFrame
         A References table.
-    truth : Known or None
     own : Known
         Reference of the algorithm errors: in a simulation the exact attitude, rotated to the
         start of the run; for a log that of the most accurate algorithm.
@@ -166,26 +165,7 @@ class Grounds:
 def choose_factors(
     imu: pd.DataFrame, rates: Sequence[float], findings: list[Finding]
 ) -> tuple[int, ...]:
-    """Choose the integer divisors of a log's rate.
-
-    Parameters
-    ----------
-    imu : DataFrame
-    rates : sequence of float, Hz
-        Requested rates; if empty, the full rate and its halves.
-    findings : list of Finding
-        Reports requested rates that cannot be reached.
-
-    Returns
-    -------
-    tuple of int
-        Ascending; 1, the full rate, is always the first.
-
-    Raises
-    ------
-    ConfigError
-        A rate is not positive, or leaves fewer than two steps.
-    """
+    """Ascending divisors of a log's rate, from 1: of the requested rates in Hz, or its halves."""
     steps = len(imu) - 1
     full = steps / float(imu.index[-1] - imu.index[0])
     if not rates:
@@ -224,24 +204,11 @@ def sweep_rates(
     factors: Sequence[int],
     progress: Progress,
 ) -> pd.DataFrame:
-    """Run every algorithm at every rate, with both meanings of a lower rate.
+    """Run every algorithm at every rate; columns as `AttitudeComparison.sweep`.
 
-    Parameters
-    ----------
-    algorithms : sequence of AttitudeAlgorithm
-    grounds : Grounds
-    factors : sequence of int
-        From `choose_factors`.
-    progress : callable
-        Called with a stage and the share that is done.
-
-    Returns
-    -------
-    DataFrame
-        As `results.AttitudeComparison.sweep`. ``drop`` keeps one sample in `factor` and forms
-        increments between those, as a slow logger would; ``sum`` adds up the increments of the
-        full rate, as an integrating sensor would. The last step may be shorter, so that every
-        cell ends at the end of the log. An algorithm that overflows has an infinite error.
+    ``drop`` keeps one sample in `factor`, as a slow logger would; ``sum`` adds up the increments of
+    the full rate, as an integrating sensor would. The last step may be shorter, so that every cell
+    ends at the end of the log. An algorithm that overflows has an infinite error.
     """
     cells = [(meaning, factor) for meaning in MEANINGS for factor in factors]
     clean = grounds.clean
@@ -301,21 +268,7 @@ def _steps(
 
 
 def sum_increments(increments: pd.DataFrame, samples: NDArray[np.int64]) -> pd.DataFrame:
-    """Add up increments between some of the samples.
-
-    Parameters
-    ----------
-    increments : DataFrame
-        An Increments table of n steps.
-    samples : ndarray of int
-        Ascending, from 0 to n.
-
-    Returns
-    -------
-    DataFrame
-        Increments table with one step between each two of the samples. The rate within a step is
-        known only where the step was not summed.
-    """
+    """Add up increments between samples; the rate within a step is known only where it is single."""
     if len(samples) == len(increments) + 1:
         return increments
     begin = samples[:-1]
@@ -371,19 +324,7 @@ def _largest_reference(q: Array, references: pd.DataFrame, used: pd.DataFrame) -
 
 
 def between_samples(imu: pd.DataFrame, q_nb: Array) -> tuple[float, float] | None:
-    """Estimate the effect of the rate between the samples.
-
-    Parameters
-    ----------
-    imu : DataFrame
-    q_nb : ndarray, (4,)
-
-    Returns
-    -------
-    tuple of float, or None
-        Rotation angle at the end, and the largest, in deg, between the attitudes with linear and
-        with cubic interpolation of the rates; None for mean rates, which are not interpolated.
-    """
+    """Final and largest angle in deg between linear and cubic rates; None for mean rates."""
     if imu.attrs["sampling"] == "mean":
         return None
     chord, cubic = (
@@ -399,19 +340,8 @@ def find_shares(
 ) -> tuple[Share, ...]:
     """Split the error of each run into the shares of sensor and algorithm.
 
-    Parameters
-    ----------
-    algorithms : sequence of AttitudeAlgorithm
-    runs : sequence of AttitudeRun
-        In the same order, on the samples of `grounds`.
-    grounds : Grounds
-
-    Returns
-    -------
-    tuple of Share
-        In a simulation an error is exactly the algorithm error, rotated by the sensor error:
-        ``q_true^-1 q = (q_true^-1 q_clean)(q_clean^-1 q)``, so that their rotation vectors add up
-        to within half their product.
+    In a simulation ``q_true^-1 q = (q_true^-1 q_clean)(q_clean^-1 q)``: the rotation vectors of
+    both shares add up to within half their product.
     """
     q_nb, own = grounds.q_nb, grounds.own
     rounded = single_increments(grounds.imu, grounds.interpolation)
@@ -452,17 +382,7 @@ NEAR = 2.0**0.5
 
 
 def trial_names(sources: Sequence[ScenarioSpec | LogSpec]) -> list[str]:
-    """Names of trials: of a log the last part of its path, of a scenario its seed.
-
-    Parameters
-    ----------
-    sources : sequence of ScenarioSpec or LogSpec
-
-    Returns
-    -------
-    list of str
-        All different.
-    """
+    """Names of trials: of a log the last part of its path, of a scenario its seed."""
     names = [
         f"{s.name}, seed {s.seed}" if isinstance(s, ScenarioSpec) else Path(s.path).name
         for s in sources
@@ -471,21 +391,7 @@ def trial_names(sources: Sequence[ScenarioSpec | LogSpec]) -> list[str]:
 
 
 def gather(sweeps: Sequence[pd.DataFrame], names: Sequence[str]) -> Trials:
-    """Combine the errors of several trials.
-
-    Parameters
-    ----------
-    sweeps : sequence of DataFrame
-        As `AttitudeComparison.sweep`, of the same algorithms.
-    names : sequence of str
-        Names of the trials.
-
-    Returns
-    -------
-    Trials
-        The interval of the mean is Student's; `luck` is the one-sided probability, by
-        Student's test of paired differences, that the next algorithm is in truth as good.
-    """
+    """Errors at the full rate of several trials, and the rank of the algorithms."""
     rows = []
     for name, sweep in zip(names, sweeps, strict=True):
         full = sweep[(sweep["factor"] == 1) & (sweep["meaning"] == "drop")]
@@ -502,15 +408,8 @@ def gather(sweeps: Sequence[pd.DataFrame], names: Sequence[str]) -> Trials:
 def rank(errors: pd.DataFrame) -> pd.DataFrame:
     """Rank algorithms by their mean error over trials.
 
-    Parameters
-    ----------
-    errors : DataFrame
-        ``trial``, ``algorithm``, ``error_deg``.
-
-    Returns
-    -------
-    DataFrame
-        As `Trials.ranking`.
+    The interval of the mean is Student's; `luck` is the one-sided probability, by Student's test of
+    paired differences, that the next algorithm is in truth no worse.
     """
     from scipy import stats
 
@@ -554,24 +453,10 @@ def _luck(worse_by: Array) -> float:
 
 
 def worst_sweep(sweeps: Sequence[pd.DataFrame]) -> pd.DataFrame:
-    """Largest errors of several sweeps, cell by cell.
+    """Largest errors of several sweeps, cell by cell of the first.
 
-    Parameters
-    ----------
-    sweeps : sequence of DataFrame
-        As `results.AttitudeComparison.sweep`, over the same algorithms.
-
-    Returns
-    -------
-    DataFrame
-        The cells of the first sweep for which each of the others has a rate at most `NEAR` times
-        higher; the highest such rate is used. The rate of a cell is the highest of these: each
-        trial is judged at that rate or below.
-
-    Raises
-    ------
-    ConfigError
-        No cell remains.
+    Of each other sweep the highest rate is used that is at most `NEAR` times that of the cell; the
+    rate of a cell is the highest of these, so that each trial is judged at that rate or below.
     """
     first, *others = sweeps
     rows = []
@@ -592,18 +477,7 @@ def worst_sweep(sweeps: Sequence[pd.DataFrame]) -> pd.DataFrame:
 
 
 def not_judged(known: Sequence[bool], names: Sequence[str]) -> tuple[Finding, ...]:
-    """Report the trials without a reference, where others have one.
-
-    Parameters
-    ----------
-    known : sequence of bool
-        Whether a reference of the attitude is known, by trial.
-    names : sequence of str
-
-    Returns
-    -------
-    tuple of Finding
-    """
+    """Report the trials without a reference, where others have one."""
     if not any(known):
         return ()
     return tuple(

@@ -123,17 +123,7 @@ class Known:
         return Known(self.q_nb[samples], self.counts[samples])
 
     def errors(self, q_nb: Array) -> Errors | None:
-        """Compare an attitude at every sample with the known one.
-
-        Parameters
-        ----------
-        q_nb : ndarray, (n, 4)
-
-        Returns
-        -------
-        tuple of float, or None
-            Final, RMS and largest rotation angle in deg; None where the truth is unknown.
-        """
+        """Errors of an attitude, (n, 4), at every sample; None where the truth is unknown."""
         if self.counts.all():
             return angles_to_errors(unit_rotation_angle(q_nb, self.q_nb))
         if not self.counts.any():
@@ -148,22 +138,10 @@ def angles_to_errors(angles: Array) -> Errors:
 
 
 def known_at(truth: pd.DataFrame, scored: Mask, stamps: Array) -> Known:
-    """Interpolate a truth at the samples of a log.
+    """Interpolate the scored rows of a truth at the samples of a log.
 
-    Parameters
-    ----------
-    truth : DataFrame
-        An Attitude table, on stamps of its own or on (some of) the log's.
-    scored : ndarray of bool
-        Rows of the truth to be used.
-    stamps : ndarray, (n,), s
-        Of the log.
-
-    Returns
-    -------
-    Known
-        A sample counts if a counting row of the truth has its time stamp, or if counting rows
-        on both sides are at most three usual steps of the truth apart.
+    A sample counts at the stamp of a scored row, or between scored rows that are no further apart
+    than three of the truth's usual steps.
     """
     rows = truth[scored]
     if rows.empty:

@@ -34,22 +34,9 @@ def plane_bound(covariance: Array) -> Array:
 
 
 def plane_reach(size: Array, distance: Array, covariance: Array) -> Array:
-    """Return the radius of the 95 % ellipse in the direction of each error.
+    """Radius of the 95 % ellipse along errors of length `size` and Mahalanobis `distance`, (n,).
 
-    Parameters
-    ----------
-    size : ndarray, (n,)
-        Length of the error.
-    distance : ndarray, (n,)
-        Its Mahalanobis distance.
-    covariance : ndarray, (n, k, k)
-        As `plane_bound`.
-
-    Returns
-    -------
-    ndarray, (n,)
-        Where the ray through the error leaves the ellipse: `size` is below it if and only if the
-        error is within. An error of no length has no direction, and gets the longer half axis.
+    An error of no length has no direction, and gets the longer half axis.
     """
     some = distance > 0.0
     along = PLANE_95 * size / np.where(some, distance, 1.0)

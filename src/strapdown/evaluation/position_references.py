@@ -132,16 +132,7 @@ class PlaceReference:
 
 
 def is_place(text: str) -> bool:
-    """Return whether a sentence is a position reference, not an attitude reference.
-
-    Parameters
-    ----------
-    text : str
-
-    Returns
-    -------
-    bool
-    """
+    """Return whether a sentence is a position reference, not an attitude reference."""
     return re.search(r"same[ -]place|\bmoved\b", text, re.IGNORECASE) is not None
 
 

@@ -136,27 +136,7 @@ _FORMS = (
 
 
 def parse_reference(text: str, start: float, end: float) -> dict[str, object]:
-    """Parse one reference point.
-
-    Parameters
-    ----------
-    text : str
-        As in the module's text; ``same-as``, colons and equals signs are understood, too.
-    start, end : float, s
-        Times that these words mean, and the span in which instants must lie.
-
-    Returns
-    -------
-    dict
-        A row for `tables.references_table`.
-
-    Raises
-    ------
-    ConfigError
-        It is not understood.
-    DataError
-        An instant lies outside the log.
-    """
+    """Parse one reference point as a row of `references_table`; instants within start and end, s."""
     plain = re.sub(r"[:=]", " ", re.sub(r"same-as", "same as", text.partition("#")[0])).strip()
     match = next((m for form in _FORMS if (m := form.fullmatch(plain))), None)
     if match is None:
@@ -196,26 +176,7 @@ def parse_reference(text: str, start: float, end: float) -> dict[str, object]:
 
 
 def instant(word: str, start: float, end: float, text: str) -> float:
-    """Parse an instant.
-
-    Parameters
-    ----------
-    word : str
-        ``start``, ``end``, or seconds.
-    start, end : float, s
-        Times that the words mean, and the span in which it must lie.
-    text : str
-        The sentence, for messages.
-
-    Returns
-    -------
-    float, s
-
-    Raises
-    ------
-    DataError
-        It lies outside the span.
-    """
+    """Parse ``start``, ``end`` or seconds between these; `text` is the sentence, for messages."""
     if word.lower() in ("start", "end"):
         return start if word.lower() == "start" else end
     value = float(word.lower().rstrip("s "))
@@ -248,16 +209,7 @@ def _axis(word: str, text: str) -> tuple[str, float]:
 
 
 def in_words(row: pd.Series) -> str:
-    """Return a row of a References table as text.
-
-    Parameters
-    ----------
-    row : Series
-
-    Returns
-    -------
-    str
-    """
+    """Return a row of a References table as text."""
     at, since = (f"{float(row[key]):.3f}".rstrip("0").rstrip(".") for key in ("time", "since"))
     if row["kind"] == "same":
         return f"{at} s: same attitude as at {since} s"
@@ -319,24 +271,7 @@ def score_references(
 
 
 def reference_errors(attitude: pd.DataFrame, references: pd.DataFrame) -> list[float]:
-    """Compare an attitude with reference points, as `score_references` does, in deg alone.
-
-    Parameters
-    ----------
-    attitude : DataFrame
-        The quaternions of an Attitude table.
-    references : DataFrame
-        A References table.
-
-    Returns
-    -------
-    list of float
-
-    Raises
-    ------
-    DataError
-        A reference lies before the attitude begins.
-    """
+    """Compare an attitude with reference points, as `score_references` does, in deg alone."""
     rows = enumerate(references.iterrows(), start=1)
     return [_compare(attitude, row, number)[1] for number, (_, row) in rows]
 
@@ -368,20 +303,10 @@ def _compare(attitude: pd.DataFrame, row: pd.Series, number: int) -> tuple[list[
 
 
 def with_tilt(q_nb: ArrayLike, roll: float, pitch: float) -> NDArray[np.float64]:
-    """Rotate an attitude by the smallest angle to a roll and a pitch.
+    """Rotate an attitude by the smallest angle to a roll and a pitch in deg.
 
-    Parameters
-    ----------
-    q_nb : array_like, (4,)
-    roll, pitch : float, deg
-
-    Returns
-    -------
-    ndarray, (4,)
-        The attitude nearest to `q_nb` among those of this roll and pitch. The angle between
-        the two is the angle between their directions of gravity in the body, because the
-        least rotation that leads from one direction to another is about an axis perpendicular to
-        both.
+    That angle is the one between the directions of gravity in the body: the least rotation from one
+    direction to another is about an axis perpendicular to both.
     """
     down = np.array([0.0, 0.0, 1.0])
     known = rotation.quaternion_from_euler([roll, pitch, 0.0])
@@ -407,23 +332,7 @@ def _turned(imu: pd.DataFrame, axis: int, since: float, until: float) -> float:
 
 
 def references_from_words(words: list[str], start: float, end: float) -> pd.DataFrame:
-    """Make a References table from text.
-
-    Parameters
-    ----------
-    words : list of str
-    start, end : float, s
-        Span of the log.
-
-    Returns
-    -------
-    DataFrame
-
-    Raises
-    ------
-    ConfigError, DataError
-        As `parse_reference`.
-    """
+    """Make a References table from text."""
     return references_table([parse_reference(text, start, end) for text in words])
 
 

@@ -467,20 +467,9 @@ class CoarseOffset:
 
 
 def even_rates(imu: pd.DataFrame, step: float) -> EvenRates:
-    """Mean rates over the cells of an even grid, smoothed.
+    """Mean rates over the cells of a grid of `step` s, smoothed by a Gaussian of two cells.
 
-    Parameters
-    ----------
-    imu : DataFrame
-        An Imu table, of any spacing and either kind of sampling.
-    step : float, s
-        Of the grid; no shorter than the usual step of the log.
-
-    Returns
-    -------
-    EvenRates
-        From the integral of the rates, so that time stamps in bursts are weighted by their
-        interval; then a Gaussian of two cells.
+    From the integral of the rates, so that stamps in bursts are weighted by their interval.
     """
     from scipy.interpolate import CubicSpline
     from scipy.ndimage import gaussian_filter1d
@@ -521,20 +510,9 @@ def even_rates(imu: pd.DataFrame, step: float) -> EvenRates:
 
 
 def proper_rotation(product: Array) -> tuple[Array, float]:
-    """Rotation that best fits one set of vectors to another (Wahba's problem).
+    """Rotation C_ab of least squares from the sum of ``a b^T``, and the sum of ``a · C_ab b``.
 
-    Parameters
-    ----------
-    product : ndarray, (3, 3)
-        Sum of ``a b^T`` over the pairs.
-
-    Returns
-    -------
-    C_ab : ndarray, (3, 3)
-        Rotation from b to a with the least sum of squares, by singular values (Markley 1988,
-        doi:10.1007/BF03546354).
-    common : float
-        Sum of ``a · C_ab b``.
+    Wahba's problem by singular values (Markley 1988, doi:10.1007/BF03546354).
     """
     u, size, vt = np.linalg.svd(product)
     sign = np.array([1.0, 1.0, np.sign(np.linalg.det(u) * np.linalg.det(vt)) or 1.0])
@@ -544,21 +522,8 @@ def proper_rotation(product: Array) -> tuple[Array, float]:
 def coarse_offset(first: pd.DataFrame, second: pd.DataFrame) -> CoarseOffset:
     """Find the offset of two clocks from the rates, whatever the mounting.
 
-    Parameters
-    ----------
-    first, second : DataFrame
-        Imu tables of two sensors on one body.
-
-    Returns
-    -------
-    CoarseOffset
-        Peaks of the correlation of the rates' magnitudes, weighted by the share of the vectors
-        that one rotation explains.
-
-    Raises
-    ------
-    DataError
-        There is too little motion, no overlap, or two offsets fit about equally well.
+    Peaks of the correlation of the rates' magnitudes, weighted by the share of the vectors that one
+    rotation explains.
     """
     usual = max(float(np.median(np.diff(t.index.to_numpy()))) for t in (first, second))
     step = max(COARSE_STEP, usual)
@@ -625,34 +590,14 @@ def _vector_share(a: EvenRates, b: EvenRates, lag: int) -> float:
 
 
 def second_clock(aligned: SecondLog, time: ArrayLike) -> Array:
-    """Convert instants of the first clock to the second.
-
-    Parameters
-    ----------
-    aligned : SecondLog
-    time : array_like, (n,), s
-
-    Returns
-    -------
-    ndarray, (n,), s
-    """
+    """Convert instants of the first clock to the second."""
     t = np.asarray(time, dtype=np.float64)
     out: Array = t + aligned.offset + 1e-6 * aligned.drift_ppm * (t - aligned.middle)
     return out
 
 
 def first_clock(aligned: SecondLog, time: ArrayLike) -> Array:
-    """Convert instants of the second clock to the first: inverse of `second_clock`.
-
-    Parameters
-    ----------
-    aligned : SecondLog
-    time : array_like, (n,), s
-
-    Returns
-    -------
-    ndarray, (n,), s
-    """
+    """Convert instants of the second clock to the first: inverse of `second_clock`."""
     since = np.asarray(time, dtype=np.float64) - aligned.middle - aligned.offset
     out: Array = aligned.middle + since / (1.0 + 1e-6 * aligned.drift_ppm)
     return out

@@ -299,21 +299,9 @@ def _between(
 def same_stamps(
     stamps: Array, time: Array, share: float = 0.0
 ) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Find the nearest stamp of each instant, and whether it is equal but for rounding.
+    """Nearest stamp of each instant, and whether it is equal but for rounding.
 
-    Parameters
-    ----------
-    stamps : ndarray, (m,), s
-        Increasing.
-    time : ndarray, (n,), s
-    share : float
-        Share of the step around the instant that still counts as rounding.
-
-    Returns
-    -------
-    nearest : ndarray of int, (n,)
-    same : ndarray of bool, (n,)
-        Within `share`, or eight units in the last place.
+    Rounding: within `share` of the step around it, or eight units in the last place.
     """
     last = len(stamps) - 1
     right = np.clip(np.searchsorted(stamps, time), min(1, last), last)
@@ -489,13 +477,7 @@ class DifferenceSummary:
     findings: tuple[Finding, ...]
 
     def __getitem__(self, quantity: str) -> QuantityError:
-        """Error of one quantity.
-
-        Raises
-        ------
-        DataError
-            The name does not exist.
-        """
+        """Error of one quantity."""
         for error in self.errors:
             if error.quantity == quantity:
                 return error

@@ -171,13 +171,7 @@ def _known_aiding(aiding: str) -> None:
 
 
 def load(name: str) -> Any:
-    """Import a library.
-
-    Raises
-    ------
-    ConfigError
-        The library is not installed.
-    """
+    """Import a library."""
     try:
         return importlib.import_module(name)
     except ImportError:
@@ -185,25 +179,13 @@ def load(name: str) -> Any:
 
 
 def needed_columns(aiding: str) -> list[str]:
-    """Columns of the Imu table that an aiding needs.
-
-    Raises
-    ------
-    ConfigError
-        The aiding is unknown.
-    """
+    """Columns of the Imu table that an aiding needs."""
     _known_aiding(aiding)
     return (GYRO + ACCEL + MAG)[: 3 * (1 + AIDINGS.index(aiding))]
 
 
 def samples_for(imu: pd.DataFrame, aiding: str) -> Samples:
-    """Extract the data that an aiding needs from an Imu table.
-
-    Raises
-    ------
-    DataError
-        A column is absent or not finite; or as `tables.check_imu`.
-    """
+    """Extract the data that an aiding needs from an Imu table."""
     check_imu(imu)
     columns = needed_columns(aiding)
     source = imu.attrs.get("source")
@@ -235,19 +217,7 @@ def samples_for(imu: pd.DataFrame, aiding: str) -> Samples:
 
 
 def steadiness(dt: Array, label: str, source: str | None) -> Finding | None:
-    """Report varying steps of a record passed to a library that assumes a constant rate.
-
-    Parameters
-    ----------
-    dt : ndarray, s
-    label : str
-        Of the library.
-    source : str or None
-
-    Returns
-    -------
-    Finding or None
-    """
+    """Report varying steps in s of a record for a library that assumes a constant rate."""
     mean = float(dt.mean())
     off = float(np.abs(dt / mean - 1.0).max())
     if off <= STEADY:

@@ -205,11 +205,6 @@ class Camera:
         Delay of the stamps, unknown to the evaluation.
     clock_sd : float, s
         Standard deviation that the evaluation assigns to a clock offset of zero.
-
-    Raises
-    ------
-    ConfigError
-        A number is out of range, or `up` gives no direction in the image.
     """
 
     name: str

@@ -61,9 +61,6 @@ class CrashCase:
 
     Attributes
     ----------
-    name, summary : str
-    crash : CrashScenario
-    recorders : tuple of CaseRecorder
     usual : tuple of str
         Recorders used if none is named.
     remark : str
@@ -255,15 +252,11 @@ class RecordedCase:
 
     Attributes
     ----------
-    case : CrashCase
-    units : tuple of RecordedUnit
-    cameras : tuple of Camera
     camera_path : DataFrame
         As `path_from_cameras`, for the center of mass, by time from the impact.
     truth : DataFrame
         As `point_path`, for the center of mass, by time from the impact, each ms from 0.1 s before
         to 0.85 s after it; positions are relative to the position at the impact.
-    entry : EntryTruth
     """
 
     case: CrashCase

@@ -49,11 +49,6 @@ class HaversinePulse:
         North, east, down.
     rate_change : tuple of float, deg/s
         Change of the derivatives of roll, pitch, heading.
-
-    Raises
-    ------
-    ConfigError
-        A number is not finite, the start is before zero, or the length is not positive.
     """
 
     start: float
@@ -109,18 +104,10 @@ class CrashMotion(EarthMotion):
     Attributes
     ----------
     duration : float, s
-    origin : Origin
     velocity : tuple of float, m/s
         North, east, down, before the first pulse.
-    pulses : tuple of HaversinePulse
     roll_deg, pitch_deg, heading_deg : float, deg
         Before the first pulse.
-    ellipsoid : Ellipsoid
-
-    Raises
-    ------
-    ConfigError
-        The duration is not positive, or a pulse is not within the motion.
 
     Notes
     -----
@@ -220,12 +207,6 @@ class Setting:
         yaw. Zero for none.
     after : float, s
         Minimum duration of the motion after the end of the last impact.
-    ellipsoid : Ellipsoid
-
-    Raises
-    ------
-    ConfigError
-        A number is negative or not finite, or the mean acceleration is zero.
     """
 
     origin: Origin = field(default_factory=lambda: Origin(45.0, 20.0, 100.0))

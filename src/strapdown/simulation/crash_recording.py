@@ -340,13 +340,7 @@ def _shifted(triad: Triad, by: Triad) -> Triad:
 
 
 class RememberedMotion:
-    """A motion that caches its samples for several triads.
-
-    Parameters
-    ----------
-    motion : Motion
-        Its rates and specific forces are cached for each array of instants.
-    """
+    """A motion that caches its samples for several triads."""
 
     def __init__(self, motion: Motion) -> None:
         self.motion = motion
@@ -426,11 +420,6 @@ class WarmUp:
     time_constant : float, s
     elapsed : float, s
         From switch-on to the start of the motion; stated, not simulated.
-
-    Raises
-    ------
-    ConfigError
-        A number is negative or not finite, or the time constant is zero.
     """
 
     accel: float
@@ -533,12 +522,10 @@ class RecorderTruth:
 
     Attributes
     ----------
-    accelerometers : tuple of TriadErrors
     gyro : TriadErrors, optional
     mounting : Mounting
         True mounting, without standard deviations.
     clock_offset : float, s
-    clock_drift_ppm : float
     trigger_error : float, s
         Delay of the trigger stamp.
     """

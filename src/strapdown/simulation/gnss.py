@@ -62,11 +62,6 @@ class GnssReceiver:
     outage : float, s
     stated_position_sd, stated_velocity_sd : triad, optional
         Standard deviations that the receiver states; default, the true ones.
-
-    Raises
-    ------
-    ConfigError
-        A number is out of range, or `on_excess` is unknown.
     """
 
     rate: float = 10.0

@@ -282,7 +282,6 @@ class Course:
     ----------
     time : float, s
         End of the tracks so far.
-    limits : Limits
     speed, turn_rate, climb : list of (time, value)
         m/s, deg/s, deg.
     """
