@@ -121,7 +121,7 @@ def memory(algorithm: AttitudeAlgorithm) -> int:
 
 
 def count_cost(algorithm: AttitudeAlgorithm, dt: ArrayLike | None = None) -> Cost:
-    """Count the operations of one sample, averaged over steps `dt` in s from the middle of a log."""
+    """Count the operations of one sample, averaged over steps `dt` in s of a log."""
     lengths = np.full(STEPS, 0.01) if dt is None else np.asarray(dt, dtype=np.float64)
     first = max(0, (len(lengths) - STEPS) // 2)
     middle = np.resize(lengths[first : first + STEPS], STEPS)

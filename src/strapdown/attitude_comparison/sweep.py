@@ -268,7 +268,7 @@ def _steps(
 
 
 def sum_increments(increments: pd.DataFrame, samples: NDArray[np.int64]) -> pd.DataFrame:
-    """Add up increments between samples; the rate within a step is known only where it is single."""
+    """Add up increments between samples; the change of rate is known in single steps only."""
     if len(samples) == len(increments) + 1:
         return increments
     begin = samples[:-1]

@@ -136,7 +136,7 @@ _FORMS = (
 
 
 def parse_reference(text: str, start: float, end: float) -> dict[str, object]:
-    """Parse one reference point as a row of `references_table`; instants within start and end, s."""
+    """Parse one reference point as a row of `references_table`; instants from start to end."""
     plain = re.sub(r"[:=]", " ", re.sub(r"same-as", "same as", text.partition("#")[0])).strip()
     match = next((m for form in _FORMS if (m := form.fullmatch(plain))), None)
     if match is None:
