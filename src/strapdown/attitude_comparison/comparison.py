@@ -33,9 +33,7 @@ from strapdown.attitude_comparison.options import AttitudeSpec
 from strapdown.attitude_comparison.references import (
     PeerRun,
     gather_references,
-    judge_runs,
-    judge_truth,
-    judge_turns,
+    judge,
     read_second,
     run_beside,
     truth_of_second,
@@ -65,7 +63,7 @@ from strapdown.bundle.seal import InputFiles, Seal, check_destination, input_fil
 from strapdown.config import LogSpec
 from strapdown.constants import GYRO_SUMS, GYRO_UNITS
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.evaluation.differences import Known, known_at, largest_differences
+from strapdown.evaluation.differences import known_at, largest_differences
 from strapdown.evaluation.reference_points import SamePose, Score, score_references
 from strapdown.formats import read_log
 from strapdown.formats.columns import factor_of, parse_unit
@@ -201,10 +199,20 @@ class AttitudeComparison:
         if table.empty:
             table = table.reindex(range(len(self.runs)))
             table["algorithm"] = [run.algorithm for run in self.runs]
-        shares = pd.DataFrame([_flat(share) for share in self.shares], columns=_flat_names())
-        costs = pd.DataFrame(
-            [vars(cost) for cost in self.costs], columns=[f.name for f in fields(Cost)]
+        shares = pd.DataFrame(
+            {"algorithm": share.algorithm}
+            | {
+                f"{part}_{moment}_deg": value
+                for part in ("own", "sensor", "single")
+                for moment, value in zip(
+                    ("final", "rms", "max"),
+                    getattr(share, f"{part}_deg") or (nan, nan, nan),
+                    strict=True,
+                )
+            }
+            for share in self.shares
         )
+        costs = pd.DataFrame([vars(cost) for cost in self.costs])
         table = table.merge(shares, on="algorithm", how="left")
         return table.merge(costs, on="algorithm", how="left")
 
@@ -271,25 +279,14 @@ class AttitudeComparison:
         return short_html(self)
 
 
-_PARTS, _MOMENTS = ("own", "sensor", "single"), ("final", "rms", "max")
-
-
-def _flat_names() -> list[str]:
-    return ["algorithm", *(f"{part}_{moment}_deg" for part in _PARTS for moment in _MOMENTS)]
-
-
-def _flat(share: Share) -> list[Any]:
-    known = (share.own_deg, share.sensor_deg, share.single_deg)
-    values = [v for three in known for v in (three or (nan, nan, nan))]
-    return [share.algorithm, *values]
-
-
 def run_comparison(spec: AttitudeSpec, progress: Progress = silent) -> AttitudeComparison:
     """Run attitude algorithms over a log or a scenario, and compare them with what is known."""
     specs = [spec.model_copy(update={"source": s, "also": ()}) for s in (spec.source, *spec.also)]
-    judged = []
-    for k, one in enumerate(specs):
-        judged.append(_bench(one, _part_of(progress, k, len(specs))))
+
+    def part(k: int) -> Progress:
+        return lambda stage, share: progress(stage, (k + share) / len(specs))
+
+    judged = [_bench(one, part(k)) for k, one in enumerate(specs)]
     bench = judged[0][0]
     if len(judged) == 1:
         return bench
@@ -313,22 +310,6 @@ def run_comparison(spec: AttitudeSpec, progress: Progress = silent) -> AttitudeC
     )
 
 
-def _part_of(progress: Progress, k: int, count: int) -> Progress:
-    """Progress of one of several equal parts."""
-    return lambda stage, share: progress(stage, (k + share) / count)
-
-
-def _make_algorithms(texts: Sequence[str]) -> list[AttitudeAlgorithm]:
-    algorithms = [make_algorithm(text) for text in texts]
-    if not algorithms:
-        raise ConfigError("attitude.none-named", quantity="algorithms")
-    if len({a.label for a in algorithms}) < len(algorithms):
-        raise ConfigError(
-            "attitude.named-twice", quantity="algorithms", algorithms=[a.label for a in algorithms]
-        )
-    return algorithms
-
-
 def _cost(algorithm: AttitudeAlgorithm, dt: pd.Series) -> Cost:
     """Operations of one sample; the kernels of a plug-in may be beyond counting."""
     try:
@@ -347,7 +328,12 @@ def _cost(algorithm: AttitudeAlgorithm, dt: pd.Series) -> Cost:
 
 def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, Evidence]:
     """Run the bench on one source; return the result and the evidence for its answer."""
-    algorithms = _make_algorithms(spec.algorithms)
+    algorithms = [make_algorithm(text) for text in spec.algorithms]
+    labels = [a.label for a in algorithms]
+    if not labels:
+        raise ConfigError("attitude.none-named", quantity="algorithms")
+    if len(set(labels)) < len(labels):
+        raise ConfigError("attitude.named-twice", quantity="algorithms", algorithms=labels)
     progress("reading", 0.0)
     source = read_source(spec)
     whole = source.imu
@@ -372,21 +358,16 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, 
         runs.append(run_attitude(algorithm, increments, q_nb))
     span = (float(imu.index[0]), float(imu.index[-1]))
     levelled = initial["method"] == "level"
-    told = gather_references(spec, source, span, rests, levelled)
-    references = told.points
+    references, places, offers = gather_references(spec, source, span, rests, levelled)
     scores = [s for run in runs for s in truth_score(run, source)]
     scores += [s for run in runs for s in score_references(run, references, imu)]
-    findings += judge_runs(runs, increments)
-    findings += judge_turns(scores)
-    findings += judge_truth(source, span)
-    grounds = Grounds.of(
-        imu,
-        q_nb,
-        spec.interpolation,
-        references=references,
-        truth=_known(source, imu),
-        clean=None if source.clean is None else source.clean.loc[imu.index],
-    )
+    findings += judge(runs, imu, increments, scores, source)
+    known = None
+    if source.truth is not None and source.scored is not None:
+        known = known_at(source.truth, source.scored, imu.index.to_numpy(dtype=np.float64))
+        known = known if known.counts.any() else None
+    clean = None if source.clean is None else source.clean.loc[imu.index]
+    grounds = Grounds.of(imu, q_nb, spec.interpolation, references, known, clean)
     progress("sharing out the error", 0.2)
     shares = find_shares(algorithms, runs, grounds)
     factors = choose_factors(imu, spec.rates_hz, findings)
@@ -398,6 +379,11 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, 
         grounds, algorithms, costs, sweep, bias, rests, None if between is None else between[1]
     )
     beside = run_beside(spec.peers, source, imu, q_nb, references, findings)
+    positions: tuple[PositionScore, ...] = ()
+    if places:
+        from strapdown.evaluation.position_references import score_places
+
+        positions = tuple(p for run in runs for p in score_places(run, places, imu, rests))
     truth, scored = source.truth, source.scored
     if truth is not None and scored is not None:
         inside = np.asarray((truth.index >= span[0]) & (truth.index <= span[1]))
@@ -424,20 +410,12 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, 
         shares=shares,
         sweep=sweep,
         answer=find_answer(evidence, spec.tolerance_deg),
-        places=tuple(p for run in runs for p in told.score_positions(run, imu, rests)),
+        places=positions,
         peers=beside,
-        offers=told.offers,
-        second=None if second is None else second.aligned,
+        offers=offers,
+        second=second,
     )
     return bench, evidence
-
-
-def _known(source: Source, imu: pd.DataFrame) -> Known | None:
-    """The truth at the samples, where some of them are scored."""
-    if source.truth is None or source.scored is None:
-        return None
-    found = known_at(source.truth, source.scored, imu.index.to_numpy(dtype=np.float64))
-    return found if found.counts.any() else None
 
 
 # Initial attitude and gyro bias of a run.
@@ -518,81 +496,67 @@ def initial_attitude(
 ) -> tuple[Array, dict[str, Any], float]:
     """Initial attitude ``q_nb`` of a run, its description, and the start time in s."""
     name = imu.attrs.get("source")
-    start = float(imu.index[0])
-    at_rest = bool(rests) and rests[0].start - start <= 1.0 and rests[0].accel_mean is not None
+    stamps = imu.index.to_numpy(dtype=np.float64)
+    begin = float(stamps[0])
+    at_rest = bool(rests) and rests[0].start - begin <= 1.0 and rests[0].accel_mean is not None
     choice = text.strip().lower()
+    how = {"truth": "from the truth", "level": "levelled; heading zero", "zero": "zero"}
     if choice == "auto":
         choice = "truth" if truth is not None else "level" if at_rest else "zero"
-        how = {
-            "truth": "from the truth",
-            "level": "levelled; heading zero, because nothing says what it is",
-            "zero": "zero, because none was given and the log does not begin at rest with an "
-            "accelerometer",
-        }[choice]
-    else:
-        how = {"truth": "from the truth", "level": "levelled; heading zero", "zero": "zero"}.get(
-            choice, "given"
+        how["level"] += ", because nothing says what it is"
+        how["zero"] += (
+            ", because none was given and the log does not begin at rest with an accelerometer"
         )
-    begin = start
     if choice == "truth":
         if truth is None:
             raise ConfigError("attitude.log-no-truth-take", file=name, quantity="--initial")
-        q_nb, begin = _first_truth(truth, imu)
+        # A known attitude is a valid start, even at samples that are not scored.
+        known = known_at(truth, np.ones(len(truth), dtype=bool), stamps)
+        good = np.flatnonzero(known.counts)
+        if not good.size:
+            raise ConfigError(
+                "attitude.truth-nowhere-known-sample-between",
+                file=name,
+                quantity="--initial",
+                stamps=stamps[0],
+                stamps_2=stamps[-1],
+            )
+        q_nb, begin = known.q_nb[good[0]], float(stamps[good[0]])
     elif choice == "level":
-        q_nb = _levelled(rests, at_rest, name, findings)
+        if not at_rest or rests[0].accel_mean is None:
+            raise ConfigError(
+                "attitude.levelling-needs-accelerometer-log-begins",
+                file=name,
+                quantity="--initial",
+            )
+        tilt = rotation.level(rests[0].accel_mean)
+        if abs(tilt[0]) > 90.0:
+            findings.append(
+                Finding(
+                    "attitude.levelled-upside-down-roll",
+                    file=name,
+                    quantity="accel",
+                    roll=tilt[0],
+                )
+            )
+        q_nb = rotation.quaternion_from_euler([*tilt, 0.0])
     elif choice == "zero":
         q_nb = np.array([1.0, 0.0, 0.0, 0.0])
     else:
-        q_nb = rotation.quaternion_from_euler(_three_angles(text))
+        try:
+            angles = [float(part) for part in text.split(",")]
+        except ValueError:
+            angles = []
+        if len(angles) != 3 or not (np.abs(angles) <= 1e6).all():
+            raise ConfigError("attitude.no-attitude", quantity="--initial", text=text)
+        q_nb = rotation.quaternion_from_euler(angles)
     roll, pitch, heading = (float(a) for a in rotation.euler_from_quaternion(q_nb))
     words = {
         "roll_deg": roll,
         "pitch_deg": pitch,
         "heading_deg": heading,
         "time_s": begin,
-        "from": how,
-        "method": choice if choice in ("truth", "level", "zero") else "given",
+        "from": how.get(choice, "given"),
+        "method": choice if choice in how else "given",
     }
     return q_nb, words, begin
-
-
-def _first_truth(truth: pd.DataFrame, imu: pd.DataFrame) -> tuple[Array, float]:
-    stamps = imu.index.to_numpy(dtype=np.float64)
-    # A known attitude is a valid start, even at samples that are not scored.
-    known = known_at(truth, np.ones(len(truth), dtype=bool), stamps)
-    good = np.flatnonzero(known.counts)
-    if not good.size:
-        raise ConfigError(
-            "attitude.truth-nowhere-known-sample-between",
-            file=imu.attrs.get("source"),
-            quantity="--initial",
-            stamps=stamps[0],
-            stamps_2=stamps[-1],
-        )
-    return known.q_nb[good[0]], float(stamps[good[0]])
-
-
-def _levelled(
-    rests: tuple[RestStretch, ...], at_rest: bool, name: str | None, findings: list[Finding]
-) -> Array:
-    if not at_rest:
-        raise ConfigError(
-            "attitude.levelling-needs-accelerometer-log-begins", file=name, quantity="--initial"
-        )
-    assert rests[0].accel_mean is not None
-    roll, pitch = rotation.level(rests[0].accel_mean)
-    if abs(roll) > 90.0:
-        findings.append(
-            Finding("attitude.levelled-upside-down-roll", file=name, quantity="accel", roll=roll)
-        )
-    return rotation.quaternion_from_euler([roll, pitch, 0.0])
-
-
-def _three_angles(text: str) -> list[float]:
-    try:
-        angles = [float(part) for part in text.split(",")]
-    except ValueError:
-        angles = []
-    if len(angles) != 3 or not (np.abs(angles) <= 1e6).all():
-        raise ConfigError("attitude.no-attitude", quantity="--initial", text=text)
-    return angles

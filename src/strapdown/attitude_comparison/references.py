@@ -26,12 +26,11 @@ from strapdown.evaluation.reference_points import (
     tilt_references,
 )
 from strapdown.formats import read_log
-from strapdown.formats.recording import Recording
 from strapdown.sensors.rest import RestStretch, find_rests
 from strapdown.tables import QUATERNION, THETA, attitude_table, find_gaps
 
 if TYPE_CHECKING:
-    from strapdown.evaluation.position_references import PlaceReference, PositionScore
+    from strapdown.evaluation.position_references import PlaceReference
     from strapdown.evaluation.second_log import SecondLog
 
 Array = NDArray[np.float64]
@@ -61,33 +60,18 @@ class PeerRun:
     scores: tuple[Score, ...]
 
 
-@dataclass(frozen=True)
-class KnownReferences:
-    """Reference points of attitude and position, and suggestions for more."""
-
-    points: pd.DataFrame
-    places: tuple[PlaceReference, ...]
-    offers: tuple[SamePose, ...]
-
-    def score_positions(
-        self, run: AttitudeRun, imu: pd.DataFrame, rests: Sequence[RestStretch]
-    ) -> tuple[PositionScore, ...]:
-        """Compare the displacements of a run with the known ones."""
-        if not self.places:
-            return ()
-        from strapdown.evaluation.position_references import score_places
-
-        return score_places(run, self.places, imu, rests)
-
-
 def gather_references(
     spec: AttitudeSpec,
     source: Source,
     span: tuple[float, float],
     rests: tuple[RestStretch, ...],
     levelled: bool,
-) -> KnownReferences:
-    """Collect reference points; a rest that the run is leveled at is not one."""
+) -> tuple[pd.DataFrame, tuple[PlaceReference, ...], tuple[SamePose, ...]]:
+    """Reference points of attitude and position, and poses that are offered as such.
+
+    `span` is the meaning of the words start and end, s. A rest that the run is leveled at is no
+    reference.
+    """
     words = list(spec.references)
     whole = spec.from_s is spec.to_s is spec.duration_s is None
     if isinstance(spec.source, ScenarioSpec) and not words and whole:
@@ -113,23 +97,11 @@ def gather_references(
                 quantity="--reference rests",
             )
         points = pd.concat([points, tilts], ignore_index=True) if len(points) else tilts
-    return KnownReferences(
-        points,
-        positions,
-        same_pose_candidates(usable) if points.empty else (),
-    )
+    return points, positions, same_pose_candidates(usable) if points.empty else ()
 
 
-@dataclass(frozen=True)
-class Second:
-    """Second log, synchronized and aligned with the first."""
-
-    recording: Recording
-    aligned: SecondLog
-
-
-def read_second(spec: AttitudeSpec, source: Source) -> tuple[Source, Second | None]:
-    """Read the log of a second sensor, if one is named, and align it with the first."""
+def read_second(spec: AttitudeSpec, source: Source) -> tuple[Source, SecondLog | None]:
+    """Cut the source to the part that the log of a second sensor covers, and align the two."""
     if spec.reference_log_path is None:
         return source, None
     if spec.truth_path is not None:
@@ -161,35 +133,29 @@ def read_second(spec: AttitudeSpec, source: Source) -> tuple[Source, Second | No
         clean=None,
         findings=source.findings + findings,
         inputs=(*source.inputs, inputs),
-    ), Second(recording, aligned)
+        second=recording,
+    ), aligned
 
 
-def truth_of_second(source: Source, second: Second, imu: pd.DataFrame, q_nb: Array) -> Source:
+def truth_of_second(source: Source, aligned: SecondLog, imu: pd.DataFrame, q_nb: Array) -> Source:
     """Use the attitude by the second log's rates as the truth."""
     from strapdown.evaluation.second_log import truth_from_second_log
 
-    rests = find_rests(second.recording.imu)
+    assert source.second is not None
+    second = source.second
+    rests = find_rests(second.imu)
     bias = rests[0].gyro_mean if rests else (0.0, 0.0, 0.0)
     findings = source.findings
     if not rests:
         findings += (
             Finding(
                 "attitude.no-rest-found-bias-truth",
-                file=second.recording.name,
+                file=second.name,
                 quantity="gyro bias",
             ),
         )
-    truth = truth_from_second_log(
-        second.aligned,
-        imu,
-        second.recording.imu,
-        gyro_bias=bias,
-        q_start=q_nb,
-    )
+    truth = truth_from_second_log(aligned, imu, second.imu, gyro_bias=bias, q_start=q_nb)
     return replace(source, truth=truth, scored=np.ones(len(truth), dtype=bool), findings=findings)
-
-
-# Findings about the runs of the attitude bench.
 
 
 # Within this of ±90° pitch the kinematics of Euler angles amplify every error tenfold.
@@ -222,56 +188,23 @@ def truth_score(run: AttitudeRun, source: Source) -> list[Score]:
     ]
 
 
-def judge_turns(scores: list[Score]) -> list[Finding]:
-    """Report stated turns that differ from those of the gyro."""
-    findings = {}
-    for score in scores:
-        if score.turned_deg is None or score.expected_deg is None:
-            continue
-        off = (score.turned_deg - score.expected_deg) / 360.0
-        if abs(off) > 0.5:
-            findings[score.against] = Finding(
-                "attitude.says-turns-gyro-turned",
-                quantity="reference",
-                against=score.against,
-                expected_deg=score.expected_deg / 360.0,
-                turned_deg=score.turned_deg / 360.0,
-            )
-    return list(findings.values())
-
-
-def judge_truth(source: Source, span: tuple[float, float]) -> list[Finding]:
-    """Report a truth that covers a small part of the log only."""
-    if source.truth is None or source.scored is None or not source.scored.any():
-        return []
-    counted = source.truth.index[source.scored]
-    covered = float(counted[-1] - counted[0])
-    if covered >= 0.5 * (span[1] - span[0]):
-        return []
-    return [
-        Finding(
-            "attitude.covers-rest-nothing-known",
-            file=source.name,
-            quantity="truth",
-            severity="note",
-            covered=covered,
-            span=span[1] - span[0],
-        )
-    ]
-
-
-def judge_runs(runs: list[AttitudeRun], increments: pd.DataFrame) -> list[Finding]:
-    """Report unreliable parts of the runs or of their steps."""
+def judge(
+    runs: Sequence[AttitudeRun],
+    imu: pd.DataFrame,
+    increments: pd.DataFrame,
+    scores: Sequence[Score],
+    source: Source,
+) -> list[Finding]:
+    """Report unreliable parts of the runs, their steps, stated turns and the truth."""
     findings = []
     for run in runs:
         if passed_pole(run):
+            apart = run.diagnostics["closest_to_pole_deg"]
             findings.append(
                 Finding(
-                    "attitude.near-vertical-pitch"
-                    if run.diagnostics["closest_to_pole_deg"]
-                    else "attitude.through-vertical-pitch",
+                    "attitude.near-vertical-pitch" if apart else "attitude.through-vertical-pitch",
                     quantity=run.algorithm,
-                    apart_deg=run.diagnostics["closest_to_pole_deg"],
+                    apart_deg=apart,
                     time=run.diagnostics["closest_to_pole_time_s"],
                 )
             )
@@ -288,6 +221,34 @@ def judge_runs(runs: list[AttitudeRun], increments: pd.DataFrame) -> list[Findin
                 index=increments.index[largest],
             )
         )
+    wrong = {}
+    for score in scores:
+        if score.turned_deg is None or score.expected_deg is None:
+            continue
+        if abs((score.turned_deg - score.expected_deg) / 360.0) > 0.5:
+            wrong[score.against] = Finding(
+                "attitude.says-turns-gyro-turned",
+                quantity="reference",
+                against=score.against,
+                expected_deg=score.expected_deg / 360.0,
+                turned_deg=score.turned_deg / 360.0,
+            )
+    findings += wrong.values()
+    if source.truth is not None and source.scored is not None and source.scored.any():
+        counted = source.truth.index[source.scored]
+        covered = float(counted[-1] - counted[0])
+        span = float(imu.index[-1]) - float(imu.index[0])
+        if covered < 0.5 * span:
+            findings.append(
+                Finding(
+                    "attitude.covers-rest-nothing-known",
+                    file=source.name,
+                    quantity="truth",
+                    severity="note",
+                    covered=covered,
+                    span=span,
+                )
+            )
     return findings
 
 
@@ -312,7 +273,7 @@ def run_beside(
     """
     if not names:
         return ()
-    from strapdown.peers import PEERS, run_peers
+    from strapdown.peers import PEERS, align_heading, run_peers
 
     wanted = list(PEERS) if [n.lower() for n in names] == ["all"] else list(names)
     runs, found = run_peers(wanted, imu, q_nb, longest_s=LONGEST)
@@ -320,21 +281,15 @@ def run_beside(
     out = []
     for label, aiding, attitude in runs:
         if aiding == "gyro+accel" and source.truth is not None and source.scored is not None:
-            attitude = _headed(attitude, source.truth[source.scored])
+            known = source.truth[source.scored]
+            stamps = attitude.index.to_numpy()
+            known = known[(known.index >= stamps[0]) & (known.index <= stamps[-1])]
+            if len(known):
+                first = known[QUATERNION].to_numpy(dtype=np.float64)[0]
+                row = int(np.searchsorted(stamps, float(known.index[0])))
+                q = align_heading(attitude[QUATERNION].to_numpy(), first, row)
+                attitude = attitude_table(stamps, q)
         run = AttitudeRun(label, label, "", attitude, {})
         scores = [*truth_score(run, source), *score_references(run, references, imu)]
         out.append(PeerRun(label, aiding, attitude, tuple(scores)))
     return tuple(out)
-
-
-def _headed(attitude: pd.DataFrame, truth: pd.DataFrame) -> pd.DataFrame:
-    from strapdown.peers import align_heading
-
-    inside = truth[(truth.index >= attitude.index[0]) & (truth.index <= attitude.index[-1])]
-    if inside.empty:
-        return attitude
-    row = int(np.searchsorted(attitude.index.to_numpy(), float(inside.index[0])))
-    q = align_heading(
-        attitude[QUATERNION].to_numpy(), inside[QUATERNION].to_numpy(dtype=np.float64)[0], row
-    )
-    return attitude_table(attitude.index.to_numpy(), q)

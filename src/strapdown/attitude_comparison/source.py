@@ -17,7 +17,7 @@ from strapdown.config import LogSpec, ScenarioSpec
 from strapdown.errors import DataError, Finding
 from strapdown.evaluation.differences import error_angles
 from strapdown.formats import read_log
-from strapdown.formats.recording import Origin, Reading, ReadOptions
+from strapdown.formats.recording import Origin, Reading, ReadOptions, Recording
 from strapdown.increments import increments_from_imu
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.tables import QUATERNION
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Source:
-    """Log or scenario; `clean` is a scenario without sensor errors."""
+    """Log or scenario; `clean` is a scenario without sensor errors, `second` a second log."""
 
     name: str
     what: str
@@ -36,11 +36,12 @@ class Source:
     imu: pd.DataFrame
     truth: pd.DataFrame | None
     scored: NDArray[np.bool_] | None
-    readings: tuple[Reading, ...]
-    findings: tuple[Finding, ...]
-    inputs: tuple[InputFiles, ...]
-    sampling_error_deg: tuple[float, float] | None
+    readings: tuple[Reading, ...] = ()
+    findings: tuple[Finding, ...] = ()
+    inputs: tuple[InputFiles, ...] = ()
+    sampling_error_deg: tuple[float, float] | None = None
     clean: pd.DataFrame | None = None
+    second: Recording | None = None
 
 
 def simulate_scenario(spec: ScenarioSpec) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -82,51 +83,44 @@ def read_options(spec: LogSpec) -> ReadOptions:
 
 def read_source(spec: AttitudeSpec) -> Source:
     """Read the log, or simulate the scenario, of a specification."""
-    if isinstance(spec.source, ScenarioSpec):
-        return _scenario(spec.source)
-    recording = read_log(spec.source.path, read_options(spec.source))
-    inputs = (input_files("log", spec.source.path, recording.files),)
-    return Source(
-        recording.name,
-        "recorded log",
-        recording.origin,
-        recording.imu,
-        recording.truth,
-        recording.scored,
-        recording.readings,
-        recording.findings,
-        inputs,
-        None,
-    )
-
-
-def _scenario(spec: ScenarioSpec) -> Source:
+    asked = spec.source
+    if isinstance(asked, LogSpec):
+        log = read_log(asked.path, read_options(asked))
+        return Source(
+            log.name,
+            "recorded log",
+            log.origin,
+            log.imu,
+            log.truth,
+            log.scored,
+            log.readings,
+            log.findings,
+            (input_files("log", asked.path, log.files),),
+        )
     from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
 
-    scenario = find_scenario(spec.name)
-    imu, truth = simulate_scenario(spec)
+    scenario = find_scenario(asked.name)
+    imu, truth = simulate_scenario(asked)
     clean, _ = simulate_imu(
         scenario.motion,
         ImuErrors(),
-        rate=spec.rate_hz,
-        sampling=spec.sampling,
+        rate=asked.rate_hz,
+        sampling=asked.sampling,
         accelerometer=False,
     )
     exact = run_attitude(Quaternion(), increments_from_imu(clean), truth[QUATERNION].to_numpy()[0])
     lost = error_angles(exact.attitude, truth)
     return Source(
-        spec.name,
+        asked.name,
         f"simulated: {scenario.title} ({scenario.source})"
-        + (f", sensor {Path(spec.sensor).name}" if spec.sensor else ""),
+        + (f", sensor {Path(asked.sensor).name}" if asked.sensor else ""),
         Origin(0, "s"),
         imu,
         truth,
         np.ones(len(truth), dtype=bool),
-        (),
-        (),
-        sensor_file(spec.sensor),
-        (float(lost.iloc[-1]), float(lost.max())),
-        clean,
+        inputs=sensor_file(asked.sensor),
+        sampling_error_deg=(float(lost.iloc[-1]), float(lost.max())),
+        clean=clean,
     )
 
 
@@ -149,39 +143,37 @@ def describe(imu: pd.DataFrame, what: str, whole: pd.DataFrame) -> str:
 
 def with_truth(source: Source, spec: AttitudeSpec) -> Source:
     """Add the given truth to the source, on its own clock and within its window."""
-    if spec.truth_path is None:
-        if source.truth is None or source.scored is None:
-            return source
-        start, end = source.imu.index[0], source.imu.index[-1]
-        inside = np.asarray((source.truth.index >= start) & (source.truth.index <= end))
+    truth, scored, stated = source.truth, source.scored, spec.truth_path
+    if stated is not None:
+        from strapdown.formats.references import read_truth
+
+        options = read_options(spec.source) if isinstance(spec.source, LogSpec) else None
+        truth = read_truth(Path(stated), options, source.origin)
+        scored = np.ones(len(truth), dtype=bool)
+    if truth is None or scored is None:
+        return source
+    start, end = source.imu.index[0], source.imu.index[-1]
+    inside = np.asarray((truth.index >= start) & (truth.index <= end))
+    if stated is None:
         if not inside.any():
             return replace(source, truth=None, scored=None)
-        return replace(source, truth=source.truth[inside], scored=source.scored[inside])
-    from strapdown.formats.references import read_truth
-
-    path = Path(spec.truth_path)
-    options = read_options(spec.source) if isinstance(spec.source, LogSpec) else None
-    truth = read_truth(path, options, source.origin)
-    inside = np.asarray(
-        (truth.index >= source.imu.index[0]) & (truth.index <= source.imu.index[-1])
-    )
+        return replace(source, truth=truth[inside], scored=scored[inside])
     if inside.sum() < 2:
-        log = source.imu.index
         raise DataError(
             "attitude.instants-lie-within-log-runs",
-            file=path.name,
+            file=Path(stated).name,
             quantity="time",
             inside=int(inside.sum()),
             index=truth.index[0],
             index_2=truth.index[-1],
-            log=log[0],
-            log_2=log[-1],
+            log=start,
+            log_2=end,
         )
     return replace(
         source,
         truth=truth[inside],
-        scored=np.ones(int(inside.sum()), dtype=bool),
+        scored=scored[inside],
         # It may differ from the scenario's own truth, which alone is exact.
         clean=None,
-        inputs=(*source.inputs, input_files("truth", spec.truth_path, (path,))),
+        inputs=(*source.inputs, input_files("truth", stated, (Path(stated),))),
     )

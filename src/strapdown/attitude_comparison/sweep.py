@@ -121,7 +121,6 @@ class Grounds:
         imu: pd.DataFrame,
         q_nb: Array,
         interpolation: str,
-        *,
         references: pd.DataFrame,
         truth: Known | None,
         clean: pd.DataFrame | None,
@@ -296,7 +295,10 @@ def _cell(
             q if error_free is None else attitude_history(algorithm, error_free, grounds.q_nb)
         )
         total = None if grounds.truth is None else grounds.truth.errors(q)
-        reference = _largest_reference(q, grounds.references, used)
+        reference = np.nan
+        if len(grounds.references):
+            attitude = pd.DataFrame(q, index=used.index, columns=QUATERNION)
+            reference = max(reference_errors(attitude, grounds.references))
     except DivergenceError:
         own, reference = infinite, np.inf if len(grounds.references) else np.nan
         total = None if grounds.truth is None else infinite
@@ -311,13 +313,6 @@ def _cell(
         # A truth is more complete and more accurate than a reference point.
         "error_deg": next(e for e in (largest, reference, own_deg) if not np.isnan(e)),
     }
-
-
-def _largest_reference(q: Array, references: pd.DataFrame, used: pd.DataFrame) -> float:
-    if references.empty:
-        return np.nan
-    attitude = pd.DataFrame(q, index=used.index, columns=QUATERNION)
-    return max(reference_errors(attitude, references))
 
 
 # Shares of the error: sensor, algorithm, single precision.
