@@ -375,7 +375,23 @@ def find_evidence(
     rests: tuple[RestStretch, ...],
     between_deg: float | None,
 ) -> Evidence:
-    """Gather the evidence for one source."""
+    """Gather the evidence for one source; `between_deg`: possible effect between the stamps."""
+    imu, truth, references = grounds.imu, grounds.truth, grounds.references
+    without_bias = with_cubic = None
+    if grounds.known and rests and bias["rad_per_s"] is None:
+        less = imu.copy()
+        less[GYRO] = imu[GYRO].to_numpy() - np.asarray(rests[0].gyro_mean)
+        without_bias = error_at_full_rate(MOST_ACCURATE, replace(grounds, imu=less))
+    linear = grounds.interpolation != "cubic" and imu.attrs["sampling"] != "mean"
+    if grounds.known and linear:
+        cubic = replace(grounds, interpolation="cubic")
+        with_cubic = error_at_full_rate(RotationVector(samples=1), cubic)
+    start = reference_sd = 0.0
+    if truth is not None and truth.counts[0]:
+        start = float(unit_rotation_angle(grounds.q_nb[None], truth.q_nb[:1])[0])
+    if truth is None and len(references):
+        sd = references["sd"].to_numpy(dtype=np.float64)
+        reference_sd = float(np.nan_to_num(sd).min())
     return Evidence(
         algorithms=algorithms,
         costs=costs,
@@ -383,11 +399,11 @@ def find_evidence(
         sensor=grounds.sensor_errors(),
         known=grounds.known,
         exact=grounds.exact,
-        without_bias=_without_bias(grounds, bias, rests),
-        with_cubic=_with_cubic(grounds),
-        start=_start_error(grounds),
+        without_bias=without_bias,
+        with_cubic=with_cubic,
+        start=start,
         sampling=0.0 if grounds.exact or between_deg is None else between_deg,
-        reference_sd=_reference_sd(grounds),
+        reference_sd=reference_sd,
     )
 
 
@@ -412,38 +428,3 @@ def _worst(errors: Sequence[float | None]) -> float | None:
     """The largest value, if all are known."""
     known = [e for e in errors if e is not None]
     return max(known) if len(known) == len(errors) else None
-
-
-def _reference_sd(grounds: Grounds) -> float:
-    """Standard deviation of the best reference point; zero with a truth."""
-    if grounds.truth is not None or grounds.references.empty:
-        return 0.0
-    return float(np.nan_to_num(grounds.references["sd"].to_numpy(dtype=np.float64)).min())
-
-
-def _start_error(grounds: Grounds) -> float:
-    """Error of the initial attitude in deg, where it is known."""
-    known = grounds.truth
-    if known is None or not known.counts[0]:
-        return 0.0
-    return float(unit_rotation_angle(grounds.q_nb[None], known.q_nb[:1])[0])
-
-
-def _without_bias(
-    grounds: Grounds, bias: dict[str, object], rests: tuple[RestStretch, ...]
-) -> float | None:
-    """Remaining error of the most accurate algorithm with the bias of a rest removed."""
-    if bias["rad_per_s"] is not None or not rests or not grounds.known:
-        return None
-    imu = grounds.imu.copy()
-    imu[GYRO] = imu[GYRO].to_numpy() - np.asarray(rests[0].gyro_mean)
-    return error_at_full_rate(MOST_ACCURATE, replace(grounds, imu=imu))
-
-
-def _with_cubic(grounds: Grounds) -> float | None:
-    """Remaining error with cubic interpolation of the rates, where it was linear."""
-    if grounds.interpolation == "cubic" or grounds.imu.attrs["sampling"] == "mean":
-        return None
-    if not grounds.known:
-        return None
-    return error_at_full_rate(RotationVector(samples=1), replace(grounds, interpolation="cubic"))

@@ -138,7 +138,16 @@ class AttitudeOptions:
         for rate in self.rates_hz:
             refuse_no_rate(float(rate))
         check_part(self.from_s, self.to_s, self.duration_s)
-        first, *others = _one_of_each(one for text in sources for one in self._of_source(text))
+        found: list[ScenarioSpec | LogSpec] = []
+        for one in (one for text in sources for one in self._of_source(text)):
+            # A source that is named twice would count as two trials.
+            if one in found:
+                name = one.name if isinstance(one, ScenarioSpec) else one.path
+                raise ConfigError(
+                    "attitude.named-twice-trial-does-not", file=name, quantity="source"
+                )
+            found.append(one)
+        first, *others = found
         words, truth_path = _sort_references(_texts(self.reference))
         bias = _text(self.gyro_bias)
         bias_path = str(Path(bias)) if _exists(bias) else None
@@ -163,7 +172,7 @@ class AttitudeOptions:
             duration_s=self.duration_s,
         )
 
-    def _of_source(self, text: str) -> list[ScenarioSpec] | list[LogSpec]:
+    def _of_source(self, text: str) -> Sequence[ScenarioSpec | LogSpec]:
         """Specify a scenario, once per trial, or a log."""
         if self.trials < 1:
             raise ConfigError("attitude.no-number-trials", quantity="--trials", trials=self.trials)
@@ -171,14 +180,12 @@ class AttitudeOptions:
         if not name:
             raise ConfigError("attitude.nothing-named", quantity="source")
         reading = {
-            "columns": dict(self.columns) or None,
-            "gyro_unit": self.gyro_unit,
-            "accel_unit": self.accel_unit,
-            "time_unit": self.time_unit,
-            "axes": self.axes,
-            "repair": self.repair or None,
+            key: value
+            for key in ("columns", "gyro_unit", "accel_unit", "time_unit", "axes", "repair")
+            if (value := getattr(self, key)) not in (None, False, {})
         }
-        said = {key: value for key, value in reading.items() if value is not None}
+        if "columns" in reading:
+            reading["columns"] = dict(self.columns)
         # The name of a scenario has neither a suffix nor a folder.
         if not Path(name).suffix and len(Path(name).parts) == 1:
             from strapdown.simulation import SCENARIOS, find_scenario
@@ -187,9 +194,9 @@ class AttitudeOptions:
                 self._refuse_of_scenario()
                 find_scenario(name)  # lists the valid names
             if name in SCENARIOS:
-                if said:
+                if reading:
                     raise ConfigError(
-                        "attitude.scenario-not-read-file", quantity=name, given=list(said)
+                        "attitude.scenario-not-read-file", quantity=name, given=list(reading)
                     )
                 highest = max((float(r) for r in self.rates_hz), default=100.0)
                 first = specify(
@@ -204,14 +211,9 @@ class AttitudeOptions:
                     first.model_copy(update={"seed": first.seed + k}) for k in range(self.trials)
                 ]
         self._refuse_of_scenario()
+        path = str(Path(text))
         return [
-            specify(
-                LogSpec,
-                path=str(Path(text)),
-                sampling=self.sampling,
-                rate_hz=self.rate_hz,
-                **said,
-            )
+            specify(LogSpec, path=path, sampling=self.sampling, rate_hz=self.rate_hz, **reading)
         ]
 
     def _refuse_of_scenario(self) -> None:
@@ -246,19 +248,6 @@ def _texts(values: object) -> list[str]:
     return [str(v) for v in values]
 
 
-def _one_of_each(
-    sources: Iterable[ScenarioSpec | LogSpec],
-) -> list[ScenarioSpec | LogSpec]:
-    """Refuse a source that is named twice: it would count as two trials."""
-    found: list[ScenarioSpec | LogSpec] = []
-    for source in sources:
-        if source in found:
-            name = source.name if isinstance(source, ScenarioSpec) else source.path
-            raise ConfigError("attitude.named-twice-trial-does-not", file=name, quantity="source")
-        found.append(source)
-    return found
-
-
 def _exists(text: str) -> bool:
     """Whether a text is an existing path; False for sentences and invalid characters."""
     if text in ("", "none", "rest", "rests"):
@@ -271,6 +260,10 @@ def _exists(text: str) -> bool:
 
 def _sort_references(items: Sequence[str]) -> tuple[tuple[str, ...], str | None]:
     """Separate reference sentences from the path of a truth."""
+    if not items:
+        return (), None
+    from strapdown.formats.references import read_reference_words
+
     words: list[str] = []
     truth: str | None = None
     for item in items:
@@ -281,7 +274,7 @@ def _sort_references(items: Sequence[str]) -> tuple[tuple[str, ...], str | None]
             words.append(item)
         elif path.is_dir():
             raise ConfigError("attitude.folder", file=item, quantity="reference")
-        elif (listed := _listed(path)) is not None:
+        elif (listed := read_reference_words(path)) is not None:
             words += listed
         elif truth is None:
             truth = str(path)
@@ -290,9 +283,3 @@ def _sort_references(items: Sequence[str]) -> tuple[tuple[str, ...], str | None]
                 "attitude.two-attitude-truths-given", quantity="reference", truth=truth, item=item
             )
     return tuple(words), truth
-
-
-def _listed(path: Path) -> list[str] | None:
-    from strapdown.formats.references import read_reference_words
-
-    return read_reference_words(path)
