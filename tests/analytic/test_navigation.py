@@ -24,10 +24,10 @@ from strapdown.nav_state import NavState
 from strapdown.simulation import (
     ImuErrors,
     Origin,
+    PathMotion,
     SineVelocityMotion,
     StationaryMotion,
     Wave,
-    rocking_stand,
     simulate_imu,
 )
 from strapdown.simulation import earth_motion as place_integral
@@ -278,7 +278,7 @@ def test_coning_that_nobody_compensates_drifts_as_it_must():
     """
     swing, period, step, duration = math.radians(3.0), 1.0, 0.02, 60.0
     waves = Wave(3.0, period), Wave(3.0, period, 90.0)
-    stand = rocking_stand(
+    stand = PathMotion(
         duration, Origin(50.0, 10.0, 0.0), roll_waves=waves[:1], pitch_waves=waves[1:]
     )
     imu, _ = simulate_imu(stand, ImuErrors(), rate=1.0 / step, sampling="mean")

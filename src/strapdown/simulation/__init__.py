@@ -51,7 +51,7 @@ if TYPE_CHECKING:
         point_kinematics,
         point_path,
     )
-    from strapdown.simulation.path_motion import Manoeuvre, PathMotion, Wave, rocking_stand
+    from strapdown.simulation.path_motion import Manoeuvre, PathMotion, Wave
     from strapdown.simulation.scenarios import SCENARIOS, Scenario, find_scenario
     from strapdown.simulation.spline_motion import (
         SineVelocityMotion,
@@ -129,7 +129,6 @@ __all__ = [
     "point_kinematics",
     "point_path",
     "record_crash",
-    "rocking_stand",
     "sample_accelerometer",
     "sample_gyro",
     "ship",
@@ -154,7 +153,7 @@ load_on_first_use(
         "motion": "Motion Pulse PulseMotion Track",
         "mounted_motion": "ExactAnswers MountedMotion PointKinematics Ringing "
         "point_kinematics point_path",
-        "path_motion": "Manoeuvre PathMotion Wave rocking_stand",
+        "path_motion": "Manoeuvre PathMotion Wave",
         "scenarios": "SCENARIOS Scenario find_scenario",
         "spline_motion": "SineVelocityMotion SplineMotion through_waypoints",
         "vehicles": "Accelerate LaneChange Stop Straight Turn aircraft car ship",

@@ -292,15 +292,8 @@ _SCALE = np.array([2.0**10, 2.0**10, 2.0**-13])
 _ROUNDS = 16
 
 
-@dataclass(frozen=True)
-class PlaceIntegral:
-    """Change of latitude, longitude (rad) and height (m) since time zero."""
-
-    scaled: RateIntegral
-
-    def __call__(self, time: ArrayLike) -> Array:
-        """Latitude and longitude in rad and height in m relative to the origin, (n, 3)."""
-        return np.asarray(self.scaled(time) / _SCALE)
+#: Change of latitude and longitude in rad and height in m since time zero, (n, 3).
+PlaceIntegral = Callable[[Array], Array]
 
 
 def integrate_velocity(
@@ -322,12 +315,12 @@ def integrate_velocity(
     from strapdown._kernels.earth import place_rates
 
     parameters = ellipsoid.parameters()
-    place: PlaceIntegral | None = None
+    scaled: RateIntegral | None = None
     ends = np.asarray(breaks, dtype=np.float64)
 
     def rates(time: ArrayLike) -> Array:
         t = np.asarray(time, dtype=np.float64)
-        moved = np.zeros((t.size, 3)) if place is None else place(t)
+        moved = np.zeros((t.size, 3)) if scaled is None else scaled(t) / _SCALE
         at, out = origin.place(moved), np.empty((t.size, 3))
         _refuse_pole(at)
         place_rates(at, velocity(t), parameters, out)
@@ -335,14 +328,15 @@ def integrate_velocity(
 
     before = np.zeros((ends.size, 3))
     for _ in range(_ROUNDS):
-        place = PlaceIntegral(integrate_rate(rates, breaks))
-        now = place(ends)
+        scaled = integrate_rate(rates, breaks)
+        now = scaled(ends) / _SCALE
         # A hundredth of the double-precision resolution of a latitude.
         if np.all(np.abs(now - before) <= [1e-18, 1e-18, 1e-11] + 1e-16 * np.abs(now)):
             break
         before = now
-    assert place is not None
-    return place
+    found = scaled
+    assert found is not None
+    return lambda time: np.asarray(found(time) / _SCALE)
 
 
 def _refuse_pole(place: Array) -> None:

@@ -78,7 +78,7 @@ def simulate_imu(
     wants_force = accelerometer or bool(np.any(np.asarray(errors.gyro.g_sensitivity)))
     plain = None
     if wants_force:
-        plain = _force(motion, TriadErrors(), time, 1.0 / rate, sampling, 0, 0.0)
+        plain = _sampled(motion, TriadErrors(), time, sampling, 0, 0.0, of_force=True)
     gyro = sample_gyro(
         motion,
         errors.gyro,
@@ -121,14 +121,13 @@ def sample_gyro(
     disables this. `specific_force` ((n, 3), m/s²): specific force in body axes, if already
     computed.
     """
-    step = float(time[1] - time[0])
     plain = specific_force
     if plain is None and np.any(np.asarray(errors.g_sensitivity)):
-        plain = _force(motion, TriadErrors(), time, step, sampling, 0, 0.0)
+        plain = _sampled(motion, TriadErrors(), time, sampling, 0, 0.0, of_force=True)
     return apply(
         errors,
         time,
-        _rate(motion, errors, time, step, sampling, seed, straight),
+        _sampled(motion, errors, time, sampling, seed, straight, of_force=False),
         sampling=sampling,
         seed=seed,
         specific_force=plain,
@@ -153,13 +152,12 @@ def sample_accelerometer(
     `sample_gyro`. `vibration` ((n, 3), (m/s²)²): as of `sensors.error_chain.apply`.
     `specific_force` ((n, 3), m/s²): as of `sample_gyro`.
     """
-    step = float(time[1] - time[0])
     plain = specific_force
     if plain is None:
-        plain = _force(motion, TriadErrors(), time, step, sampling, 0, 0.0)
+        plain = _sampled(motion, TriadErrors(), time, sampling, 0, 0.0, of_force=True)
     true = plain
     if errors.jitter > 0.0 or np.isfinite(errors.bandwidth):
-        true = _force(motion, errors, time, step, sampling, seed, straight)
+        true = _sampled(motion, errors, time, sampling, seed, straight, of_force=True)
     return apply(
         errors,
         time,
@@ -202,64 +200,37 @@ def _stamps(motion: Motion, rate: float, sampling: str) -> Array:
     return np.arange(int(samples)) / rate
 
 
-def _instants(motion: Motion, errors: TriadErrors, time: Array, seed: Seed) -> Array:
-    """True sampling instants; the motion is known from zero to its end."""
-    if errors.jitter == 0.0:
-        return time
-    steps = np.full(time.size, time[1] - time[0])
-    return np.clip(time + jitter(errors, steps, seed), 0.0, motion.duration)
-
-
-def _rate(
+def _sampled(
     motion: Motion,
     errors: TriadErrors,
     time: Array,
-    step: float,
     sampling: str,
     seed: Seed,
     straight: float,
+    *,
+    of_force: bool,
 ) -> Array:
-    at = _instants(motion, errors, time, seed)
-    if sampling == "instantaneous":
-        return low_passed_at(motion.rate, at, errors.bandwidth, (), straight)
-    angle = motion.angle(at)
-    mean = np.vstack([motion.rate(at[:1]), np.diff(angle, axis=0) / step])
-    return _filtered_mean(motion.rate, at, mean, step, errors.bandwidth, (), straight)
-
-
-def _force(
-    motion: Motion,
-    errors: TriadErrors,
-    time: Array,
-    step: float,
-    sampling: str,
-    seed: Seed,
-    straight: float,
-) -> Array:
-    at, force = _instants(motion, errors, time, seed), motion.specific_force
-    cuts: Sequence[float] = getattr(motion, "cuts", ())
-    if sampling == "instantaneous":
-        return low_passed_at(force, at, errors.bandwidth, cuts, straight)
-    mean = np.vstack([force(at[:1]), mean_between(force, at, cuts)])
+    """Rate or specific force at the jittered instants, or its means, after the low-pass."""
+    step, at = float(time[1] - time[0]), time
     if errors.jitter > 0.0:
-        # The sensor divides the accumulated increment by its nominal interval.
-        mean[1:] *= np.diff(at)[:, None] / step
-    return _filtered_mean(force, at, mean, step, errors.bandwidth, cuts, straight)
-
-
-def _filtered_mean(
-    quantity: Quantity,
-    at: Array,
-    mean: Array,
-    step: float,
-    bandwidth: float,
-    cuts: Sequence[float],
-    straight: float,
-) -> Array:
-    if np.isinf(bandwidth):
+        # The motion is known from zero to its end.
+        at = time + jitter(errors, np.full(time.size, time[1] - time[0]), seed)
+        at = np.clip(at, 0.0, motion.duration)
+    quantity: Quantity = motion.specific_force if of_force else motion.rate
+    cuts: Sequence[float] = getattr(motion, "cuts", ()) if of_force else ()
+    if sampling == "instantaneous":
+        return low_passed_at(quantity, at, errors.bandwidth, cuts, straight)
+    if of_force:
+        mean = np.vstack([quantity(at[:1]), mean_between(quantity, at, cuts)])
+        if errors.jitter > 0.0:
+            # The sensor divides the accumulated increment by its nominal interval.
+            mean[1:] *= np.diff(at)[:, None] / step
+    else:
+        mean = np.vstack([quantity(at[:1]), np.diff(motion.angle(at), axis=0) / step])
+    if np.isinf(errors.bandwidth):
         return mean
-    ends = low_passed_at(quantity, at, bandwidth, cuts, straight)
-    return mean_of_filtered(ends, mean, np.full(at.size, step), bandwidth)
+    ends = low_passed_at(quantity, at, errors.bandwidth, cuts, straight)
+    return mean_of_filtered(ends, mean, np.full(at.size, step), errors.bandwidth)
 
 
 # Low-pass and means of a continuous quantity, as a sampler sees it.

@@ -121,10 +121,10 @@ class MountedMotion:
     def _point(self, time: Array) -> MovingPoint:
         arm = rigid_arm(self.mounting.position, time.size)
         for ringing in self.ringing:
-            arm = Arm(
-                arm.place + ringing.displacement(time),
-                arm.velocity + ringing.velocity(time),
-                arm.acceleration + ringing.acceleration(time),
+            arm = (
+                arm[0] + ringing.displacement(time),
+                arm[1] + ringing.velocity(time),
+                arm[2] + ringing.acceleration(time),
             )
         return moving_point(self.motion, arm, time)
 
@@ -168,20 +168,9 @@ class PointKinematics:
     q_nv: Array
 
 
-@dataclass(frozen=True)
-class Arm:
-    """Lever arm from the vehicle's origin to a point, in vehicle axes, (n, 3) each.
-
-    Attributes
-    ----------
-    place : ndarray, m
-    velocity, acceleration : ndarray, m/s and m/s²
-        Time derivatives of its components; zero for a point of the rigid vehicle.
-    """
-
-    place: Array
-    velocity: Array
-    acceleration: Array
+#: Lever arm from the vehicle's origin to a point, m, and its derivatives in m/s and m/s², of its
+#: components in vehicle axes, (n, 3) each; zero for a point of the rigid vehicle.
+Arm = tuple[Array, Array, Array]
 
 
 @dataclass(frozen=True)
@@ -224,7 +213,7 @@ def moving_point(motion: EarthMotion, arm: Arm, time: Array) -> MovingPoint:
     place = motion.origin.place(k.moved)
     place[:, :2] = np.degrees(place[:, :2])
     to_vehicle = rotation.conjugate(k.q_nb)
-    r = arm.place
+    r, d_r, _ = arm
     level_turn = earth.transport_rate(
         place[:, 0], place[:, 2], k.velocity, ellipsoid=motion.ellipsoid
     )
@@ -239,7 +228,7 @@ def moving_point(motion: EarthMotion, arm: Arm, time: Array) -> MovingPoint:
         place,
         k.q_nb,
         r,
-        rotation.rotate(to_vehicle, k.velocity) + arm.velocity + np.cross(relative, r),
+        rotation.rotate(to_vehicle, k.velocity) + d_r + np.cross(relative, r),
         rotation.rotate(to_vehicle, whole) + _lever(arm, relative, relative_swing),
         _lever(arm, rate, swing) - rotation.rotate(to_vehicle, fall) - _turned_twice(spin, r),
     )
@@ -288,7 +277,7 @@ def rigid_arm(position: ArrayLike, count: int) -> Arm:
             "simulation.not-three-finite-numbers-2", quantity="position", position=position
         )
     still = np.zeros((count, 3))
-    return Arm(np.tile(r, (count, 1)), still, still)
+    return np.tile(r, (count, 1)), still, still
 
 
 def in_axes_of(motion: EarthMotion, point: MovingPoint, epoch: float) -> PointKinematics:
@@ -344,8 +333,8 @@ def _gravity_change(motion: EarthMotion, place: Array, offset: Array) -> Array:
 
 
 def _lever(arm: Arm, rate: Array, swing: Array) -> Array:
-    coriolis = 2.0 * np.cross(rate, arm.velocity)
-    return arm.acceleration + coriolis + np.cross(swing, arm.place) + _turned_twice(rate, arm.place)
+    r, d_r, dd_r = arm
+    return dd_r + 2.0 * np.cross(rate, d_r) + np.cross(swing, r) + _turned_twice(rate, r)
 
 
 def _turned_twice(rate: Array, r: Array) -> Array:

@@ -216,40 +216,6 @@ class _Path:
     acceleration: Array
 
 
-def rocking_stand(
-    duration: float,
-    origin: Origin,
-    *,
-    roll_deg: float = 0.0,
-    pitch_deg: float = 0.0,
-    heading_deg: float = 0.0,
-    roll_waves: Sequence[Wave] = (),
-    pitch_waves: Sequence[Wave] = (),
-    heading_waves: Sequence[Wave] = (),
-    ellipsoid: Ellipsoid = WGS84,
-) -> PathMotion:
-    """A body that rocks about a fixed position.
-
-    Parameters
-    ----------
-    duration : float, s
-    roll_deg, pitch_deg, heading_deg : float, deg
-        Mean angles.
-    roll_waves, pitch_waves, heading_waves : sequence of Wave, deg
-    """
-    return PathMotion(
-        duration,
-        origin,
-        heading_deg=heading_deg,
-        attack_deg=pitch_deg,
-        roll_deg=roll_deg,
-        roll_waves=tuple(roll_waves),
-        pitch_waves=tuple(pitch_waves),
-        heading_waves=tuple(heading_waves),
-        ellipsoid=ellipsoid,
-    )
-
-
 # A course as tracks of speed, turn rate and climb, built from a list of maneuvers.
 
 

@@ -158,8 +158,7 @@ class WalkingMotion(EarthMotion):
     @property
     def breaks(self) -> Sequence[float]:
         """Starts and ends of the moves, s."""
-        tracks = (*self._tracks.place, *self._tracks.lift, self._tracks.pitch, self._tracks.heading)
-        inner = {t for track in tracks for t in track.times if 0.0 < t < self.duration}
+        inner = {t for track in self._tracks for t in track.times if 0.0 < t < self.duration}
         return [0.0, *sorted(inner), self.duration]
 
     def stances(self, time: Array) -> NDArray[np.bool_]:
@@ -177,7 +176,7 @@ class WalkingMotion(EarthMotion):
 
     def kinematics(self, time: Array) -> Kinematics:
         """State at given instants; as `EarthMotion.kinematics`."""
-        parts = [track.evaluate(time) for track in (self._tracks.pitch, self._tracks.heading)]
+        parts = [track.evaluate(time) for track in self._tracks[4:]]
         still = np.zeros(len(time))
         angles = np.column_stack([still + self.roll_deg, parts[0][0], parts[1][0]])
         rates = np.column_stack([still, parts[0][1], parts[1][1]])
@@ -193,12 +192,10 @@ class WalkingMotion(EarthMotion):
 
     def _moving(self, time: Array) -> tuple[Array, Array]:
         """Velocity and acceleration."""
-        out = [track.evaluate(time) for track in self._tracks.place]
-        lifted = [track.evaluate(time) for track in self._tracks.lift]
-        velocity = np.column_stack([v for _, v, _ in out])
-        acceleration = np.column_stack([a for _, _, a in out])
-        velocity[:, 2] += sum(v for _, v, _ in lifted)
-        acceleration[:, 2] += sum(a for _, _, a in lifted)
+        north, east, down, lift = (track.evaluate(time) for track in self._tracks[:4])
+        velocity, acceleration = (
+            np.column_stack([north[k], east[k], down[k] + (0.0 + lift[k])]) for k in (1, 2)
+        )
         return velocity, acceleration
 
     @cached_property
@@ -227,7 +224,8 @@ class WalkingMotion(EarthMotion):
         return out
 
     @cached_property
-    def _tracks(self) -> _Tracks:
+    def _tracks(self) -> tuple[Track, ...]:
+        """North, east, down, lift, pitch, heading."""
         times: list[float] = [0.0]
         places: list[tuple[float, float, float, float]] = [self._steps[0]]
         lifted: list[tuple[float, float]] = [(0.0, 0.0)]
@@ -256,39 +254,24 @@ class WalkingMotion(EarthMotion):
         )
         lift = Track(*(tuple(column) for column in zip(*lifted, strict=True)))
         pitch = Track(*(tuple(column) for column in zip(*pitched, strict=True)))
-        return _Tracks((north, east, down), (lift,), pitch, heading)
-
-
-@dataclass(frozen=True)
-class _Tracks:
-    place: tuple[Track, Track, Track]
-    lift: tuple[Track, ...]
-    pitch: Track
-    heading: Track
+        return north, east, down, lift, pitch, heading
 
 
 def walk(
     gait: Gait,
     strides: int,
-    origin: Origin,
     *,
     corner_each: int = 10,
     corner_deg: float = 90.0,
     stairs: Sequence[int] = (),
     climb: float = 0.17,
-    heading_deg: float = 0.0,
-    stand: float = 5.0,
-    roll_deg: float = 0.0,
-    pitch_deg: float = 0.0,
-    ellipsoid: Ellipsoid = WGS84,
-) -> WalkingMotion:
-    """Simulate a walk around blocks.
+) -> tuple[Stride, ...]:
+    """Strides of a walk around blocks.
 
     Parameters
     ----------
     gait : Gait
     strides : int
-    origin : Origin
     corner_each : int
         Number of strides between corners; zero for none. A corner takes two strides.
     corner_deg : float, deg
@@ -297,23 +280,13 @@ def walk(
         Strides that climb two stairs, counted from zero, and advance 0.6 m.
     climb : float, m
         Height of a stair.
-    heading_deg, stand, roll_deg, pitch_deg, ellipsoid
-        As `WalkingMotion`.
-
-    Returns
-    -------
-    WalkingMotion
     """
     listed = []
     for k in range(strides):
-        corner = corner_each > 0 and k >= corner_each and k % corner_each in (0, 1)
+        turn = corner_each > 0 and k >= corner_each and k % corner_each in (0, 1)
         up = k in stairs
+        size = 0.6 / gait.stride if up else (0.6 if turn else 1.0)
         listed.append(
-            Stride(
-                gait,
-                0.5 * corner_deg if corner else 0.0,
-                2.0 * climb if up else 0.0,
-                0.6 / gait.stride if up else (0.6 if corner else 1.0),
-            )
+            Stride(gait, 0.5 * corner_deg if turn else 0.0, 2.0 * climb if up else 0.0, size)
         )
-    return WalkingMotion(tuple(listed), origin, heading_deg, stand, roll_deg, pitch_deg, ellipsoid)
+    return tuple(listed)

@@ -26,7 +26,7 @@ from strapdown.sensors.triad_errors import (
     check_axes_matrix,
     report_transposed,
 )
-from strapdown.simulation import Origin, StationaryMotion, Wave, rocking_stand, simulate_imu
+from strapdown.simulation import Origin, PathMotion, StationaryMotion, Wave, simulate_imu
 from strapdown.systems.inputs import part_of_log
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import values_of
@@ -240,11 +240,11 @@ def _simulated(spec: AlignmentSpec) -> AlignmentSource:
     ]
     angles = (asked.roll_deg, asked.pitch_deg, asked.heading_deg)
     motion = (
-        rocking_stand(
+        PathMotion(
             asked.duration_s,
             origin,
             roll_deg=angles[0],
-            pitch_deg=angles[1],
+            attack_deg=angles[1],
             heading_deg=angles[2],
             roll_waves=waves[0],
             pitch_waves=waves[1],

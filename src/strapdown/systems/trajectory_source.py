@@ -19,12 +19,12 @@ from strapdown.simulation import (
     EarthMotion,
     ImuErrors,
     Origin,
+    PathMotion,
     SineVelocityMotion,
     StationaryMotion,
     Wave,
     aircraft,
     car,
-    rocking_stand,
     ship,
     simulate_imu,
     through_waypoints,
@@ -32,7 +32,7 @@ from strapdown.simulation import (
 from strapdown.simulation import vehicles as steps
 from strapdown.simulation.path_motion import Manoeuvre
 from strapdown.simulation.vehicles import LIMITS
-from strapdown.simulation.walking import GAITS, walk
+from strapdown.simulation.walking import GAITS, WalkingMotion, walk
 
 # Default onset and end time of a turn or a climb, s.
 TURN_RAMP = {"car": 1.0, "aircraft": 3.0, "ship": 10.0}
@@ -127,11 +127,11 @@ def make_motion(spec: motions.MotionSpec, ellipsoid: Ellipsoid) -> EarthMotion:
         angles = (spec.roll_deg, spec.pitch_deg, spec.heading_deg)
         return StationaryMotion(spec.duration_s, origin, *angles, ellipsoid)
     if isinstance(spec, motions.RockingStandSpec):
-        return rocking_stand(
+        return PathMotion(
             spec.duration_s,
             origin,
             roll_deg=spec.roll_deg,
-            pitch_deg=spec.pitch_deg,
+            attack_deg=spec.pitch_deg,
             heading_deg=spec.heading_deg,
             roll_waves=_angle_waves(spec.roll_waves),
             pitch_waves=_angle_waves(spec.pitch_waves),
@@ -139,19 +139,22 @@ def make_motion(spec: motions.MotionSpec, ellipsoid: Ellipsoid) -> EarthMotion:
             ellipsoid=ellipsoid,
         )
     if isinstance(spec, motions.WalkingSpec):
-        return walk(
+        strides = walk(
             GAITS[spec.gait],
             spec.strides,
-            origin,
             corner_each=spec.corner_each,
             corner_deg=spec.corner_deg,
             stairs=spec.stairs,
             climb=spec.stair_m,
-            heading_deg=spec.heading_deg,
-            stand=spec.stand_s,
-            roll_deg=spec.roll_deg,
-            pitch_deg=spec.pitch_deg,
-            ellipsoid=ellipsoid,
+        )
+        return WalkingMotion(
+            strides,
+            origin,
+            spec.heading_deg,
+            spec.stand_s,
+            spec.roll_deg,
+            spec.pitch_deg,
+            ellipsoid,
         )
     return _vehicle(spec, origin, ellipsoid)
 

@@ -27,7 +27,6 @@ from strapdown.simulation import (
     Wave,
     aircraft,
     car,
-    rocking_stand,
     ship,
     simulate_imu,
 )
@@ -92,11 +91,11 @@ SHIP = ship(
     heading_waves=(Wave(0.8, 14.0),),
     heave_waves=(Wave(0.9, 7.2, 10.0),),
 )
-STAND = rocking_stand(
+STAND = PathMotion(
     60.0,
     PLACE,
     roll_deg=1.0,
-    pitch_deg=-2.0,
+    attack_deg=-2.0,
     heading_deg=45.0,
     roll_waves=(Wave(3.0, 5.0),),
     pitch_waves=(Wave(2.0, 4.0, 30.0),),
@@ -303,12 +302,12 @@ def test_waves_and_pitches_are_checked():
     with pytest.raises(ConfigError, match="not finite"):
         Wave(math.inf, 1.0)
     with pytest.raises(ConfigError, match="pitch reaches 85 deg"):
-        rocking_stand(1.0, PLACE, pitch_deg=-80.0, pitch_waves=(Wave(5.0, 3.0),))
+        PathMotion(1.0, PLACE, attack_deg=-80.0, pitch_waves=(Wave(5.0, 3.0),))
     with pytest.raises(
         ConfigError, check=lambda refused: refused.finding.code == "simulation.wave-comes-times"
     ):
-        rocking_stand(100.0, PLACE, roll_waves=(Wave(1.0, 1e-5),))
+        PathMotion(100.0, PLACE, roll_waves=(Wave(1.0, 1e-5),))
     with pytest.raises(
         ConfigError, check=lambda refused: refused.finding.code == "simulation.motion-cannot-last"
     ):
-        rocking_stand(0.0, PLACE)
+        PathMotion(0.0, PLACE)

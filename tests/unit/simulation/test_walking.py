@@ -19,7 +19,8 @@ STANDARD_G = 9.80665
 
 @pytest.fixture(scope="module", params=list(GAITS))
 def motion(request):
-    return walk(GAITS[request.param], 24, HERE, stairs=(14, 15), roll_deg=5.0, pitch_deg=-15.0)
+    strides = walk(GAITS[request.param], 24, stairs=(14, 15))
+    return WalkingMotion(strides, HERE, roll_deg=5.0, pitch_deg=-15.0)
 
 
 def test_in_stances_nothing_moves_to_the_last_bit(motion):
@@ -88,7 +89,7 @@ def test_a_walk_is_as_hard_as_one(motion):
     [
         (lambda: WalkingMotion((), HERE), "strides"),
         (lambda: WalkingMotion((Stride(GAITS["walk"]),), HERE, stand=0.0), "strides"),
-        (lambda: walk(GAITS["run"], 3, HERE, pitch_deg=-30.0), "pitch_deg"),
+        (lambda: WalkingMotion(walk(GAITS["run"], 3), HERE, pitch_deg=-30.0), "pitch_deg"),
         (lambda: replace(GAITS["walk"], swing=0.0), "swing"),
         (lambda: replace(GAITS["walk"], strike_time=0.3), "strike_time"),
         (lambda: replace(GAITS["walk"], heel_off_deg=85.0), "pitch"),

@@ -13,7 +13,7 @@ from strapdown.report.alignment_trust import bounds_hold, trust
 from strapdown.report.values import rate_words
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty
-from strapdown.simulation import Origin, StationaryMotion, Wave, rocking_stand, simulate_imu
+from strapdown.simulation import Origin, PathMotion, StationaryMotion, Wave, simulate_imu
 from strapdown.systems.alignment_run import channel_findings, run_alignment
 from strapdown.tables import ACCEL, GYRO
 
@@ -98,7 +98,7 @@ def test_a_log_without_noise_was_not_recorded(stand, tmp_path):
 
 def test_a_rocking_body_is_what_the_inertial_frame_is_for(tmp_path):
     waves = {"roll_waves": (Wave(1.5, 6.0, 0.0),), "pitch_waves": (Wave(0.7, 4.0, 30.0),)}
-    motion = rocking_stand(300.0, PLACE, heading_deg=40.0, **waves)
+    motion = PathMotion(300.0, PLACE, heading_deg=40.0, **waves)
     imu, _ = simulate_imu(motion, SENSOR.draw(2), rate=50.0, sampling="mean", seed=2)
     found = result_of(write(tmp_path / "rock.csv", imu))
     assert trust(found).verdict == "trusted"

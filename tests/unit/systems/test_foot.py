@@ -21,7 +21,7 @@ from strapdown.navigation.replay import run_batch, run_by_sample
 from strapdown.navigation.truth_comparison import compare_with_truth
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty
-from strapdown.simulation import GAITS, Origin, simulate_imu, walk
+from strapdown.simulation import GAITS, Origin, WalkingMotion, simulate_imu, walk
 from strapdown.systems.navigation_draft import (
     BENT,
     STANCE,
@@ -201,7 +201,7 @@ def test_a_walk_by_sample_is_the_walk_at_once():
 
 
 def log_of(path, stand=6.0):
-    motion = walk(GAITS["walk"], 3, Origin(48.0, 11.0, 500.0), stand=stand)
+    motion = WalkingMotion(walk(GAITS["walk"], 3), Origin(48.0, 11.0, 500.0), stand=stand)
     imu, _ = simulate_imu(motion, load_sensor("xsens-mti-1").draw(1), rate=200.0, seed=1)
     names = {c: f"{c}_{'rad_per_s' if 'gyro' in c else 'm_per_s2'}" for c in imu.columns}
     columns = {"time_s": imu.index.to_numpy()} | {n: imu[c].to_numpy() for c, n in names.items()}
