@@ -364,11 +364,6 @@ class CrashScenario:
     kind: Kind | None = None
     parameters: Mapping[str, float] = field(default_factory=dict)
 
-    @property
-    def is_crash(self) -> bool:
-        """Whether the scenario contains an impact."""
-        return bool(self.impacts)
-
 
 # Scenarios: their numbers are in crashes.toml.
 

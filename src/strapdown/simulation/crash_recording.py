@@ -6,6 +6,7 @@ import math
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -85,27 +86,43 @@ def record_crash(
     truth = draw_truth(design, root)
     felt, vibration = _felt(motion, truth.mounting, tuple(ringing), mounted)
     felt = RememberedMotion(felt)
-    accelerometers = tuple(
-        _record_accelerometer(
-            felt, design, k, truth, (begin, stop), sampling, child(root, ACCEL_NOISE, k), vibration
-        )
-        for k in range(len(design.accelerometers))
-    )
-    gyro = None
-    if design.gyro is not None and truth.gyro is not None:
-        told = design.told_gyro()
-        assert told is not None
-        stamps, at = _stamps(motion, design, design.gyro, truth, begin, stop)
-        values = sample_gyro(
+
+    def record(
+        triad: TriadDesign,
+        told: TriadUncertainty,
+        columns: list[str],
+        sample: Callable[[Array], Array],
+    ) -> RecordedTriad:
+        stamps, at = _stamps(felt, design, triad, truth, begin, stop)
+        table = pd.DataFrame(sample(at), index=pd.Index(stamps, name="time"), columns=columns)
+        table.attrs = {"sampling": sampling, "source": f"{design.name} {triad.part}"}
+        return RecordedTriad(table, told, triad.part)
+
+    def forces(k: int, errors: TriadErrors, at: Array) -> Array:
+        shaken = None
+        if vibration is not None and any(errors.axis("vibration_rectification")):
+            shaken = _mean_square(vibration, at, felt.duration)
+        return sample_accelerometer(
             felt,
-            truth.gyro,
+            errors,
             at,
             sampling=sampling,
-            seed=child(root, GYRO_NOISE),
-            straight=STRAIGHT_RATE,
+            seed=child(root, ACCEL_NOISE, k),
+            straight=STRAIGHT_FORCE,
+            vibration=shaken,
         )
-        table = _table(stamps, values, GYRO, sampling, design, design.gyro)
-        gyro = RecordedTriad(table, told, design.gyro.part)
+
+    def rates(errors: TriadErrors, at: Array) -> Array:
+        seed = child(root, GYRO_NOISE)
+        return sample_gyro(felt, errors, at, sampling=sampling, seed=seed, straight=STRAIGHT_RATE)
+
+    accelerometers = tuple(
+        record(triad, design.told(k), ACCEL, partial(forces, k, truth.accelerometers[k]))
+        for k, triad in enumerate(design.accelerometers)
+    )
+    gyro, told = None, design.told_gyro()
+    if design.gyro is not None and truth.gyro is not None and told is not None:
+        gyro = record(design.gyro, told, GYRO, partial(rates, truth.gyro))
     unit = CrashUnit(
         design.name,
         accelerometers,
@@ -183,34 +200,6 @@ def _felt(
     return felt, vibration
 
 
-def _record_accelerometer(
-    felt: Motion,
-    design: RecorderDesign,
-    which: int,
-    truth: RecorderTruth,
-    bounds: tuple[float, float],
-    sampling: str,
-    seed: Seed,
-    vibration: Callable[[Array], Array] | None,
-) -> RecordedTriad:
-    triad, errors = design.accelerometers[which], truth.accelerometers[which]
-    stamps, at = _stamps(felt, design, triad, truth, *bounds)
-    shaken = None
-    if vibration is not None and any(errors.axis("vibration_rectification")):
-        shaken = _mean_square(vibration, at, felt.duration)
-    values = sample_accelerometer(
-        felt,
-        errors,
-        at,
-        sampling=sampling,
-        seed=seed,
-        straight=STRAIGHT_FORCE,
-        vibration=shaken,
-    )
-    table = _table(stamps, values, ACCEL, sampling, design, triad)
-    return RecordedTriad(table, design.told(which), triad.part)
-
-
 def _mean_square(vibration: Callable[[Array], Array], at: Array, duration: float) -> Array:
     """Mean square over an interval about each sample, in two halves: to 1e-3 up to four periods."""
     half = 0.5 * (at[1] - at[0])
@@ -245,19 +234,6 @@ def _stamps(
     return stamps, np.clip(at, 0.0, motion.duration)
 
 
-def _table(
-    stamps: Array,
-    values: Array,
-    columns: list[str],
-    sampling: str,
-    design: RecorderDesign,
-    triad: TriadDesign,
-) -> pd.DataFrame:
-    table = pd.DataFrame(values, index=pd.Index(stamps, name="time"), columns=columns)
-    table.attrs = {"sampling": sampling, "source": f"{design.name} {triad.part}"}
-    return table
-
-
 # True errors of a recorder, drawn from its design.
 
 
@@ -276,7 +252,9 @@ def draw_truth(design: RecorderDesign, root: Seed) -> RecorderTruth:
         if errors is None:
             errors = draw_errors(triad.uncertainty, root, ACCEL_ERRORS, k)
             if k > 0 and design.high_g_bias > 0.0:
-                errors = replace(errors, bias=_uniform(design.high_g_bias, root, k))
+                draw = np.random.Generator(np.random.PCG64(child(root, HIGH_G, k)))
+                bias = draw.uniform(-design.high_g_bias, design.high_g_bias, 3)
+                errors = replace(errors, bias=_triad(bias))
         sd = design.warm_up.accel if design.warm_up else 0.0
         accelerometers.append(_warmed(errors, design.warm_up, sd, root, k))
     gyro = None
@@ -292,7 +270,7 @@ def draw_truth(design: RecorderDesign, root: Seed) -> RecorderTruth:
         tuple(accelerometers),
         gyro,
         Mounting(
-            _shifted(told.position, _triad(told.position_sd * moved[:3])),
+            _triad(np.add(told.position, told.position_sd * moved[:3])),
             _turned(told, moved[3:]),
         ),
         design.clock_offset,
@@ -315,11 +293,6 @@ def _normal(count: int, root: Seed, *place: int) -> Array:
     return generator.standard_normal(count)
 
 
-def _uniform(bound: float, root: Seed, which: int) -> Triad:
-    generator = np.random.Generator(np.random.PCG64(child(root, HIGH_G, which)))
-    return _triad(generator.uniform(-bound, bound, 3))
-
-
 def _triad(values: Array) -> Triad:
     x, y, z = (float(v) for v in values)
     return (x, y, z)
@@ -332,11 +305,6 @@ def _turned(told: Mounting, by: Array) -> Triad:
     turn = rotation.quaternion_from_rotation_vector(np.radians(told.angles_sd_deg) * by)
     there = rotation.quaternion_from_euler(told.angles_deg)
     return _triad(rotation.euler_from_quaternion(rotation.compose(turn, there)))
-
-
-def _shifted(triad: Triad, by: Triad) -> Triad:
-    x, y, z = (float(a + b) for a, b in zip(triad, by, strict=True))
-    return (x, y, z)
 
 
 class RememberedMotion:
@@ -511,9 +479,7 @@ class RecorderDesign:
     def _warm(self, own: TriadUncertainty, sd: float) -> TriadUncertainty:
         if self.warm_up is None:
             return own
-        bias = np.hypot(own.axis("bias"), sd * self.warm_up.left)
-        x, y, z = (float(b) for b in bias)
-        return replace(own, bias=(x, y, z))
+        return replace(own, bias=_triad(np.hypot(own.axis("bias"), sd * self.warm_up.left)))
 
 
 @dataclass(frozen=True)

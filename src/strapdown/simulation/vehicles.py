@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import ConfigError
 from strapdown.simulation.earth_motion import Origin
 from strapdown.simulation.motion import Track, minimum_jerk
@@ -18,7 +18,6 @@ from strapdown.simulation.path_motion import (
     Limits,
     Manoeuvre,
     PathMotion,
-    Wave,
     check_length,
     integrate_track,
     lay_course,
@@ -39,137 +38,44 @@ def car(
     origin: Origin,
     manoeuvres: Steps,
     *,
-    heading_deg: float = 0.0,
     speed: float = 0.0,
-    sway_roll: float = 0.0,
-    sway_pitch: float = 0.0,
     limits: Limits = LIMITS["car"],
-    ellipsoid: Ellipsoid = WGS84,
+    **path: Any,
 ) -> PathMotion:
-    """A car: level, nose along its path; optionally on springs.
+    """A car: level, nose along its path; on springs with `sway_roll` and `sway_pitch`.
 
     Parameters
     ----------
     origin : Origin
     manoeuvres : sequence of (str, Manoeuvre)
         Each with its name for messages.
-    heading_deg : float, deg
     speed : float, m/s
-        Both at time zero.
-    sway_roll, sway_pitch : float, deg/(m/s²)
-        As `PathMotion`.
+        At time zero.
     limits : Limits
-    ellipsoid : Ellipsoid
-
-    Returns
-    -------
-    PathMotion
+    **path
+        Other fields of `PathMotion`: ``heading_deg`` at time zero, ``ellipsoid`` …
 
     Raises
     ------
     ConfigError
         As `lay_course` and `PathMotion`.
     """
-    return replace(
-        _laid(origin, manoeuvres, heading_deg, speed, limits, ellipsoid),
-        sway_roll=sway_roll,
-        sway_pitch=sway_pitch,
-    )
+    duration, speeds, turns, climbs = lay_course(manoeuvres, speed, limits)
+    return PathMotion(duration, origin, speed=speeds, turn_rate=turns, climb=climbs, **path)
 
 
 def aircraft(
-    origin: Origin,
-    manoeuvres: Steps,
-    *,
-    heading_deg: float = 0.0,
-    speed: float = 0.0,
-    attack_deg: float = 0.0,
-    limits: Limits = LIMITS["aircraft"],
-    ellipsoid: Ellipsoid = WGS84,
+    origin: Origin, manoeuvres: Steps, *, limits: Limits = LIMITS["aircraft"], **path: Any
 ) -> PathMotion:
-    """An aircraft: banked in every turn, pitched above its path by the angle of attack.
-
-    Parameters
-    ----------
-    origin, manoeuvres, heading_deg, speed, limits, ellipsoid
-        As `car`.
-    attack_deg : float, deg
-
-    Returns
-    -------
-    PathMotion
-
-    Raises
-    ------
-    ConfigError
-        As `car`.
-    """
-    return replace(
-        _laid(origin, manoeuvres, heading_deg, speed, limits, ellipsoid),
-        coordinated=True,
-        attack_deg=attack_deg,
-    )
+    """An aircraft, as `car`: banked in every turn, pitched above its path by `attack_deg`."""
+    return car(origin, manoeuvres, limits=limits, coordinated=True, **path)
 
 
 def ship(
-    origin: Origin,
-    manoeuvres: Steps,
-    *,
-    heading_deg: float = 0.0,
-    speed: float = 0.0,
-    roll_waves: Sequence[Wave] = (),
-    pitch_waves: Sequence[Wave] = (),
-    heading_waves: Sequence[Wave] = (),
-    heave_waves: Sequence[Wave] = (),
-    limits: Limits = LIMITS["ship"],
-    ellipsoid: Ellipsoid = WGS84,
+    origin: Origin, manoeuvres: Steps, *, limits: Limits = LIMITS["ship"], **path: Any
 ) -> PathMotion:
-    """A ship in waves.
-
-    Parameters
-    ----------
-    origin, manoeuvres, heading_deg, speed, limits, ellipsoid
-        As `car`.
-    roll_waves, pitch_waves, heading_waves : sequence of Wave, deg
-    heave_waves : sequence of Wave, m
-        Downward.
-
-    Returns
-    -------
-    PathMotion
-
-    Raises
-    ------
-    ConfigError
-        As `car`.
-    """
-    return replace(
-        _laid(origin, manoeuvres, heading_deg, speed, limits, ellipsoid),
-        roll_waves=tuple(roll_waves),
-        pitch_waves=tuple(pitch_waves),
-        heading_waves=tuple(heading_waves),
-        heave_waves=tuple(heave_waves),
-    )
-
-
-def _laid(
-    origin: Origin,
-    manoeuvres: Steps,
-    heading_deg: float,
-    speed: float,
-    limits: Limits,
-    ellipsoid: Ellipsoid,
-) -> PathMotion:
-    duration, speeds, turns, climbs = lay_course(manoeuvres, speed, limits)
-    return PathMotion(
-        duration,
-        origin,
-        heading_deg=heading_deg,
-        speed=speeds,
-        turn_rate=turns,
-        climb=climbs,
-        ellipsoid=ellipsoid,
-    )
+    """A ship, as `car`, with `roll_waves`, `pitch_waves`, `heading_waves`, `heave_waves`."""
+    return car(origin, manoeuvres, limits=limits, **path)
 
 
 # Ratio of largest to mean slope of a minimum-jerk move.

@@ -190,7 +190,9 @@ def _vehicle(
             roll_waves=_angle_waves(spec.roll_waves),
             pitch_waves=_angle_waves(spec.pitch_waves),
             heading_waves=_angle_waves(spec.heading_waves),
-            heave_waves=[Wave(w.amplitude_m, w.period_s, w.phase_deg) for w in spec.heave_waves],
+            heave_waves=tuple(
+                Wave(w.amplitude_m, w.period_s, w.phase_deg) for w in spec.heave_waves
+            ),
             limits=limits,
             ellipsoid=ellipsoid,
         )

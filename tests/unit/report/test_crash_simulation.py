@@ -23,7 +23,7 @@ from strapdown.simulation.crash_motion import CRASHES
 from strapdown.simulation.mounted_motion import ExactAnswers
 from strapdown.tables import ACCEL, GYRO, NED
 
-CRASHED = [name for name, c in CRASHES.items() if c.is_crash]
+CRASHED = [name for name, c in CRASHES.items() if c.impacts]
 
 
 @pytest.fixture(scope="module")
