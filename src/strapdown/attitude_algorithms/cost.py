@@ -63,27 +63,6 @@ class _State(list[Any]):
         super().__setitem__(index, value)
 
 
-def _counted_run(
-    algorithm: AttitudeAlgorithm, lengths: Sequence[float] = (0.01,) * STEPS
-) -> tuple[Counter[str], _State]:
-    count: Counter[str] = Counter()
-
-    def number(value: float) -> arithmetic.Counted:
-        return arithmetic.Counted(value, count)
-
-    home, name = step_kernel(algorithm)
-    step = getattr(arithmetic.counted_kernels(home), name)
-    start = algorithm.begin(rotation.quaternion_from_euler([20.0, -35.0, 250.0]))
-    state = _State(number(float(v)) for v in start)
-    for k, dt in enumerate(lengths):
-        # The axis changes a little from step to step, as in every motion.
-        theta = (0.6 * TURN, (0.64 - 0.01 * k) * TURN, (0.48 + 0.01 * k) * TURN)
-        dtheta = (0.0, -0.01 * TURN, 0.01 * TURN)
-        numbers = [number(v) for v in (dt, *theta, *dtheta)]
-        step(state, *numbers, *algorithm.kernel_options())
-    return count, state
-
-
 def kernel_home(algorithm: AttitudeAlgorithm) -> str:
     """Module of an algorithm's kernels: one of `arithmetic.SOURCES`, or a plug-in's."""
     home: str = type(algorithm).advance_kernel.py_func.__module__
@@ -96,36 +75,22 @@ def step_kernel(algorithm: AttitudeAlgorithm) -> tuple[str, str]:
     return kernel_home(algorithm), name.replace("_advance", "_step")
 
 
-def operation_count(algorithm: AttitudeAlgorithm) -> dict[str, float]:
-    """Count the floating-point operations of a step.
-
-    Parameters
-    ----------
-    algorithm : AttitudeAlgorithm
-
-    Returns
-    -------
-    dict
-        ``add`` (subtractions, too), ``multiply``, ``divide`` (remainders, too), ``sqrt`` and
-        ``trig``, per step, the mean over 12 steps of 0.01 rad each. From angle increments:
-        forming them from rates is the same for every algorithm. A sign, a comparison and
-        a copy are free.
-    """
-    count, _ = _counted_run(algorithm)
-    return {kind: count[kind] / STEPS for kind in CORTEX_M4F_CYCLES}
-
-
-def memory(algorithm: AttitudeAlgorithm) -> int:
-    """Return how many numbers an algorithm keeps between steps."""
-    return _counted_run(algorithm)[1].used
-
-
 def count_cost(algorithm: AttitudeAlgorithm, dt: ArrayLike | None = None) -> Cost:
     """Count the operations of one sample, averaged over steps `dt` in s of a log."""
     lengths = np.full(STEPS, 0.01) if dt is None else np.asarray(dt, dtype=np.float64)
     first = max(0, (len(lengths) - STEPS) // 2)
     middle = np.resize(lengths[first : first + STEPS], STEPS)
-    count, state = _counted_run(algorithm, middle.tolist())
+    count: Counter[str] = Counter()
+    home, name = step_kernel(algorithm)
+    step = getattr(arithmetic.counted_kernels(home), name)
+    start = algorithm.begin(rotation.quaternion_from_euler([20.0, -35.0, 250.0]))
+    state = _State(arithmetic.Counted(float(v), count) for v in start)
+    for k, length in enumerate(middle.tolist()):
+        # The axis changes a little from step to step, as in every motion.
+        theta = (0.6 * TURN, (0.64 - 0.01 * k) * TURN, (0.48 + 0.01 * k) * TURN)
+        dtheta = (0.0, -0.01 * TURN, 0.01 * TURN)
+        numbers = [arithmetic.Counted(v, count) for v in (length, *theta, *dtheta)]
+        step(state, *numbers, *algorithm.kernel_options())
     operations = {kind: count[kind] / STEPS for kind in CORTEX_M4F_CYCLES}
     return Cost(
         algorithm=algorithm.label,

@@ -35,7 +35,6 @@ __all__ = [
     "PlaceReference",
     "SensorErrors",
     "dead_reckon",
-    "growth_laws",
     "is_place",
     "parse_place",
     "score_places",
@@ -299,7 +298,12 @@ def _score(
     corrected = np.sum([leg.position_corrected[-1] for leg in legs], axis=0)
     ends = [float(np.sqrt(np.square(leg.velocity[-1]).sum())) for leg in legs]
     worst = legs[int(np.argmax(ends))]
-    noise = errors.accel_noise if errors.accel_noise is not None else _density(rests, imu)
+    noise = errors.accel_noise
+    if noise is None:
+        # From the quietest of the rests: sd times √(step).
+        scatter = [float(np.mean(np.square(r.accel_sd))) for r in rests if r.accel_sd is not None]
+        step = float(np.median(np.diff(imu.index.to_numpy(dtype=np.float64))))
+        noise = float(np.sqrt(min(scatter, default=0.0) * step))
     expected = np.array(place.moved)
     raw = [(leg.position_by_bias, leg.position_by_tilt, leg.seconds**3 / 3.0) for leg in legs]
     mended = [
@@ -341,13 +345,6 @@ def _sd(parts: list[tuple[Array, Array, float]], errors: SensorErrors, noise: fl
     variance += np.square(by_tilt * np.radians(errors.tilt_sd_deg)).sum()
     variance += 3.0 * noise**2 * sum(p[2] for p in parts)
     return float(np.sqrt(variance))
-
-
-def _density(rests: list[RestStretch], imu: pd.DataFrame) -> float:
-    """White noise of an accelerometer, from the quietest of the rests: sd times √(step)."""
-    scatter = [float(np.mean(np.square(r.accel_sd))) for r in rests if r.accel_sd is not None]
-    step = float(np.median(np.diff(imu.index.to_numpy(dtype=np.float64))))
-    return float(np.sqrt(min(scatter, default=0.0) * step))
 
 
 def _triple(values: Array) -> tuple[float, float, float]:
@@ -557,27 +554,3 @@ def _turned(attitude: pd.DataFrame, until: float) -> Array:
     q = np.vstack([attitude[QUATERNION].to_numpy()[inside], attitude_at(attitude, [until])])
     turn = rotation.dcm_from_quaternion(q)
     return np.asarray(np.trapezoid(turn, time, axis=0))
-
-
-def growth_laws(
-    seconds: float, *, accel_error: float, tilt_rate: float, gravity: float = STANDARD_GRAVITY
-) -> tuple[float, float]:
-    """Position error by constant errors, without correction at the end.
-
-    Parameters
-    ----------
-    seconds : float, s
-    accel_error : float, m/s²
-        Constant in the local level.
-    tilt_rate : float, rad/s
-        Rate at which a horizontal axis drifts.
-    gravity : float, m/s²
-
-    Returns
-    -------
-    by_accel, by_tilt : float, m
-        ``accel_error t²/2`` and ``g tilt_rate t³/6`` (Alexiev 2021, who leaves out g). Where
-        the velocity is brought to zero in proportion to time, the first vanishes, and half of
-        the second remains with the other sign: ``g tilt_rate (t³/6 - t³/4)``.
-    """
-    return 0.5 * accel_error * seconds**2, gravity * tilt_rate * seconds**3 / 6.0

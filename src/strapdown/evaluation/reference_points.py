@@ -425,7 +425,11 @@ def tilt_references(
     """
     rows: list[dict[str, object]] = []
     for rest in rests:
-        if rest.accel_mean is None or (levelled_from is not None and _overlap(rest, levelled_from)):
+        if rest.accel_mean is None or (
+            levelled_from is not None
+            and rest.start <= levelled_from.end
+            and levelled_from.start <= rest.end
+        ):
             continue
         roll, pitch = level(rest.accel_mean)
         rows.append(
@@ -480,10 +484,6 @@ def same_pose_candidates(rests: Sequence[RestStretch]) -> tuple[SamePose, ...]:
 
 def _middle(rest: RestStretch) -> float:
     return 0.5 * (rest.start + rest.end)
-
-
-def _overlap(a: RestStretch, b: RestStretch) -> bool:
-    return a.start <= b.end and b.start <= a.end
 
 
 def _force(rest: RestStretch) -> tuple[Array, Array]:

@@ -175,7 +175,34 @@ def align_second_log(
         raise DataError(
             "evaluation.rotation-clock-leave-power-rates", quantity="gyro", share=100 * (1 - share)
         )
-    return _result(fit, state, axis, covariance, residual, coarse)
+    sd = np.sqrt(np.diag(covariance))
+    mounting = rotation.quaternion_from_dcm(state.turn)
+    mounting_sd = np.degrees(sd[TURN])
+    if axis is not None:
+        # About a sensor axis that is partly along the single axis the result is undetermined.
+        mounting_sd = np.where(np.abs(axis) > 1e-3, np.inf, mounting_sd)
+    return SecondLog(
+        start=float(fit.time[0]),
+        end=float(fit.time[-1]),
+        middle=fit.middle,
+        offset=state.offset,
+        offset_sd=float(sd[OFFSET]),
+        drift_ppm=1e6 * state.drift,
+        drift_sd_ppm=1e6 * float(sd[DRIFT]),
+        mounting=(float(mounting[0]), float(mounting[1]), float(mounting[2]), float(mounting[3])),
+        mounting_deg=_triple(rotation.euler_from_quaternion(mounting)),
+        mounting_sd_deg=_triple(mounting_sd),
+        bias=_triple(state.bias),
+        bias_sd=_triple(sd[BIAS]),
+        scale=state.scale,
+        scale_sd=float(sd[SCALE]),
+        axis=None if axis is None else _triple(axis),
+        correlation=coarse.correlation,
+        runner_up=coarse.runner_up,
+        residual=residual,
+        smoothing=SMOOTH_CELLS * fit.step,
+        cells=len(fit.time),
+    )
 
 
 class _Fit:
@@ -229,7 +256,13 @@ class _Fit:
             size = np.sqrt((design**2).sum(axis=0))
             scaled = design / size
             change = free @ (np.linalg.solve(scaled.T @ scaled, scaled.T @ left.ravel()) / size)
-            state = _moved(state, change)
+            state = _State(
+                state.offset + float(change[OFFSET]),
+                state.drift + float(change[DRIFT]),
+                rotation.dcm_from_rotation_vector(change[TURN]) @ state.turn,
+                state.bias + change[BIAS],
+                state.scale + float(change[SCALE]),
+            )
             if np.abs(change[TURN]).max() < 1e-10 and abs(change[OFFSET]) < 1e-9:
                 break
         return state, axis
@@ -355,54 +388,6 @@ class _Fit:
         power = float(((self.rate - self.rate.mean(axis=0)) ** 2).sum())
         square = float((left**2).sum())
         return covariance, float(np.sqrt(square / len(left))), 1.0 - square / max(power, 1e-300)
-
-
-def _moved(state: _State, change: Array) -> _State:
-    return _State(
-        state.offset + float(change[OFFSET]),
-        state.drift + float(change[DRIFT]),
-        rotation.dcm_from_rotation_vector(change[TURN]) @ state.turn,
-        state.bias + change[BIAS],
-        state.scale + float(change[SCALE]),
-    )
-
-
-def _result(
-    fit: _Fit,
-    state: _State,
-    axis: Array | None,
-    covariance: Array,
-    residual: float,
-    coarse: CoarseOffset,
-) -> SecondLog:
-    sd = np.sqrt(np.diag(covariance))
-    mounting = rotation.quaternion_from_dcm(state.turn)
-    mounting_sd = np.degrees(sd[TURN])
-    if axis is not None:
-        # About a sensor axis that is partly along the single axis the result is undetermined.
-        mounting_sd = np.where(np.abs(axis) > 1e-3, np.inf, mounting_sd)
-    return SecondLog(
-        start=float(fit.time[0]),
-        end=float(fit.time[-1]),
-        middle=fit.middle,
-        offset=state.offset,
-        offset_sd=float(sd[OFFSET]),
-        drift_ppm=1e6 * state.drift,
-        drift_sd_ppm=1e6 * float(sd[DRIFT]),
-        mounting=(float(mounting[0]), float(mounting[1]), float(mounting[2]), float(mounting[3])),
-        mounting_deg=_triple(rotation.euler_from_quaternion(mounting)),
-        mounting_sd_deg=_triple(mounting_sd),
-        bias=_triple(state.bias),
-        bias_sd=_triple(sd[BIAS]),
-        scale=state.scale,
-        scale_sd=float(sd[SCALE]),
-        axis=None if axis is None else _triple(axis),
-        correlation=coarse.correlation,
-        runner_up=coarse.runner_up,
-        residual=residual,
-        smoothing=SMOOTH_CELLS * fit.step,
-        cells=len(fit.time),
-    )
 
 
 def _triple(values: ArrayLike) -> tuple[float, float, float]:
@@ -538,7 +523,8 @@ def coarse_offset(first: pd.DataFrame, second: pd.DataFrame) -> CoarseOffset:
                 least_rate=LEAST_RATE,
             )
     x, y = (np.sqrt((g.rate**2).sum(axis=1)) for g in (a, b))
-    least = min(LEAST_OVERLAP, 0.5 * _shorter(a, b)) / step
+    shorter = min(len(a.rate) * a.step, len(b.rate) * b.step)
+    least = min(LEAST_OVERLAP, 0.5 * shorter) / step
     lags, score = lag_correlation(x, y, a.known, b.known, least)
     if not score.size:
         raise DataError(
@@ -568,10 +554,6 @@ def coarse_offset(first: pd.DataFrame, second: pd.DataFrame) -> CoarseOffset:
             runner_up=found.runner_up,
         )
     return found
-
-
-def _shorter(a: EvenRates, b: EvenRates) -> float:
-    return min(len(a.rate) * a.step, len(b.rate) * b.step)
 
 
 def _vector_share(a: EvenRates, b: EvenRates, lag: int) -> float:

@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from strapdown import rotation
 from strapdown._kernels import arithmetic
 from strapdown.attitude_algorithms import AttitudeAlgorithm
-from strapdown.attitude_algorithms.cost import kernel_home, operation_count, step_kernel
+from strapdown.attitude_algorithms.cost import count_cost, kernel_home, step_kernel
+from strapdown.constants import CORTEX_M4F_CYCLES
 from strapdown.errors import ConfigError
 from strapdown.export_c.kernels import Function, Kernels
 from strapdown.export_c.translate import WIDTH, Translator, comment, number
@@ -166,10 +167,12 @@ def _update(around: Sampling, step: Function, increments: Function) -> str:
 
 
 def _header(algorithm: AttitudeAlgorithm, around: Sampling, size: int) -> str:
-    accuracy, count = algorithm.accuracy, operation_count(algorithm)
+    accuracy, cost = algorithm.accuracy, count_cost(algorithm)
     # Looked up at run time, because the package root imports higher layers.
     version = importlib.import_module("strapdown").__version__
-    operations = ", ".join(f"{count[k]:.3g} {k}" for k in count if count[k])
+    operations = ", ".join(
+        f"{number:.3g} {kind}" for kind in CORTEX_M4F_CYCLES if (number := getattr(cost, kind))
+    )
     orders = (
         f"increments {accuracy.increments}, rates interpolated by a cubic {accuracy.rates} (by the "
         f"trapezoid at most 2), drift on pure coning {accuracy.coning}"
