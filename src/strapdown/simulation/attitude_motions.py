@@ -18,6 +18,7 @@ from strapdown.simulation.motion import (
     FlatMotion,
     Quaternion,
     Track,
+    check_numbers,
     minimum_jerk,
 )
 
@@ -61,21 +62,9 @@ class Coning(FlatMotion):
     q_nb: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        for name, value, most, unit in (
-            ("half_angle", self.half_angle, 180.0, "deg"),
-            ("frequency", self.frequency, np.inf, "Hz"),
-            ("duration", self.duration, np.inf, "s"),
-        ):
-            if not 0.0 < value < most:
-                raise ConfigError(
-                    "simulation.cone-out-of-range"
-                    if np.isfinite(most)
-                    else "simulation.cone-not-positive",
-                    quantity=name,
-                    value=value,
-                    unit=unit,
-                    most=most,
-                )
+        check_numbers(self, positive="half_angle frequency duration")
+        if not self.half_angle < 180.0:
+            raise ConfigError("simulation.cone-out-of-range", quantity="half_angle")
         length = float(np.linalg.norm(self.axis))
         if not (np.isfinite(length) and length > 0.0):
             raise ConfigError("simulation.no-direction", quantity="axis", axis=self.axis)
@@ -186,24 +175,9 @@ class Sculling(FlatMotion):
     q_nb: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        for name, value, most, unit in (
-            ("swing", self.swing, 180.0, "deg"),
-            ("push", self.push, np.inf, "m/s2"),
-            ("frequency", self.frequency, np.inf, "Hz"),
-            ("duration", self.duration, np.inf, "s"),
-        ):
-            if not (0.0 < value <= most and np.isfinite(value)):
-                raise ConfigError(
-                    "simulation.sculling-out-of-range"
-                    if np.isfinite(most)
-                    else "simulation.sculling-not-positive",
-                    quantity=name,
-                    value=value,
-                    unit=unit,
-                    most=most,
-                )
-        if not np.isfinite(self.phase):
-            raise ConfigError("simulation.no-angle", quantity="phase", phase=self.phase)
+        check_numbers(self, positive="swing push frequency duration", finite="phase")
+        if not self.swing <= 180.0:
+            raise ConfigError("simulation.sculling-out-of-range", quantity="swing")
         n, e = np.asarray(self.swing_axis), np.asarray(self.push_axis)
         length = float(np.linalg.norm(n) * np.linalg.norm(e))
         if not (np.isfinite(length) and length > 0.0 and abs(n @ e) <= 1e-9 * length):
@@ -489,10 +463,7 @@ class Gesture(EulerMotion):
     q_nb: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.duration < np.inf:
-            raise ConfigError(
-                "simulation.motion-cannot-last", quantity="duration", duration=self.duration
-            )
+        check_numbers(self, positive="duration")
 
     def turned(self, time: ArrayLike) -> tuple[Array, Array, Array]:
         """As `EulerMotion.turned`."""

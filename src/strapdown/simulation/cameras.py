@@ -16,7 +16,7 @@ from strapdown import frames, rotation
 from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.error_chain import child
 from strapdown.sensors.triad_errors import Triad
-from strapdown.simulation.motion import Motion
+from strapdown.simulation.motion import Motion, check_numbers
 from strapdown.tables import GEODETIC
 
 __all__ = ["Camera", "film", "paper_cameras", "path_from_cameras"]
@@ -224,22 +224,16 @@ class Camera:
     clock_sd: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("focal", "rate"):
-            if not 0.0 < getattr(self, name) < math.inf:
-                raise _refused(self, name, getattr(self, name), "simulation.camera-not-positive")
-        spreads = ("position_sd", "angles_sd_deg", "focal_sd", "k1_sd", "clock_sd")
-        for name in ("reading_sd", *spreads):
-            if not 0.0 <= getattr(self, name) < math.inf:
-                raise _refused(self, name, getattr(self, name), "simulation.camera-negative")
-        for name in ("k1", "clock_offset"):
-            if not math.isfinite(getattr(self, name)):
-                raise _refused(self, name, getattr(self, name), "simulation.camera-not-finite")
+        sds = "reading_sd position_sd angles_sd_deg focal_sd k1_sd clock_sd"
+        check_numbers(self, positive="focal rate", not_negative=sds, finite="k1 clock_offset")
         if min(self.size) < 1:
-            raise _refused(self, "size", self.size, "simulation.camera-size")
+            raise ConfigError(
+                "simulation.camera-size", quantity="size", name=self.name, value=self.size
+            )
         length = np.linalg.norm(self.looking) * np.linalg.norm(self.up)
         across = np.linalg.norm(np.cross(self.looking, self.up))
         if not (np.isfinite(length) and length > 0.0 and across > 1e-6 * length):
-            raise _refused(self, "up", self.up, "simulation.camera-up")
+            raise ConfigError("simulation.camera-up", quantity="up", name=self.name, value=self.up)
 
     @property
     def axes(self) -> Array:
@@ -293,10 +287,6 @@ def project(camera: Camera, axes: Array, points: Array) -> Array:
 
 def _middle(camera: Camera) -> Array:
     return 0.5 * np.asarray(camera.size, dtype=np.float64)
-
-
-def _refused(camera: Camera, quantity: str, value: object, code: str) -> ConfigError:
-    return ConfigError(code, quantity=quantity, name=camera.name, value=value)
 
 
 # Triangulation of a marker's path from two cameras.

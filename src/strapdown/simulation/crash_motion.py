@@ -21,10 +21,14 @@ from strapdown.simulation.earth_motion import (
     Kinematics,
     Origin,
     PlaceIntegral,
-    check_duration,
     integrate_velocity,
 )
-from strapdown.simulation.motion import euler_attitude, euler_body_acceleration, euler_body_rate
+from strapdown.simulation.motion import (
+    check_numbers,
+    euler_attitude,
+    euler_body_acceleration,
+    euler_body_rate,
+)
 
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
@@ -125,7 +129,7 @@ class CrashMotion(EarthMotion):
     ellipsoid: Ellipsoid = WGS84
 
     def __post_init__(self) -> None:
-        check_duration(self.duration)
+        check_numbers(self, positive="duration")
         object.__setattr__(self, "pulses", tuple(self.pulses))
         for k, pulse in enumerate(self.pulses):
             if pulse.end > self.duration * (1.0 + _ROUNDING):
@@ -219,11 +223,7 @@ class Setting:
     ellipsoid: Ellipsoid = WGS84
 
     def __post_init__(self) -> None:
-        for name in ("stand", "coast", "friction", "after"):
-            if not 0.0 <= getattr(self, name) < math.inf:
-                raise ConfigError("simulation.value", quantity=name, value=getattr(self, name))
-        if not 0.0 < self.towing < math.inf:
-            raise ConfigError("simulation.towing", quantity="towing", towing=self.towing)
+        check_numbers(self, positive="towing", not_negative="stand coast friction after")
 
 
 class CrashCourse:

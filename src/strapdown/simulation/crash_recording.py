@@ -22,7 +22,7 @@ from strapdown.sensors.error_chain import Seed, child
 from strapdown.sensors.triad_errors import Triad, TriadErrors
 from strapdown.sensors.uncertainty import TriadUncertainty, draw_errors, uncertainty_of
 from strapdown.simulation.imu import mean_over, sample_accelerometer, sample_gyro
-from strapdown.simulation.motion import Motion
+from strapdown.simulation.motion import Motion, check_numbers
 from strapdown.tables import ACCEL, GYRO, SAMPLINGS
 
 Array = NDArray[np.float64]
@@ -369,10 +369,7 @@ class TriadDesign:
     errors: TriadErrors | None = None
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.rate) and self.rate > 0.0):
-            raise ConfigError(
-                "simulation.hz-no-rate", quantity="rate", part=self.part, rate=self.rate
-            )
+        check_numbers(self, positive="rate")
 
 
 @dataclass(frozen=True)
@@ -396,12 +393,7 @@ class WarmUp:
     elapsed: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("accel", "gyro", "time_constant", "elapsed"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0) or (
-                name == "time_constant" and value == 0.0
-            ):
-                raise ConfigError("simulation.out-range-4", quantity=name, value=value)
+        check_numbers(self, positive="time_constant", not_negative="accel gyro elapsed")
 
     @property
     def left(self) -> float:
@@ -455,13 +447,15 @@ class RecorderDesign:
     def __post_init__(self) -> None:
         if not self.accelerometers:
             raise ConfigError("simulation.recorder-none", quantity="accelerometers", name=self.name)
-        for name in ("trigger_sd", "high_g_bias"):
-            if not 0.0 <= getattr(self, name) < math.inf:
-                raise _out(self, name, "simulation.recorder-negative")
-        if not math.isfinite(self.clock_offset):
-            raise _out(self, "clock_offset", "simulation.recorder-not-finite")
+        check_numbers(self, not_negative="trigger_sd high_g_bias", finite="clock_offset")
         if not abs(self.clock_drift_ppm) <= MOST_DRIFT:
-            raise _out(self, "clock_drift_ppm", "simulation.recorder-drift")
+            raise ConfigError(
+                "simulation.recorder-drift",
+                quantity="clock_drift_ppm",
+                name=self.name,
+                value=self.clock_drift_ppm,
+                most=MOST_DRIFT,
+            )
 
     def told(self, which: int) -> TriadUncertainty:
         """Stated uncertainty of an accelerometer, with high-g bias and residual warm-up bias."""
@@ -506,11 +500,6 @@ class RecorderTruth:
     def clock(self, time: float) -> float:
         """Reading of the recorder's clock at an instant of the motion, s."""
         return self.clock_offset + (1.0 + 1e-6 * self.clock_drift_ppm) * time
-
-
-def _out(design: RecorderDesign, name: str, code: str) -> ConfigError:
-    value = getattr(design, name)
-    return ConfigError(code, quantity=name, name=design.name, value=value, most=MOST_DRIFT)
 
 
 # The four recorders of the crash test of Tadic and Vukajlovic (2016).

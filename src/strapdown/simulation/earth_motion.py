@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from strapdown import rotation
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import ConfigError
-from strapdown.simulation.motion import RateIntegral, integrate_rate
+from strapdown.simulation.motion import RateIntegral, check_numbers, integrate_rate
 from strapdown.tables import trajectory_table
 
 Array = NDArray[np.float64]
@@ -217,12 +217,6 @@ class EarthMotion(ABC):
         return integrate_rate(self.rate, self.breaks)
 
 
-def check_duration(duration: float) -> None:
-    """Raise unless the duration is finite and positive."""
-    if not 0.0 < duration < math.inf:
-        raise ConfigError("simulation.motion-cannot-last", quantity="duration", duration=duration)
-
-
 def _euler(k: Kinematics) -> Array:
     """Roll, pitch and heading in deg, heading from 0 to 360."""
     if k.angles is None or (np.abs(k.angles[:, :2]) >= (180.0, 90.0)).any():
@@ -263,7 +257,7 @@ class StationaryMotion(EarthMotion):
     ellipsoid: Ellipsoid = WGS84
 
     def __post_init__(self) -> None:
-        check_duration(self.duration)
+        check_numbers(self, positive="duration")
 
     @property
     def breaks(self) -> Sequence[float]:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
 
@@ -18,6 +19,21 @@ from strapdown.errors import ConfigError
 
 Array = NDArray[np.float64]
 Quaternion = tuple[float, float, float, float]
+
+
+def check_numbers(
+    owner: object, *, positive: str = "", not_negative: str = "", finite: str = ""
+) -> None:
+    """Raise ConfigError unless attributes, named with blanks between, are in their range."""
+    for names, code, lowest in (
+        (positive, "simulation.not-positive", math.ulp(0.0)),
+        (not_negative, "simulation.negative", 0.0),
+        (finite, "simulation.not-finite", -math.inf),
+    ):
+        for name in names.split():
+            value = getattr(owner, name)
+            if not (lowest <= value and math.isfinite(value)):
+                raise ConfigError(code, quantity=name, value=value)
 
 
 def euler_attitude(angles: Array, q_nb: Quaternion) -> Array:
@@ -256,7 +272,7 @@ class PulseMotion(FlatMotion):
         edges = np.unique([0.0, *(e for p in self.pulses for e in (p.start, p.end))])
         # Evaluated at mid-interval, away from the edges.
         middle = np.append(0.5 * (edges[:-1] + edges[1:]), edges[-1] + 1.0)
-        rates = PulseMotion(tuple(_half_open(p) for p in self.pulses), 0.0).rate(middle)
+        rates = PulseMotion(tuple(replace(p, closed=False) for p in self.pulses), 0.0).rate(middle)
         at_edge = [np.asarray(self.q_nb, dtype=np.float64)]
         for k, length in enumerate(np.diff(edges)):
             turn = rotation.quaternion_from_rotation_vector(rates[k] * length)
@@ -266,10 +282,6 @@ class PulseMotion(FlatMotion):
         return rotation.compose(
             np.array(at_edge)[last], rotation.quaternion_from_rotation_vector(since)
         )
-
-
-def _half_open(pulse: Pulse) -> Pulse:
-    return Pulse(pulse.axis, pulse.start, pulse.end, pulse.rate)
 
 
 def minimum_jerk(x: Array) -> tuple[Array, Array, Array]:

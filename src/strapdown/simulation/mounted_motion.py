@@ -16,6 +16,7 @@ from strapdown.sensors.crash_unit import Mounting
 from strapdown.simulation.crash_motion import CrashMotion
 from strapdown.simulation.earth_motion import EarthMotion
 from strapdown.simulation.imu import mean_between
+from strapdown.simulation.motion import check_numbers
 from strapdown.tables import EULER, NED, VELOCITY, trajectory_table
 
 Array = NDArray[np.float64]
@@ -394,11 +395,7 @@ class Ringing:
                 "simulation.no-direction-2", quantity="direction", direction=self.direction
             )
         object.__setattr__(self, "direction", tuple(x / length for x in direction))
-        if not (math.isfinite(self.start) and math.isfinite(self.amplitude)):
-            raise ConfigError("simulation.not-finite", quantity="start, amplitude")
-        for name in ("frequency", "decay"):
-            if not 0.0 < getattr(self, name) < math.inf:
-                raise ConfigError("simulation.cannot", quantity=name, value=getattr(self, name))
+        check_numbers(self, positive="frequency decay", finite="start amplitude")
 
     def displacement(self, time: ArrayLike) -> Array:
         """Displacement from the rigid position, in vehicle axes, (n, 3), m."""

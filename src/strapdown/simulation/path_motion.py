@@ -19,10 +19,15 @@ from strapdown.simulation.earth_motion import (
     Kinematics,
     Origin,
     PlaceIntegral,
-    check_duration,
     integrate_velocity,
 )
-from strapdown.simulation.motion import STILL, Track, euler_attitude, euler_body_rate
+from strapdown.simulation.motion import (
+    STILL,
+    Track,
+    check_numbers,
+    euler_attitude,
+    euler_body_rate,
+)
 
 Array = NDArray[np.float64]
 
@@ -91,7 +96,7 @@ class PathMotion(EarthMotion):
     ellipsoid: Ellipsoid = WGS84
 
     def __post_init__(self) -> None:
-        check_duration(self.duration)
+        check_numbers(self, positive="duration")
         steepest = max(abs(x) for x in self.climb.values) + abs(self.attack_deg)
         steepest += sum(abs(w.amplitude) for w in self.pitch_waves)
         if not steepest <= MOST_PITCH:
@@ -325,12 +330,6 @@ def _track(points: list[tuple[float, float]]) -> Track:
     return Track(times, values)
 
 
-def check_length(value: float, name: str = "duration") -> None:
-    """Raise unless the length of a maneuver is finite and positive."""
-    if not 0.0 < value < math.inf:
-        raise ConfigError("simulation.not-above-zero", quantity=name, value=value)
-
-
 @dataclass(frozen=True)
 class Wave:
     """``amplitude sin(2 pi t/period + phase)``.
@@ -353,12 +352,7 @@ class Wave:
     phase_deg: float = 0.0
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.period < math.inf:
-            raise ConfigError(
-                "simulation.wave-cannot-period", quantity="period", period=self.period
-            )
-        if not (math.isfinite(self.amplitude) and math.isfinite(self.phase_deg)):
-            raise ConfigError("simulation.amplitude-or-phase-not-finite", quantity="wave")
+        check_numbers(self, positive="period", finite="amplitude phase_deg")
 
 
 def sum_waves(waves: Sequence[Wave], time: Array) -> tuple[Array, Array, Array]:

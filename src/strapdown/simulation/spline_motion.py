@@ -19,10 +19,9 @@ from strapdown.simulation.earth_motion import (
     Kinematics,
     Origin,
     PlaceIntegral,
-    check_duration,
     integrate_velocity,
 )
-from strapdown.simulation.motion import euler_attitude, euler_body_rate
+from strapdown.simulation.motion import check_numbers, euler_attitude, euler_body_rate
 from strapdown.simulation.path_motion import MOST_PITCH
 from strapdown.tables import EULER, check_trajectory, places_of
 
@@ -427,7 +426,7 @@ class SineVelocityMotion(EarthMotion):
     ellipsoid: Ellipsoid = WGS84
 
     def __post_init__(self) -> None:
-        check_duration(self.duration)
+        check_numbers(self, positive="duration")
         least = self.duration * _LEAST_PERIOD
         if not least <= self.period < math.inf:
             raise ConfigError(

@@ -12,13 +12,12 @@ import numpy as np
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError
 from strapdown.simulation.earth_motion import Origin
-from strapdown.simulation.motion import Track, minimum_jerk
+from strapdown.simulation.motion import Track, check_numbers, minimum_jerk
 from strapdown.simulation.path_motion import (
     Course,
     Limits,
     Manoeuvre,
     PathMotion,
-    check_length,
     integrate_track,
     lay_course,
 )
@@ -100,13 +99,7 @@ class Accelerate:
 
     def lay(self, course: Course) -> None:
         """Append it to a course."""
-        if not 0.0 <= self.to < math.inf:
-            raise ConfigError(
-                "simulation.speed-negative",
-                quantity="to",
-                speed=self.to,
-            )
-        check_length(self.duration)
+        check_numbers(self, positive="duration", not_negative="to")
         greatest = _PEAK * abs(self.to - course.speed_now) / self.duration
         if greatest > course.limits.acceleration:
             least = self.duration * greatest / course.limits.acceleration
@@ -155,12 +148,7 @@ class Stop:
     def lay(self, course: Course) -> None:
         """Append it to a course."""
         Brake(0.0, self.braking).lay(course)
-        if not 0.0 <= self.stay < math.inf:
-            raise ConfigError(
-                "simulation.stay-negative",
-                quantity="stay",
-                stay=self.stay,
-            )
+        check_numbers(self, not_negative="stay")
         course.time += self.stay
 
 
@@ -177,7 +165,7 @@ class Straight:
 
     def lay(self, course: Course) -> None:
         """Append it to a course."""
-        check_length(self.duration)
+        check_numbers(self, positive="duration")
         course.time += self.duration
 
 
@@ -195,7 +183,7 @@ class Along:
 
     def lay(self, course: Course) -> None:
         """Append it to a course."""
-        check_length(self.distance, "distance")
+        check_numbers(self, positive="distance")
         course.time += self.distance / course.moving_speed("simulation.distance-at-rest")
 
 
@@ -220,7 +208,7 @@ class Turn:
 
     def lay(self, course: Course) -> None:
         """Append it to a course."""
-        check_length(self.radius, "radius")
+        check_numbers(self, positive="radius ramp")
         speed, most = course.level_speed("simulation.turn-at-rest"), course.limits.lateral
         lateral = speed * speed / self.radius
         if lateral > most:
@@ -257,6 +245,7 @@ class BankedTurn:
 
     def lay(self, course: Course) -> None:
         """Append it to a course."""
+        check_numbers(self, positive="ramp")
         most = course.limits.bank_deg
         if not 0.0 < self.bank_deg <= most:
             raise ConfigError(
@@ -300,12 +289,12 @@ class Climb:
                 most=most,
             )
         speed = course.moving_speed("simulation.climb-at-rest")
-        check_length(self.ramp, "ramp")
+        check_numbers(self, positive="ramp")
         if self.height is None:
             course.move(course.climb, course.time, self.ramp, self.angle_deg)
             course.time += self.ramp
             return
-        check_length(self.height, "height")
+        check_numbers(self, positive="height")
         if course.climb_now != 0.0:
             raise ConfigError(
                 "simulation.climb-not-from-level",
@@ -342,7 +331,7 @@ class Level:
 
     def lay(self, course: Course) -> None:
         """Append it to a course."""
-        check_length(self.ramp, "ramp")
+        check_numbers(self, positive="ramp")
         course.move(course.climb, course.time, self.ramp, 0.0)
         course.time += self.ramp
 
@@ -364,7 +353,7 @@ class LaneChange:
 
     def lay(self, course: Course) -> None:
         """Append it to a course."""
-        check_length(self.duration)
+        check_numbers(self, positive="duration")
         speed, most = course.level_speed("simulation.lane-change-at-rest"), course.limits.lateral
         quarter = 0.25 * self.duration
         times = tuple(quarter * k for k in range(5))
@@ -402,7 +391,6 @@ def _turn(course: Course, angle: float, rate: float, ramp: float) -> None:
             quantity="angle",
             angle=angle,
         )
-    check_length(ramp, "ramp")
     whole = abs(angle) / rate
     ramp = min(ramp, whole)
     side = math.copysign(rate, angle)

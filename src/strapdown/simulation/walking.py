@@ -25,7 +25,7 @@ from strapdown.simulation.earth_motion import (
     PlaceIntegral,
     integrate_velocity,
 )
-from strapdown.simulation.motion import Track, euler_attitude, euler_body_rate
+from strapdown.simulation.motion import Track, check_numbers, euler_attitude, euler_body_rate
 from strapdown.simulation.path_motion import MOST_PITCH
 
 __all__ = ["GAITS", "Gait", "Stride", "WalkingMotion", "walk"]
@@ -62,9 +62,7 @@ class Gait:
     strike_time: float
 
     def __post_init__(self) -> None:
-        for name in ("swing", "stance", "strike_time"):
-            if not 0.0 < getattr(self, name) < math.inf:
-                raise ConfigError("simulation.gait-needs-time-above-zero", quantity=name)
+        check_numbers(self, positive="swing stance strike_time")
         if not self.strike_time < 0.2 * self.swing:
             raise ConfigError("simulation.blow-lasts-more-than-fifth", quantity="strike_time")
         if not max(abs(self.heel_off_deg), abs(self.toe_up_deg)) < MOST_PITCH:

@@ -262,7 +262,7 @@ def test_what_cannot_be_recorded_is_refused(more, message):
     ("make", "message"),
     [
         (lambda: RecorderDesign("one", ()), "' has no ranges"),
-        (lambda: TriadDesign("part", PERFECT, 0.0), "part: a rate of 0 Hz is not positive"),
+        (lambda: TriadDesign("part", PERFECT, 0.0), "rate: 0 is not above zero"),
         (lambda: design(trigger_sd=-1.0), "trigger_sd"),
         (lambda: design(clock_drift_ppm=5000.0), "clock_drift_ppm"),
         (lambda: design(clock_offset=np.inf), "clock_offset"),

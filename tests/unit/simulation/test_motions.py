@@ -345,7 +345,7 @@ def test_the_new_motions_do_not_know_pulses():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Coning(0.0, 1.0, 1.0), "is not a valid cone"),
+        (lambda: Coning(0.0, 1.0, 1.0), "half_angle: 0 is not above zero"),
         (lambda: Coning(180.0, 1.0, 1.0), "below 180 deg"),
         (lambda: Coning(1.0, float("nan"), 1.0), "frequency"),
         (lambda: Coning(1.0, 1.0, 1.0, axis=(0.0, 0.0, 0.0)), "is zero"),
@@ -353,7 +353,7 @@ def test_the_new_motions_do_not_know_pulses():
         (lambda: Track((0.0, 1.0), (0.0,)), "2 times and 1 values"),
         (lambda: Track((0.0, 1.0, 1.0), (0.0, 1.0, 2.0)), "is not after"),
         (lambda: Track((0.0, float("inf")), (0.0, 1.0)), "not finite"),
-        (lambda: Gesture(0.0), "s is not positive"),
+        (lambda: Gesture(0.0), "duration: 0 is not above zero"),
         (lambda: SmoothRandom(7.0, 1, 10.0), "use at least 8 s"),
         (lambda: SmoothRandom(20.0, 1, 10.0, band=(0.13, 0.14)), "no multiple"),
         (lambda: SmoothRandom(20.0, 1, 10.0, band=(0.0, 1.0)), "no multiple"),

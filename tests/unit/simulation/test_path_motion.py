@@ -297,7 +297,7 @@ def test_what_a_vehicle_cannot_do_is_said(speed, manoeuvres, words):
 
 
 def test_waves_and_pitches_are_checked():
-    with pytest.raises(ConfigError, match="period of 0 s"):
+    with pytest.raises(ConfigError, match="period: 0 is not above zero"):
         Wave(1.0, 0.0)
     with pytest.raises(ConfigError, match="not finite"):
         Wave(math.inf, 1.0)
@@ -308,6 +308,6 @@ def test_waves_and_pitches_are_checked():
     ):
         PathMotion(100.0, PLACE, roll_waves=(Wave(1.0, 1e-5),))
     with pytest.raises(
-        ConfigError, check=lambda refused: refused.finding.code == "simulation.motion-cannot-last"
+        ConfigError, check=lambda refused: refused.finding.code == "simulation.not-positive"
     ):
         PathMotion(0.0, PLACE)
