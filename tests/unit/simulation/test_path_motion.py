@@ -274,7 +274,7 @@ def test_means_are_integrals_of_what_is_felt():
         (20.0, [Turn(90.0, 0.0)], "radius: 0 is not above zero"),
         (20.0, [Turn(0.0, 90.0)], "angle: a turn of 0 deg"),
         (0.0, [Accelerate(50.0, 2.0)], "needs up to 46.9 m/s²"),
-        (0.0, [Accelerate(-5.0, 2.0)], "a speed of -5 m/s"),
+        (0.0, [Accelerate(-5.0, 2.0)], "to: -5 is negative"),
         (5.0, [Brake(7.0, 2.0)], "braking from 5 to 7 m/s"),
         (0.0, [Stop(2.0, 1.0)], "braking from 0 to 0 m/s"),
         (5.0, [Straight(0.0)], "duration: 0 is not above zero"),
