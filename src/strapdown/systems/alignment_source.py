@@ -26,7 +26,6 @@ from strapdown.sensors.triad_errors import (
     check_axes_matrix,
     report_transposed,
 )
-from strapdown.simulation import Origin, PathMotion, StationaryMotion, Wave, simulate_imu
 from strapdown.systems.inputs import part_of_log
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import values_of
@@ -229,6 +228,7 @@ def _sensor_file(spec: AlignmentSpec) -> tuple[InputFiles, ...]:
 
 
 def _simulated(spec: AlignmentSpec) -> AlignmentSource:
+    from strapdown.simulation import Origin, PathMotion, StationaryMotion, Wave, simulate_imu
 
     asked = spec.simulation
     assert asked is not None  # one of the two is there

@@ -32,7 +32,6 @@ from strapdown.navigation.measurements.measurement import TabulatedMeasurement
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.error_chain import child, normal
 from strapdown.systems.alignment_source import body_record
-from strapdown.systems.trajectory_source import make_motion, with_key
 from strapdown.tables import (
     GEODETIC,
     GNSS,
@@ -173,6 +172,7 @@ def _simulated(
     findings: list[Finding],
 ) -> NavigationSource:
     from strapdown.simulation import simulate_imu
+    from strapdown.systems.trajectory_source import make_motion, with_key
 
     asked = spec.simulation
     assert asked is not None  # one of the two is there
