@@ -105,7 +105,7 @@ class Compilations:
             return
         from numba.core import event
 
-        tell = self._tell
+        tell = self._report
 
         class Listener(event.Listener):
             depth = 0
