@@ -56,23 +56,29 @@ def build_old(folder):
 
     The tag, or the commit behind it, is checked out and patched (see `STRICT`).
     """
-    print(f"making version 0.1 in {folder}", flush=True)
-    source, venv = folder / "src", folder / "venv"
-    shutil.rmtree(folder, ignore_errors=True)
-    source.mkdir(parents=True)
-    tree = (
-        TAG if git("rev-parse", "-q", "--verify", f"{TAG}^{{commit}}").returncode == 0 else COMMIT
-    )
-    archive = git("archive", "--format=tar", tree)
+    if folder.exists() and any(folder.iterdir()):
+        sys.exit(
+            f"{folder} has no Python of version 0.1 and is not empty; let STRAPDOWN_OLD name an "
+            "environment with strapdown 0.1.0, or an empty folder, where it is then made"
+        )
+    tag = git("rev-parse", "-q", "--verify", f"{TAG}^{{commit}}")
+    archive = git("archive", "--format=tar", COMMIT if tag.returncode else TAG)
     if archive.returncode:
         sys.exit(f"git has neither {TAG} nor {COMMIT}: fetch the tags (git fetch --tags)")
-    subprocess.run(["tar", "-x", "-C", source], input=archive.stdout, check=True)
-    subprocess.run(["patch", "-p1", "-i", STRICT], cwd=source, check=True)
-    subprocess.run([sys.executable, "-m", "venv", venv], check=True)
-    pip = [venv / "bin/python", "-m", "pip", "--disable-pip-version-check", "-q"]
-    subprocess.run([*pip, "wheel", "--no-deps", "-w", folder / "dist", source], check=True)
-    wheel = next((folder / "dist").glob("strapdown-*.whl"))
-    subprocess.run([*pip, "install", "-c", ROOT / "constraints.txt", wheel], check=True)
+    print(f"making version 0.1 in {folder}", flush=True)
+    source, venv = folder / "src", folder / "venv"
+    source.mkdir(parents=True)
+    try:
+        subprocess.run(["tar", "-x", "-C", source], input=archive.stdout, check=True)
+        subprocess.run(["patch", "-p1", "-i", STRICT], cwd=source, check=True)
+        subprocess.run([sys.executable, "-m", "venv", venv], check=True)
+        pip = [venv / "bin/python", "-m", "pip", "--disable-pip-version-check", "-q"]
+        subprocess.run([*pip, "wheel", "--no-deps", "-w", folder / "dist", source], check=True)
+        wheel = next((folder / "dist").glob("strapdown-*.whl"))
+        subprocess.run([*pip, "install", "-c", ROOT / "constraints.txt", wheel], check=True)
+    except BaseException:
+        shutil.rmtree(folder)
+        raise
 
 
 def environment(side):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import re
+import subprocess
 import sys
 from pathlib import Path
 from typing import ClassVar
@@ -306,3 +307,42 @@ def test_a_rename_of_today_is_one_line_of_a_table(record):
     assert record["adapter_0_1"].ADAPTER.arguments(step)[0] == "coast"
     assert Renamed().arguments(step) == ["outage", "adis16470", "--with", "zero_velocity"]
     assert Renamed().quantity("nav/integrity.json/place") == "nav/integrity/place"
+
+
+@pytest.fixture
+def program(record, monkeypatch):
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    yield load("__main__", "record_program")
+    sys.modules.pop("record_program")
+
+
+def test_an_environment_is_not_made_over_other_files(program, tmp_path):
+    (tmp_path / "kept").touch()
+    with pytest.raises(SystemExit):
+        program.build_old(tmp_path)
+    assert (tmp_path / "kept").exists()
+
+
+def test_an_environment_that_could_not_be_made_leaves_no_half(program, tmp_path, monkeypatch):
+    def fail(*words, **more):
+        if words[0][0] == "git":
+            return subprocess.CompletedProcess(words[0], 0, b"")
+        raise subprocess.CalledProcessError(1, words[0])
+
+    monkeypatch.setattr(program.subprocess, "run", fail)
+    with pytest.raises(subprocess.CalledProcessError):
+        program.build_old(tmp_path / "0.1")
+    assert not (tmp_path / "0.1").exists()
+
+
+def test_a_run_that_ended_has_its_key_and_a_failed_one_has_none(program, tmp_path, monkeypatch):
+    def run(words, **more):
+        return subprocess.CompletedProcess(words, int(words[3] == "bad"), "", "")
+
+    monkeypatch.setattr(program.subprocess, "run", run)
+    keys = {"good": "1", "bad": "2"}
+    broken = program.record(
+        "old", "python", "adapter", ["good", "bad"], tmp_path, tmp_path, 1, keys
+    )
+    assert broken == ["bad"]
+    assert [file.name for file in tmp_path.iterdir()] == ["good.key"]
