@@ -130,7 +130,7 @@ def test_what_is_written(navigated):
     # Ten a second, as the recorder says; the step of the samples is 20 ms.
     assert np.allclose(np.diff(table["time_s"]), 0.1, atol=0.021)
     seen = read_raw(folder / "out" / "innovations" / "rtk.position.csv").columns
-    assert {"nu_north_m", "s_north_m", "weight_north_m"} <= set(seen)
+    assert {"nu_north_m", "s_north_m2", "weight_north"} <= set(seen)
     sensors = read_raw(folder / "out" / "sensor_errors.csv").columns
     assert {"gyro_bias_x_rad_s", "gyro_bias_x_sd_rad_s"} <= set(sensors)
     assert done.out.count("\n") > 10 and "Seal" in done.out

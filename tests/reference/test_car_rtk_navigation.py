@@ -22,6 +22,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from tests.withheld_fixes import score_withheld, scores_table
 
 from strapdown import rotation
 from strapdown.estimation.covariance import COVARIANCES
@@ -36,7 +37,7 @@ from strapdown.navigation.measurements.gnss_clock import time_offset, velocity_d
 from strapdown.navigation.measurements.gnss_readiness import gnss_readiness
 from strapdown.navigation.measurements.vehicle import NoSlip
 from strapdown.navigation.navigator import Navigator, with_states
-from strapdown.navigation.outage_test import score_withheld, scores_table, spans_to_withhold
+from strapdown.navigation.outage_test import spans_to_withhold
 from strapdown.rotation import level
 from strapdown.tables import gnss_table, imu_table
 

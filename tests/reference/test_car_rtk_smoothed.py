@@ -8,17 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from strapdown.navigation.outage_test import (
-    score_withheld,
-    score_withheld_smoothed,
-    scores_table,
-    spans_to_withhold,
-)
+from strapdown.navigation.outage_test import spans_to_withhold
 from strapdown.navigation.smoother import RauchTungStriebel
 
 sys.path.insert(0, str(Path(__file__).parent))
 import test_car_rtk_navigation as car
 from test_car_rtk_navigation import NO_SLIP, SETTLED, begun
+from tests.withheld_fixes import score_withheld, score_withheld_smoothed, scores_table
 
 #: Fixtures of the recording and of its clocks.
 drive, clock = car.drive, car.clock

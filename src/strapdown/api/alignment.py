@@ -3,144 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, field, fields, replace
-from html import escape
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import pandas as pd
+from typing import Any
 
 from strapdown.api.navigation import NavigationRun
-from strapdown.api.reading import GnssFile, ImuFile, imu_input, table_input
-from strapdown.bundle.seal import Seal, check_destination
-from strapdown.config.alignment import NOT_BEFORE_FINE, AlignmentSpec, LogTable
+from strapdown.api.reading import ImuFile, imu_input, keys_in, log_in, table_input
+from strapdown.config.alignment import NOT_BEFORE_FINE, AlignmentSpec
 from strapdown.config.coast import CoastSpec
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.spec import specify
 from strapdown.errors import ConfigError
 from strapdown.formats import read_raw
 from strapdown.progress import Progress, silent
-from strapdown.report.alignment import write_alignment
-from strapdown.report.coast import read_coasting_run, write_coast
-from strapdown.systems.alignment_run import AlignmentResult, run_alignment
-from strapdown.systems.inputs import NOWHERE, Memory, moved_inputs, moved_paths
-from strapdown.systems.outage_run import CoastResult, run_coast
-from strapdown.tables import EULER
-
-if TYPE_CHECKING:
-    from strapdown.report.chart_figure import ChartFigure
+from strapdown.report.coast import read_coasting_run
+from strapdown.systems.alignment_run import AlignmentRun, run_alignment
+from strapdown.systems.inputs import NOWHERE, Memory
+from strapdown.systems.outage_run import OutageRun, run_coast
 
 __all__ = [
     "AlignmentRun",
     "OutageRun",
     "align",
     "coast",
-    "run_specified",
     "specify_alignment",
 ]
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class AlignmentRun(AlignmentResult):
-    """Result of an alignment.
-
-    `attitude` is the attitude over the record by time (deg); `start` and `end` are the attitudes at
-    its ends, each with `sd` and `covariance`; `readiness` gives the time until they were known.
-    `save` writes the result; until then it is in memory only.
-    """
-
-    memory: Memory = field(default=Memory({}))
-
-    def to_pandas(self) -> pd.DataFrame:
-        """Attitude table over the record by time in s: quaternion, and angles in deg."""
-        return self.attitude.copy()
-
-    def plot(self, kind: str = "attitude") -> ChartFigure:
-        """Draw roll, pitch and heading over time.
-
-        Parameters
-        ----------
-        kind : {'attitude', 'roll', 'pitch', 'heading'}
-
-        Returns
-        -------
-        ChartFigure
-            Displays itself in a notebook; `save` writes it as SVG, PNG or PDF.
-
-        Raises
-        ------
-        ConfigError
-            The chart does not exist.
-        """
-        from strapdown.report.alignment_charts import attitude_chart
-        from strapdown.report.chart_figure import ChartFigure
-
-        if kind not in ("attitude", *EULER):
-            raise ConfigError("api.unknown-chart", quantity="kind", kind=kind)
-        chart = attitude_chart(self)
-        if kind != "attitude":
-            chart = replace(chart, panels=(chart.panels[EULER.index(kind)],))
-        return ChartFigure(chart)
-
-    def save(
-        self,
-        out: str | Path,
-        *,
-        report: bool = True,
-        force: bool = False,
-        progress: Progress = silent,
-    ) -> Seal:
-        """Write the alignment as a sealed bundle, which `verify` runs again.
-
-        Parameters
-        ----------
-        out : str or Path
-            New folder. Tables given in memory become input files in it.
-        report : bool
-            Whether to write the page and the figures as well.
-        force : bool
-            Overwrite an existing bundle.
-        progress : callable, optional
-            Called with a stage and the completed fraction.
-
-        Returns
-        -------
-        Seal
-
-        Raises
-        ------
-        ConfigError
-            `out` exists and may not be overwritten.
-        DataError
-            An input file has changed since it was read.
-        """
-        check_destination(Path(out), force)
-        with self.memory.as_files() if self.memory.tables else nullcontext(NOWHERE) as folder:
-            result = _moved(self, NOWHERE, folder)
-            return write_alignment(result, out, report=report, force=force, progress=progress)
-
-    def __repr__(self) -> str:
-        last = self.attitude.iloc[-1]
-        sd = self.end.sd_deg
-        angles = ", ".join(
-            f"{name} {last[name]:.4g}° ± {s:.2g}°" for name, s in zip(EULER, sd, strict=True)
-        )
-        return f"<AlignmentRun {self.source.name}: at the end {angles} (1 sd)>"
-
-    def _repr_html_(self) -> str:
-        found = "".join(f"<li>{escape(str(f))}</li>" for f in self.findings)
-        return f"<div><b>{escape(repr(self)[1:-1])}</b></div><ul>{found}</ul>"
-
-
-def _moved(run: AlignmentRun, old: Path, new: Path) -> AlignmentRun:
-    if not run.memory.tables or old == new:
-        return run
-    return replace(
-        run,
-        spec=AlignmentSpec.checked(moved_paths(run.spec.plain(), old, new)),
-        inputs=moved_inputs(run.inputs, old, new, copied=True),
-    )
 
 
 def align(
@@ -198,60 +86,28 @@ def align(
                 file=Path(imu).name,
                 quantity="site, sensor, gnss",
             )
-        return run_specified(AlignmentSpec.read(imu), Path(imu), progress)
-    given = imu_input(imu)
+        return run_alignment(AlignmentSpec.read(imu), Path(imu), progress)
+    samples = imu_input(imu)
     fixes = None if gnss is None else table_input(gnss, "gnss")
-    tables = {"imu.npz": given} if isinstance(given, pd.DataFrame) else {}
-    tables |= {"gnss.csv": fixes} if isinstance(fixes, pd.DataFrame) else {}
-    memory = Memory(tables)
-    with memory.as_files() if tables else nullcontext(NOWHERE) as folder:
-        log = (
-            given
-            if isinstance(given, ImuFile)
-            else ImuFile(specify(LogTable, path=str(folder / "imu.npz")))
-        )
-        if isinstance(fixes, pd.DataFrame):
-            path: str | None = str(folder / "gnss.csv")
-        else:
-            path = fixes.path if isinstance(fixes, GnssFile) else fixes
-        place = site if site is None or isinstance(site, Mapping) else _named(site)
+    memory = Memory.of({"imu.npz": samples, "gnss.csv": fixes})
+    with memory.as_files() as folder:
         spec = specify_alignment(
-            log,
-            site=place,
+            log_in(samples, folder),
+            site=site if site is None or isinstance(site, Mapping) else _named(site),
             sensor=sensor,
             coarse={"kind": method} if isinstance(method, str) else method,
             fine=fine,
-            gnss=path,
+            gnss=None if fixes is None else keys_in(fixes, folder / "gnss.csv")["path"],
             prefilter={"kind": prefilter} if isinstance(prefilter, str) else prefilter,
         )
-        run = run_specified(spec, None, progress)
-        return _moved(replace(run, memory=memory), folder, NOWHERE)
+        run = run_alignment(spec, None, progress)
+        return replace(run, memory=memory).in_folder(folder, NOWHERE)
 
 
 def _named(site: Sequence[float]) -> dict[str, float]:
     if len(site) not in (2, 3):
         raise ConfigError("api.not-a-position", quantity="site", count=len(site))
     return dict(zip(("lat_deg", "lon_deg", "alt_m"), map(float, site), strict=False))
-
-
-def run_specified(
-    spec: AlignmentSpec, file: Path | None = None, progress: Progress = silent
-) -> AlignmentRun:
-    """Run a specification of an alignment.
-
-    Parameters
-    ----------
-    spec : AlignmentSpec
-    file : Path, optional
-        File it was read from, also an input.
-    progress : callable, optional
-
-    Returns
-    -------
-    AlignmentRun
-    """
-    result = run_alignment(spec, file, progress)
-    return AlignmentRun(**{f.name: getattr(result, f.name) for f in fields(result)})
 
 
 def specify_alignment(
@@ -327,93 +183,6 @@ def _site(log: str, known: Mapping[str, float], called: Callable[[str], str]) ->
 # --- predicted drift in a GNSS outage -----------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class OutageRun(CoastResult):
-    """Predicted drift in a GNSS outage.
-
-    `forecast` has the covariance over the outage and the shares of its sources; `recorded`, for a
-    navigation run, the actual drift. `save` writes the result; until then it is in memory only.
-    """
-
-    memory: Memory = field(default=Memory({}))
-
-    @property
-    def bound_m(self) -> pd.Series:
-        """95 % bound of the horizontal position, m, by time since the outage began, s."""
-        return pd.Series(
-            self.forecast.bound, index=pd.Index(self.forecast.time, name="time"), name="bound_m"
-        )
-
-    def to_pandas(self) -> pd.DataFrame:
-        """The 95 % bound, and the motion over the outage, by time since it began."""
-        table = self.bound_m.to_frame()
-        return table.join(self.forecast.trajectory)
-
-    def plot(self) -> ChartFigure:
-        """Draw the 95 % bound over the outage.
-
-        Returns
-        -------
-        ChartFigure
-            Displays itself in a notebook; `save` writes it as SVG, PNG or PDF.
-        """
-        from strapdown.report.chart_figure import ChartFigure
-        from strapdown.report.coast_document import cone_chart
-
-        return ChartFigure(cone_chart(self))
-
-    def save(
-        self,
-        out: str | Path,
-        *,
-        report: bool = True,
-        force: bool = False,
-        progress: Progress = silent,
-    ) -> Seal:
-        """Write the prediction as a sealed bundle, which `verify` runs again.
-
-        Parameters
-        ----------
-        out : str or Path
-            New folder.
-        report : bool
-            Whether to write the page and the figures as well.
-        force : bool
-            Overwrite an existing bundle.
-        progress : callable, optional
-
-        Returns
-        -------
-        Seal
-
-        Raises
-        ------
-        ConfigError
-            `out` exists and may not be overwritten.
-        """
-        check_destination(Path(out), force)
-        with self.memory.as_files() if self.memory.tables else nullcontext(NOWHERE) as folder:
-            result = _moved_outage(self, NOWHERE, folder)
-            return write_coast(result, out, report=report, force=force, progress=progress)
-
-    def __repr__(self) -> str:
-        time, bound = self.forecast.time[-1], self.forecast.bound[-1]
-        return f"<OutageRun {self.name}: within {bound:.4g} m (95 %) after {time:g} s>"
-
-    def _repr_html_(self) -> str:
-        return f"<div><b>{escape(repr(self)[1:-1])}</b></div>"
-
-
-def _moved_outage(run: OutageRun, old: Path, new: Path) -> OutageRun:
-    if not run.memory.tables or old == new or run.navigation is None:
-        return run
-    return replace(
-        run,
-        navigation=NavigationSpec.checked(moved_paths(run.navigation.plain(), old, new)),
-        inputs=moved_inputs(run.inputs, old, new, copied=True),
-    )
-
-
 def coast(
     source: str | Path | NavigationRun,
     outage_s: float = 60.0,
@@ -450,8 +219,8 @@ def coast(
     with _run_of(source) as (navigation, file, memory, folder):
         sensor = None if navigation is not None else str(source)
         spec = specify(CoastSpec, outage_s=float(outage_s), sensor=sensor, **options)
-        run = run_outage(spec, navigation, file, progress)
-        return _moved_outage(replace(run, memory=memory), folder, NOWHERE)
+        run = run_coast(spec, navigation, file, progress)
+        return replace(run, memory=memory).in_folder(folder, NOWHERE)
 
 
 @contextmanager
@@ -462,29 +231,5 @@ def _run_of(
     if not isinstance(source, NavigationRun):
         yield (*read_coasting_run(source), Memory({}), NOWHERE)
         return
-    with source.memory.as_files() if source.memory.tables else nullcontext(NOWHERE) as folder:
-        table = moved_paths(source.spec.plain(), NOWHERE, folder)
-        yield NavigationSpec.checked(table), None, source.memory, folder
-
-
-def run_outage(
-    spec: CoastSpec,
-    navigation: NavigationSpec | None = None,
-    file: Path | None = None,
-    progress: Progress = silent,
-) -> OutageRun:
-    """Run a specification of an outage prediction; as `run_coast`.
-
-    Parameters
-    ----------
-    spec : CoastSpec
-    navigation : NavigationSpec, optional
-    file : Path, optional
-    progress : callable, optional
-
-    Returns
-    -------
-    OutageRun
-    """
-    result = run_coast(spec, navigation, file, progress)
-    return OutageRun(**{f.name: getattr(result, f.name) for f in fields(result)})
+    with source.memory.as_files() as folder:
+        yield source.in_folder(NOWHERE, folder).spec, None, source.memory, folder

@@ -26,7 +26,7 @@ from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.increments import increments_from_imu
 from strapdown.progress import Progress, silent
 from strapdown.sensors.rest import find_rests
-from strapdown.systems.inputs import NOWHERE, Memory, moved_inputs, moved_paths
+from strapdown.systems.inputs import NOWHERE, Memory, moved
 from strapdown.tables import GYRO, QUATERNION, attitude_table
 
 if TYPE_CHECKING:
@@ -368,22 +368,15 @@ def compare_attitude(
     with memory.as_files() as folder:
         asked = replace(options or AttitudeOptions(), **changes)
         made = run_comparison(asked.specify(folder / "imu.npz"), progress)
-        return replace(_moved(made, folder, NOWHERE), on_disk=partial(_on_disk, memory))
+        return replace(
+            moved(made, "specification", folder, NOWHERE), on_disk=partial(_on_disk, memory)
+        )
 
 
 @contextmanager
 def _on_disk(memory: Memory, result: AttitudeComparison) -> Iterator[AttitudeComparison]:
     with memory.as_files() as folder:
-        yield _moved(result, NOWHERE, folder)
-
-
-def _moved(result: AttitudeComparison, old: Path, new: Path) -> AttitudeComparison:
-    """The comparison with its input paths moved from one folder to another."""
-    return replace(
-        result,
-        specification=moved_paths(result.specification, old, new),
-        inputs=moved_inputs(result.inputs, old, new, copied=True),
-    )
+        yield moved(result, "specification", NOWHERE, folder)
 
 
 def _is_named(source: Any) -> bool:

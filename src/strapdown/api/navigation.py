@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
-from strapdown.api.reading import GnssFile, ImuFile, imu_input, table_input
-from strapdown.config.alignment import LogTable
+from strapdown.api.reading import GnssFile, ImuFile, imu_input, keys_in, log_in, table_input
 from strapdown.config.navigation import NavigationSpec
-from strapdown.config.spec import specify
 from strapdown.errors import ConfigError
 from strapdown.formats.clocks import on_clock_of
 from strapdown.progress import Progress, silent
@@ -33,7 +30,6 @@ __all__ = [
     "ZeroAngularRate",
     "ZeroVelocity",
     "navigate",
-    "smoothed_too",
     "specify_navigation",
 ]
 
@@ -216,33 +212,27 @@ def navigate(
                 quantity="measurements, sensor, start, reference, options",
             )
         spec = NavigationSpec.read(imu)
-        return run_navigation(smoothed_too(spec) if smooth else spec, Path(imu), progress)
-    memory = _memory(imu, measurements, reference)
-    with memory.as_files() if memory.tables else nullcontext(NOWHERE) as folder:
-        log = _log_in(imu, memory, folder)
-        aids = {one.name: _aid_in(one, memory, folder) for one in measurements}
-        if len(aids) < len(measurements):
-            raise ConfigError("api.measurement-named-twice", quantity="measurements")
+        return run_navigation(spec.smoothed() if smooth else spec, Path(imu), progress)
+    samples = imu_input(imu)
+    data = _data_of(measurements)
+    memory = _memory(imu, samples, data, reference)
+    with memory.as_files() as folder:
+        aids = {}
+        for one in measurements:
+            given = data[one.name]
+            keys = {} if given is None else keys_in(given, folder / f"{one.name}.csv")
+            path = {"path": keys["path"]} if keys else {}
+            aids[one.name] = {"kind": one.kind, **keys, **one.options, **path}
         extra = dict(options or {})
         if reference is not None:
-            extra["truth"] = {"path": _path_in(reference, "reference", memory, folder)}
+            in_memory = isinstance(reference, pd.DataFrame)
+            extra["truth"] = {"path": str(folder / "reference.csv" if in_memory else reference)}
         if smooth:
             extra["smoother"] = {"kind": "rts"}
+        log = log_in(samples, folder)
         spec = specify_navigation(log, aids, sensor=sensor, start=start, options=extra)
         run = run_navigation(spec, None, progress)
         return replace(run, memory=memory).in_folder(folder, NOWHERE)
-
-
-def smoothed_too(spec: NavigationSpec) -> NavigationSpec:
-    """Return the specification with smoothing, whatever its file says.
-
-    Parameters
-    ----------
-    spec : NavigationSpec
-    """
-    if spec.smoother.kind != "none":
-        return spec
-    return NavigationSpec.checked({**spec.plain(), "smoother": {"kind": "rts"}})
 
 
 def specify_navigation(
@@ -347,61 +337,38 @@ def _site(
 # --- files and memory ---------------------------------------------------------------------
 
 
-def _memory(imu: Any, measurements: Sequence[Measurement], reference: Any) -> Memory:
-    """Every table that is not a file, by the file name that a bundle gives it."""
-    tables: dict[str, pd.DataFrame] = {}
-    samples = imu_input(imu)
-    if isinstance(samples, pd.DataFrame):
-        tables["imu.npz"] = samples
+def _data_of(
+    measurements: Sequence[Measurement],
+) -> dict[str, str | GnssFile | pd.DataFrame | None]:
+    """Data of each measurement by its name: a file, a table, or None."""
+    data: dict[str, str | GnssFile | pd.DataFrame | None] = {}
     for one in measurements:
         if not isinstance(one, Measurement):
             raise ConfigError(
                 "api.not-a-measurement", quantity="measurements", name=type(one).__name__
             )
-        data = None if one.data is None else table_input(one.data, one.name)
-        if isinstance(data, pd.DataFrame):
-            tables[f"{one.name}.csv"] = data
-    if isinstance(reference, pd.DataFrame):
-        tables["reference.csv"] = reference
-    if isinstance(samples, pd.DataFrame):
-        # Samples keep the clock in their attributes; a file has a clock of its own.
-        tables = {
-            name: table
-            if name == "imu.npz"
-            else _relative(on_clock_of(table, imu)[0])
-            if isinstance(imu, pd.DataFrame)
-            else table
-            for name, table in tables.items()
+        data[one.name] = None if one.data is None else table_input(one.data, one.name)
+    if len(data) < len(measurements):
+        raise ConfigError("api.measurement-named-twice", quantity="measurements")
+    return data
+
+
+def _memory(imu: Any, samples: Any, data: Mapping[str, Any], reference: Any) -> Memory:
+    """Every table that is not a file, by the file name that a bundle gives it."""
+    tables = {f"{name}.csv": one for name, one in data.items()} | {"reference.csv": reference}
+    memory = Memory.of({"imu.npz": samples, **tables})
+    if not (isinstance(samples, pd.DataFrame) and isinstance(imu, pd.DataFrame)):
+        return memory
+    # Samples keep the clock in their attributes; a file has a clock of its own.
+    return Memory(
+        {
+            name: table if name == "imu.npz" else _relative(on_clock_of(table, imu)[0])
+            for name, table in memory.tables.items()
         }
-    return Memory(tables)
+    )
 
 
 def _relative(table: pd.DataFrame) -> pd.DataFrame:
     out = table.copy()
     out.attrs = {k: v for k, v in table.attrs.items() if k not in ("clock", "gps_week")}
     return out
-
-
-def _log_in(imu: Any, memory: Memory, folder: Path) -> ImuFile:
-    if "imu.npz" in memory.tables:
-        return ImuFile(specify(LogTable, path=str(folder / "imu.npz")))
-    given = imu_input(imu)
-    assert isinstance(given, ImuFile)
-    return given
-
-
-def _aid_in(one: Measurement, memory: Memory, folder: Path) -> dict[str, Any]:
-    """The configuration table of a measurement."""
-    table = {"kind": one.kind, **one.options}
-    if one.data is None:
-        return table
-    if f"{one.name}.csv" in memory.tables:
-        return {**table, "path": str(folder / f"{one.name}.csv")}
-    data = table_input(one.data, one.name)
-    if isinstance(data, GnssFile):
-        return {**table, **data.keys(), **one.options, "path": data.path}
-    return {**table, "path": str(data)}
-
-
-def _path_in(data: Any, name: str, memory: Memory, folder: Path) -> str:
-    return str(folder / f"{name}.csv") if f"{name}.csv" in memory.tables else str(data)

@@ -12,7 +12,7 @@ import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -24,9 +24,6 @@ from strapdown.formats.gnss_files import GNSS_READERS, GnssOptions
 from strapdown.formats.gnss_files import read_gnss as read_gnss_table
 from strapdown.tables import ACCEL, GYRO, QUATERNION, imu_table
 
-if TYPE_CHECKING:
-    from strapdown.config.alignment import LogTable
-
 __all__ = [
     "GnssFile",
     "GnssFixes",
@@ -34,6 +31,8 @@ __all__ = [
     "ImuFile",
     "Streams",
     "imu_input",
+    "keys_in",
+    "log_in",
     "read",
     "read_gnss",
     "read_imu",
@@ -257,8 +256,6 @@ def read_imu(
     unknown = set(units or {}) - {"gyro", "accel", "time"}
     if unknown:
         raise ConfigError("api.quantity-without-unit", quantity="units", unknown=sorted(unknown)[0])
-    from strapdown.config.alignment import LogTable
-
     log = specify(
         LogTable,
         path=str(path),
@@ -384,8 +381,6 @@ def imu_input(source: Any) -> ImuFile | pd.DataFrame:
     if isinstance(source, ImuFile):
         return source
     if isinstance(source, str | Path):
-        from strapdown.config.alignment import LogTable
-
         return ImuFile(specify(LogTable, path=str(source)))
     if isinstance(source, pd.DataFrame):
         file = _unchanged(source)
@@ -415,6 +410,20 @@ def table_input(data: Any, quantity: str) -> str | GnssFile | pd.DataFrame:
         file = _unchanged(data)
         return file if isinstance(file, GnssFile) else by_time(data)
     raise ConfigError("api.not-a-table-or-file", quantity=quantity, name=type(data).__name__)
+
+
+def log_in(samples: ImuFile | pd.DataFrame, folder: Path) -> ImuFile:
+    """Return the file of samples; those in memory are ``imu.npz`` in a folder."""
+    if isinstance(samples, ImuFile):
+        return samples
+    return ImuFile(specify(LogTable, path=str(folder / "imu.npz")))
+
+
+def keys_in(data: str | GnssFile | pd.DataFrame, file: Path) -> dict[str, Any]:
+    """Return the configuration keys of a measurement's data; a table in memory is in a file."""
+    if isinstance(data, GnssFile):
+        return {**data.keys(), "path": data.path}
+    return {"path": str(file) if isinstance(data, pd.DataFrame) else data}
 
 
 def imu_of(source: Any) -> pd.DataFrame:

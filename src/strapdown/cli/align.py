@@ -30,7 +30,7 @@ from strapdown.errors import ConfigError
 if TYPE_CHECKING:
     from strapdown.config.alignment import AlignmentSpec
     from strapdown.progress import Progress
-    from strapdown.systems.alignment_run import AlignmentResult
+    from strapdown.systems.alignment_run import AlignmentRun, run_alignment
 
 EPILOG = (
     "Example: strapdown align log.csv --lat 55.75 --lon 37.62 --alt 150 --sensor fog-1000\n\n"
@@ -108,7 +108,6 @@ def align(
     drifts and biases; the report states the uncertainty of each, its limits, and the alignment
     time.
     """
-    from strapdown.api.alignment import run_specified
     from strapdown.cli.console import WORDS, print_findings, print_seal
     from strapdown.cli.result_folder import (
         default_folder,
@@ -132,9 +131,9 @@ def align(
         WORDS.set("file")
     asked = AlignmentSpec.read(source) if own else None
 
-    def compute(report: Progress) -> AlignmentResult:
+    def compute(report: Progress) -> AlignmentRun:
         spec = spec_of_flags(source, given) if asked is None else asked
-        return run_specified(spec, source if own else None, report)
+        return run_alignment(spec, source if own else None, report)
 
     folder = out or default_folder(source, "align", None if asked is None else source_name(asked))
     done = run_and_save(compute, folder, write, "align.json")
@@ -186,7 +185,7 @@ def _flag(place: str) -> str:
     return place if flag is None else f"{flag}, {rest}" if rest else flag
 
 
-def print_alignment(result: AlignmentResult) -> None:
+def print_alignment(result: AlignmentRun) -> None:
     """Print the result of an alignment, and its limits."""
     from strapdown.cli.console import console, print_block
     from strapdown.report import alignment_document as tables

@@ -26,7 +26,7 @@ from strapdown.errors import ConfigError
 if TYPE_CHECKING:
     from strapdown.config.coast import CoastSpec
     from strapdown.progress import Progress
-    from strapdown.systems.outage_run import CoastResult
+    from strapdown.systems.outage_run import OutageRun
 
 EPILOG = (
     "Example: strapdown coast adis16470 --outage 60 --speed 15 --with no_slip\n\n"
@@ -166,24 +166,24 @@ def coast(
     For a sensor the prediction uses its data sheet and a stated motion. For a navigation run it
     uses the filter's own state, and compares the prediction with the measured drifts.
     """
-    from strapdown.api.alignment import run_outage
     from strapdown.cli.console import WORDS, print_findings, print_seal
     from strapdown.cli.result_folder import default_folder, run_and_save, source_name
     from strapdown.report.coast import read_coasting_run
     from strapdown.systems.inputs import check_part
+    from strapdown.systems.outage_run import run_coast
 
     check_part(run.from_s, run.to_s, run.duration_s)
     navigation, file = read_coasting_run(source)
     named = None if navigation is None or file is None else source_name(navigation)
     tables = {"motion": asdict(motion), "start": asdict(start)}
 
-    def compute(report: Progress) -> CoastResult:
+    def compute(report: Progress) -> OutageRun:
         spec = coast_of_flags(
             source, outage, navigation is not None, tables, keep or [], asdict(run)
         )
         if navigation is not None:
             WORDS.set("file")
-        return run_outage(spec, navigation, file, report)
+        return run_coast(spec, navigation, file, report)
 
     folder = out or default_folder(source, "coast", named)
     done = run_and_save(compute, folder, write, "coast.json")
@@ -254,7 +254,7 @@ def _flag(place: str) -> str:
     return FLAGS.get(place, "--with" if place.startswith("aiding") else place)
 
 
-def print_coast(result: CoastResult) -> None:
+def print_coast(result: OutageRun) -> None:
     """Print the predicted drift, its sources, and the measured drifts."""
     from strapdown.cli.console import console, print_block
     from strapdown.report import coast_words as words

@@ -128,7 +128,6 @@ def navigate(
     write: OutFlags,
 ) -> None:
     """Find position, velocity and attitude over a record, by inertial sensors and measurements."""
-    from strapdown.api.navigation import smoothed_too
     from strapdown.bundle.seal import check_destination, write_latency
     from strapdown.cli.console import WORDS, print_seal
     from strapdown.cli.result_folder import (
@@ -156,7 +155,7 @@ def navigate(
         WORDS.set("file")
     asked = NavigationSpec.read(source) if own else None
     if asked is not None and flags.smooth:
-        asked = smoothed_too(asked)
+        asked = asked.smoothed()
     named = None if asked is None else source_name(asked)
     folder = out or default_folder(source, "navigate", named)
     if live is not None:

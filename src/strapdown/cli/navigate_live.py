@@ -19,7 +19,7 @@ from strapdown.cli.navigate_tables import print_latency, print_navigation
 from strapdown.cli.shared_options import OutFlags
 from strapdown.config.navigation import NavigationSpec
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
-from strapdown.live.clock import MachineClock
+from strapdown.live.replay import MachineClock
 from strapdown.live.run import LiveRun, live_spec, receive, result_of
 from strapdown.live.sources import open_source
 from strapdown.report.navigation import write_navigation

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from strapdown.cli.console import WORDS, console, print_block, print_findings, print_table
 from strapdown.errors import Finding
-from strapdown.live.latency import Latency
+from strapdown.live.replay import Latency
 from strapdown.report.alignment_trust import MOST_SAID
 from strapdown.report.document import TableBlock
 from strapdown.report.navigation_found import NavigationFound, examine, told_of

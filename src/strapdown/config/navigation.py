@@ -389,6 +389,12 @@ class NavigationSpec(FileSpec):
             out["simulation"] = {**simulation, "gnss": receivers}
         return out
 
+    def smoothed(self) -> NavigationSpec:
+        """Return the specification with a smoother: its own, or a Rauch-Tung-Striebel smoother."""
+        if self.smoother.kind != NONE:
+            return self
+        return NavigationSpec.checked({**self.plain(), "smoother": {"kind": "rts"}})
+
     @property
     def receivers(self) -> dict[str, ReceiverTable]:
         """Simulated receivers, by name of their measurement."""

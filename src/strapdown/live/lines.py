@@ -32,7 +32,6 @@ from strapdown.navigation.modes import PipelineChunk
 from strapdown.navigation.navigator import Navigator
 from strapdown.navigation.record import CovarianceSnapshot
 from strapdown.rotation import euler_sd
-from strapdown.systems.navigation_source import COLUMN_UNITS
 from strapdown.tables import EULER, GEODETIC, GNSS, TRAJECTORY, VELOCITY
 from strapdown.tables.checks import POSITION_SD, VELOCITY_SD
 
@@ -107,7 +106,6 @@ def parse_line(text: str, aids: Sequence[str]) -> Sample | Measured | Word | Non
 
     Parameters
     ----------
-    text : str
     aids : sequence of str
         Names of the measurements that lines may hold.
 
@@ -115,11 +113,6 @@ def parse_line(text: str, aids: Sequence[str]) -> Sample | Measured | Word | Non
     -------
     Sample, Measured, Word or None
         None for an ignored line.
-
-    Raises
-    ------
-    BadLineError
-        The line has another format, or an invalid number.
     """
     text = text.strip()
     if not text or text.startswith("#"):
@@ -207,7 +200,6 @@ class AidRows:
 
     Parameters
     ----------
-    aid : TabulatedMeasurement
     given : AidSpec
         Configuration, whose standard deviations of fixes replace received ones.
     """
@@ -238,11 +230,6 @@ class AidRows:
         ----------
         values : mapping of str to float
             By column; a fix may omit velocity, standard deviations and quality.
-
-        Raises
-        ------
-        BadLineError
-            A column is missing or unknown.
         """
         name = self.aid.name
         for column in values:
@@ -288,9 +275,7 @@ class AidRows:
         values = np.array(self._rows)
         units = _UNITS_OF_FIXES
         if not self.of_fixes:
-            of = {c: COLUMN_UNITS.get(c.removesuffix("_sd"), "") for c in self._columns}
-            of |= dict(getattr(type(self.aid), "units", {}))
-            units = {c: u.replace("/", "_") for c, u in of.items()}
+            units = {c: u.replace("/", "_") for c, u in self.aid.column_units().items()}
         columns = {"time_s": np.array(self._time)}
         for k, name in enumerate(self._columns):
             if not np.isnan(values[:, k]).all():
@@ -317,17 +302,11 @@ class StateLines:
 
     Parameters
     ----------
-    navigator : Navigator
     write : callable
         Takes a line with its end.
     form : {'json', 'csv'}
     every : float, s
         Least interval between lines, by stamps; zero for each sample.
-
-    Raises
-    ------
-    ConfigError
-        Unknown format.
     """
 
     def __init__(

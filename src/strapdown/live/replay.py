@@ -1,25 +1,205 @@
-"""Replay a record to a pipeline sample by sample, each when it is due."""
+"""Replay a record by a clock, each sample when it is due: clock, latency, warm-up, replay."""
 
 from __future__ import annotations
 
 import math
+import time
+from array import array
 from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 import pandas as pd
 
-from strapdown.errors import ConfigError
-from strapdown.live.clock import Clock, MachineClock
-from strapdown.live.latency import LatencyTape
-from strapdown.live.warm_up import warm_up
+from strapdown.constants import STANDARD_GRAVITY
+from strapdown.errors import ConfigError, StrapdownError
+from strapdown.nav_state import NavState
+from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.measurements.measurement import Measurement
+from strapdown.navigation.modes import KnownStart, Navigation
 from strapdown.navigation.pipeline import NavigationPipeline
+from strapdown.navigation.preprocessing import GapPolicy
 from strapdown.navigation.recorder import Recorder
-from strapdown.navigation.replay import PipelineRun, Recording, pieces_by_sample
+from strapdown.navigation.replay import PipelineRun, Recording, pieces_by_sample, run_by_sample
 from strapdown.progress import Progress, silent
+from strapdown.tables import gnss_table, imu_table
 from strapdown.tables.checks import source_of
 
-__all__ = ["Replay", "before_stamp", "parse_pace"]
+__all__ = [
+    "Clock",
+    "Latency",
+    "LatencyTape",
+    "MachineClock",
+    "Replay",
+    "before_stamp",
+    "parse_pace",
+    "warm_up",
+]
+
+
+#: Possible delay of the end of a sleep, s; the remaining time is waited actively.
+AWAKE = 1e-3
+
+
+class Clock(Protocol):
+    """Monotonic time in seconds."""
+
+    def now(self) -> float:
+        """Seconds since an arbitrary instant."""
+
+    def wait_until(self, instant: float) -> None:
+        """Return at an instant, or at once if it is past."""
+
+
+class MachineClock:
+    """The monotonic clock of the machine."""
+
+    def now(self) -> float:
+        """Seconds since an arbitrary instant."""
+        return time.perf_counter()
+
+    def wait_until(self, instant: float) -> None:
+        """Return at an instant, or at once if it is past."""
+        left = instant - self.now()
+        if left > AWAKE:
+            time.sleep(left - AWAKE)
+        while self.now() < instant:
+            pass
+
+
+# Latency from a sample to its state, and missed deadlines.
+
+
+@dataclass(frozen=True)
+class Latency:
+    """Latency of the samples of a run.
+
+    Attributes
+    ----------
+    median, most, largest : float, s
+        From the delivery of a sample to its state; `most` is the 99th percentile.
+    mean : float, s
+    missed : int or None
+        States later than the next sample's due time; None without due times.
+    behind : float, s, or None
+        The largest such delay.
+    """
+
+    samples: int
+    median: float
+    most: float
+    largest: float
+    mean: float
+    missed: int | None
+    behind: float | None
+
+    def told(self) -> Mapping[str, float | int | None]:
+        """Values by names with units, as in ``latency.json``."""
+        return {
+            "samples": self.samples,
+            "median_ms": _ms(self.median),
+            "p99_ms": _ms(self.most),
+            "largest_ms": _ms(self.largest),
+            "mean_ms": _ms(self.mean),
+            "missed_deadlines": self.missed,
+            "largest_behind_ms": None if self.behind is None else _ms(self.behind),
+        }
+
+
+def _ms(seconds: float) -> float:
+    return round(1e3 * seconds, 6)
+
+
+class LatencyTape:
+    """Collect the times of delivery and of the state of each sample."""
+
+    def __init__(self) -> None:
+        self._took = array("d")
+        self._late = array("d")
+
+    def take(self, delivered: float, done: float, deadline: float = math.nan) -> None:
+        """Add one sample.
+
+        Parameters
+        ----------
+        delivered, done : float, s
+        deadline : float, s
+            Due time of the next sample, by which the state is needed; NaN without due times.
+        """
+        self._took.append(done - delivered)
+        self._late.append(done - deadline)
+
+    def latency(self) -> Latency | None:
+        """Return the collected latency; None without samples."""
+        if not self._took:
+            return None
+        took, late = np.array(self._took), np.array(self._late)
+        late = late[np.isfinite(late)]
+        return Latency(
+            samples=len(took),
+            median=float(np.median(took)),
+            most=float(np.percentile(took, 99.0)),
+            largest=float(took.max()),
+            mean=float(took.mean()),
+            missed=int((late > 0.0).sum()) if late.size else None,
+            behind=max(float(late.max()), 0.0) if late.size else None,
+        )
+
+
+# Compile and load everything before the first sample.
+
+
+#: Samples of a rest: more than a preprocessor needs before the first step.
+ROWS, STEP = 80, 0.01
+
+
+def warm_up(chain: NavigationPipeline, sampling: str = "mean") -> None:
+    """Navigate a rest of less than a second with a copy of a pipeline, and discard the result.
+
+    Parameters
+    ----------
+    sampling : {'instantaneous', 'mean'}
+    """
+    time = STEP * np.arange(ROWS)
+    force = np.tile([0.0, 0.0, -STANDARD_GRAVITY], (ROWS, 1))
+    # Some detectors do not accept constant readings as a rest.
+    force[1::2, 0] += 1e-3
+    imu = imu_table(time, 1e-5 * force[:, [0, 0, 0]], force, sampling=sampling)
+    here = NavState.from_degrees(45.0, 20.0, 0.0)
+    start = KnownStart(here, (10.0,) * 3, (1.0,) * 3, (1.0,) * 3, at_first_sample=True)
+    own = replace(
+        chain,
+        modes=(Navigation(),),
+        start=start,
+        commands=(),
+        intake=replace(chain.intake, gaps=GapPolicy()),
+    )
+    # An error on this rest does not mean an error on the record.
+    with suppress(StrapdownError):
+        run_by_sample(own, imu, _fixes(chain))
+
+
+def _fixes(chain: NavigationPipeline) -> dict[str, pd.DataFrame]:
+    """Two fixes of each receiver, the first in the middle of the rest."""
+    at = 0.5 * ROWS * STEP
+    return {
+        aid.name: gnss_table(
+            np.array([at, at + 2.0 * STEP]) + aid.time_offset,
+            np.tile([45.0, 20.0, 0.0], (2, 1)),
+            np.zeros((2, 3)),
+            (1.0,) * 3,
+            (0.1,) * 3,
+            np.full(2, float(aid.qualities[0])),
+        )
+        for aid in chain.navigator.aids
+        if isinstance(aid, Gnss)
+    }
+
+
+# Replay a record to a pipeline sample by sample, each when it is due.
+
 
 #: Interval of progress reports, s of the record.
 TOLD = 1.0
@@ -37,11 +217,6 @@ def parse_pace(text: str) -> float:
     -------
     float
         Infinite for ``max``.
-
-    Raises
-    ------
-    ConfigError
-        The text is not a pace.
     """
     if text.strip().lower() == "max":
         return math.inf
@@ -110,11 +285,6 @@ def _ahead(chain: NavigationPipeline, tables: Mapping[str, pd.DataFrame]) -> flo
 
 
 def before_stamp(aid: Measurement) -> float:
-    """Time by which a measurement precedes its stamp, s: known offsets and delays.
-
-    Parameters
-    ----------
-    aid : Aid
-    """
+    """Time by which a measurement precedes its stamp, s: known offsets and delays."""
     offset, delay = (float(getattr(aid, n, 0.0)) for n in ("time_offset", "velocity_delay"))
     return max(offset + delay, 0.0)

@@ -21,8 +21,6 @@ from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
 from strapdown.formats.clocks import EPOCH
 from strapdown.formats.columns import parse_axes
 from strapdown.formats.log_writers import LOG_WRITERS
-from strapdown.live.clock import Clock
-from strapdown.live.latency import Latency, LatencyTape
 from strapdown.live.lines import (
     END,
     AidRows,
@@ -33,8 +31,8 @@ from strapdown.live.lines import (
     Word,
     parse_line,
 )
+from strapdown.live.replay import Clock, Latency, LatencyTape, warm_up
 from strapdown.live.sources import Line, LineSource
-from strapdown.live.warm_up import warm_up
 from strapdown.navigation.engine import SAME_INSTANT
 from strapdown.navigation.measurements.measurement import TabulatedMeasurement
 from strapdown.navigation.modes import PipelineChunk
@@ -58,8 +56,6 @@ class LiveRun:
 
     Attributes
     ----------
-    spec : NavigationSpec
-    got : Reception
     run : PipelineRun or None
         None if navigation never began.
     error : StrapdownError or None
@@ -103,23 +99,12 @@ def receive(
     ----------
     spec : NavigationSpec
         With `live`, and without a record (`live_spec`).
-    source : LineSource
-    clock : Clock
     write : callable
         Called with each line of the state.
     warn : callable
         Called with each finding.
     form, every
         As `StateLines`.
-
-    Returns
-    -------
-    LiveRun
-
-    Raises
-    ------
-    ConfigError
-        The pipeline cannot be built.
     """
     with closing(source):
         chain = make_chain(spec, sensors_of(spec))
@@ -166,11 +151,6 @@ def result_of(
     NavigationRun
         From the states computed in real time. If reading the record back gives other numbers, from
         the record: the result can always be reproduced.
-
-    Raises
-    ------
-    StrapdownError
-        As `run_navigation`.
     """
     spec = write_received(live.spec, live.got, folder)
 
@@ -247,10 +227,6 @@ def live_spec(spec: NavigationSpec) -> NavigationSpec:
     ----------
     spec : NavigationSpec
         With ``[live]``, or of a record, whose files are then ignored.
-
-    Returns
-    -------
-    NavigationSpec
     """
     whole = _plain(spec)
     whole.pop("simulation", None)
@@ -267,7 +243,6 @@ def write_received(spec: NavigationSpec, got: Reception, folder: Path) -> Naviga
     ----------
     spec : NavigationSpec
         Specification of the live run.
-    got : Reception
     folder : Path
         Destination: ``received.csv`` in body axes, and a file for each measurement.
 
@@ -309,12 +284,6 @@ def write_received(spec: NavigationSpec, got: Reception, folder: Path) -> Naviga
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class _Waiting:
-    time: float
-    values: Array
-
-
 class Reception:
     """Pass the samples of lines to a pipeline, and record its input.
 
@@ -325,11 +294,8 @@ class Reception:
 
     Parameters
     ----------
-    chain : NavigationPipeline
     spec : NavigationSpec
         With `live`.
-    recording : Recording
-    clock : Clock
     show : callable
         Called with the output chunk of each sample.
     warn : callable
@@ -368,7 +334,7 @@ class Reception:
             if isinstance(aid, TabulatedMeasurement)
         }
         self._origin = self._first = math.nan
-        self._waiting: deque[_Waiting] = deque()
+        self._waiting: deque[tuple[float, Array]] = deque()
         self._newest = self._done = -math.inf
         self._samples = GrowingRows.of(7)
         self._words: list[str] = []
@@ -413,13 +379,7 @@ class Reception:
         return self.error is None
 
     def finish(self) -> None:
-        """Process the waiting samples, and end the run of the pipeline.
-
-        Raises
-        ------
-        DataError
-            Navigation never began.
-        """
+        """Process the waiting samples, and end the run of the pipeline."""
         while self._waiting and self.error is None:
             self._advance(math.nan)
         self._state, piece = self._chain.finish(self._state)
@@ -433,10 +393,10 @@ class Reception:
         for part, turn in ((slice(0, 3), self._gyro), (slice(3, 6), self._accel)):
             if turn is not None:
                 values[part] = turn @ values[part]
-        self._waiting.append(_Waiting(time, values))
+        self._waiting.append((time, values))
         self._newest = time
         # Stamps are rounded decimal fractions.
-        while self._waiting and self._waiting[0].time <= time - self._live.hold_s + SAME_INSTANT:
+        while self._waiting and self._waiting[0][0] <= time - self._live.hold_s + SAME_INSTANT:
             self._advance(arrived)
             if self.error is not None:
                 return
@@ -450,26 +410,26 @@ class Reception:
 
     def _advance(self, arrived: float) -> None:
         """Pass the oldest waiting sample to the pipeline."""
-        one = self._waiting[0]
+        stamp, values = self._waiting[0]
         state = self._state
         for word in self._words:
-            state = self._chain.command(state, word, one.time)
+            state = self._chain.command(state, word, stamp)
         try:
-            state, piece = self._chain.advance(state, np.array([one.time]), one.values[None, :])
+            state, piece = self._chain.advance(state, np.array([stamp]), values[None, :])
         except StrapdownError as error:
             self.error = error
             return
         self._recording.take(piece)
         self._show(piece)
-        step = one.time - self._done
+        step = stamp - self._done
         if math.isfinite(arrived):
             done = self._clock.now()
             self.tape.take(arrived, done, arrived + step if math.isfinite(step) else math.nan)
-        self.commands += [CommandTable(time_s=one.time, mode=word) for word in self._words]  # type: ignore[arg-type]
+        self.commands += [CommandTable(time_s=stamp, mode=word) for word in self._words]  # type: ignore[arg-type]
         self._words.clear()
-        self._state, self._done = state, one.time
+        self._state, self._done = state, stamp
         self._waiting.popleft()
-        self._samples = self._samples.and_then(np.concatenate([[one.time], one.values])[None, :])
+        self._samples = self._samples.and_then(np.concatenate([[stamp], values])[None, :])
 
     def _measured(self, said: Measured) -> None:
         rows = self.rows[said.name]

@@ -12,7 +12,7 @@ from typing import IO
 from urllib.parse import urlsplit
 
 from strapdown.errors import ConfigError
-from strapdown.live.clock import Clock
+from strapdown.live.replay import Clock
 
 __all__ = ["Line", "LineSource", "open_source"]
 
@@ -33,7 +33,6 @@ class Line:
     ----------
     number : int
         Counted from 1.
-    text : str
     arrived : float, s
         By the clock of the run.
     """
@@ -52,8 +51,6 @@ class LineSource:
         For messages.
     read : callable
         Returns bytes; empty at the end; raises `TimeoutError` if no data arrived.
-    clock : Clock
-    close : callable
     whole : bool
         Whether each read ends with a complete line.
     """
@@ -78,13 +75,7 @@ class LineSource:
         self._thread.start()
 
     def next(self, wait: float = LOOK) -> Line | None:
-        """Return the next line, or None at the end.
-
-        Raises
-        ------
-        TimeoutError
-            No line arrived within the timeout.
-        """
+        """Return the next line, or None at the end."""
         try:
             return self._queue.get(timeout=wait)
         except queue.Empty:
@@ -136,17 +127,7 @@ def open_source(where: str, clock: Clock, stdin: IO[bytes]) -> LineSource:
     where : str
         ``-`` for standard input, or ``udp://HOST:PORT``; without a host, for this machine only.
         Port 0 selects a free one.
-    clock : Clock
     stdin : file
-
-    Returns
-    -------
-    LineSource
-
-    Raises
-    ------
-    ConfigError
-        It does not name a source of lines, or the port is in use.
     """
     if where == "-":
         # A thread in a buffered read holds its lock to the end of the process.

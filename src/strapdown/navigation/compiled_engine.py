@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,10 +37,7 @@ __all__ = ["CompiledEngine", "compiled"]
 Array = NDArray[np.float64]
 
 # Exactly these types: a subclass may behave differently.
-MECHANIZATIONS: dict[type[Mechanization], int] = {
-    NorthEastDown: NED,
-    WanderAzimuth: WANDER,
-}
+MECHANIZATIONS: dict[type[Mechanization], int] = {NorthEastDown: NED, WanderAzimuth: WANDER}
 FORMS: dict[type[CovarianceForm], int] = {
     Joseph: kernel.JOSEPH,
     Plain: kernel.PLAIN,
@@ -58,28 +56,6 @@ def compiled(filter_: ErrorFilter) -> bool:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Fixed:
-    """Results of m fixes.
-
-    Attributes
-    ----------
-    time : ndarray, (m,), s
-        When they were taken.
-    told : ndarray, (m, 3, 3)
-        Innovation, its predicted variance, and weight of each component.
-    covariance : ndarray, (m, 9, 9)
-    sensors, sensors_sd : ndarray, (m, k)
-        As of a `Mark`, after each.
-    """
-
-    time: Array
-    told: Array
-    covariance: Array
-    sensors: Array
-    sensors_sd: Array
-
-
 class CompiledEngine(Engine):
     """North-east-down or wander azimuth, rotation-vector errors, closed loop.
 
@@ -89,7 +65,6 @@ class CompiledEngine(Engine):
     ----------
     filter_ : ErrorFilter
         For which `compiled` is true.
-    state : EngineState
     """
 
     def __init__(self, filter_: ErrorFilter, state: EngineState) -> None:
@@ -174,7 +149,7 @@ class CompiledEngine(Engine):
         notes: tuple[float, float],
         arm: Array,
         fixes: Epochs,
-    ) -> tuple[int, Fixed, bool]:
+    ) -> tuple[int, tuple[Array, ...], bool]:
         """Process steps, and fixes with white errors, to the end of either.
 
         Parameters
@@ -193,7 +168,9 @@ class CompiledEngine(Engine):
         Returns
         -------
         made : int
-        fixed : Fixed
+        fixed : tuple of ndarray, of the m fixes that were taken
+            Times (m,), s; innovation, its predicted variance and weight (m, 3, 3); then, as of a
+            `CovarianceSnapshot` after each, covariance (m, 9, 9), sensors and their sd (m, k).
         noted : bool
             Whether it stopped for a covariance to be noted.
         """
@@ -235,7 +212,7 @@ class CompiledEngine(Engine):
         if why == kernel.BAD_FIX:
             raise bad_observation(0, told[done, 0, 0], told[done, 1, 0], fixes.values[done, 4:])
         self._after(why, time, made)
-        fixed = Fixed(at[:done], told[:done], noted[:done], sensors[:done], sd[:done])
+        fixed = tuple(each[:done] for each in (at, told, noted, sensors, sd))
         return int(made), fixed, why == kernel.NOTE
 
     def close(self) -> None:
@@ -288,20 +265,12 @@ class CompiledEngine(Engine):
         This saves the cost of making an engine per sample. Continuing a second time from the same
         state gives a new engine, with the same result.
         """
-        gave = state.__dict__.pop("_gave", None)
-        if isinstance(gave, cls) and gave.navigation is filter_:
-            return gave
-        return cls(filter_, state)
+        gave = _AT_STATE.pop(state, None)
+        return gave if gave is not None and gave.navigation is filter_ else cls(filter_, state)
 
     def state(self) -> EngineState:
         """Return the current state; afterwards the engine may be used by `going_on` only."""
-        state = self._copied()
-        # Beside the fields of the state: not part of its value.
-        state.__dict__["_gave"] = self
-        return state
-
-    def _copied(self) -> EngineState:
-        return EngineState(
+        state = EngineState(
             filter=self.filter,
             errors=self.errors,
             time=self.time,
@@ -311,6 +280,8 @@ class CompiledEngine(Engine):
             open_rows=self._group[1][: self._count].copy(),
             last=self.last,
         )
+        _AT_STATE[state] = self
+        return state
 
     def _after(self, why: int, time: Array, made: int) -> None:
         """Copy the results of a loop."""
@@ -340,3 +311,7 @@ class CompiledEngine(Engine):
     def _no_covariance(self) -> DivergenceError:
         time = float(self._times[kernel.AT_STEP])
         return DivergenceError("navigation.covariance-lost", quantity="covariance", time=time)
+
+
+#: Engines that stand at a state and can go on from it, as long as the state exists.
+_AT_STATE: WeakKeyDictionary[EngineState, CompiledEngine] = WeakKeyDictionary()

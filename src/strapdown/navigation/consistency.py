@@ -121,7 +121,6 @@ class ObservationConsistency:
         gross errors.
     inside : float
         Share of the epochs whose NIS is inside its two bounds.
-    components : tuple of ComponentConsistency
     alarms : tuple of Alarm
         Detected changes within the run (`InnovationMonitor`).
     verdicts : tuple of Verdict
@@ -156,7 +155,6 @@ def consistency_of(
 
     Parameters
     ----------
-    name : str
     innovations : DataFrame
         By time in s: ``nu LABEL``, ``s LABEL``, ``weight LABEL`` (`NavigationRecord.innovations`).
     window : int
@@ -165,10 +163,6 @@ def consistency_of(
         Probability of any verdict, other than on gross errors, for a consistent filter. It is
         divided evenly among the tests of each component: scale, bias, lag 1, whiteness and a
         change within the run.
-
-    Returns
-    -------
-    ObservationConsistency
 
     Raises
     ------
@@ -228,7 +222,6 @@ def whiteness(values: Array, lags: int = LAGS) -> tuple[Array, float]:
     ----------
     values : ndarray, (n,)
         Approximately equally spaced; NaN for a missing value.
-    lags : int
 
     Returns
     -------
@@ -365,7 +358,6 @@ class Inconsistency:
     ----------
     name : str
         Of the observation: ``rtk.position``.
-    aid : str
     component : str
         With its unit.
     kind : {'change', 'understated', 'bias', 'correlated', 'gross'}
@@ -585,7 +577,6 @@ class InnovationMonitor:
 
     Attributes
     ----------
-    threshold : float
     larger : float
         The standard deviation c.
     apart : float
@@ -623,7 +614,6 @@ class InnovationMonitor:
 
         Parameters
         ----------
-        state : MonitorState
         time : array_like, (n,), s
         normalised : array_like, (n, k)
             Innovations over their predicted standard deviations. NaN is ignored.
@@ -720,8 +710,6 @@ def judge(
     normalised : ndarray, (n, k)
         NaN for missing values and gross errors.
     gross : ndarray of bool, (n, k)
-    components : sequence of ComponentConsistency
-    alarms : sequence of Alarm
     level : float
         Below this probability a deviation is significant.
     fewest : int

@@ -176,14 +176,7 @@ class Engine(ABC):
 
 
 class GeneralEngine(Engine):
-    """Engine for any mechanization, error model and form: group by group.
-
-    Parameters
-    ----------
-    filter_ : ErrorFilter
-    state : EngineState
-    feeds_back : bool
-    """
+    """Engine for any mechanization, error model and form: group by group."""
 
     def __init__(self, filter_: ErrorFilter, state: EngineState, feeds_back: bool) -> None:
         self.navigation = filter_
@@ -223,11 +216,7 @@ class GeneralEngine(Engine):
         ends[-1] = self.time
         begun = self.filter
         self.filter, Phi = self.navigation.follow(
-            begun,
-            ends,
-            np.array(self.open_history),
-            np.array(self.open_rows),
-            self.mechanization,
+            begun, ends, np.array(self.open_history), np.array(self.open_rows), self.mechanization
         )
         self.nodes.grew(begun, Phi, self.filter)
         if not self.feeds_back:
@@ -340,7 +329,6 @@ class NodeRows:
 
     Parameters
     ----------
-    filter_ : ErrorFilter
     wanted : bool
         Whether nodes are recorded.
 
@@ -348,7 +336,6 @@ class NodeRows:
     ----------
     room : ndarray, (m, width)
         Rows, of which `used` are filled; empty without a smoother.
-    used : int
     """
 
     def __init__(self, filter_: ErrorFilter, wanted: bool) -> None:
@@ -384,7 +371,6 @@ class NodeRows:
 
         Parameters
         ----------
-        begun, ended : FilterState
         Phi : ndarray, (n, n)
             Of the states of the model.
         """
@@ -406,7 +392,6 @@ class NodeRows:
 
         Parameters
         ----------
-        before, after : FilterState
         taken : ndarray, (p,)
             Correction of the estimate: fed back, or kept separately.
         """

@@ -19,19 +19,12 @@ class FilterOptions:
 
     Attributes
     ----------
-    model : type of ErrorModel
-    form : CovarianceForm
     rule : UpdateRule, optional
         Weighting of observations whose aid has no rule of its own; full weight if not given.
     step : float, s
         Longest step of the covariance, propagated with mean attitude and force.
     mark_interval : float, s
         Longest time between two records of the covariance.
-
-    Raises
-    ------
-    ConfigError
-        A time is invalid.
     """
 
     model: type[ErrorModel] = RotationVectorModel

@@ -114,14 +114,12 @@ def compasses_of(
     ----------
     chain : NavigationPipeline
         Pipeline of the run.
-    sensors : ImuUncertainty
     imu : DataFrame
         Samples of the run.
     record : NavigationRecord
         Result of the run.
     aligned : sequence of Aligned
         Its alignments.
-    ellipsoid : Ellipsoid
 
     Returns
     -------
@@ -366,19 +364,12 @@ def sd_after(
 
     Parameters
     ----------
-    filter_ : ErrorFilter
-    start : NavState
     P : ndarray, (p, p)
         As `ErrorFilter.begin`.
-    manoeuvre : Manoeuvre
     position_sd, velocity_sd : ndarray, (3,), or None
         Of the fixes, north, east, down, m and m/s; None for a missing quantity.
     interval : float, s
         Between two fixes.
-
-    Returns
-    -------
-    float
     """
     state = filter_.begin(start, P)
     state = _fixed(filter_, state, position_sd, velocity_sd)
@@ -461,7 +452,6 @@ def seen_rests(
 
     Parameters
     ----------
-    chain : NavigationPipeline
     imu : DataFrame
         Samples of the run.
     record : NavigationRecord

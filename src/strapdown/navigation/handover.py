@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -41,7 +41,6 @@ if TYPE_CHECKING:
     from strapdown.navigation.pipeline import NavigationPipeline, PipelineState
 
 __all__ = [
-    "Place",
     "align",
     "errors_by_antenna",
     "fixes_until",
@@ -68,13 +67,8 @@ def align(chain: NavigationPipeline, state: PipelineState) -> Aligned:
 
     Parameters
     ----------
-    chain : NavigationPipeline
     state : PipelineState
         In an alignment mode.
-
-    Returns
-    -------
-    Aligned
 
     Raises
     ------
@@ -109,14 +103,8 @@ def handed_over(chain: NavigationPipeline, state: PipelineState, found: Aligned)
 
     Parameters
     ----------
-    chain : NavigationPipeline
     state : PipelineState
         At the end of an alignment mode.
-    found : Aligned
-
-    Returns
-    -------
-    FilterState
     """
     filter_ = chain.navigator.filter
     rest = _window(chain, state)[:, 1:7].mean(axis=0)
@@ -136,7 +124,7 @@ def handed_over(chain: NavigationPipeline, state: PipelineState, found: Aligned)
     if isinstance(mode, CoarseMode) and isinstance(mode.way, GnssCourse):
         ellipsoid = find_ellipsoid(filter_.mechanization.ellipsoid)
         assert found.alignment.velocity is not None and found.alignment.joint is not None
-        place = here_by_fix(
+        start, P = here_by_fix(
             _fixes(chain, state),
             state.time,
             q_nb,
@@ -147,12 +135,7 @@ def handed_over(chain: NavigationPipeline, state: PipelineState, found: Aligned)
         )
         turn = _turn(_window(chain, state), state.time)
         return from_alignment(
-            filter_,
-            found.alignment,
-            place.state,
-            place.covariance,
-            rest,
-            _by_antenna(chain, q_nb, place.state.v_n, turn),
+            filter_, found.alignment, start, P, rest, _by_antenna(chain, q_nb, start.v_n, turn)
         )
     site, sd = _site(chain, state, q_nb)
     start = NavState.from_degrees(site.lat_deg, site.lon_deg, site.alt, time=state.time)
@@ -168,7 +151,6 @@ def unused_fixes(
 
     Parameters
     ----------
-    chain : NavigationPipeline
     state : PipelineState
         At the end of an alignment mode.
     begun : float, s
@@ -279,14 +261,8 @@ def from_state(filter_: ErrorFilter, start: NavState, P: Array) -> FilterState:
 
     Parameters
     ----------
-    filter_ : ErrorFilter
-    start : NavState
     P : ndarray, (9, 9)
         Displacement, velocity, rotation in north-east-down; sensor errors are as the model states.
-
-    Returns
-    -------
-    FilterState
     """
     return filter_.begin(start, _with_sensors(filter_, P))
 
@@ -303,7 +279,6 @@ def from_alignment(
 
     Parameters
     ----------
-    filter_ : ErrorFilter
     found : Alignment
         Its biases, if estimated, are subtracted.
     start : NavState
@@ -370,7 +345,6 @@ def from_fine(
     ----------
     filter_ : ErrorFilter
         Filter of navigation; any mechanization, error model and form.
-    fine : FineResult
     rest : ndarray, (6,)
         Mean rate in rad/s and specific force in m/s² at rest, body axes.
     site_sd : array_like, (3,), m
@@ -380,10 +354,6 @@ def from_fine(
         arm of the antenna by which it was found.
     by_others : ndarray, (6, p), optional
         As in `from_alignment`.
-
-    Returns
-    -------
-    FilterState
     """
     old, state = fine.filter, fine.state
     P = old.physical_covariance(state)
@@ -490,18 +460,12 @@ def _read_by_input(filter_: ErrorFilter) -> Array:
 
 
 def errors_by_antenna(
-    filter_: ErrorFilter,
-    name: str,
-    q_nb: Array,
-    lever_arm: Array,
-    velocity: Array,
-    turn: Array,
+    filter_: ErrorFilter, name: str, q_nb: Array, lever_arm: Array, velocity: Array, turn: Array
 ) -> Array:
     """Return the errors of position and velocity from fixes per physical error.
 
     Parameters
     ----------
-    filter_ : ErrorFilter
     name : str
         Name of the measurement with the fixes.
     q_nb : ndarray, (4,)
@@ -551,22 +515,6 @@ LOOKED_AT, LOOKED_BACK, LEAST_LOOKED_AT = 9, 10.0, 4
 CLEAR = 5.0
 
 
-@dataclass(frozen=True, eq=False)
-class Place:
-    """Position and velocity of the sensors at an instant.
-
-    Attributes
-    ----------
-    state : NavState
-        With the given attitude.
-    covariance : ndarray, (6, 6)
-        Displacement and velocity, north-east-down.
-    """
-
-    state: NavState
-    covariance: Array
-
-
 def fixes_until(
     tables: Sequence[pd.DataFrame], time: float, offset: float = 0.0
 ) -> pd.DataFrame | None:
@@ -609,18 +557,12 @@ def site_of_fixes(
         Fixes until `time`.
     begin, time : float, s
         Of the rest. If it holds no fix, the newest one before is taken.
-    ellipsoid : Ellipsoid
 
     Returns
     -------
     site : Site
     sd : ndarray, (3,), m
         The smallest stated by a fix: correlated errors do not average out.
-
-    Raises
-    ------
-    DataError
-        No fix has a position.
     """
     place, sd, stamps = _good(fixes, POSITION_SD, time)
     first = min(int(np.searchsorted(stamps, begin)), len(stamps) - 1)
@@ -636,7 +578,7 @@ def here_by_fix(
     ellipsoid: Ellipsoid,
     velocity: Array,
     velocity_covariance: Array,
-) -> Place:
+) -> tuple[NavState, Array]:
     """Return the position of a vehicle, by its newest fix that agrees with those before.
 
     Parameters
@@ -647,21 +589,17 @@ def here_by_fix(
     q_nb : ndarray, (4,)
     lever_arm : ndarray, (3,), m
         Lever arm of the antenna, body axes.
-    ellipsoid : Ellipsoid
     velocity : ndarray, (3,), m/s
         Velocity of the sensors at `time`, north, east, down.
     velocity_covariance : ndarray, (3, 3), (m/s)²
 
     Returns
     -------
-    Place
-        Propagated from the fix by the velocity; the acceleration is unknown, 1 m/s². The effect of
-        a wrong stamp of the fix is left to `by_antenna.errors_by_antenna`.
-
-    Raises
-    ------
-    DataError
-        No fix has a position.
+    state : NavState
+        With the given attitude, propagated from the fix by the velocity.
+    covariance : ndarray, (6, 6)
+        Displacement and velocity, north-east-down; the acceleration is unknown, 1 m/s². The effect
+        of a wrong stamp of the fix is left to `errors_by_antenna`.
     """
     place, sd, stamps = _good(fixes, POSITION_SD, time)
     assert fixes is not None
@@ -675,7 +613,7 @@ def here_by_fix(
     P[:3, :3] = np.diag(unknown) + velocity_covariance * after**2
     P[:3, 3:] = P[3:, :3] = velocity_covariance * after
     P[3:, 3:] = velocity_covariance
-    return Place(state, P)
+    return state, P
 
 
 def _newest_that_agrees(

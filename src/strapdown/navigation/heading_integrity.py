@@ -12,8 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
@@ -28,6 +27,7 @@ __all__ = [
     "REASONS",
     "SURE",
     "WITNESSES",
+    "HeadingCheck",
     "HeadingIntegrity",
     "LightSpan",
     "doubted",
@@ -74,22 +74,39 @@ VERTICAL = ("down", "VD", "height")
 CLIP, REJECTED = 4.0, 3.0
 
 
-class Heard(Protocol):
-    """Result of an independent heading check: see `navigation.heading_witness.Evidence`.
+@dataclass(frozen=True, eq=False)
+class HeadingCheck:
+    """Result of an independent heading check.
 
-    Its `kind` is one of `WITNESSES`.
+    Attributes
+    ----------
+    since : float, s
+        When the check began.
+    time : ndarray, (n,), s
+        Seconds of the run, after `since`.
+    difference : ndarray, (n,), deg
+        Heading of the run minus that of the check.
+    sd : ndarray, (n,), deg
+        Standard deviation of the check's heading; carried by gyros, a 99 % bound divided by `SURE`.
+    kind : str
+        A key of `WITNESSES`.
+    scale : ndarray, (n,)
+        By fixes: factor, 1 or more, by which its innovations scatter more than expected,
+        correlation included; it is part of `sd`.
+    covariance : ndarray, (n, 9, 9)
+        By fixes: as `NavigationRecord.covariance`, of the check.
+    plain : ndarray, (n,), deg
+        Carried by gyros: `sd` from the stated gyro errors, without those observed during the rest.
     """
 
-    @property
-    def since(self) -> float: ...
-    @property
-    def time(self) -> Array: ...
-    @property
-    def difference(self) -> Array: ...
-    @property
-    def sd(self) -> Array: ...
-    @property
-    def kind(self) -> str: ...
+    since: float
+    time: Array
+    difference: Array
+    sd: Array
+    kind: str
+    scale: Array = field(default_factory=lambda: np.empty(0))
+    covariance: Array = field(default_factory=lambda: np.empty((0, 9, 9)))
+    plain: Array = field(default_factory=lambda: np.empty(0))
 
 
 @dataclass(frozen=True)
@@ -99,7 +116,6 @@ class LightSpan:
     Attributes
     ----------
     begin, end : float, s
-    colour : str
     reason : str
         A key of `REASONS`.
     """
@@ -154,7 +170,7 @@ class HeadingIntegrity:
 
 def heading_light(
     record: NavigationRecord,
-    evidence: Sequence[Heard],
+    evidence: Sequence[HeadingCheck],
     scatter: Array | None = None,
     *,
     green: float = 3.0,
@@ -164,17 +180,12 @@ def heading_light(
 
     Parameters
     ----------
-    record : NavigationRecord
-    evidence : sequence of Heard
+    evidence : sequence of HeadingCheck
         Results of the independent checks; empty without a check.
     scatter : ndarray, (n,), optional
         Of `recent_scatter` at the seconds of the run.
     green, red : float, deg
         Green promises an error below the first; beyond the second a bound is red.
-
-    Returns
-    -------
-    HeadingIntegrity
 
     Raises
     ------
@@ -248,10 +259,6 @@ def seconds_of(record: NavigationRecord) -> Array:
 def recent_scatter(record: NavigationRecord) -> Array:
     """Recent scatter of the innovations over the predicted one, at each second of a run.
 
-    Parameters
-    ----------
-    record : NavigationRecord
-
     Returns
     -------
     ndarray, (n,)
@@ -286,21 +293,18 @@ def recent_scatter(record: NavigationRecord) -> Array:
     return worst
 
 
-def doubted(record: NavigationRecord, evidence: Sequence[Heard], upto: float, green: float) -> bool:
+def doubted(
+    record: NavigationRecord, evidence: Sequence[HeadingCheck], upto: float, green: float
+) -> bool:
     """Whether a run was contradicted, or its innovations scattered too much, until an instant.
 
     Parameters
     ----------
-    record : NavigationRecord
-    evidence : sequence of Heard
+    evidence : sequence of HeadingCheck
         Results of the independent checks.
     upto : float, s
     green : float, deg
         As of `heading_light`.
-
-    Returns
-    -------
-    bool
     """
     seconds = seconds_of(record)
     before = seconds <= upto
@@ -319,7 +323,7 @@ def _own_sd(record: NavigationRecord, seconds: Array) -> Array:
 
 
 def _best(
-    seconds: Array, evidence: Sequence[Heard]
+    seconds: Array, evidence: Sequence[HeadingCheck]
 ) -> tuple[Array, Array, Array, NDArray[np.object_]]:
     """Difference, standard deviation, start and kind of the tightest check of each second."""
     difference, sd, since = (np.full(len(seconds), np.nan) for _ in range(3))
@@ -356,7 +360,7 @@ def _carried(seconds: Array, witnessed: Array, own: Array, apart: NDArray[np.boo
 
 
 def _contradicted(
-    seconds: Array, evidence: Sequence[Heard], own: Array, green: float
+    seconds: Array, evidence: Sequence[HeadingCheck], own: Array, green: float
 ) -> NDArray[np.bool_]:
     """Seconds at which any check with a known heading contradicts the run."""
     out = np.zeros(len(seconds), dtype=np.bool_)

@@ -29,28 +29,36 @@ from strapdown.evaluation.trajectory_differences import trajectory_at
 from strapdown.frames import q_ne
 from strapdown.mechanization.ned import NorthEastDown
 from strapdown.mechanization.wander_azimuth import WanderAzimuth
-from strapdown.nav_state import NavState
 from strapdown.navigation.consistency import ObservationConsistency
 from strapdown.navigation.gyrocompass import Compass
-from strapdown.navigation.heading_integrity import GROWS, RECENT, SURE, doubted, seconds_of
+from strapdown.navigation.heading_integrity import (
+    GROWS,
+    RECENT,
+    SURE,
+    HeadingCheck,
+    doubted,
+    seconds_of,
+)
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.measurements.heading import Heading
 from strapdown.navigation.navigator import Navigator, NavigatorState
 from strapdown.navigation.pipeline import NavigationPipeline
 from strapdown.navigation.preprocessing import NEAR as NEAR_FIXES
 from strapdown.navigation.preprocessing import JoinedSteps, joined_steps
-from strapdown.navigation.record import CovarianceSnapshot, NavigationChunk, NavigationRecord
+from strapdown.navigation.record import (
+    CovarianceSnapshot,
+    NavigationChunk,
+    NavigationRecord,
+    state_of_row,
+)
 from strapdown.rotation import euler_sd
 from strapdown.sensors.uncertainty import ImuUncertainty
-from strapdown.tables import EULER, GEODETIC, VELOCITY
+from strapdown.tables import EULER
 from strapdown.tables.checks import index_of, values_of
 
 __all__ = [
     "LONGEST",
     "UNSEEN",
-    "AgreeingSources",
-    "CarriedHeading",
-    "Evidence",
     "Witnesses",
     "agreeing_sources",
     "carry_headings",
@@ -84,37 +92,7 @@ CLIP = 3.0
 NEAR = 1e-6
 
 
-@dataclass(frozen=True, eq=False)
-class Evidence:
-    """Result of one heading check.
-
-    Attributes
-    ----------
-    since : float, s
-        When the check began.
-    time : ndarray, (n,), s
-        Seconds of the run, after `since`.
-    difference : ndarray, (n,), deg
-        Heading of the run minus that of the check.
-    sd : ndarray, (n,), deg
-        Standard deviation of the check's heading, times `scale`.
-    scale : ndarray, (n,)
-        Factor by which its innovations scatter more than expected, correlation included: 1 or more.
-    covariance : ndarray, (n, 9, 9)
-        As `NavigationRecord.covariance`, of the check.
-    kind : str
-    """
-
-    since: float
-    time: Array
-    difference: Array
-    sd: Array
-    scale: Array
-    covariance: Array
-    kind: str = "motion"
-
-
-def hear_witnesses(made: Witnesses, record: NavigationRecord, enough: float) -> list[Evidence]:
+def hear_witnesses(made: Witnesses, record: NavigationRecord, enough: float) -> list[HeadingCheck]:
     """Run heading checks over a record, two at a time at most.
 
     A new check begins each minute, and each three minutes while one is accurate enough. The older
@@ -125,15 +103,13 @@ def hear_witnesses(made: Witnesses, record: NavigationRecord, enough: float) -> 
 
     Parameters
     ----------
-    made : Witnesses
-    record : NavigationRecord
     enough : float, deg
         Standard deviation of a heading below which older evidence is not needed: a third of the
         limit.
 
     Returns
     -------
-    list of Evidence
+    list of HeadingCheck
         In order of `since`.
     """
     end = float(made.time[-1])
@@ -221,7 +197,7 @@ class _Witness:
             nu, s = one.innovations.nu[:2], one.innovations.s[:2]
             self.seen.append((one.time, nu / np.sqrt(s)))
 
-    def evidence(self) -> Evidence:
+    def evidence(self) -> HeadingCheck:
         """Return the result at each second."""
         marked = np.array([mark.time for mark in self.marks])
         seconds = np.arange(math.ceil(self.since + NEAR), math.floor(marked[-1]) + 1.0)
@@ -239,7 +215,7 @@ class _Witness:
         scale = self._scale(seconds)
         sd = euler_sd(euler, covariance[:, 6:, 6:])[:, 2] if len(seconds) else seconds
         sd = np.hypot(scale * sd, LEAST_HEADING)
-        return Evidence(self.since, seconds, apart, sd, scale, covariance)
+        return HeadingCheck(self.since, seconds, apart, sd, "motion", scale, covariance)
 
     def _scale(self, seconds: Array) -> Array:
         """Factor by which the newest innovations exceed their expected scatter and correlation."""
@@ -273,20 +249,7 @@ def _begin(
     """State at an instant of a run, with a practically unknown heading."""
     model = filter_.model
     row = run.iloc[int(np.searchsorted(index_of(run), at - NEAR))]
-    lat, lon, alt = (float(row[c]) for c in GEODETIC)
-    roll, pitch, heading = (float(row[c]) for c in EULER)
-    start = replace(
-        NavState.from_degrees(
-            lat,
-            lon,
-            alt,
-            v_n=row[VELOCITY].to_numpy(dtype=np.float64),
-            roll_deg=roll,
-            pitch_deg=pitch,
-            heading_deg=heading,
-        ),
-        time=at,
-    )
+    start = replace(state_of_row(row), time=at)
     marks = record.sd.index.to_numpy(dtype=np.float64)
     k = max(int(np.searchsorted(marks, at + NEAR, side="right")) - 1, 0)
     P = LOOSER**2 * record.covariance[k]
@@ -323,7 +286,6 @@ class Witnesses:
 
     Attributes
     ----------
-    navigator : Navigator
     time : ndarray, (n,), s
         Ends of the joined steps.
     rows : ndarray, (n, 10)
@@ -447,33 +409,6 @@ LONGEST = 7200.0
 GAP = 0.5
 
 
-@dataclass(frozen=True, eq=False)
-class CarriedHeading:
-    """Headings of a run after one rest, carried by the gyros; as `heading_light.Heard`.
-
-    Attributes
-    ----------
-    since : float, s
-        When the rest ended.
-    time : ndarray, (n,), s
-        Seconds of the run after the rest.
-    difference : ndarray, (n,), deg
-        Heading of the run minus the carried one.
-    sd : ndarray, (n,), deg
-        99 % bound of the error of the carried heading, divided by `heading_light.SURE`.
-    plain : ndarray, (n,), deg
-        The same from the stated gyro errors, without the gyro errors observed during the rest.
-    kind : str
-    """
-
-    since: float
-    time: Array
-    difference: Array
-    sd: Array
-    plain: Array
-    kind: str = "gyrocompass"
-
-
 def carry_headings(
     compasses: Sequence[Compass],
     doubts: Sequence[float],
@@ -481,7 +416,7 @@ def carry_headings(
     record: NavigationRecord,
     sensors: ImuUncertainty,
     ellipsoid: Ellipsoid,
-) -> list[CarriedHeading]:
+) -> list[HeadingCheck]:
     """Carry headings forward, each until a later one agrees with it.
 
     Parameters
@@ -494,12 +429,6 @@ def carry_headings(
         From the first of the compasses on.
     record : NavigationRecord
         Run that gives the position: a kilometer turns north by less than 0.02 deg.
-    sensors : ImuUncertainty
-    ellipsoid : Ellipsoid
-
-    Returns
-    -------
-    list of CarriedHeading
 
     Notes
     -----
@@ -528,7 +457,14 @@ def carry_headings(
         difference = np.asarray(rotation.within_half_turn(own[used] - one.heading(told)))
         bound, plain = one.bounds(told)
         out.append(
-            CarriedHeading(one.compass.time, seconds[used], difference, bound / SURE, plain / SURE)
+            HeadingCheck(
+                one.compass.time,
+                seconds[used],
+                difference,
+                bound / SURE,
+                "gyrocompass",
+                plain=plain / SURE,
+            )
         )
     return [one for one in out if len(one.time)]
 
@@ -605,30 +541,9 @@ def _longitude(time: Array, rows: pd.DataFrame) -> Array:
 FEWEST_SOURCES = 5
 
 
-@dataclass(frozen=True, eq=False)
-class AgreeingSources:
-    """Heading by the second-best of several agreeing sources; as `heading_light.Heard`.
-
-    Attributes
-    ----------
-    since : float, s
-    time : ndarray, (n,), s
-        Seconds with two or more sources, all of which agree.
-    difference, sd : ndarray, (n,), deg
-        Heading of the run minus that of the second-best source, and its standard deviation.
-    kind : str
-    """
-
-    since: float
-    time: Array
-    difference: Array
-    sd: Array
-    kind: str = "sources"
-
-
 def agreeing_sources(
-    chain: NavigationPipeline, record: NavigationRecord, carried: Sequence[CarriedHeading]
-) -> list[AgreeingSources]:
+    chain: NavigationPipeline, record: NavigationRecord, carried: Sequence[HeadingCheck]
+) -> list[HeadingCheck]:
     """Combine heading measurements and headings found by gyrocompassing.
 
     A constant error of a heading measurement is not observable from it alone, and the filter
@@ -637,15 +552,9 @@ def agreeing_sources(
     all agree with the run within 2.58 standard deviations. A measurement with an estimated
     misalignment does not count as a source.
 
-    Parameters
-    ----------
-    chain : NavigationPipeline
-    record : NavigationRecord
-    carried : sequence of CarriedHeading
-
     Returns
     -------
-    list of AgreeingSources
+    list of HeadingCheck
         One or none.
     """
     seconds = seconds_of(record)
@@ -671,7 +580,7 @@ def agreeing_sources(
     d, s = d[second, column], s[second, column]
     if not good.any():
         return []
-    return [AgreeingSources(float(seconds[good][0]), seconds[good], d[good], s[good])]
+    return [HeadingCheck(float(seconds[good][0]), seconds[good], d[good], s[good], "sources")]
 
 
 def _of_aid(record: NavigationRecord, name: str, seconds: Array) -> tuple[Array, Array] | None:
@@ -691,7 +600,7 @@ def _of_aid(record: NavigationRecord, name: str, seconds: Array) -> tuple[Array,
     return d, sd
 
 
-def _of_gyros(carried: Sequence[CarriedHeading], seconds: Array) -> tuple[Array, Array]:
+def _of_gyros(carried: Sequence[HeadingCheck], seconds: Array) -> tuple[Array, Array]:
     """Run minus the heading carried from the newest rest, by the stated gyro errors."""
     d, sd = np.full(len(seconds), np.nan), np.full(len(seconds), np.inf)
     for one in carried:

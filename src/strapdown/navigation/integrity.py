@@ -14,7 +14,6 @@ from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
 from strapdown.errors import Finding, StrapdownError
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.evaluation.trajectory_differences import trajectory_differences
-from strapdown.nav_state import NavState
 from strapdown.navigation.consistency import (
     Inconsistency,
     ObservationConsistency,
@@ -30,15 +29,13 @@ from strapdown.navigation.gyrocompass import (
 )
 from strapdown.navigation.heading_integrity import (
     SURE,
+    HeadingCheck,
     HeadingIntegrity,
-    Heard,
     LightSpan,
     heading_light,
     recent_scatter,
 )
 from strapdown.navigation.heading_witness import (
-    CarriedHeading,
-    Evidence,
     Witnesses,
     agreeing_sources,
     carry_headings,
@@ -49,11 +46,11 @@ from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.measurements.measurement import Measurement, TabulatedMeasurement, lasting
 from strapdown.navigation.pipeline import NavigationPipeline
 from strapdown.navigation.preprocessing import joined_steps
-from strapdown.navigation.record import NavigationRecord
+from strapdown.navigation.record import NavigationRecord, state_of_row
 from strapdown.navigation.recorder import IntervalRecorder
 from strapdown.navigation.replay import PipelineRun, run_batch
 from strapdown.progress import Progress
-from strapdown.tables import EULER, GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
+from strapdown.tables import POSITION_SD, VELOCITY_SD
 from strapdown.tables.checks import index_of, values_of
 
 __all__ = ["Advice", "IntegrityReport", "Repeated", "assess_integrity", "repeat_without"]
@@ -76,7 +73,6 @@ class Advice:
 
     Attributes
     ----------
-    span : LightSpan
     time : float, s
         Last second of the span.
     sd : float, deg
@@ -98,7 +94,6 @@ class IntegrityReport:
 
     Attributes
     ----------
-    light : HeadingIntegrity
     unwitnessed : tuple of Finding
         Why no independent heading check was possible; empty where one was.
     north_sd : float, deg
@@ -150,27 +145,21 @@ def assess_integrity(
         Pipeline of the run, with the uncertainty of its sensors.
     filter_ : ErrorFilter
         Its filter without states of measurements, for independent solutions.
-    imu : DataFrame
     tables : mapping of str to DataFrame
         By name of the measurement.
-    run : PipelineRun
     limits_deg : tuple of float, (2,), deg
         Error limit for a trusted heading (green), and 95 % bound of a rejected one (red).
     repeat : bool
         Whether to run again excluding the first inconsistent measurement.
     progress : callable
         Called with a stage and its completed share.
-
-    Returns
-    -------
-    IntegrityReport
     """
     record = run.record
     green, red = limits_deg
     ellipsoid = find_ellipsoid(chain.navigator.filter.mechanization.ellipsoid)
     progress("judging the heading", 0.0)
     consistency = consistency_of_all(record.innovations)
-    evidence: list[Evidence] = []
+    evidence: list[HeadingCheck] = []
     made, why = None, _unable(chain, record)
     try:
         if why is None:
@@ -186,7 +175,7 @@ def assess_integrity(
     north_sd = north_within(chain.sensors, float(record.trajectory["lat"].iloc[0]), ellipsoid)
     carried, no_north = _carried(chain, imu, run, north_sd, green)
     sources = agreeing_sources(chain, record, carried)
-    heard: list[Heard] = [*evidence, *carried, *sources]
+    heard = [*evidence, *carried, *sources]
     light = heading_light(record, heard, recent_scatter(record), green=green, red=red)
     found = inconsistencies(consistency, record.innovations, lasting(chain.navigator.aids))
     repeated = None
@@ -215,7 +204,7 @@ def assess_integrity(
 
 def _carried(
     chain: NavigationPipeline, imu: pd.DataFrame, run: PipelineRun, north_sd: float, green: float
-) -> tuple[list[CarriedHeading], tuple[Finding, ...]]:
+) -> tuple[list[HeadingCheck], tuple[Finding, ...]]:
     """Headings carried from rests, or why there are none."""
     sensors, record = chain.sensors, run.record
     assert sensors is not None
@@ -249,7 +238,7 @@ def _unable(chain: NavigationPipeline, record: NavigationRecord) -> Finding | No
 
 def _advice(
     light: HeadingIntegrity,
-    evidence: list[Evidence],
+    evidence: list[HeadingCheck],
     made: Witnesses | None,
     record: NavigationRecord,
 ) -> tuple[Advice, ...]:
@@ -272,13 +261,14 @@ def _advice(
 def _advised(
     span: LightSpan,
     time: float,
-    evidence: list[Evidence],
+    evidence: list[HeadingCheck],
     made: Witnesses,
     record: NavigationRecord,
 ) -> Advice:
     told = [(e, int(np.searchsorted(e.time, time))) for e in evidence]
     told = [(e, k) for e, k in told if k < len(e.time) and e.time[k] == time]
-    start = _state(record, time)
+    row = int(np.searchsorted(record.trajectory.index, time - 1e-6))
+    start = state_of_row(record.trajectory.iloc[row])
     best, at = min(told, key=lambda pair: pair[0].sd[pair[1]])
     filter_ = made.navigator.filter
     mark = max(int(np.searchsorted(index_of(record.sd), time + 1e-6)) - 1, 0)
@@ -307,16 +297,6 @@ def _typical(table: pd.DataFrame, columns: list[str], factor: float) -> Array | 
     sd = values_of(table, columns)
     sd = sd[np.isfinite(sd).all(axis=1) & (sd > 0.0).all(axis=1)]
     return np.asarray(factor * np.median(sd, axis=0)) if len(sd) else None
-
-
-def _state(record: NavigationRecord, time: float) -> NavState:
-    row = record.trajectory.iloc[int(np.searchsorted(record.trajectory.index, time - 1e-6))]
-    lat, lon, alt = (float(row[c]) for c in GEODETIC)
-    roll, pitch, heading = (float(row[c]) for c in EULER)
-    v_n = row[VELOCITY].to_numpy(dtype=np.float64)
-    return NavState.from_degrees(
-        lat, lon, alt, v_n=v_n, roll_deg=roll, pitch_deg=pitch, heading_deg=heading
-    )
 
 
 # Re-run of the navigation without the inconsistent measurements.
@@ -373,19 +353,10 @@ def repeat_without(
 
     Parameters
     ----------
-    chain : NavigationPipeline
-    imu : DataFrame
-    tables : mapping of str to DataFrame
     record : NavigationRecord
         Result of the run.
     found : sequence of Inconsistency
         The first is excluded; of gross errors all those of the same measurement.
-    ellipsoid : Ellipsoid
-    progress : callable
-
-    Returns
-    -------
-    Repeated
     """
     aids, told, change = _changed(chain.navigator.aids, tables, found)
     changed = replace(chain, navigator=replace(chain.navigator, aids=aids, smoother=None))

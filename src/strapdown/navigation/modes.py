@@ -63,12 +63,6 @@ class Until:
         be met if both are given.
     least : float, s
         Time before the first attempt.
-    pause : float
-
-    Raises
-    ------
-    ConfigError
-        A number is invalid, or the mode has no end condition.
     """
 
     duration: float = field(default=math.inf, metadata={"unit": "s"})
@@ -108,13 +102,7 @@ class Until:
 
 @dataclass(frozen=True)
 class Mode:
-    """Mode of a pipeline.
-
-    Attributes
-    ----------
-    name : str
-    until : Until
-    """
+    """Mode of a pipeline."""
 
     kind: ClassVar[str]
 
@@ -128,7 +116,6 @@ class CoarseMode(Mode):
 
     Attributes
     ----------
-    way : CoarseAlignment
     window : float, s
         Length of the newest samples to align; the whole mode, if not given. A vehicle that waits
         for an hour and then drives is aligned by its last minute.
@@ -143,12 +130,7 @@ class CoarseMode(Mode):
 
 @dataclass(frozen=True)
 class FineMode(Mode):
-    """Fine alignment: attitude and biases by a filter at rest, after a coarse alignment.
-
-    Attributes
-    ----------
-    way : FineAlignment
-    """
+    """Fine alignment: attitude and biases by a filter at rest, after a coarse alignment."""
 
     kind: ClassVar[str] = "fine"
 
@@ -170,15 +152,8 @@ def check_timeline(modes: tuple[Mode, ...], known_start: bool) -> None:
 
     Parameters
     ----------
-    modes : tuple of Mode
     known_start : bool
         Whether the initial state is stated.
-
-    Raises
-    ------
-    ConfigError
-        The last mode is not navigation, a name occurs twice, a fine alignment comes first, an
-        alignment mode never ends, or there is neither an alignment nor a known state.
     """
     names = [mode.name for mode in modes]
     for name in names:
@@ -226,11 +201,6 @@ class KnownStart:
         Roll, pitch, heading.
     at_first_sample : bool
         Whether the state is that of the first sample, whatever its time.
-
-    Raises
-    ------
-    ConfigError
-        A standard deviation is negative or not a number.
     """
 
     state: NavState
@@ -273,12 +243,10 @@ class Aligned:
 
     Attributes
     ----------
-    mode : str
     begin, end : float, s
         Of the mode.
     alignment : Alignment
         At its end.
-    fine : FineResult or None
     """
 
     mode: str

@@ -24,7 +24,7 @@ from strapdown.estimation.error_filter import (
 )
 from strapdown.estimation.robust import AdaptiveRule, Scales
 from strapdown.nav_state import NavState
-from strapdown.navigation.compiled_engine import CompiledEngine, Fixed, compiled
+from strapdown.navigation.compiled_engine import CompiledEngine, compiled
 from strapdown.navigation.engine import (
     SAME_INSTANT,
     Engine,
@@ -113,18 +113,26 @@ class Navigator:
         """Aids by their names."""
         return {aid.name: aid for aid in self.aids}
 
+    @cached_property
+    def tables(self) -> tuple[str, ...]:
+        """Names of the aids with tables."""
+        return tuple(aid.name for aid in self.aids if isinstance(aid, TabulatedMeasurement))
+
+    def tabulated(self, name: str) -> TabulatedMeasurement:
+        """Return the aid with a table that has this name; any other name is refused."""
+        aid = self.by_name.get(name)
+        if isinstance(aid, TabulatedMeasurement):
+            return aid
+        code = "navigation.no-aid-table"
+        raise ConfigError(code, quantity="aiding", name=name, word=name, known=self.tables)
+
     def begin(self, start: NavState, P: Array) -> NavigatorState:
         """Return the state at a start.
 
         Parameters
         ----------
-        start : NavState
         P : ndarray, (p, p)
             As `ErrorFilter.begin`.
-
-        Returns
-        -------
-        NavigatorState
         """
         return self.begin_from(self.filter.begin(start, P))
 
@@ -147,25 +155,10 @@ class Navigator:
 
         Parameters
         ----------
-        state : NavigatorState
         name : str
             Of the aid.
-        table : DataFrame
-
-        Returns
-        -------
-        NavigatorState
         """
-        aid = self.by_name.get(name)
-        if not isinstance(aid, TabulatedMeasurement):
-            raise ConfigError(
-                "navigation.no-aid-table",
-                quantity="aiding",
-                name=name,
-                word=name,
-                known=[a.name for a in self.aids if isinstance(a, TabulatedMeasurement)],
-            )
-        more = aid.epochs(table)
+        more = self.tabulated(name).epochs(table)
         queue = state.queues[name]
         if queue.time.size:
             # An epoch may be before those of an earlier row: a velocity with a delay.
@@ -181,16 +174,10 @@ class Navigator:
 
         Parameters
         ----------
-        state : NavigatorState
         time : ndarray, (k,), s
             Ends of the steps.
         rows : ndarray, (k, 10)
             Rows of a MotionIncrements table.
-
-        Returns
-        -------
-        state : NavigatorState
-        piece : NavigationChunk
 
         Raises
         ------
@@ -205,10 +192,6 @@ class Navigator:
 
     def finish(self, state: NavigatorState) -> NavigationChunk:
         """Return a mark of the newest sample, after the last epoch; the state is unchanged.
-
-        Parameters
-        ----------
-        state : NavigatorState
 
         Returns
         -------
@@ -229,17 +212,7 @@ class Navigator:
 
 
 def with_states(filter_: ErrorFilter, aids: tuple[Measurement, ...]) -> ErrorFilter:
-    """Return a filter whose model has the states of the aids, too.
-
-    Parameters
-    ----------
-    filter_ : ErrorFilter
-    aids : tuple of Aid
-
-    Returns
-    -------
-    ErrorFilter
-    """
+    """Return a filter whose model has the states of the aids, too."""
     more = tuple(state for aid in aids for state in aid.states())
     model = replace(filter_.model, sensors=(*filter_.model.sensors, *more))
     return replace(filter_, model=model)
@@ -403,7 +376,7 @@ class EpochLoop:
             made, fixed, stopped = engine.propagate_with_fixes(
                 time, rows, self.history, made, notes, arm, usual
             )
-            done = len(fixed.told)
+            done = len(fixed[0])
             self._fixed(aid, queue, fixed)
             queue = Epochs(queue.time[done:], queue.values[done:])
             if stopped:
@@ -421,19 +394,18 @@ class EpochLoop:
         count = int(np.argmax(ends)) if ends.any() else len(ends)
         return Epochs(queue.time[:count], queue.values[:count])
 
-    def _fixed(self, aid: Gnss, fixes: Epochs, fixed: Fixed) -> None:
+    def _fixed(self, aid: Gnss, fixes: Epochs, fixed: tuple[Array, ...]) -> None:
         """Record the results of position fixes."""
-        count = len(fixed.told)
-        codes, times = fixes.values[:count, 0].tolist(), fixed.time.tolist()
+        time, innovations, *marks = fixed
+        count, times = len(time), time.tolist()
+        codes = fixes.values[:count, 0].tolist()
         names = {code: aid.names(code) for code in set(codes)}
-        told = map(Innovations, fixed.told[:, 0], fixed.told[:, 1], fixed.told[:, 2])
+        told = map(Innovations, innovations[:, 0], innovations[:, 1], innovations[:, 2])
         self.seen += [
             InnovationRecord(at, *names[code], nu)
             for at, code, nu in zip(times, codes, told, strict=True)
         ]
-        for mark in map(
-            CovarianceSnapshot, times, fixed.covariance, fixed.sensors, fixed.sensors_sd
-        ):
+        for mark in map(CovarianceSnapshot, times, *marks):
             self._add_mark(mark)
         if count:
             self.observed = times[-1]

@@ -62,7 +62,6 @@ class Share:
 
     Attributes
     ----------
-    source : Source
     sd : ndarray, (k,)
         Standard deviation of its errors at the begin of the outage, in SI; empty for white noise.
     variance : mapping of str to ndarray, (n,)
@@ -177,10 +176,6 @@ def forecast(
     aided : bool
         Whether measurements remain.
     progress : callable, optional
-
-    Returns
-    -------
-    Forecast
     """
     interval = max(outage / INSTANTS, navigator.filter.step)
     navigator = replace(navigator, mark_interval=interval)
@@ -288,10 +283,6 @@ BIASES = {triad: (f"{triad}_bias", f"{triad}_drift") for triad in ("gyro", "acce
 def sources_of(model: ErrorModel) -> tuple[Source, ...]:
     """Return the sources of drift of an error model.
 
-    Parameters
-    ----------
-    model : ErrorModel
-
     Returns
     -------
     tuple of Source
@@ -333,16 +324,8 @@ def scaled(
 
     Parameters
     ----------
-    navigator : Navigator
     state : NavigatorState
         At the begin of the outage.
-    source : Source
-    factor : float
-
-    Returns
-    -------
-    navigator : Navigator
-    state : NavigatorState
     """
     model = navigator.filter.model
     if source.name in ("gyro_noise", "accel_noise"):

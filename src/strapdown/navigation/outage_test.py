@@ -18,7 +18,7 @@ from strapdown.errors import ConfigError
 from strapdown.estimation.covariance import Step
 from strapdown.evaluation.plane_bound import PLANE_95, plane_reach
 from strapdown.navigation.measurements.measurement import TabulatedMeasurement
-from strapdown.navigation.navigator import Navigator, NavigatorState
+from strapdown.navigation.navigator import Navigator
 from strapdown.navigation.pipeline import NavigationPipeline, PipelineState
 from strapdown.navigation.record import InnovationRecord, NavigationChunk, Span
 from strapdown.progress import Progress
@@ -35,10 +35,7 @@ __all__ = [
     "end_of_what_tells",
     "score_of",
     "score_of_smoothed",
-    "score_withheld",
-    "score_withheld_smoothed",
     "score_withholding",
-    "scores_table",
     "spans_to_withhold",
     "withheld_runs",
 ]
@@ -62,7 +59,6 @@ class WithheldScore:
 
     Attributes
     ----------
-    span : Span
     time : ndarray, (n,), s
         Of the fixes that were withheld, on the clock of the inertial sensors.
     error : ndarray, (n, 3), m
@@ -119,17 +115,11 @@ def spans_to_withhold(begin: float, end: float, length: float, places: int = 5) 
     begin, end : float, s
         Interval with fixes in which the filter has settled.
     length : float, s
-    places : int
 
     Returns
     -------
     tuple of Span
         They overlap if the interval is too short; each is tested by itself.
-
-    Raises
-    ------
-    ConfigError
-        The record is too short for one span.
     """
     room = end - begin - length
     if room < 0.0 or places < 1 or not length > 0.0:
@@ -144,112 +134,13 @@ def spans_to_withhold(begin: float, end: float, length: float, places: int = 5) 
     return tuple(Span(f"{length:g} s", float(at), float(at + length)) for at in starts)
 
 
-def score_withheld(
-    navigator: Navigator,
-    state: NavigatorState,
-    time: Array,
-    rows: Array,
-    name: str,
-    table: pd.DataFrame,
-    spans: Sequence[Span],
-) -> tuple[WithheldScore, ...]:
-    """Navigate with all fixes up to each span, and without fixes through it.
-
-    The aid stays in the navigator and its innovations are computed, but not used. Spans are
-    independent: the run continued after a span has used its fixes.
-
-    Parameters
-    ----------
-    navigator : Navigator
-    state : NavigatorState
-        At the start; the tables of the other aids have been given.
-    time : ndarray, (n,), s
-    rows : ndarray, (n, 10)
-        As `Navigator.advance`, from the state on.
-    name : str
-        Of the aid; its observation ``NAME.position`` is scored.
-    table : DataFrame
-        Of the aid, not given yet.
-    spans : sequence of Span
-        On the clock of the inertial sensors.
-
-    Returns
-    -------
-    tuple of WithheldScore
-        In the order of the spans.
-
-    Raises
-    ------
-    ConfigError
-        The aid does not exist, or a span has no fixes or is not within the record.
-    """
-    blind = blinded(navigator, name)
-    state = navigator.tell(state, name, table)
-    found: dict[int, WithheldScore] = {}
-    at = 0
-    for k in sorted(range(len(spans)), key=lambda k: spans[k].begin):
-        span = spans[k]
-        first, last = np.searchsorted(time, [span.begin, span.end], side="right").tolist()
-        if first < at or first == last or span.end > time[-1]:
-            raise ConfigError(
-                "evaluation.not-within-record",
-                quantity="withhold",
-                begin=span.begin,
-                end=span.end,
-                time=state.time,
-                time_2=time[-1],
-            )
-        state, _ = navigator.advance(state, time[at:first], rows[at:first])
-        at = first
-        found[k] = _score(blind, state, time[first:last], rows[first:last], name, span)
-    return tuple(found[k] for k in range(len(spans)))
-
-
-def scores_table(scores: Sequence[WithheldScore]) -> pd.DataFrame:
-    """Return scores as a table.
-
-    Parameters
-    ----------
-    scores : sequence of WithheldScore
-
-    Returns
-    -------
-    DataFrame
-        By begin of the span in s: its ``length`` s and ``fixes``; of the largest horizontal error
-        ``error`` m, ``bound`` m (95 %), ``distance`` (Mahalanobis, 2.45 at the bound); ``down``
-        m, the largest error of height; ``inside``, the share of the fixes within their bounds.
-    """
-    rows = []
-    for one in scores:
-        worst = int(np.argmax(one.horizontal))
-        rows.append(
-            {
-                "length": one.span.end - one.span.begin,
-                "fixes": len(one.time),
-                "error": one.largest,
-                "bound": float(one.bound[worst]),
-                "distance": float(one.distance[worst]),
-                "down": float(np.abs(one.error[:, 2]).max()),
-                "inside": float(np.mean(one.distance <= PLANE_95)),
-            }
-        )
-    begins = pd.Index([one.span.begin for one in scores], name="begin")
-    return pd.DataFrame(rows, index=begins)
-
-
 def blinded(navigator: Navigator, name: str) -> Navigator:
     """Return a navigator that computes an aid's innovations without using them.
 
     Parameters
     ----------
-    navigator : Navigator
     name : str
         Of the aid.
-
-    Raises
-    ------
-    ConfigError
-        No such aid with a table exists.
     """
     aid = navigator.by_name.get(name)
     if not isinstance(aid, TabulatedMeasurement):
@@ -265,31 +156,13 @@ def blinded(navigator: Navigator, name: str) -> Navigator:
     return replace(navigator, aids=blind)
 
 
-def _score(
-    blind: Navigator, state: NavigatorState, time: Array, rows: Array, name: str, span: Span
-) -> WithheldScore:
-    _, piece = blind.advance(state, time, rows)
-    return score_of([piece], name, span)
-
-
 def score_of(pieces: Sequence[NavigationChunk], name: str, span: Span) -> WithheldScore:
     """Score a navigator over a span in which an aid's innovations were computed but not used.
 
     Parameters
     ----------
-    pieces : sequence of NavigationChunk
     name : str
         Of the aid; its observation ``NAME.position`` is scored.
-    span : Span
-
-    Returns
-    -------
-    WithheldScore
-
-    Raises
-    ------
-    ConfigError
-        The aid has no fixes there.
     """
     seen = seen_of(pieces, name, span)
     time = np.array([one.time for one in seen])
@@ -305,16 +178,10 @@ def seen_of(pieces: Sequence[NavigationChunk], name: str, span: Span) -> list[In
 
     Parameters
     ----------
-    pieces : sequence of NavigationChunk
     name : str
         Of the aid.
     span : Span
         For messages.
-
-    Raises
-    ------
-    ConfigError
-        The span has no innovations.
     """
     seen = [one for piece in pieces for one in piece.seen if one.name == f"{name}.position"]
     if not seen:
@@ -347,52 +214,6 @@ def end_of_what_tells(span: Span) -> float:
     return span.end + max(AFTER * (span.end - span.begin), LEAST_AFTER)
 
 
-def score_withheld_smoothed(
-    navigator: Navigator,
-    state: NavigatorState,
-    time: Array,
-    rows: Array,
-    name: str,
-    spans: Sequence[Span],
-) -> tuple[WithheldScore, ...]:
-    """Score a navigator's smoother over spans without fixes, each by itself.
-
-    Parameters
-    ----------
-    navigator : Navigator
-        With a smoother.
-    state : NavigatorState
-        At the start, with the fixes.
-    time : ndarray, (n,), s
-    rows : ndarray, (n, 10)
-        As `Navigator.advance`, from the state on.
-    name : str
-        Of the aid; its observation ``NAME.position`` is scored.
-    spans : sequence of Span
-        In the order of time, within the record.
-
-    Returns
-    -------
-    tuple of WithheldScore
-
-    Raises
-    ------
-    ConfigError
-        The aid does not exist, or a span has no fixes.
-    """
-    blind = blinded(navigator, name)
-    found, at = [], 0
-    for span in spans:
-        ends = [span.begin, span.end, end_of_what_tells(span)]
-        first, last, after = np.searchsorted(time, ends, side="right").tolist()
-        state, _ = navigator.advance(state, time[at:first], rows[at:first])
-        at = first
-        through, piece = blind.advance(state, time[first:last], rows[first:last])
-        _, later = navigator.advance(through, time[last:after], rows[last:after])
-        found.append(score_of_smoothed(navigator, [piece], [later], name, span))
-    return tuple(found)
-
-
 def score_of_smoothed(
     navigator: Navigator,
     pieces: Sequence[NavigationChunk],
@@ -415,16 +236,6 @@ def score_of_smoothed(
         That follow, with the aid.
     name : str
         Of the aid, which is a receiver.
-    span : Span
-
-    Returns
-    -------
-    WithheldScore
-
-    Raises
-    ------
-    ConfigError
-        The aid has no fixes there.
     """
     assert navigator.smoother is not None
     seen = seen_of(pieces, name, span)
@@ -480,8 +291,6 @@ def score_withholding(
 
     Parameters
     ----------
-    chain : NavigationPipeline
-    imu : DataFrame
     tables : mapping of str to DataFrame
         By name of the measurement.
     name : str
@@ -490,17 +299,11 @@ def score_withholding(
         The test outages.
     begun : float, s
         Begin of navigation.
-    progress : callable
 
     Returns
     -------
     tuple of Withheld
         In the order of the outages.
-
-    Raises
-    ------
-    ConfigError
-        An outage is not within the run, or has no fixes.
     """
     time = index_of(imu)
     values = values_of(imu, [*GYRO, *ACCEL])
@@ -550,7 +353,6 @@ class WithheldRun:
         At its end.
     rows : slice
         Of its samples.
-    pieces : tuple of NavigationChunk
     """
 
     number: int
@@ -572,7 +374,6 @@ def withheld_runs(
 
     Parameters
     ----------
-    chain : NavigationPipeline
     blind : NavigationPipeline
         The same without use of the withheld fixes (`blinded`).
     state : PipelineState

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from statistics import median
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -16,7 +16,6 @@ from strapdown.alignment.alignment import Site
 from strapdown.errors import ConfigError, DataError, DivergenceError
 from strapdown.estimation.error_filter import FilterState
 from strapdown.navigation.handover import align, from_state, handed_over, unused_fixes
-from strapdown.navigation.measurements.measurement import TabulatedMeasurement
 from strapdown.navigation.modes import (
     Aligned,
     CoarseMode,
@@ -38,9 +37,6 @@ from strapdown.navigation.preprocessing import (
 from strapdown.navigation.record import Event, GrowingRows, InnovationRecord, NavigationChunk, Span
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables.checks import is_number
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 __all__ = [
     "MeasurementMonitor",
@@ -65,7 +61,6 @@ class Rejected:
     Attributes
     ----------
     begin, end : float, s
-    count : int
     largest : float
         In expected standard deviations.
     """
@@ -104,7 +99,6 @@ class MeasurementMonitorState:
 
     Attributes
     ----------
-    aids : mapping of str to MeasurementStatus
     rejected : mapping of str to Rejected
         By name of the observation.
     late : mapping of str to Rejected
@@ -129,11 +123,6 @@ class MeasurementMonitor:
         A measurement with a table is in outage when it is silent for longer than this multiple of
         its own interval, the median of the last five. Before the second observation there is no
         interval, and an outage at the start is reported at its end.
-
-    Raises
-    ------
-    ConfigError
-        The number is not above 1.
     """
 
     outage: float = 3.0
@@ -160,8 +149,6 @@ class MeasurementMonitor:
 
         Parameters
         ----------
-        state : MeasurementMonitorState
-        piece : NavigationChunk
         time : float, s
             Time of the newest step.
 
@@ -275,7 +262,6 @@ class PipelineState:
 
     Attributes
     ----------
-    intake : ImuPreprocessorState
     mode : int
         Index of the mode in the pipeline's `modes`.
     begun : float, s
@@ -292,7 +278,6 @@ class PipelineState:
         Pending commands.
     holes : tuple of Hole
         Gaps that the steps have not reached yet.
-    navigator : NavigatorState or None
     deliveries : MeasurementMonitorState
         Measurements received so far.
     time : float, s
@@ -326,8 +311,6 @@ class NavigationPipeline:
 
     Attributes
     ----------
-    navigator : Navigator
-    intake : ImuPreprocessor
     modes : tuple of Mode
         The last is navigation.
     start : KnownStart, optional
@@ -343,7 +326,6 @@ class NavigationPipeline:
     fixes : str, optional
         Name of the measurement whose table holds the fixes of an alignment; the first GNSS
         receiver, if not given.
-    commands : tuple of Command
     deliveries : MeasurementMonitor
         Reports outages, recoveries and rejections.
 
@@ -373,13 +355,13 @@ class NavigationPipeline:
             raise ConfigError("navigation.no-alignment-after-gap", quantity="gaps")
         for command in self.commands:
             self._check_word(command.word)
-        if self.fixes is not None and self.fixes not in self._tables():
+        if self.fixes is not None and self.fixes not in self.navigator.tables:
             raise ConfigError(
                 "navigation.no-aid-table-2",
                 quantity="fixes",
                 fixes=self.fixes,
                 word=self.fixes,
-                known=self._tables(),
+                known=self.navigator.tables,
             )
 
     @property
@@ -406,11 +388,11 @@ class NavigationPipeline:
             next_try=np.inf,
             kept=GrowingRows.of(KEPT),
             aligned=None,
-            told=dict.fromkeys(self._tables(), ()),
+            told=dict.fromkeys(self.navigator.tables, ()),
             commands=tuple(sorted(self.commands, key=lambda one: one.time)),
             holes=(),
             navigator=None,
-            deliveries=self.deliveries.begin(self._tables()),
+            deliveries=self.deliveries.begin(self.navigator.tables),
             time=-np.inf,
         )
 
@@ -419,14 +401,8 @@ class NavigationPipeline:
 
         Parameters
         ----------
-        state : PipelineState
         name : str
             Name of the measurement.
-        table : DataFrame
-
-        Returns
-        -------
-        PipelineState
 
         Raises
         ------
@@ -443,17 +419,8 @@ class NavigationPipeline:
                 if self.intake.gaps.beyond == "align"
                 else state
             )
-        aid = self.navigator.by_name.get(name)
-        if not isinstance(aid, TabulatedMeasurement):
-            raise ConfigError(
-                "navigation.no-aid-table",
-                quantity="aiding",
-                name=name,
-                word=name,
-                known=self._tables(),
-            )
         # Validated on arrival, not after an alignment.
-        aid.epochs(table)
+        self.navigator.tabulated(name).epochs(table)
         return self._remembering(state, name, table)
 
     def command(self, state: PipelineState, word: str, time: float = -np.inf) -> PipelineState:
@@ -461,7 +428,6 @@ class NavigationPipeline:
 
         Parameters
         ----------
-        state : PipelineState
         word : str
             As `Command.word`.
         time : float, s
@@ -478,18 +444,12 @@ class NavigationPipeline:
 
         Parameters
         ----------
-        state : PipelineState
         time : ndarray, (k,), s
             Stamps.
         values : ndarray, (k, 6)
             Rates in rad/s and specific forces in m/s², axes of the sensors.
         last : bool
             Whether no sample follows: a pre-filter then releases its delayed samples.
-
-        Returns
-        -------
-        state : PipelineState
-        piece : PipelineChunk
 
         Raises
         ------
@@ -515,11 +475,6 @@ class NavigationPipeline:
             known = tuple(one for one in known if one.index[-1] > state.time - REMEMBERED)
         return replace(state, told={**state.told, name: (*known, table)})
 
-    def _tables(self) -> tuple[str, ...]:
-        return tuple(
-            aid.name for aid in self.navigator.aids if isinstance(aid, TabulatedMeasurement)
-        )
-
     def _check_word(self, word: str) -> None:
         words = ("next", *(mode.name for mode in self.modes[1:]))
         if word not in words:
@@ -540,13 +495,7 @@ TIME, VALUES, ROWS = 0, slice(1, 7), slice(7, 17)
 
 
 class ModeSequencer:
-    """Mode sequence during one chunk.
-
-    Parameters
-    ----------
-    chain : NavigationPipeline
-    state : PipelineState
-    """
+    """Mode sequence during one chunk."""
 
     def __init__(self, chain: NavigationPipeline, state: PipelineState) -> None:
         self._chain = chain
@@ -616,10 +565,7 @@ class ModeSequencer:
         gap = {"length": hole.length, "begin": hole.begin, "end": hole.end}
         if hole.length > policy.coast and policy.beyond == "refuse":
             raise DataError(
-                "navigation.gap",
-                file=self._state.intake.source,
-                quantity="time",
-                data=gap,
+                "navigation.gap", file=self._state.intake.source, quantity="time", data=gap
             )
         anew = hole.length > policy.coast and policy.beyond == "align"
         code = "gap-before-alignment" if anew else "gap-bridged"
@@ -685,11 +631,7 @@ class ModeSequencer:
             if state.navigator is not None:
                 self._navigation.append(self._chain.navigator.finish(state.navigator))
             self._state = replace(
-                state,
-                begun=np.nan,
-                kept=GrowingRows.of(ROWS.stop),
-                aligned=None,
-                navigator=None,
+                state, begun=np.nan, kept=GrowingRows.of(ROWS.stop), aligned=None, navigator=None
             )
             return
         if state.navigator is not None:

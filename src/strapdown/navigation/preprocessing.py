@@ -20,7 +20,7 @@ from strapdown.estimation.error_filter import symmetric
 from strapdown.increments.motion import IncrementStream, IncrementStreamState
 from strapdown.navigation.navigator import Navigator, NavigatorState
 from strapdown.navigation.record import GrowingRows
-from strapdown.prefilter.prefilter import CHANNELS, Grid, Prefilter
+from strapdown.prefilter.prefilter import CHANNELS, Grid, Portion, Prefilter
 from strapdown.sensors.saturation import ROUNDING
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GYRO
@@ -28,8 +28,6 @@ from strapdown.tables.checks import index_of, is_number, values_of
 
 __all__ = [
     "NEAR",
-    "Filtered",
-    "Filtering",
     "FilteringState",
     "GapPolicy",
     "Hole",
@@ -99,14 +97,9 @@ def joined_steps(
 
     Parameters
     ----------
-    intake : ImuPreprocessor
     imu : DataFrame
         Imu table.
     begin, end : float, s
-
-    Returns
-    -------
-    JoinedSteps
     """
     ends, joined = [np.empty(0)], [np.empty((0, 10))]
     for steps in steps_of(intake, imu, begin, end):
@@ -145,119 +138,85 @@ class FilteringState:
     newest: Array = field(default_factory=lambda: np.empty((0, 6)))
 
 
-@dataclass(frozen=True, eq=False)
-class Filtered:
-    """Output of a pre-filter.
+def begin_filtering(
+    prefilter: Prefilter, first: Array, means: bool, source: str | None
+) -> FilteringState:
+    """Return the state before the first sample; the first stamps, s, give the step."""
+    try:
+        grid = Grid(0.0, even_step(first), means)
+    except DataError as error:
+        f = error.finding
+        raise DataError(
+            "navigation.prefilter-needs-even-stamps",
+            file=source,
+            row=f.row,
+            quantity=f.quantity,
+            reason=f,
+        ) from None
+    try:
+        return FilteringState(grid, prefilter.begin(grid, 6))
+    except ConfigError as error:
+        if error.finding.quantity != "rate":
+            raise
+        raise error.replaced(file=source, quantity="prefilter, rate_hz") from None
 
-    Attributes
-    ----------
-    time : ndarray, (m,), s
-        On the clock of the samples, corrected for the delay of the filter.
-    values : ndarray, (m, 6)
-    rows : ndarray, (m, 10) or (0, 10)
-        Motion increments, if the pre-filter computes them.
+
+def advance_filtering(
+    prefilter: Prefilter,
+    state: FilteringState,
+    time: Array,
+    values: Array,
+    last: bool,
+    source: str | None,
+) -> tuple[FilteringState, Portion]:
+    """Process samples whose stamps may drift against an even grid; `last` ends the input.
+
+    The stamps of the output are on the clock of the samples, corrected for the delay of the filter.
     """
+    numbers = _numbered(state, time, source)
+    all_numbers = np.concatenate([state.numbers, numbers])
+    all_stamps = np.concatenate([state.stamps, time])
+    known = len(state.newest)
+    nodes = np.concatenate([state.newest, values])
+    at = all_numbers[len(all_numbers) - len(nodes) :]
+    if len(nodes) > 1 and np.diff(at).max() > 1.0:
+        every = np.arange(at[0], at[-1] + 1.0)
+        nodes = np.column_stack([np.interp(every, at, column) for column in nodes.T])
+    inner, portion = prefilter.advance(state.inner, np.ascontiguousarray(nodes[known:]), last)
+    # For means, some filters have outputs midway between two samples.
+    wanted = np.rint(2.0 * portion.time / state.grid.step) / 2.0
+    stamps = np.interp(wanted, all_numbers, all_stamps) if wanted.size else np.empty(0)
+    keep = min(len(all_numbers), 1) - 1
+    if wanted.size:
+        keep = int(np.searchsorted(all_numbers, wanted[-1], side="right")) - 1
+    keep = max(keep, 0)
+    after = FilteringState(
+        state.grid,
+        inner,
+        all_numbers[keep:].copy(),
+        all_stamps[keep:].copy(),
+        values[-1:].copy() if len(values) else state.newest,
+    )
+    return after, replace(portion, time=stamps)
 
-    time: Array
-    values: Array
-    rows: Array
 
-
-@dataclass(frozen=True)
-class Filtering:
-    """Pre-filter for samples whose stamps may drift against an even grid.
-
-    Attributes
-    ----------
-    prefilter : Prefilter
-    """
-
-    prefilter: Prefilter
-
-    def begin(self, first: Array, means: bool, source: str | None) -> FilteringState:
-        """Return the state before the first sample.
-
-        Parameters
-        ----------
-        first : ndarray, s
-            First stamps of the record, which give the step.
-        means : bool
-            Whether samples are means over the step before them.
-        source : str, optional
-            Name for messages.
-
-        Raises
-        ------
-        DataError
-            The stamps are uneven.
-        """
-        try:
-            grid = Grid(0.0, even_step(first), means)
-        except DataError as error:
-            f = error.finding
-            raise DataError(
-                "navigation.prefilter-needs-even-stamps",
-                file=source,
-                row=f.row,
-                quantity=f.quantity,
-                reason=f,
-            ) from None
-        try:
-            return FilteringState(grid, self.prefilter.begin(grid, 6))
-        except ConfigError as error:
-            if error.finding.quantity != "rate":
-                raise
-            raise error.replaced(file=source, quantity="prefilter, rate_hz") from None
-
-    def advance(
-        self, state: FilteringState, time: Array, values: Array, last: bool, source: str | None
-    ) -> tuple[FilteringState, Filtered]:
-        """Process further samples; `last` ends the input."""
-        numbers = self._numbered(state, time, source)
-        all_numbers = np.concatenate([state.numbers, numbers])
-        all_stamps = np.concatenate([state.stamps, time])
-        known = len(state.newest)
-        nodes = np.concatenate([state.newest, values])
-        at = all_numbers[len(all_numbers) - len(nodes) :]
-        if len(nodes) > 1 and np.diff(at).max() > 1.0:
-            every = np.arange(at[0], at[-1] + 1.0)
-            nodes = np.column_stack([np.interp(every, at, column) for column in nodes.T])
-        inner, portion = self.prefilter.advance(
-            state.inner, np.ascontiguousarray(nodes[known:]), last
+def _numbered(state: FilteringState, time: Array, source: str | None) -> Array:
+    """Grid indices of stamps."""
+    stamps = np.concatenate([state.stamps[-1:], time])
+    steps = np.rint(np.diff(stamps) / state.grid.step)
+    if steps.size and not steps.min() >= 1.0:
+        row = int(np.argmin(steps))
+        raise DataError(
+            "navigation.samples-uneven",
+            file=source,
+            quantity="time",
+            stamps=stamps[row],
+            stamps_2=stamps[row + 1],
+            step=state.grid.step,
         )
-        # For means, some filters have outputs midway between two samples.
-        wanted = np.rint(2.0 * portion.time / state.grid.step) / 2.0
-        stamps = np.interp(wanted, all_numbers, all_stamps) if wanted.size else np.empty(0)
-        keep = min(len(all_numbers), 1) - 1
-        if wanted.size:
-            keep = int(np.searchsorted(all_numbers, wanted[-1], side="right")) - 1
-        keep = max(keep, 0)
-        after = FilteringState(
-            state.grid,
-            inner,
-            all_numbers[keep:].copy(),
-            all_stamps[keep:].copy(),
-            values[-1:].copy() if len(values) else state.newest,
-        )
-        return after, Filtered(stamps, portion.values, portion.rows)
-
-    def _numbered(self, state: FilteringState, time: Array, source: str | None) -> Array:
-        """Grid indices of stamps."""
-        stamps = np.concatenate([state.stamps[-1:], time])
-        steps = np.rint(np.diff(stamps) / state.grid.step)
-        if steps.size and not steps.min() >= 1.0:
-            row = int(np.argmin(steps))
-            raise DataError(
-                "navigation.samples-uneven",
-                file=source,
-                quantity="time",
-                stamps=stamps[row],
-                stamps_2=stamps[row + 1],
-                step=state.grid.step,
-            )
-        if state.numbers.size:
-            return np.asarray(state.numbers[-1] + np.cumsum(steps))
-        return np.concatenate([np.zeros(min(1, len(time))), np.cumsum(steps)])
+    if state.numbers.size:
+        return np.asarray(state.numbers[-1] + np.cumsum(steps))
+    return np.concatenate([np.zeros(min(1, len(time))), np.cumsum(steps)])
 
 
 # Gaps in the inertial data: policy and added uncertainty.
@@ -348,10 +307,8 @@ def widened(navigator: Navigator, state: NavigatorState, hole: Hole) -> Navigato
 
     Parameters
     ----------
-    navigator : Navigator
     state : NavigatorState
         At the begin of the gap.
-    hole : Hole
 
     Returns
     -------
@@ -424,7 +381,6 @@ class RangeEnds:
 
         Parameters
         ----------
-        state : RangeState
         time : ndarray, (k,), s
         values : ndarray, (k, 6)
 
@@ -554,7 +510,6 @@ class ImuPreprocessorState:
     tail : GrowingRows
         Stamp and values, in body axes, of the samples held until then; afterwards of at least the
         last second.
-    filtering : FilteringState or None
     stream : IncrementStreamState or None
         None if the pre-filter computes the increments, and until this is known.
     own : bool
@@ -594,7 +549,6 @@ class ImuPreprocessor:
         The stamps of its output are corrected for its delay; the output is later by it.
     stream : IncrementStream, optional
         Linear for raw samples, cubic after a pre-filter, if not given.
-    gaps : GapPolicy
     ends : RangeEnds, optional
         Range ends of the sensors, in body axes.
     """
@@ -639,17 +593,11 @@ class ImuPreprocessor:
 
         Parameters
         ----------
-        state : ImuPreprocessorState
         time : ndarray, (k,), s
         values : ndarray, (k, 6)
             rad/s and m/s².
         last : bool
             Whether no sample follows.
-
-        Returns
-        -------
-        state : ImuPreprocessorState
-        steps : ImuIncrements
 
         Raises
         ------
@@ -699,14 +647,11 @@ class ImuPreprocessor:
                 quantity="time",
                 count=len(time),
             )
-        state = replace(
-            state,
-            usual=float(np.quantile(np.diff(time), 0.95, method="lower")),
-        )
+        state = replace(state, usual=float(np.quantile(np.diff(time), 0.95, method="lower")))
         if self.prefilter is None:
             return replace(state, stream=self.increments.begin(state.sampling))
         means = state.sampling == "mean"
-        return replace(state, filtering=Filtering(self.prefilter).begin(time, means, state.source))
+        return replace(state, filtering=begin_filtering(self.prefilter, time, means, state.source))
 
     def _holes(
         self, state: ImuPreprocessorState, known: int
@@ -741,8 +686,8 @@ class ImuPreprocessor:
             assert before is not None
             if len(time) and state.stream is None and not state.own and state.first is None:
                 state = replace(state, first=(float(time[0]), values[0].copy()))
-            filtering, out = Filtering(self.prefilter).advance(
-                before, time, values, last, state.source
+            filtering, out = advance_filtering(
+                self.prefilter, before, time, values, last, state.source
             )
             state = replace(state, filtering=filtering)
             time, values = out.time, out.values

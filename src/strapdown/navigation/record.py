@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from strapdown.errors import Finding
 from strapdown.estimation.covariance import Innovations, Observation
+from strapdown.nav_state import NavState
+from strapdown.tables import EULER, GEODETIC, VELOCITY
 
 __all__ = [
     "CovarianceSnapshot",
@@ -21,6 +23,7 @@ __all__ = [
     "NavigationChunk",
     "NavigationRecord",
     "Span",
+    "state_of_row",
 ]
 
 
@@ -56,7 +59,6 @@ class Span:
 
     Attributes
     ----------
-    name : str
     begin, end : float, s
     """
 
@@ -89,7 +91,6 @@ class NavigationRecord:
         ``weight LABEL``.
     events : tuple of Event
         In the order of time.
-    modes : tuple of Span
     outages : mapping of str to tuple of Span
         By name of the aid.
     """
@@ -104,6 +105,16 @@ class NavigationRecord:
     events: tuple[Event, ...] = ()
     modes: tuple[Span, ...] = ()
     outages: Mapping[str, tuple[Span, ...]] = field(default_factory=dict)
+
+
+def state_of_row(row: pd.Series) -> NavState:
+    """Position, velocity and attitude of a row of a Trajectory table; without its time."""
+    lat, lon, alt = (float(row[c]) for c in GEODETIC)
+    roll, pitch, heading = (float(row[c]) for c in EULER)
+    v_n = row[VELOCITY].to_numpy(dtype=np.float64)
+    return NavState.from_degrees(
+        lat, lon, alt, v_n=v_n, roll_deg=roll, pitch_deg=pitch, heading_deg=heading
+    )
 
 
 # Output of a navigator for a chunk of a log.
@@ -202,10 +213,6 @@ class GrowingRows:
     """Rows of numbers: an immutable value; longer values share its memory.
 
     Appending to the newest value costs only the new rows; appending to an older one copies it.
-
-    Attributes
-    ----------
-    count : int
     """
 
     room: _Room

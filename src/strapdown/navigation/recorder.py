@@ -75,11 +75,6 @@ class IntervalRecorder(Recorder):
     Attributes
     ----------
     rate_hz : float, Hz
-
-    Raises
-    ------
-    ConfigError
-        The rate is invalid.
     """
 
     name: ClassVar[str] = "interval"
@@ -121,7 +116,6 @@ class Tape:
 
     Attributes
     ----------
-    navigator : Navigator
     rate : float, Hz
         Most states and marks a second; infinite for all.
     """
@@ -173,10 +167,6 @@ class Tape:
         smoothing : Smoothing, optional
             Of the same chunks: states and marks are smoothed; innovations are the filter's.
 
-        Returns
-        -------
-        NavigationRecord
-
         Raises
         ------
         DataError
@@ -209,11 +199,7 @@ class Tape:
         return NavigationRecord(
             trajectory=trajectory,
             sd=trajectory_error_table(
-                time,
-                sd[:, :3],
-                sd[:, 3:6],
-                euler_sd(euler, covariance[:, 6:, 6:]),
-                source,
+                time, sd[:, :3], sd[:, 3:6], euler_sd(euler, covariance[:, 6:, 6:]), source
             ),
             covariance=covariance.copy(),
             sensors=pd.DataFrame(marks[:, 82 : 82 + count].copy(), index=time, columns=labels),
@@ -262,15 +248,10 @@ def record_of(
 
     Parameters
     ----------
-    navigator : Navigator
     pieces : sequence of NavigationChunk
         At least one sample and one mark.
     source : str, optional
         Name for messages.
-
-    Returns
-    -------
-    NavigationRecord
     """
     tape = FullRecorder().begin(navigator)
     for piece in pieces:

@@ -43,7 +43,6 @@ class PipelineRun:
 
     Attributes
     ----------
-    record : NavigationRecord
     aligned : tuple of Aligned
         Result of each alignment mode.
     smoothed : NavigationRecord or None
@@ -60,7 +59,6 @@ class Recording:
 
     Parameters
     ----------
-    chain : NavigationPipeline
     recorder : Recorder, optional
         All samples, if not given.
     """
@@ -119,7 +117,6 @@ def run_batch(
 
     Parameters
     ----------
-    chain : NavigationPipeline
     imu : DataFrame
         Imu table.
     tables : mapping of str to DataFrame, optional
@@ -130,15 +127,6 @@ def run_batch(
         Called with the mode and the share that is done.
     chunk : float, s
         Length of the chunks of the record; limits the size of copies.
-
-    Returns
-    -------
-    PipelineRun
-
-    Raises
-    ------
-    DataError, ConfigError, DivergenceError
-        As `NavigationPipeline.advance` and `NavigationPipeline.tell`.
     """
     recording = Recording(chain, recorder)
     begin, end = float(imu.index[0]), float(imu.index[-1])
@@ -165,10 +153,6 @@ def run_by_sample(
     ahead : float, s
         Time by which table rows precede the samples of their stamps; at least the known delay of a
         measurement with late stamps.
-
-    Returns
-    -------
-    PipelineRun
     """
     recording = Recording(chain, recorder)
     for piece in pieces_by_sample(chain, imu, tables, ahead):

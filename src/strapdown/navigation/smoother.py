@@ -95,7 +95,6 @@ class Smoothing:
 
     Parameters
     ----------
-    navigator : Navigator
     memory : int, bytes
     """
 
@@ -115,10 +114,6 @@ class Smoothing:
         ----------
         marks : ndarray, (m,), s
             Times of the marks of the run for which covariances are computed.
-
-        Returns
-        -------
-        Smoothed
         """
         n, time = self._tape.size, self._tape.times()
         of_mark = np.clip(np.searchsorted(time, marks + SAME_MARK, side="right") - 1, 0, None)
@@ -224,7 +219,6 @@ class Smoothed:
 
     Attributes
     ----------
-    mechanization : Mechanization
     time : ndarray, (k,), s
         Of the nodes.
     errors : ndarray, (k, 9)
@@ -293,11 +287,6 @@ class SmoothingTape:
     size : int
         Number of physical errors, p.
     memory : int, bytes
-
-    Raises
-    ------
-    ConfigError
-        From `take`: the folder for temporary files has no room.
     """
 
     def __init__(self, size: int, memory: int) -> None:

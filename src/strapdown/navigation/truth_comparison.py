@@ -136,11 +136,6 @@ def compare_with_truth(
         `NavigationRecord.covariance`.
     truth : DataFrame or EarthMotion
         Trajectory table of any rate, on the same clock (`trajectory_at`), or the motion itself.
-    ellipsoid : Ellipsoid
-
-    Returns
-    -------
-    TruthComparison
 
     Raises
     ------
@@ -200,17 +195,11 @@ def compare_with_places(
         correlated with its own.
     antenna : sequence of float, (3,), m
         Point of the positions, from the point that the trajectory describes, in body axes.
-    ellipsoid : Ellipsoid
 
     Returns
     -------
     TruthComparison
         Of the position alone.
-
-    Raises
-    ------
-    DataError
-        No position is within the run; a covariance is not positive.
     """
     stamps = trajectory.index.to_numpy(dtype=np.float64)
     instants = np.asarray(marks, dtype=np.float64)
@@ -253,7 +242,6 @@ def state_errors(computed: pd.DataFrame, true: pd.DataFrame, ellipsoid: Ellipsoi
     ----------
     computed, true : DataFrame
         Trajectory tables of the same instants.
-    ellipsoid : Ellipsoid
     """
     a, b = (table[TRAJECTORY].to_numpy(dtype=np.float64) for table in (computed, true))
     q_a, q_b = (rotation.quaternion_from_euler(x[:, 6:]) for x in (a, b))
@@ -388,11 +376,6 @@ def normalised_squares(errors: Array, covariance: Array) -> Array:
     Returns
     -------
     ndarray, (...)
-
-    Raises
-    ------
-    DataError
-        A covariance is not positive definite; its first epoch is named.
     """
     sd = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
     if not np.all(sd > 0.0):
@@ -476,11 +459,6 @@ def smoother_consistency(
     ----------
     forward, smoothed : NavigationRecord
         Of one run.
-    ellipsoid : Ellipsoid
-
-    Returns
-    -------
-    SmootherConsistency
     """
     columns = list(TRAJECTORY_ERROR)
     apart = trajectory_differences(forward.trajectory, smoothed.trajectory, ellipsoid)

@@ -73,7 +73,6 @@ class Portion:
         Samples at these stamps, of the kind given by `Prefilter.sampling`.
     rows : ndarray, (m, 10) or (0, 10)
         Motion increments ending at these stamps, if the prefilter forms them itself.
-    changed : Changed
     """
 
     time: Array
@@ -92,7 +91,6 @@ class Prefiltered:
         Imu table.
     increments : DataFrame
         MotionIncrements table over the same time, the input of a mechanization.
-    report : PrefilterReport
     """
 
     imu: pd.DataFrame
@@ -114,7 +112,6 @@ class Prefilter(ABC):
 
         Parameters
         ----------
-        grid : Grid
         channels : int
             Three gyros, then three accelerometers if present.
         """
@@ -155,10 +152,6 @@ class Prefilter(ABC):
         ----------
         imu : DataFrame
             Imu table with even stamps, with or without accelerometers.
-
-        Returns
-        -------
-        Prefiltered
 
         Raises
         ------
@@ -211,13 +204,7 @@ class Prefilter(ABC):
 
 
 def grid_of(imu: pd.DataFrame) -> Grid:
-    """Return the evenly spaced stamps of a table.
-
-    Raises
-    ------
-    DataError
-        The stamps are uneven; the message names the row.
-    """
+    """Return the evenly spaced stamps of a table."""
     time = index_of(imu)
     try:
         step = even_step(time)
@@ -227,13 +214,7 @@ def grid_of(imu: pd.DataFrame) -> Grid:
 
 
 def whole_factor(rate: float, grid: Grid, name: str) -> int:
-    """Samples per output.
-
-    Raises
-    ------
-    ConfigError
-        The rate does not divide the sample rate.
-    """
+    """Samples per output."""
     own = 1.0 / grid.step
     if not (math.isfinite(rate) and rate > 0.0):
         raise ConfigError("prefilter.rate-not-positive", quantity="rate", rate=rate)
@@ -309,7 +290,6 @@ class PrefilterReport:
 
     Attributes
     ----------
-    name : str
     delay : float, s
         Group delay of the filter, the same for all channels and frequencies; the output stamps are
         corrected for it.
@@ -326,7 +306,6 @@ class PrefilterReport:
         As `replaced`, for outlying samples that were kept because one side confirms them.
     share : dict
         Replaced fraction of each channel.
-    findings : tuple of Finding
     """
 
     name: str

@@ -45,7 +45,6 @@ class RobustFir(Prefilter):
         End of the passband as a fraction of the output's Nyquist frequency.
     attenuation : float, dB
         From that Nyquist frequency on.
-    outliers : OutlierDesign
     steps : tuple of float, optional
         Quantization steps of the channels, as `OutlierDesign.begin`.
 

@@ -23,9 +23,6 @@ class SummedState:
 
     Attributes
     ----------
-    grid : Grid
-    factor : int
-    outliers : OutlierState
     given : int
         Outputs so far.
     values : ndarray, (k, c)
@@ -59,7 +56,6 @@ class Summed(Prefilter):
     ----------
     rate : float, Hz
         Output rate; must divide the sample rate.
-    outliers : OutlierDesign
     steps : tuple of float, optional
         As `OutlierDesign.begin`.
     """

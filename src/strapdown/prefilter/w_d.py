@@ -36,15 +36,12 @@ class RobustWdState:
 
     Attributes
     ----------
-    grid : Grid
-    channels : int
     noise : ndarray, (c,), or None
         None until enough samples are available to estimate it.
     waiting : ndarray, (k, c)
         Samples after the last whole epoch.
     taken, given : int
         Epochs filtered and epochs returned so far.
-    signals : tuple of SignalState
     """
 
     grid: Grid
@@ -76,7 +73,6 @@ class RobustWd(Prefilter):
         samples (median of the sixth difference).
     smooth : bool
         Whether later samples are used; without them the filter has no delay but has phase.
-    form, rule : CovarianceForm, UpdateRule
     """
 
     name: ClassVar[str] = "w_d"

@@ -19,7 +19,7 @@ from strapdown.report.alignment_trust import answer_error, trust
 from strapdown.report.document import draw_stills, finding_json, write_drawings, write_text
 from strapdown.report.document_html import document_page
 from strapdown.report.report_bundle import report_bundle, write_table
-from strapdown.systems.alignment_run import AlignmentResult, run_alignment
+from strapdown.systems.alignment_run import AlignmentRun, run_alignment
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import EULER
 
@@ -36,7 +36,7 @@ def rerun_alignment(configuration: dict[str, Any], out: Path, *, report: bool = 
 
 @one_thread()
 def write_alignment(
-    result: AlignmentResult,
+    result: AlignmentRun,
     out: str | Path,
     *,
     name: str | None = None,
@@ -48,7 +48,7 @@ def write_alignment(
 
     Parameters
     ----------
-    result : AlignmentResult
+    result : AlignmentRun
     out : str or Path
         Folder to create.
     name : str, optional
@@ -84,7 +84,7 @@ def write_alignment(
     return seals[0]
 
 
-def _attitude(result: AlignmentResult) -> pd.DataFrame:
+def _attitude(result: AlignmentRun) -> pd.DataFrame:
     """Attitude at the requested rate; column names carry units."""
     table = result.attitude
     rate = result.spec.output.rate_hz
@@ -114,7 +114,7 @@ def _history(history: pd.DataFrame) -> pd.DataFrame:
 # JSON of an alignment: attitude, bounds, findings and method.
 
 
-def alignment_json(result: AlignmentResult) -> dict[str, Any]:
+def alignment_json(result: AlignmentRun) -> dict[str, Any]:
     """Return an alignment as plain data for programs.
 
     Returns
@@ -195,7 +195,7 @@ def _attitude_alignment_json(one: Alignment) -> dict[str, Any]:
     }
 
 
-def _fine(result: AlignmentResult) -> dict[str, Any]:
+def _fine(result: AlignmentRun) -> dict[str, Any]:
     assert result.fine is not None
     end = result.fine.alignment
     return {
@@ -217,7 +217,7 @@ def _fine(result: AlignmentResult) -> dict[str, Any]:
     }
 
 
-def _prefilter(result: AlignmentResult) -> dict[str, Any] | None:
+def _prefilter(result: AlignmentRun) -> dict[str, Any] | None:
     report = result.prefilter
     if report is None:
         return None

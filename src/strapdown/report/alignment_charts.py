@@ -24,7 +24,7 @@ from strapdown.report.chart import (
 )
 from strapdown.report.values import NOT_KNOWN, angle_bound
 from strapdown.report.values import alignment_values_instant as instant
-from strapdown.systems.alignment_run import AlignmentResult
+from strapdown.systems.alignment_run import AlignmentRun
 from strapdown.tables import ACCEL, EULER, GYRO
 from strapdown.tables.checks import values_of
 
@@ -51,7 +51,7 @@ _OFF_WORDS = {
 }
 
 
-def readiness_chart(result: AlignmentResult) -> Chart:
+def readiness_chart(result: AlignmentRun) -> Chart:
     """Accuracy against alignment time, coarse and fine."""
     found = result.readiness
     length = result.spec.coarse.duration_s
@@ -107,7 +107,7 @@ def readiness_chart(result: AlignmentResult) -> Chart:
     )
 
 
-def signal_chart(result: AlignmentResult) -> Chart:
+def signal_chart(result: AlignmentRun) -> Chart:
     """Angular rate and specific force: as recorded, as aligned, and 1 s means."""
     panels = []
     for columns, factor, label in (
@@ -150,7 +150,7 @@ def _means(imu: pd.DataFrame, column: str, factor: float) -> Line:
     return curve("mean over 1 s", middle, value, BLACK, width=1.1, buckets=500)
 
 
-def attitude_chart(result: AlignmentResult) -> Chart:
+def attitude_chart(result: AlignmentRun) -> Chart:
     """Attitude over the record: the aligned attitude propagated by the gyros."""
     table = result.attitude
     time = table.index.to_numpy(dtype=np.float64)
@@ -186,7 +186,7 @@ def attitude_chart(result: AlignmentResult) -> Chart:
     )
 
 
-def bias_charts(result: AlignmentResult) -> tuple[Chart, ...]:
+def bias_charts(result: AlignmentRun) -> tuple[Chart, ...]:
     """Gyro and accelerometer biases over the fine alignment."""
     if result.fine is None:
         return ()
@@ -224,7 +224,7 @@ def bias_charts(result: AlignmentResult) -> tuple[Chart, ...]:
     return tuple(out)
 
 
-def innovation_chart(result: AlignmentResult) -> Chart | None:
+def innovation_chart(result: AlignmentRun) -> Chart | None:
     """Innovation of each epoch in its own standard deviations."""
     if result.fine is None:
         return None

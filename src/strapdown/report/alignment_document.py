@@ -39,7 +39,7 @@ from strapdown.report.values import (
 from strapdown.report.values import (
     alignment_values_instant as instant,
 )
-from strapdown.systems.alignment_run import AlignmentResult
+from strapdown.systems.alignment_run import AlignmentRun
 from strapdown.tables import ACCEL, EULER, GYRO, QUATERNION
 from strapdown.tables.checks import values_of
 
@@ -58,12 +58,12 @@ CONVENTIONS = (
 )
 
 
-def alignment_document(result: AlignmentResult, name: str) -> Document:
+def alignment_document(result: AlignmentRun, name: str) -> Document:
     """Return the report of an alignment.
 
     Parameters
     ----------
-    result : AlignmentResult
+    result : AlignmentRun
     name : str
         Folder name, for the verification command.
     """
@@ -98,14 +98,14 @@ def alignment_document(result: AlignmentResult, name: str) -> Document:
     return Document(title, headline(result), facts, front, sections, title)
 
 
-def _sensors(result: AlignmentResult) -> str:
+def _sensors(result: AlignmentRun) -> str:
     given = result.spec.sensors
     stated = [*(f"gyro {k}" for k in given.gyro), *(f"accel {k}" for k in given.accel)]
     parts = [given.sensor or ""] + ([f"stated: {', '.join(stated)}"] if stated else [])
     return "; ".join(p for p in parts if p)
 
 
-def _answer(result: AlignmentResult, reasons: tuple[Finding, ...]) -> tuple[Block, ...]:
+def _answer(result: AlignmentRun, reasons: tuple[Finding, ...]) -> tuple[Block, ...]:
     said = tuple(
         ("For it" if one.severity == "note" else "Against it", f"{one.sentence()}.")
         for one in reasons
@@ -117,7 +117,7 @@ def _answer(result: AlignmentResult, reasons: tuple[Finding, ...]) -> tuple[Bloc
     return tuple(blocks)
 
 
-def _more(result: AlignmentResult) -> tuple[Section, ...]:
+def _more(result: AlignmentRun) -> tuple[Section, ...]:
     """Section on the accuracy that a turn of the body would add."""
     table = turn_table(result)
     if table is None:
@@ -130,7 +130,7 @@ def _more(result: AlignmentResult) -> tuple[Section, ...]:
     return (Section("more", "What would make more known", (Paragraph(said), table)),)
 
 
-def _biases(result: AlignmentResult) -> tuple[Section, ...]:
+def _biases(result: AlignmentRun) -> tuple[Section, ...]:
     table: TableBlock | None = bias_table(result)
     if table is None:
         return ()
@@ -140,7 +140,7 @@ def _biases(result: AlignmentResult) -> tuple[Section, ...]:
     return (Section("sensors", "Drifts and biases", tuple(blocks)),)
 
 
-def _findings(result: AlignmentResult) -> tuple[Block, ...]:
+def _findings(result: AlignmentRun) -> tuple[Block, ...]:
     blocks: list[Block] = [findings_list(result.findings)]
     refused = result.readiness.refused
     if refused:
@@ -152,7 +152,7 @@ def _findings(result: AlignmentResult) -> tuple[Block, ...]:
     return tuple(blocks)
 
 
-def _method(result: AlignmentResult, name: str) -> tuple[Block, ...]:
+def _method(result: AlignmentRun, name: str) -> tuple[Block, ...]:
     taken = [
         (
             "",
@@ -181,7 +181,7 @@ def _method(result: AlignmentResult, name: str) -> tuple[Block, ...]:
 Array = NDArray[np.float64]
 
 
-def headline(result: AlignmentResult) -> str:
+def headline(result: AlignmentRun) -> str:
     """Return the answer in one sentence."""
     end = result.end
     angles = ", ".join(f"{EULER[k]} {angle_bound(end, k)}" for k in ORDER)
@@ -191,7 +191,7 @@ def headline(result: AlignmentResult) -> str:
     return f"{angles[0].upper()}{angles[1:]} at {instant(end.time)} ({bounds})."
 
 
-def key_figures(result: AlignmentResult) -> tuple[KeyFigure, ...]:
+def key_figures(result: AlignmentRun) -> tuple[KeyFigure, ...]:
     """Return the key figures at the top of the page."""
     out = []
     for k in ORDER:
@@ -207,7 +207,7 @@ def key_figures(result: AlignmentResult) -> tuple[KeyFigure, ...]:
     return tuple(out)
 
 
-def _bound_of(result: AlignmentResult, which: int) -> str:
+def _bound_of(result: AlignmentRun, which: int) -> str:
     if not bounds_hold(result):
         return "its bound does not hold: the record contradicts it"
     sd = float(result.end.sd_deg[which])
@@ -218,7 +218,7 @@ def _places(half: float) -> int:
     return min(5, max(1, 2 - math.floor(math.log10(half)))) if half > 0 else 2
 
 
-def limits(result: AlignmentResult) -> tuple[tuple[str, str], ...]:
+def limits(result: AlignmentRun) -> tuple[tuple[str, str], ...]:
     """Return the limiting error sources and their remedies."""
     site = result.site
     gyro, accel = prior_sd(result)
@@ -238,7 +238,7 @@ def limits(result: AlignmentResult) -> tuple[tuple[str, str], ...]:
     return tuple(out)
 
 
-def _heading_limit(result: AlignmentResult, east: float) -> tuple[str, str]:
+def _heading_limit(result: AlignmentRun, east: float) -> tuple[str, str]:
     """Limit of the heading for a 1-sigma east gyro drift in rad/s."""
     coarse, heading = result.coarse, float(result.end.sd_deg[2])
     across = float(np.linalg.norm(result.site.earth_rate[:2]))
@@ -276,13 +276,13 @@ def _heading_limit(result: AlignmentResult, east: float) -> tuple[str, str]:
     return ("Noise and motion limit the heading", f"{told}: a longer or quieter alignment helps.")
 
 
-def prior_sd(result: AlignmentResult) -> tuple[Array, Array]:
+def prior_sd(result: AlignmentRun) -> tuple[Array, Array]:
     """Standard deviations of the gyro and accelerometer errors before any estimation."""
     rate, force = (values_of(result.imu, columns).mean(axis=0) for columns in (GYRO, ACCEL))
     return resting_sd(result.sensors, rate, force)
 
 
-def _mean_attitude(result: AlignmentResult) -> Array:
+def _mean_attitude(result: AlignmentRun) -> Array:
     middle = values_of(result.attitude, QUATERNION)[len(result.attitude) // 2]
     return rotation.dcm_from_quaternion(middle)
 
@@ -294,7 +294,7 @@ def _mean_attitude(result: AlignmentResult) -> Array:
 SHOWN = (30.0, 60.0, 100.0, 300.0, 600.0)
 
 
-def answer_table(result: AlignmentResult) -> TableBlock:
+def answer_table(result: AlignmentRun) -> TableBlock:
     """Attitude at start and end from both alignments."""
     known = answer_error(result)
     columns = ["", "start", "end", "coarse alone"]
@@ -320,7 +320,7 @@ def answer_table(result: AlignmentResult) -> TableBlock:
     return TableBlock(tuple(columns), tuple(rows), text=(0,), strong=(0,))
 
 
-def bias_table(result: AlignmentResult) -> TableBlock | None:
+def bias_table(result: AlignmentRun) -> TableBlock | None:
     """Estimated gyro and accelerometer biases, and the reduction of their uncertainty."""
     if result.fine is None:
         return None
@@ -362,7 +362,7 @@ def _found(share: float) -> str:
     return "yes" if share > 0.7 else "in part"
 
 
-def readiness_table(result: AlignmentResult) -> TableBlock:
+def readiness_table(result: AlignmentRun) -> TableBlock:
     """Heading and level accuracy after given alignment times."""
     found = result.readiness
     whole = float(result.imu.index[-1] - result.imu.index[0])
@@ -395,7 +395,7 @@ def _bound(half: float, name: str) -> str:
     return f"{small(half)}°" if half < (180.0 if name == "heading_sd" else 90.0) else NOT_KNOWN
 
 
-def turn_table(result: AlignmentResult) -> TableBlock | None:
+def turn_table(result: AlignmentRun) -> TableBlock | None:
     """Predicted accuracy after a turn and a further stationary stretch, best heading first."""
     if not result.manoeuvres:
         return None
@@ -418,7 +418,7 @@ def turn_table(result: AlignmentResult) -> TableBlock | None:
     return TableBlock(columns, tuple(rows), text=(0,), caption=caption, strong=(0,))
 
 
-def method_rows(result: AlignmentResult) -> tuple[tuple[str, str], ...]:
+def method_rows(result: AlignmentRun) -> tuple[tuple[str, str], ...]:
     """Slots of the chain with their modules."""
     spec = result.spec
     rows = [("Record", f"{result.source.name}: {result.source.what}")]

@@ -13,7 +13,7 @@ from strapdown.alignment.fine import ROCKS
 from strapdown.constants import TWO_SIDED_95
 from strapdown.errors import Finding
 from strapdown.rotation import within_half_turn
-from strapdown.systems.alignment_run import AlignmentResult, reference_offset
+from strapdown.systems.alignment_run import AlignmentRun, reference_offset
 from strapdown.tables import EULER
 from strapdown.tables.checks import values_of
 
@@ -75,7 +75,7 @@ def reason(good: bool, code: str, **data: Any) -> Finding:
     return Finding(code, severity="note" if good else "warning", data=data)
 
 
-def answer_error(result: AlignmentResult) -> tuple[str, Array, float] | None:
+def answer_error(result: AlignmentRun) -> tuple[str, Array, float] | None:
     """Return the error against the truth or a reference, deg, with the reference's sd.
 
     Returns
@@ -95,7 +95,7 @@ def answer_error(result: AlignmentResult) -> tuple[str, Array, float] | None:
     return stated.source or "the reference", off, stated.sd_deg
 
 
-def trust(result: AlignmentResult) -> Trust:
+def trust(result: AlignmentRun) -> Trust:
     """Judge the answer by the evidence in its own record."""
     reasons: list[Finding] = []
     known = answer_error(result)
@@ -135,17 +135,17 @@ def trust(result: AlignmentResult) -> Trust:
     return Trust(verdict, tuple(reasons), _short(result, known is not None))
 
 
-def bounds_hold(result: AlignmentResult) -> bool:
+def bounds_hold(result: AlignmentRun) -> bool:
     """Whether the record is consistent with the bounds."""
     return all(one.severity == "note" for one in (*_agreement(result), *_surprises(result)))
 
 
-def _allowed(finding: Finding, result: AlignmentResult) -> bool:
+def _allowed(finding: Finding, result: AlignmentRun) -> bool:
     """Whether the coarse alignment method is designed for the condition of a finding."""
     return finding.code == ROCKS and result.coarse.method == "inertial_frame"
 
 
-def _short(result: AlignmentResult, known: bool) -> tuple[Finding, ...]:
+def _short(result: AlignmentRun, known: bool) -> tuple[Finding, ...]:
     codes = ["alignment.near-known"] if known else []
     if result.fine is not None:
         codes += ["alignment.coarse-and-fine-agree", "alignment.sensors-as-expected"]
@@ -154,7 +154,7 @@ def _short(result: AlignmentResult, known: bool) -> tuple[Finding, ...]:
     return tuple(reason(True, code) for code in codes)
 
 
-def _agreement(result: AlignmentResult) -> list[Finding]:
+def _agreement(result: AlignmentRun) -> list[Finding]:
     """Compare coarse and fine alignment at the end of the coarse alignment."""
     if result.fine is None:
         return []
@@ -178,7 +178,7 @@ def _agreement(result: AlignmentResult) -> list[Finding]:
     return out
 
 
-def _surprises(result: AlignmentResult) -> list[Finding]:
+def _surprises(result: AlignmentRun) -> list[Finding]:
     """Check the size of the fine-alignment innovations against their expected covariance."""
     if result.fine is None:
         return []

@@ -28,7 +28,7 @@ from strapdown.report.report_bundle import report_bundle
 from strapdown.report.values import spaced
 from strapdown.sensors.catalogue import SENSORS
 from strapdown.systems.one_thread import one_thread
-from strapdown.systems.outage_run import CoastResult, run_coast
+from strapdown.systems.outage_run import OutageRun, run_coast
 
 
 def read_coasting_run(source: str | Path) -> tuple[NavigationSpec | None, Path | None]:
@@ -110,7 +110,7 @@ def rerun_coast(configuration: dict[str, Any], out: Path, *, report: bool = True
 
 @one_thread()
 def write_coast(
-    result: CoastResult,
+    result: OutageRun,
     out: str | Path,
     *,
     name: str | None = None,
@@ -122,7 +122,7 @@ def write_coast(
 
     Parameters
     ----------
-    result : CoastResult
+    result : OutageRun
     out : str or Path
         Folder to create.
     name : str, optional
@@ -181,7 +181,7 @@ SHOWN = {
 }
 
 
-def coast_json(result: CoastResult) -> dict[str, Any]:
+def coast_json(result: OutageRun) -> dict[str, Any]:
     """Return an outage prediction as plain data for programs.
 
     Returns
@@ -245,12 +245,12 @@ def coast_json(result: CoastResult) -> dict[str, Any]:
     }
 
 
-def write_coast_tables(result: CoastResult, folder: Path) -> None:
+def write_coast_tables(result: OutageRun, folder: Path) -> None:
     """Write the cone, its error budget over time, and the observed drifts.
 
     Parameters
     ----------
-    result : CoastResult
+    result : OutageRun
     folder : Path
         ``cone.csv``, ``budget.csv``, and ``drifts.csv`` if there were fixes.
     """
@@ -283,7 +283,7 @@ def write_coast_tables(result: CoastResult, folder: Path) -> None:
         csv.write(folder / "drifts.csv", columns, {**told, "sign": "computed less fix"})
 
 
-def _variances(result: CoastResult) -> dict[str, Array]:
+def _variances(result: OutageRun) -> dict[str, Array]:
     if result.recorded is not None:
         return result.recorded.variance
     return {q: result.forecast.variance(q) for q in QUANTITIES}

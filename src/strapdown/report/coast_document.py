@@ -48,15 +48,15 @@ from strapdown.report.document import (
 )
 from strapdown.report.plan_view import ellipse
 from strapdown.report.values import GAP, duration_words, half, length_words, plain, share_words
-from strapdown.systems.outage_run import CoastResult, Drift
+from strapdown.systems.outage_run import Drift, OutageRun
 
 
-def coast_document(result: CoastResult, name: str) -> Document:
+def coast_document(result: OutageRun, name: str) -> Document:
     """Return the report of an outage prediction.
 
     Parameters
     ----------
-    result : CoastResult
+    result : OutageRun
     name : str
         Folder name, for the verification command.
     """
@@ -95,7 +95,7 @@ def coast_document(result: CoastResult, name: str) -> Document:
     )
 
 
-def _facts(result: CoastResult) -> tuple[tuple[str, str], ...]:
+def _facts(result: OutageRun) -> tuple[tuple[str, str], ...]:
     return (
         ("Sensor" if result.navigation is None else "Record", f"{result.name}: {result.what}"),
         ("Motion", motion_words(result)),
@@ -105,7 +105,7 @@ def _facts(result: CoastResult) -> tuple[tuple[str, str], ...]:
     )
 
 
-def _method(result: CoastResult, name: str) -> tuple[Block, ...]:
+def _method(result: OutageRun, name: str) -> tuple[Block, ...]:
     taken = [
         (
             "",
@@ -156,7 +156,7 @@ _BAR = 20
 _LEAST = 5e-4
 
 
-def time_table(result: CoastResult) -> TableBlock:
+def time_table(result: OutageRun) -> TableBlock:
     """Drift over the outage."""
     found, recorded = result.forecast, result.recorded
     grid = found.time if recorded is None else recorded.time
@@ -203,7 +203,7 @@ def time_table(result: CoastResult) -> TableBlock:
     )
 
 
-def budget_table(result: CoastResult) -> TableBlock:
+def budget_table(result: OutageRun) -> TableBlock:
     """Contribution of each error source to the horizontal drift at the end."""
     found = result.forecast
     whole = float(found.variance("horizontal")[-1])
@@ -246,7 +246,7 @@ def _part(part: float) -> tuple[str, str]:
     return size, "█" * round(_BAR * part) if part > 0.0 else ""
 
 
-def drift_table(result: CoastResult) -> TableBlock | None:
+def drift_table(result: OutageRun) -> TableBlock | None:
     """Table of the outage tests."""
     recorded = result.recorded
     drifts = [] if recorded is None else [d for d in recorded.drifts if d.time.size]
@@ -289,7 +289,7 @@ _CORNERS = 90
 _INSIDE, _OUTSIDE = "a drift that came, within its 95 %", "outside of it"
 
 
-def cone_chart(result: CoastResult) -> Chart:
+def cone_chart(result: OutageRun) -> Chart:
     """Cone over time with the observed drifts, and its error budget."""
     found, recorded = result.forecast, result.recorded
     if recorded is None:
@@ -336,7 +336,7 @@ def _tried(drifts: Sequence[Drift]) -> str:
     )
 
 
-def _came(result: CoastResult, value: object) -> list[Line]:
+def _came(result: OutageRun, value: object) -> list[Line]:
     """Observed drifts over time."""
     lines = []
     for d in () if result.recorded is None else result.recorded.drifts:
@@ -360,7 +360,7 @@ def _came(result: CoastResult, value: object) -> list[Line]:
     return lines
 
 
-def _stack(result: CoastResult) -> tuple[tuple[Fill, ...], str]:
+def _stack(result: OutageRun) -> tuple[tuple[Fill, ...], str]:
     """Bands of the error sources, as high as their shares of the variance."""
     found = result.forecast
     whole = np.maximum(found.variance("horizontal"), 1e-30)
@@ -394,7 +394,7 @@ def _stack(result: CoastResult) -> tuple[tuple[Fill, ...], str]:
     return tuple(fills), note
 
 
-def plane_chart(result: CoastResult) -> Chart:
+def plane_chart(result: OutageRun) -> Chart:
     """Possible drift seen from above, relative to the true position."""
     found, recorded = result.forecast, result.recorded
     if recorded is None:
@@ -454,7 +454,7 @@ def plane_chart(result: CoastResult) -> Chart:
     )
 
 
-def parts_chart(result: CoastResult) -> Chart:
+def parts_chart(result: OutageRun) -> Chart:
     """Along-track, cross-track, height, speed and heading over the outage."""
     found, recorded = result.forecast, result.recorded
     time = found.time if recorded is None else recorded.time
@@ -483,7 +483,7 @@ def parts_chart(result: CoastResult) -> Chart:
     )
 
 
-def budget_chart(result: CoastResult) -> Chart:
+def budget_chart(result: OutageRun) -> Chart:
     """Shares of the variance at the end, largest first."""
     found = result.forecast
     whole = float(found.variance("horizontal")[-1])

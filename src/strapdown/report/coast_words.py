@@ -19,7 +19,7 @@ from strapdown.report.values import (
     share_words,
     shown_unit,
 )
-from strapdown.systems.outage_run import CoastResult
+from strapdown.systems.outage_run import OutageRun
 
 _WORDS = {
     "position": "position at the start",
@@ -76,7 +76,7 @@ def source_words(name: str) -> str:
     return _WORDS.get(name, name.replace("_", " "))
 
 
-def at_start(share: Share, result: CoastResult) -> str:
+def at_start(share: Share, result: OutageRun) -> str:
     """Size of an error source at the start of the outage, with its unit."""
     name = share.source.name
     triad = result.sensors.gyro if name.startswith("gyro") else result.sensors.accel
@@ -109,13 +109,13 @@ def _three(value: float) -> str:
     return plain(value, min(6, max(0, 2 - math.floor(math.log10(abs(value))))))
 
 
-def end_bound(result: CoastResult) -> float:
+def end_bound(result: OutageRun) -> float:
     """95 % bound at the end of the outage, m; over all outage tests, if there were any."""
     bound = result.forecast.bound if result.recorded is None else result.recorded.bound
     return float(bound[-1])
 
 
-def motion_words(result: CoastResult) -> str:
+def motion_words(result: OutageRun) -> str:
     """The motion in words."""
     if result.navigation is not None:
         return "along its own trajectory"
@@ -136,7 +136,7 @@ def _speed(value: float) -> str:
     return f"{value:g}{GAP}m/s ({plain(KMH * value, 0)}{GAP}km/h)"
 
 
-def start_words(result: CoastResult) -> str:
+def start_words(result: OutageRun) -> str:
     """Knowledge of the state at the start of the outage, and its origin."""
     if result.recorded is not None:
         return "what its filter knew at each outage, with all that binds its errors"
@@ -157,13 +157,13 @@ def start_words(result: CoastResult) -> str:
     return text if not stated else f"{text}; stated: {', '.join(stated)}"
 
 
-def outage_words(result: CoastResult) -> str:
+def outage_words(result: OutageRun) -> str:
     """Length of the outage: ``60 s``."""
     seconds = result.spec.outage_s
     return f"{seconds:g}{GAP}s" if seconds < 600.0 else duration_words(seconds)
 
 
-def headline(result: CoastResult) -> str:
+def headline(result: OutageRun) -> str:
     """Return the answer in a sentence."""
     outage = outage_words(result)
     said = (
@@ -174,7 +174,7 @@ def headline(result: CoastResult) -> str:
     return f"{result.name}: {said}"
 
 
-def remedy(result: CoastResult) -> str:
+def remedy(result: OutageRun) -> str:
     """Return the largest contributor to the drift, and its remedy."""
     found = result.forecast
     whole = float(found.variance("horizontal")[-1])
@@ -193,7 +193,7 @@ def remedy(result: CoastResult) -> str:
     )
 
 
-def inside_words(result: CoastResult) -> str:
+def inside_words(result: OutageRun) -> str:
     """Number of observed drifts within the predicted bound; empty if none were observed."""
     drifts = [] if result.recorded is None else [d for d in result.recorded.drifts if d.time.size]
     if not drifts:
@@ -210,7 +210,7 @@ def inside_words(result: CoastResult) -> str:
     )
 
 
-def key_figures(result: CoastResult) -> tuple[KeyFigure, ...]:
+def key_figures(result: OutageRun) -> tuple[KeyFigure, ...]:
     """Return the key figures."""
     found = result.forecast
     said = "95 % at the end"

@@ -497,8 +497,12 @@ def _sensors(record: NavigationRecord) -> pd.DataFrame:
 
 
 def _column(name: str) -> str:
-    """Convert ``nu north, m`` to ``nu_north_m``."""
-    return re.sub(r"\W+", "_", name.replace("²", "2")).strip("_")
+    """Convert ``nu VN, m/s`` to ``nu_VN_m_s``, variances to ``s_VN_m2_s2``; no unit of weights."""
+    part, _, rest = name.partition(" ")
+    label, _, unit = rest.replace("²", "2").partition(", ")
+    if part == "s":
+        unit = re.sub(r"\w+", lambda u: f"{u.group()}2", unit)
+    return re.sub(r"\W+", "_", f"{part} {label} {'' if part == 'weight' else unit}").strip("_")
 
 
 def _write(path: Path, table: pd.DataFrame, told: dict[str, str]) -> None:

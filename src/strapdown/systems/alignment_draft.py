@@ -7,46 +7,57 @@ from dataclasses import MISSING, dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from strapdown.config.alignment import STAGES, AxesTable, LogTable
-from strapdown.config.choice import SLOTS, Slot, options_of
+from strapdown.config.choice import SLOTS, Kinds, Slot, options_of
 from strapdown.config.toml_text import ASK, Asked, Page, inline, string
 from strapdown.errors import Finding
 from strapdown.formats.recording import Recording
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.triad_errors import NAMED_AXES
 from strapdown.systems.alignment_source import body_record
+from strapdown.tables.checks import index_of
 
-__all__ = ["AlignmentDraft", "draft_alignment", "listed_kinds", "log_table_keys", "toml_value"]
+__all__ = [
+    "Draft",
+    "axes_table",
+    "draft_alignment",
+    "listed_kinds",
+    "log_table",
+    "options",
+    "stage",
+    "toml_value",
+]
 
 #: Grades of the catalogue with gyros for gyrocompassing, or nearly.
 GRADES = ("navigation", "tactical")
 
 
 @dataclass(frozen=True)
-class AlignmentDraft:
-    """Proposed alignment configuration as text.
+class Draft:
+    """Proposed configuration as text.
 
     Attributes
     ----------
-    text : str
     found : tuple of str
-        Findings from the log.
+        Findings from the log and the fixes.
     asked : tuple of Asked
         Questions that the user has to answer.
     findings : tuple of Finding
-        Findings of reading the log.
+        Findings of reading.
+    to_check : tuple of Asked
+        Assumptions to check.
     """
 
     text: str
     found: tuple[str, ...]
     asked: tuple[Asked, ...]
     findings: tuple[Finding, ...]
+    to_check: tuple[Asked, ...] = ()
 
 
-def draft_alignment(log: LogTable, *, folder: Path, axes: str | None = None) -> AlignmentDraft:
+def draft_alignment(log: LogTable, *, folder: Path, axes: str | None = None) -> Draft:
     """Write the proposed alignment configuration of a log.
 
     Parameters
@@ -57,15 +68,6 @@ def draft_alignment(log: LogTable, *, folder: Path, axes: str | None = None) -> 
         Folder of the configuration; the log is named relative to it.
     axes : str, optional
         Orientation of the sensor's axes, as `AxesTable.axes`.
-
-    Returns
-    -------
-    AlignmentDraft
-
-    Raises
-    ------
-    DataError, ConfigError
-        The log cannot be read; the message names file, row and remedy.
     """
     recording, imu, findings = body_record(log, AxesTable(axes=axes))
     page = Page()
@@ -73,39 +75,42 @@ def draft_alignment(log: LogTable, *, folder: Path, axes: str | None = None) -> 
         f"An alignment of {recording.name}: find roll, pitch and heading of a body that stands.",
         'Put what you know in place of each "?", then run: strapdown align on this file.',
     )
-    found = _log(page, log, folder, recording.name, imu)
+    found = log_table(page, log, folder, imu, recording.name, ", where the body stands")
     found += _site(page, recording)
-    _axes(page, axes)
+    axes_table(
+        page,
+        axes,
+        "matrix = [[1, 0, 0], [0, -1, 0], [0, 0, -1]]: any rotation; rows are the body's forward, "
+        "right, down along the sensor's x, y, z. gyro_matrix and accel_matrix, where they differ",
+        f"design = … by name: {', '.join(NAMED_AXES)}",
+    )
     _sensors(page)
     for name, one in STAGES.items():
-        _stage(page, SLOTS[name], one.default, one.empty)
+        stage(page, one, {})
+        if name == "coarse":
+            page.say("duration_s = 100.0: over the first part alone, and the fine one after it")
     _rest(page)
     text = "\n".join(page.lines) + "\n"
-    return AlignmentDraft(text, tuple(found), tuple(page.asked), findings)
+    return Draft(text, tuple(found), tuple(page.asked), findings)
 
 
-def _log(page: Page, log: LogTable, folder: Path, name: str, imu: pd.DataFrame) -> list[str]:
-    time = imu.index.to_numpy(dtype=np.float64)
-    rate = 1.0 / float(np.median(np.diff(time)))
-    span = f"{len(time)} samples, {time[0]:.6g} to {time[-1]:.6g} s, {rate:.4g} Hz"
+def log_table(
+    page: Page, log: LogTable, folder: Path, imu: pd.DataFrame, name: str, part: str = ""
+) -> list[str]:
+    """Write ``[log]`` with the keys that the user stated; return what the log is."""
+    time = index_of(imu)
+    rate = (len(time) - 1) / float(time[-1] - time[0])
+    span = f"{len(time)} samples, {time[0]:.9g} to {time[-1]:.9g} s, {rate:.4g} Hz"
     page.table("[log]", f"Found: {span}, {imu.attrs['sampling']} values.")
-    log_table_keys(page, log, folder)
-    if log.from_s is log.to_s is log.duration_s is None:
-        page.say(
-            f"from_s = {time[0]:.9g}, duration_s = 300.0 (or to_s): a part alone, where the body "
-            "stands"
-        )
-    return [f"{name}: {span}"]
-
-
-def log_table_keys(page: Page, log: LogTable, folder: Path) -> None:
-    """Write the keys of ``[log]`` that the user stated, with the path relative to the folder."""
     page.path("path", Path(log.path), folder)
     if log.columns:
         page.key("columns", inline(log.columns))
     for key, value in log.model_dump(exclude={"path", "columns"}).items():
         if value is not None and value is not False:
             page.key(key, toml_value(value) or "")
+    if log.from_s is log.to_s is log.duration_s is None:
+        page.say(f"from_s = {time[0]:.9g}, duration_s = 300.0 (or to_s): a part alone{part}")
+    return [f"{name}: {span}"]
 
 
 def _site(page: Page, recording: Recording) -> list[str]:
@@ -127,16 +132,15 @@ def _site(page: Page, recording: Recording) -> list[str]:
     return found
 
 
-def _axes(page: Page, axes: str | None) -> None:
+def axes_table(page: Page, axes: str | None, *further: str) -> None:
+    """Write ``[axes]``, with further remarks."""
     page.table("[axes]", "How the sensor's axes lie in the body, where the log does not say it.")
     if axes:
         page.key("axes", string(axes))
     page.say(
         'axes = "forward-left-up": where x, y, z of the sensor point; or "x,-y,-z", the axes that '
         "point forward, right, down",
-        "matrix = [[1, 0, 0], [0, -1, 0], [0, 0, -1]]: any rotation; rows are the body's forward, "
-        "right, down along the sensor's x, y, z. gyro_matrix and accel_matrix, where they differ",
-        f"design = … by name: {', '.join(NAMED_AXES)}",
+        *further,
     )
 
 
@@ -156,20 +160,58 @@ def _sensors(page: Page) -> None:
     )
 
 
-def _stage(page: Page, slot: Slot, default: str, empty: bool) -> None:
-    page.table(f"[{slot.name}]", f"{slot.title}:", *listed_kinds(slot, empty))
-    page.key("kind", string(default))
-    if default in slot.entries:
-        for option in options_of(slot.entries[default]):
-            value = toml_value(option.default)
-            if option.slot is not None:
-                choices = ", ".join(option.slot.entries)
-                said = value if option.default is not None else '"none"'
-                page.say(f"{option.key} = {said}    of {choices}")
-            elif value is not None:
-                page.say(f"{option.key} = {value}")
-    if slot.name == "coarse":
-        page.say("duration_s = 100.0: over the first part alone, and the fine one after it")
+def stage(page: Page, kinds: Kinds, chosen: Mapping[str, Any]) -> None:
+    """Write the table of a module: its chosen options, and the others as comments."""
+    slot = SLOTS[kinds.slot]
+    kind = chosen.get("kind", kinds.default)
+    page.table(f"[{slot.name}]", f"{slot.title}:", *listed_kinds(slot, kinds.empty))
+    page.key("kind", string(kind))
+    if kind in slot.entries:
+        options(page, slot.entries[kind], chosen)
+    keys = [o.key for o in options_of(slot.entries[kind])] if kind in slot.entries else []
+    for key, value in chosen.items():
+        if key != "kind" and key not in keys:
+            page.key(key, toml_value(value) or "", _ENDS.get(key, ""))
+
+
+#: End conditions of an alignment.
+_ENDS = {
+    "duration_s": "its end",
+    "window_s": "length of the latest part that is aligned",
+    "until_heading_sd_deg": "ends when the sd of heading is below",
+    "until_tilt_sd_deg": "and those of roll and pitch",
+}
+
+
+def options(page: Page, module: type, chosen: Mapping[str, Any]) -> None:
+    """Write chosen options as keys, the others as comments with their defaults."""
+    for option in options_of(module):
+        if option.key in chosen:
+            page.key(option.key, _inline(chosen[option.key]))
+            continue
+        value = toml_value(option.default)
+        if option.slot is not None:
+            said = value if option.default is not None else '"none"'
+            page.say(f"{option.key} = {said}    of {', '.join(option.slot.entries)}")
+        elif value is not None:
+            page.say(f"{option.key} = {value}")
+        elif option.default is MISSING:
+            page.key(option.key, ASK, f"only you know: {_WANTED.get(option.key, 'no default')}")
+
+
+def _inline(value: Any) -> str:
+    """Write a value, or a module with its options, on one line."""
+    if isinstance(value, Mapping):
+        parts = ", ".join(f"{key} = {_inline(one)}" for key, one in value.items())
+        return f"{{ {parts} }}"
+    return toml_value(value) or ""
+
+
+_WANTED = {
+    "heading_deg": "heading of the body at the start, clockwise from north (gyros that "
+    "find north at a rest of a minute need none: name their sensor with --sensor)",
+    "sd_deg": "how well it is known",
+}
 
 
 def listed_kinds(slot: Slot, empty: bool) -> list[str]:
@@ -208,5 +250,5 @@ def _rest(page: Page) -> None:
     page.blank()
     page.say(
         '[reference]: heading_deg, pitch_deg, roll_deg, sd_deg, at = "end" or "start", source: '
-        "an attitude that is known from elsewhere, to hold the answer beside",
+        "an attitude that is known from elsewhere, to hold the answer beside"
     )

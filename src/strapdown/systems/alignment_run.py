@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -20,12 +21,12 @@ from strapdown.alignment.readiness import (
     manoeuvres_after,
     readiness,
 )
-from strapdown.bundle.seal import InputFiles, input_files
+from strapdown.bundle.seal import InputFiles, Seal
 from strapdown.config.alignment import AlignmentSpec, ReferenceTable, sensors_of
 from strapdown.dsp.outliers import REPLACED, OutlierDesign
 from strapdown.dsp.samples import even_step
 from strapdown.ellipsoids import find_ellipsoid
-from strapdown.errors import DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.prefilter import Prefilter, PrefilterReport
 from strapdown.prefilter.prefilter import LOW_RATE
 from strapdown.progress import Progress, silent
@@ -34,13 +35,17 @@ from strapdown.sensors.health_log import LEAST_SAMPLES, ChannelFault
 from strapdown.sensors.imu_health import check_imu_channels
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.alignment_source import AlignmentSource, read_alignment_source
+from strapdown.systems.inputs import Memory, SavedRun, configuration_file
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, EULER, GYRO
 from strapdown.tables.checks import index_of, source_of, values_of
 
+if TYPE_CHECKING:
+    from strapdown.report.chart_figure import ChartFigure
+
 __all__ = [
     "AlignmentReadiness",
-    "AlignmentResult",
+    "AlignmentRun",
     "alignment_readiness",
     "channel_findings",
     "reference_offset",
@@ -49,34 +54,28 @@ __all__ = [
 ]
 
 
-@dataclass(frozen=True, eq=False)
-class AlignmentResult:
-    """Result of an alignment.
+@dataclass(frozen=True, eq=False, repr=False)
+class AlignmentRun(SavedRun):
+    """Result of an alignment; in memory until `save` writes it.
 
     Attributes
     ----------
     spec : AlignmentSpec
         With every option of every module.
-    source : AlignmentSource
     imu : DataFrame
         Aligned Imu table, after the pre-filter.
-    prefilter : PrefilterReport or None
-    site : Site
-    sensors : ImuUncertainty
-    coarse : Alignment
-    fine : FineResult or None
     start, end : Alignment
         The result at the first and at the last sample.
     attitude : DataFrame
         Attitude table over the record: the result, propagated by the gyros.
-    readiness : AlignmentReadiness
     manoeuvres : tuple of Manoeuvre
         Accuracy after a turn and a further rest; empty without a fine alignment.
-    inputs : tuple of InputFiles
     unread : tuple of Finding
         Intervals in which channels are silent.
     findings : tuple of Finding
         From reading, channels, pre-filter, coarse and fine alignment, in this order.
+    memory : Memory
+        Tables that are given in memory; files of the bundle.
     """
 
     spec: AlignmentSpec
@@ -95,12 +94,58 @@ class AlignmentResult:
     inputs: tuple[InputFiles, ...]
     unread: tuple[Finding, ...]
     findings: tuple[Finding, ...]
+    memory: Memory = field(default=Memory({}))
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Attitude table over the record by time in s: quaternion, and angles in deg."""
+        return self.attitude.copy()
+
+    def plot(self, kind: str = "attitude") -> ChartFigure:
+        """Draw roll, pitch and heading over time.
+
+        Parameters
+        ----------
+        kind : {'attitude', 'roll', 'pitch', 'heading'}
+
+        Returns
+        -------
+        ChartFigure
+            Displays itself in a notebook; `save` writes it as SVG, PNG or PDF.
+
+        Raises
+        ------
+        ConfigError
+            The chart does not exist.
+        """
+        from strapdown.report.alignment_charts import attitude_chart
+        from strapdown.report.chart_figure import ChartFigure
+
+        if kind not in ("attitude", *EULER):
+            raise ConfigError("api.unknown-chart", quantity="kind", kind=kind)
+        chart = attitude_chart(self)
+        if kind != "attitude":
+            chart = replace(chart, panels=(chart.panels[EULER.index(kind)],))
+        return ChartFigure(chart)
+
+    @staticmethod
+    def _writer() -> Callable[..., Seal]:
+        from strapdown.report.alignment import write_alignment
+
+        return write_alignment
+
+    def __repr__(self) -> str:
+        last = self.attitude.iloc[-1]
+        sd = self.end.sd_deg
+        angles = ", ".join(
+            f"{name} {last[name]:.4g}° ± {s:.2g}°" for name, s in zip(EULER, sd, strict=True)
+        )
+        return f"<AlignmentRun {self.source.name}: at the end {angles} (1 sd)>"
 
 
 @one_thread()
 def run_alignment(
     spec: AlignmentSpec, file: Path | None = None, progress: Progress = silent
-) -> AlignmentResult:
+) -> AlignmentRun:
     """Read a record and align it.
 
     Parameters
@@ -111,10 +156,6 @@ def run_alignment(
         Configuration file, listed as an input.
     progress : callable, optional
         Called with a stage and the share that is done.
-
-    Returns
-    -------
-    AlignmentResult
 
     Raises
     ------
@@ -177,7 +218,6 @@ def run_alignment(
     )
     progress("predicting the effect of a rotation", 0.66)
     manoeuvres = () if fine is None else manoeuvres_after(fine, site)
-    files = () if file is None else (input_files("configuration", str(file), (file,)),)
     of_filter = () if report is None else report.findings
     findings = [
         *source.findings,
@@ -186,7 +226,7 @@ def run_alignment(
         *coarse.findings,
         *(() if fine is None else fine.findings),
     ]
-    return AlignmentResult(
+    return AlignmentRun(
         spec=spec,
         source=source,
         imu=imu,
@@ -200,7 +240,7 @@ def run_alignment(
         attitude=attitude,
         readiness=curve,
         manoeuvres=manoeuvres,
-        inputs=(*files, *source.inputs),
+        inputs=(*configuration_file(file), *source.inputs),
         unread=unread,
         findings=tuple(dict.fromkeys(findings)),
     )
@@ -261,17 +301,11 @@ def channel_findings(imu: pd.DataFrame, sensors: ImuUncertainty) -> tuple[Findin
     ----------
     imu : DataFrame
         Recorded Imu table, body axes.
-    sensors : ImuUncertainty
 
     Returns
     -------
     tuple of Finding
         Short stretches; or that no channel ever changes.
-
-    Raises
-    ------
-    DataError
-        A channel is stuck, dead, saturated or not finite over more than a hundredth of the record.
     """
     if len(imu) < LEAST_SAMPLES:
         # The alignments refuse a record this short, and state the length needed.
@@ -510,10 +544,6 @@ def alignment_readiness(
     truth : DataFrame, optional
         Attitude table.
     reference : ReferenceTable, optional
-
-    Returns
-    -------
-    AlignmentReadiness
     """
     begin = float(imu.index[0])
     against = "answer" if truth is None else "truth"

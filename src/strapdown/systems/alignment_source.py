@@ -19,7 +19,6 @@ from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import files_of_fixes, read_gnss
 from strapdown.formats.recording import Reading, ReadOptions, Recording, StatedStart
 from strapdown.rotation import euler_from_dcm
-from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.triad_errors import (
     NAMED_AXES,
     axes_letters,
@@ -27,7 +26,7 @@ from strapdown.sensors.triad_errors import (
     report_transposed,
 )
 from strapdown.systems.inputs import part_of_log
-from strapdown.tables import ACCEL, GYRO
+from strapdown.tables import ACCEL, EULER, GYRO
 from strapdown.tables.checks import values_of
 
 __all__ = ["AlignmentSource", "axes_matrices", "body_record", "read_alignment_source"]
@@ -41,7 +40,6 @@ class AlignmentSource:
 
     Attributes
     ----------
-    name, what : str
     imu : DataFrame
         Imu table of the used span, body axes.
     truth : DataFrame or None
@@ -50,9 +48,6 @@ class AlignmentSource:
         Position and attitude stated in the file.
     gnss : DataFrame or None
         Gnss table, if given.
-    readings : tuple of Reading
-    inputs : tuple of InputFiles
-    findings : tuple of Finding
     """
 
     name: str
@@ -67,21 +62,7 @@ class AlignmentSource:
 
 
 def read_alignment_source(spec: AlignmentSpec) -> AlignmentSource:
-    """Read the log of a specification, or simulate its record.
-
-    Parameters
-    ----------
-    spec : AlignmentSpec
-
-    Returns
-    -------
-    AlignmentSource
-
-    Raises
-    ------
-    DataError, ConfigError
-        The input cannot be used; the message names file, row and remedy.
-    """
+    """Read the log of a specification, or simulate its record."""
     if spec.log is None:
         return _simulated(spec)
     recording, imu, findings = body_record(spec.log, spec.axes)
@@ -115,11 +96,6 @@ def body_record(
 ) -> tuple[Recording, pd.DataFrame, tuple[Finding, ...]]:
     """Read a log, rotate it into body axes, and cut it to the used span.
 
-    Parameters
-    ----------
-    log : LogTable
-    axes : AxesTable
-
     Returns
     -------
     recording : Recording
@@ -127,11 +103,6 @@ def body_record(
     imu : DataFrame
         Imu table of the span, body axes.
     findings : tuple of Finding
-
-    Raises
-    ------
-    DataError, ConfigError
-        The log cannot be used; the message names file, row and remedy.
     """
     gyro, accel = axes_matrices(axes)
     letters, turn = axes_letters(gyro) if gyro is not None else (axes.axes, None)
@@ -165,18 +136,9 @@ def _options(log: LogTable, axes: str | None) -> ReadOptions:
 def axes_matrices(axes: AxesTable) -> tuple[Array | None, Array | None]:
     """Rotation from sensor to body axes of gyros and accelerometers, where stated as matrices.
 
-    Parameters
-    ----------
-    axes : AxesTable
-
     Returns
     -------
     gyro, accel : ndarray, (3, 3), or None
-
-    Raises
-    ------
-    ConfigError
-        A matrix is not a rotation.
     """
     both = axes.matrix if axes.design is None else NAMED_AXES[axes.design]
     if both is not None:
@@ -228,41 +190,23 @@ def _sensor_file(spec: AlignmentSpec) -> tuple[InputFiles, ...]:
 
 
 def _simulated(spec: AlignmentSpec) -> AlignmentSource:
-    from strapdown.simulation import Origin, PathMotion, StationaryMotion, Wave, simulate_imu
+    from strapdown.config.motions import RockingStandSpec, StationarySpec
+    from strapdown.systems.trajectory_source import make_motion, simulate_samples
 
     asked = spec.simulation
     assert asked is not None  # one of the two is there
-    origin = Origin(spec.site.lat_deg, spec.site.lon_deg, spec.site.alt_m)
-    ellipsoid = find_ellipsoid(spec.site.ellipsoid)
-    waves = [
-        tuple(Wave(w.amplitude_deg, w.period_s, w.phase_deg) for w in group)
-        for group in (asked.roll_waves, asked.pitch_waves, asked.heading_waves)
-    ]
-    angles = (asked.roll_deg, asked.pitch_deg, asked.heading_deg)
-    motion = (
-        PathMotion(
-            asked.duration_s,
-            origin,
-            roll_deg=angles[0],
-            attack_deg=angles[1],
-            heading_deg=angles[2],
-            roll_waves=waves[0],
-            pitch_waves=waves[1],
-            heading_waves=waves[2],
-            ellipsoid=ellipsoid,
-        )
-        if any(waves)
-        else StationaryMotion(asked.duration_s, origin, *angles, ellipsoid)
+    waves = {name: getattr(asked, f"{name}_waves") for name in EULER}
+    keys = asked.model_dump(include={"duration_s", *(f"{name}_deg" for name in EULER)})
+    keys |= spec.site.model_dump(include={"lat_deg", "lon_deg", "alt_m"})
+    rocking = {f"{name}_waves": group for name, group in waves.items()}
+    stated = (
+        RockingStandSpec(kind="rocking_stand", **keys, **rocking)
+        if any(waves.values())
+        else StationarySpec(kind="stationary", **keys)
     )
     sensor = asked.sensor or spec.sensors.sensor
     assert sensor is not None  # checked with the specification
-    imu, truth = simulate_imu(
-        motion,
-        load_sensor(sensor).draw(asked.seed),
-        rate=asked.rate_hz,
-        sampling=asked.sampling,
-        seed=asked.seed,
-        source=spec.name,
-    )
+    motion = make_motion(stated, find_ellipsoid(spec.site.ellipsoid))
+    imu, truth = simulate_samples(motion, asked, sensor, spec.name)
     what = f"simulated, {Path(sensor).stem}, seed {asked.seed}"
     return AlignmentSource(spec.name, what, imu, truth, None, None, (), _sensor_file(spec), ())

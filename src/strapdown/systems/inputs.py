@@ -1,29 +1,33 @@
-"""Inputs of a run: files, tables in memory, and the part of a log that is used."""
+"""Inputs of a run and its result as files: tables in memory, the used part of a log, `save`."""
 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator, Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from html import escape
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 import pandas as pd
 
 from strapdown.bundle.configuration_paths import with_paths
-from strapdown.bundle.seal import InputFiles
-from strapdown.errors import ConfigError
-from strapdown.formats import csv
+from strapdown.bundle.seal import InputFiles, Seal, check_destination, input_files
+from strapdown.config.reading import FileSpec
+from strapdown.errors import ConfigError, Finding
 from strapdown.formats.clocks import GPS, UNIX, clock_of
-from strapdown.formats.log_writers import LOG_WRITERS
+from strapdown.progress import Progress, silent
 
 __all__ = [
     "NOWHERE",
     "Memory",
+    "SavedRun",
     "check_part",
-    "moved_inputs",
+    "configuration_file",
+    "moved",
     "moved_paths",
     "part_of_log",
 ]
@@ -35,21 +39,13 @@ def check_part(from_s: float | None, to_s: float | None, duration_s: float | Non
     Parameters
     ----------
     from_s, to_s, duration_s : float or None, s
-
-    Raises
-    ------
-    ConfigError
-        Both end and duration are given, it ends before it begins, or a value is not finite.
     """
     for flag, value in (("--from", from_s), ("--to", to_s), ("--duration", duration_s)):
         if value is not None and not np.isfinite(value):
             raise ConfigError("io.part-not-finite", quantity=flag, value=value)
     if to_s is not None and duration_s is not None:
         raise ConfigError(
-            "io.part-ends-twice",
-            quantity="--to, --duration",
-            to_s=to_s,
-            duration_s=duration_s,
+            "io.part-ends-twice", quantity="--to, --duration", to_s=to_s, duration_s=duration_s
         )
     if duration_s is not None and not duration_s > 0.0:
         raise ConfigError(
@@ -62,11 +58,7 @@ def check_part(from_s: float | None, to_s: float | None, duration_s: float | Non
 
 
 def part_of_log(
-    imu: pd.DataFrame,
-    from_s: float | None,
-    to_s: float | None,
-    duration_s: float | None,
-    name: str,
+    imu: pd.DataFrame, from_s: float | None, to_s: float | None, duration_s: float | None, name: str
 ) -> pd.DataFrame:
     """Return the samples between two instants, both included.
 
@@ -85,11 +77,6 @@ def part_of_log(
     -------
     DataFrame
         The same table if all of it is used.
-
-    Raises
-    ------
-    ConfigError
-        Fewer than two samples lie between them, or as `check_part`.
     """
     check_part(from_s, to_s, duration_s)
     time = imu.index.to_numpy(dtype=np.float64)
@@ -128,6 +115,8 @@ def part_of_log(
 # Tables in memory as input files of a bundle.
 
 
+R = TypeVar("R")
+
 #: Stands for the folder of the files that a bundle makes of tables in memory.
 NOWHERE = Path("memory")
 
@@ -144,9 +133,22 @@ class Memory:
 
     tables: Mapping[str, pd.DataFrame]
 
+    @classmethod
+    def of(cls, inputs: Mapping[str, Any]) -> Memory:
+        """Return the tables among some inputs, by their names as files."""
+        return cls({file: t for file, t in inputs.items() if isinstance(t, pd.DataFrame)})
+
     @contextmanager
     def as_files(self) -> Iterator[Path]:
-        """Write each table exactly into a temporary folder, which is removed at the end."""
+        """Write each table exactly into a temporary folder, which is removed at the end.
+
+        Without tables the folder is `NOWHERE`.
+        """
+        if not self.tables:
+            yield NOWHERE
+            return
+        from strapdown.formats.log_writers import LOG_WRITERS
+
         with tempfile.TemporaryDirectory(prefix="strapdown-") as name:
             folder = Path(name).resolve()
             for file, table in self.tables.items():
@@ -159,6 +161,8 @@ class Memory:
 
 def _write_csv(path: Path, table: pd.DataFrame) -> None:
     """Write the named columns, with the unit that their quantity has in a table."""
+    from strapdown.formats import csv
+
     clock = clock_of(table).name
     name = {GPS: "gps_sow_s", UNIX: "unix_time_s"}.get(clock, "time_s")
     columns = {name: table.index.to_numpy(dtype=np.float64)}
@@ -178,24 +182,14 @@ _UNITS = {
 }
 
 
-def moved_inputs(
-    inputs: tuple[InputFiles, ...], old: Path, new: Path, *, copied: bool = False
-) -> tuple[InputFiles, ...]:
-    """Move inputs from one folder to another.
-
-    Parameters
-    ----------
-    inputs : tuple of InputFiles
-    old, new : Path
-    copied : bool
-        Whether a bundle copies the inputs in `new`, whatever their size.
-    """
+def _moved_inputs(inputs: Iterable[InputFiles], old: Path, new: Path) -> tuple[InputFiles, ...]:
+    """Inputs moved from one folder to another; a bundle copies those of tables in memory."""
     return tuple(
         replace(
             one,
             path=new / one.path.relative_to(old),
             files=tuple(new / f.relative_to(old) for f in one.files),
-            copied=copied,
+            copied=True,
         )
         if one.path.is_relative_to(old)
         else one
@@ -204,10 +198,97 @@ def moved_inputs(
 
 
 def moved_paths(configuration: Any, old: Path, new: Path) -> Any:
-    """A configuration as plain data, with paths moved from one folder to another."""
+    """Return a configuration, or its plain data, with paths moved from one folder to another."""
+    if isinstance(configuration, FileSpec):
+        return type(configuration).checked(moved_paths(configuration.plain(), old, new))
 
     def change(path: str) -> str:
         given = Path(path)
         return str(new / given.relative_to(old)) if given.is_relative_to(old) else path
 
     return with_paths(configuration, change)
+
+
+def moved(result: R, key: str, old: Path, new: Path) -> R:
+    """Return a result whose tables in memory are files in one folder, as files in another.
+
+    Parameters
+    ----------
+    result : dataclass
+        With `inputs`.
+    key : str
+        Field with the configuration that names their paths.
+    old, new : Path
+        As of `Memory.as_files`; `NOWHERE` while there are no files.
+    """
+    if old == new:
+        return result
+    configuration = moved_paths(getattr(result, key), old, new)
+    run: Any = result
+    changed: R = replace(run, **{key: configuration, "inputs": _moved_inputs(run.inputs, old, new)})
+    return changed
+
+
+def configuration_file(file: Path | None) -> tuple[InputFiles, ...]:
+    """Return the configuration file of a run, if it has one, as an input."""
+    return () if file is None else (input_files("configuration", str(file), (file,)),)
+
+
+class SavedRun(ABC):
+    """Result of a run: data in memory until `save` writes it."""
+
+    #: Field with the configuration that names the paths of the inputs.
+    configuration: ClassVar[str] = "spec"
+    inputs: tuple[InputFiles, ...]
+    findings: tuple[Finding, ...]
+    memory: Memory
+
+    @staticmethod
+    @abstractmethod
+    def _writer() -> Callable[..., Seal]:
+        """Function that writes the bundle; imported on demand."""
+
+    def in_folder(self, old: Path, new: Path) -> Self:
+        """Return the run with its inputs in memory moved from one folder to another."""
+        return moved(self, self.configuration, old, new)
+
+    def save(
+        self,
+        out: str | Path,
+        *,
+        report: bool = True,
+        force: bool = False,
+        progress: Progress = silent,
+    ) -> Seal:
+        """Write the run as a sealed bundle, which `verify` runs again.
+
+        Parameters
+        ----------
+        out : str or Path
+            New folder. Tables given in memory become input files in it.
+        report : bool
+            Whether to write its pages and figures as well.
+        force : bool
+            Overwrite an existing bundle.
+        progress : callable, optional
+            Called with a stage and the completed fraction.
+
+        Raises
+        ------
+        ConfigError
+            `out` exists and may not be overwritten.
+        DataError
+            An input file has changed since it was read.
+        """
+        check_destination(Path(out), force)
+        write = self._writer()
+        with self.memory.as_files() as folder:
+            run = self.in_folder(NOWHERE, folder)
+            return write(run, out, report=report, force=force, progress=progress)
+
+    def _repr_html_(self) -> str:
+        found = "".join(f"<li>{escape(str(f))}</li>" for f in self.findings)
+        return f"<div><b>{escape(repr(self)[1:-1])}</b></div>{self._table_html()}<ul>{found}</ul>"
+
+    def _table_html(self) -> str:
+        return ""

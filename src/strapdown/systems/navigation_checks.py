@@ -43,21 +43,10 @@ def look_through(
 
     Parameters
     ----------
-    spec : NavigationSpec
     imu : DataFrame
         Imu table of the used span.
     tables : mapping of str to DataFrame
         By name of the measurement, on the clock of the samples.
-
-    Returns
-    -------
-    tuple of Finding
-
-    Raises
-    ------
-    DataError
-        A measurement has no overlap in time with the record, or no usable row; the message names
-        file, row and remedy.
     """
     found: list[Finding] = []
     for aid in make_aids(spec):
@@ -185,7 +174,6 @@ def channel_findings(
     ----------
     imu : DataFrame
         Recorded Imu table, body axes.
-    sensors : ImuUncertainty
     start : StartTable or None
         Known state at its first sample.
 
@@ -193,12 +181,6 @@ def channel_findings(
     -------
     tuple of Finding
         The longest stretch of each channel and kind of fault.
-
-    Raises
-    ------
-    DataError
-        A channel is silent over half of the record or saturated over 15 %, gyros are in degrees,
-        accelerometers in another unit, or gravity contradicts the stated attitude.
     """
     _refuse_unit(imu)
     _refuse_gravity(imu, start)
@@ -238,16 +220,6 @@ def saturated_findings(imu: pd.DataFrame, sensors: ImuUncertainty) -> tuple[Find
     ----------
     imu : DataFrame
         Imu table, body axes.
-    sensors : ImuUncertainty
-
-    Returns
-    -------
-    tuple of Finding
-
-    Raises
-    ------
-    DataError
-        A channel is saturated over 15 % of the record.
     """
     if len(imu) < LEAST_SAMPLES:
         return ()

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,55 +15,31 @@ from numpy.typing import NDArray
 from strapdown.config.alignment import LogTable
 from strapdown.config.choice import SLOTS, Slot, options_of
 from strapdown.config.navigation import STAGES
-from strapdown.config.toml_text import ASK, Asked, Page, named_from, string
+from strapdown.config.toml_text import ASK, Page, named_from, string
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError, Finding
 from strapdown.estimation.sensor_blocks import STATED_STATES, resting_sd, states_that_are_stated
 from strapdown.formats.gnss_fixes import POSITION_SDS, VELOCITY_SDS
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty
-from strapdown.systems.alignment_draft import listed_kinds, log_table_keys, toml_value
+from strapdown.systems.alignment_draft import (
+    Draft,
+    axes_table,
+    listed_kinds,
+    log_table,
+    options,
+    stage,
+    toml_value,
+)
 from strapdown.systems.navigation_proposal import Proposal, propose
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import index_of, source_of, values_of
 
-__all__ = [
-    "STANCE",
-    "STANDING",
-    "NavigationDraft",
-    "draft_navigation",
-    "first_stand",
-    "on_foot",
-    "second_order",
-]
+__all__ = ["STANCE", "STANDING", "draft_navigation", "first_stand", "on_foot", "second_order"]
 
 
 #: Other measurements, as comments.
 OTHER_AIDS = ("no_slip", "zero_velocity", "odometer", "barometer")
-
-
-@dataclass(frozen=True)
-class NavigationDraft:
-    """Proposed navigation configuration as text.
-
-    Attributes
-    ----------
-    text : str
-    found : tuple of str
-        Findings from log and fixes.
-    asked : tuple of Asked
-        Questions that the user has to answer.
-    to_check : tuple of Asked
-        Assumptions to check.
-    findings : tuple of Finding
-        Findings of reading.
-    """
-
-    text: str
-    found: tuple[str, ...]
-    asked: tuple[Asked, ...]
-    to_check: tuple[Asked, ...]
-    findings: tuple[Finding, ...]
 
 
 def draft_navigation(
@@ -74,7 +50,7 @@ def draft_navigation(
     gnss: Path | None = None,
     sensor: str | None = None,
     foot: bool = False,
-) -> NavigationDraft:
+) -> Draft:
     """Write the proposed navigation configuration of a log.
 
     Parameters
@@ -87,15 +63,6 @@ def draft_navigation(
         As `propose`.
     foot : bool
         Whether the unit is on a shoe: zero-velocity updates at its stances (`on_foot`).
-
-    Returns
-    -------
-    NavigationDraft
-
-    Raises
-    ------
-    DataError, ConfigError
-        A file cannot be read; the message names file, row and remedy.
     """
     made = propose(log, axes=axes, gnss=gnss, sensor=sensor)
     if foot:
@@ -108,32 +75,22 @@ def draft_navigation(
         "Each table is a place in the chain, and kind says what stands there; keys that begin "
         "with # show the defaults. Then: strapdown navigate on this file.",
     )
-    found = [*_log(page, log, made, folder), *_where(page, made, foot)]
-    _axes(page, axes)
+    found = [
+        *log_table(page, log, folder, made.imu, made.recording.name),
+        *_where(page, made, foot),
+    ]
+    axes_table(page, axes)
     found += _sensors(page, made)
-    _stage(page, "prefilter", {})
+    stage(page, STAGES["prefilter"], {})
     page.blank()
     page.say(f"Alignment: {made.how}.")
     for name in ("coarse", "fine"):
-        _stage(page, name, made.table[name])
+        stage(page, STAGES[name], made.table[name])
     for name in ("mechanization", "filter", "damping", "smoother", "recorder"):
-        _stage(page, name, made.table.get(name, {}))
+        stage(page, STAGES[name], made.table.get(name, {}))
     found += _aids(page, made, folder, foot)
     _rest(page, foot)
-    return NavigationDraft(
-        page.text, tuple(found), tuple(page.asked), tuple(page.to_check), made.findings
-    )
-
-
-def _log(page: Page, log: LogTable, made: Proposal, folder: Path) -> list[str]:
-    time = index_of(made.imu)
-    rate = (len(time) - 1) / float(time[-1] - time[0])
-    span = f"{len(time)} samples, {time[0]:.9g} to {time[-1]:.9g} s, {rate:.4g} Hz"
-    page.table("[log]", f"Found: {span}, {made.imu.attrs['sampling']} values.")
-    log_table_keys(page, log, folder)
-    if log.from_s is log.to_s is log.duration_s is None:
-        page.say(f"from_s = {time[0]:.9g}, duration_s = 300.0 (or to_s): a part alone")
-    return [f"{made.recording.name}: {span}"]
+    return Draft(page.text, tuple(found), tuple(page.asked), made.findings, tuple(page.to_check))
 
 
 def _where(page: Page, made: Proposal, foot: bool) -> list[str]:
@@ -171,16 +128,6 @@ def _where(page: Page, made: Proposal, foot: bool) -> list[str]:
     page.key("lon_deg", ASK, "only you know: longitude, east positive")
     page.key("alt_m", "0.0", "assumed: height over the ellipsoid")
     return []
-
-
-def _axes(page: Page, axes: str | None) -> None:
-    page.table("[axes]", "How the sensor's axes lie in the body, where the log does not say it.")
-    if axes:
-        page.key("axes", string(axes))
-    page.say(
-        'axes = "forward-left-up": where x, y, z of the sensor point; or "x,-y,-z", the axes that '
-        "point forward, right, down"
-    )
 
 
 def _sensors(page: Page, made: Proposal) -> list[str]:
@@ -242,53 +189,6 @@ def _whole() -> list[Any]:
     return [s for s in map(load_sensor, SENSORS) if s.grade != "crash"]
 
 
-def _stage(page: Page, name: str, chosen: Mapping[str, Any]) -> None:
-    slot = SLOTS[name]
-    default, empty = STAGES[name].default, STAGES[name].empty
-    kind = chosen.get("kind", default)
-    page.table(f"[{name}]", f"{slot.title}:", *listed_kinds(slot, empty))
-    page.key("kind", string(kind))
-    if kind in slot.entries:
-        _options(page, slot.entries[kind], chosen)
-    keys = [o.key for o in options_of(slot.entries[kind])] if kind in slot.entries else []
-    for key, value in chosen.items():
-        if key != "kind" and key not in keys:
-            page.key(key, toml_value(value) or "", _ENDS.get(key, ""))
-
-
-#: End conditions of an alignment.
-_ENDS = {
-    "duration_s": "its end",
-    "window_s": "length of the latest part that is aligned",
-    "until_heading_sd_deg": "ends when the sd of heading is below",
-    "until_tilt_sd_deg": "and those of roll and pitch",
-}
-
-
-def _options(page: Page, module: type, chosen: Mapping[str, Any]) -> None:
-    """Write chosen options as keys, the others as comments with their defaults."""
-    for option in options_of(module):
-        if option.key in chosen:
-            page.key(option.key, _inline(chosen[option.key]))
-            continue
-        value = toml_value(option.default)
-        if option.slot is not None:
-            said = value if option.default is not None else '"none"'
-            page.say(f"{option.key} = {said}    of {', '.join(option.slot.entries)}")
-        elif value is not None:
-            page.say(f"{option.key} = {value}")
-        elif option.default is MISSING:
-            page.key(option.key, ASK, f"only you know: {_WANTED.get(option.key, 'no default')}")
-
-
-def _inline(value: Any) -> str:
-    """Write a value, or a module with its options, on one line."""
-    if isinstance(value, Mapping):
-        parts = ", ".join(f"{key} = {_inline(one)}" for key, one in value.items())
-        return f"{{ {parts} }}"
-    return toml_value(value) or ""
-
-
 #: Ready-made tables for a vehicle.
 WHEELS = ("[aiding.no_slip]", 'kind = "no_slip"', "mounting_sd_deg = [6.0, 6.0]")
 
@@ -302,12 +202,6 @@ ON_FOOT = (
     "it; otsu finds it from stances and swings as they come. pivot_m: height of the unit over the "
     "ground.",
 )
-
-_WANTED = {
-    "heading_deg": "heading of the body at the start, clockwise from north (gyros that "
-    "find north at a rest of a minute need none: name their sensor with --sensor)",
-    "sd_deg": "how well it is known",
-}
 
 
 def _aids(page: Page, made: Proposal, folder: Path, foot: bool) -> list[str]:
@@ -323,7 +217,7 @@ def _aids(page: Page, made: Proposal, folder: Path, foot: bool) -> list[str]:
     elif made.gnss is None:
         page.say(
             "None is given here: height goes away by e in 570 s without one. [aiding.gnss] and "
-            "path = …, from the folder of this file",
+            "path = …, from the folder of this file"
         )
     for name, aid in made.table.get("aiding", {}).items():
         page.table(f"[aiding.{name}]")
@@ -342,7 +236,7 @@ def _aids(page: Page, made: Proposal, folder: Path, foot: bool) -> list[str]:
                     f"assumed: the fixes do not state it; {usual}",
                     check=f"how well each fix knows its {what}: {usual}",
                 )
-        _options(page, slot.entries[aid["kind"]], aid)
+        options(page, slot.entries[aid["kind"]], aid)
     if made.drives:
         page.say(
             "Does it drive on wheels? Then take the signs off; it bounds what an outage costs. How "
@@ -486,10 +380,6 @@ def first_stand(imu: pd.DataFrame) -> tuple[float, float] | None:
 def second_order(sensors: ImuUncertainty) -> float:
     """Second-order effect of a tilt that stationary accelerometers cannot observe.
 
-    Parameters
-    ----------
-    sensors : ImuUncertainty
-
     Returns
     -------
     float, m/s²
@@ -504,25 +394,13 @@ def second_order(sensors: ImuUncertainty) -> float:
 def on_foot(made: Proposal) -> Proposal:
     """Replace the proposal for a vehicle by that for a unit on a shoe.
 
-    Parameters
-    ----------
-    made : Proposal
-
-    Returns
-    -------
-    Proposal
-
     Raises
     ------
     DataError
         The log has no accelerometers, or the unit is never stationary in it.
     """
     if ACCEL[0] not in made.imu.columns:
-        raise DataError(
-            "navigation.no-accelerometers",
-            file=source_of(made.imu),
-            quantity="accel",
-        )
+        raise DataError("navigation.no-accelerometers", file=source_of(made.imu), quantity="accel")
     stand = first_stand(made.imu)
     if stand is None:
         raise DataError(

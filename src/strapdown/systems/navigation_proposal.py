@@ -76,7 +76,6 @@ class Proposal:
     ----------
     table : dict
         Of a navigation run; questions to the user have no key.
-    recording : Recording
     imu : DataFrame
         Imu table, body axes.
     gnss : DataFrame or None
@@ -134,15 +133,6 @@ def propose(
         Heading of the body at the start.
     fixes_as : GnssOptions, optional
         How to read the fixes; as those of a code receiver, if not given.
-
-    Returns
-    -------
-    Proposal
-
-    Raises
-    ------
-    DataError, ConfigError
-        A file cannot be read; the message names file, row and remedy.
     """
     recording, imu, findings = body_record(log, AxesTable(axes=axes))
     table: dict[str, Any] = {"log": log.model_dump(exclude_none=True), "axes": {"axes": axes}}
@@ -152,12 +142,12 @@ def propose(
         findings = (*findings, *fixes.attrs["findings"], *([shifted] if shifted else []))
     scatter = _scatter(imu)
     # Engine vibration differs between axes; the quietest axis identifies the sensor.
-    noise = None if scatter is None else tuple(scatter.quiet.min(axis=1).tolist())
+    noise = None if scatter is None else tuple(scatter[0].min(axis=1).tolist())
     guessed = sensor is None
     named = sensor or (None if noise is None else _nearest(noise))
     if named is not None:
         # For gyrocompassing gyros the rocking of a vehicle is motion, not noise.
-        shaken = {} if _finds_north(named) else _louder(scatter, named)
+        shaken = {} if scatter is None or _finds_north(named) else _louder(scatter[1], named)
         table["sensors"] = {"sensor": named, **shaken}
     place, start = site, recording.start
     if not place and start is not None:
@@ -182,24 +172,11 @@ def propose(
     return Proposal(table, recording, imu, fixes, rest, noise, guessed, drives, how, findings)
 
 
-@dataclass(frozen=True, eq=False)
-class Scatter:
-    """Noise densities of a record, axis by axis.
+def _scatter(imu: pd.DataFrame) -> tuple[Array, Array] | None:
+    """Noise densities, (2, 3), of gyros in rad/s/√Hz and accelerometers in m/s²/√Hz, by axis.
 
-    Attributes
-    ----------
-    quiet : ndarray, (2, 3)
-        Of gyros in rad/s/√Hz and accelerometers in m/s²/√Hz, while it is quiet.
-    usual : ndarray, (2, 3)
-        Median, vibration included.
+    While it is quiet, and the median with vibration; None without any, or of a short record.
     """
-
-    quiet: Array
-    usual: Array
-
-
-def _scatter(imu: pd.DataFrame) -> Scatter | None:
-    """Noise densities; None where the record has none, or is too short."""
     time = index_of(imu)
     if ACCEL[0] not in imu.columns or len(time) < 64:
         return None
@@ -216,19 +193,17 @@ def _scatter(imu: pd.DataFrame) -> Scatter | None:
         second = second[: (len(second) // size) * size].reshape(-1, size, 3)
         sd = np.sqrt(np.square(second).mean(axis=1) / 6.0) * math.sqrt(step)
         quiet[k], usual[k] = np.quantile(sd, QUIET, axis=0), np.median(sd, axis=0)
-    return Scatter(quiet, usual) if quiet.min() > 0.0 else None
+    return (quiet, usual) if quiet.min() > 0.0 else None
 
 
-def _louder(scatter: Scatter | None, sensor: str | None) -> dict[str, dict[str, Any]]:
+def _louder(usual: Array, sensor: str) -> dict[str, dict[str, Any]]:
     """Noise to state instead of the data sheet's, of triads with far larger vibration."""
-    if scatter is None or sensor is None:
-        return {}
     known = ImuUncertainty.of_sensor(load_sensor(sensor))
     out: dict[str, dict[str, Any]] = {}
     for k, (triad, key, unit) in enumerate(NOISE_KEYS):
         sheet = np.asarray(getattr(known, triad).axis("noise_density"))
-        if (scatter.usual[k] > LOUD * sheet).any():
-            stated = np.maximum(scatter.usual[k], sheet) / unit
+        if (usual[k] > LOUD * sheet).any():
+            stated = np.maximum(usual[k], sheet) / unit
             out[triad] = {key: tuple(float(f"{x:.2g}") for x in stated)}
     return out
 
@@ -241,10 +216,7 @@ def _nearest(noise: tuple[float, ...]) -> str:
             known = ImuUncertainty.of_sensor(load_sensor(name))
         except ConfigError:
             continue  # it lacks a triad
-        densities = (
-            max(known.gyro.axis("noise_density")),
-            max(known.accel.axis("noise_density")),
-        )
+        densities = (max(known.gyro.axis("noise_density")), max(known.accel.axis("noise_density")))
         far = sum(math.log(a / b) ** 2 for a, b in zip(noise, densities, strict=True))
         if far < least:
             best, least = name, far

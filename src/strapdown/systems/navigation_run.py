@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,7 +14,7 @@ import pandas as pd
 
 from strapdown.alignment.alignment import Alignment, Site
 from strapdown.alignment.fine import FineResult
-from strapdown.bundle.seal import InputFiles, Seal, check_destination, input_files
+from strapdown.bundle.seal import InputFiles, Seal
 from strapdown.config.alignment import sensors_of
 from strapdown.config.navigation import (
     CoarseModeSpec,
@@ -29,7 +27,6 @@ from strapdown.config.navigation import (
 )
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
 from strapdown.errors import Finding
-from strapdown.evaluation.control_points import ControlPointScore, score_control_points
 from strapdown.evaluation.trajectory_differences import (
     DifferenceSummary,
     summarise_differences,
@@ -47,7 +44,6 @@ from strapdown.navigation.modes import (
     Until,
 )
 from strapdown.navigation.navigator import Navigator, with_states
-from strapdown.navigation.outage_test import SETTLED, Withheld, score_withholding, spans_to_withhold
 from strapdown.navigation.pipeline import NavigationPipeline
 from strapdown.navigation.preprocessing import GapPolicy, ImuPreprocessor, ends_of
 from strapdown.navigation.record import NavigationRecord, Span
@@ -55,7 +51,7 @@ from strapdown.navigation.recorder import Recorder
 from strapdown.navigation.replay import PipelineRun, run_batch
 from strapdown.progress import Progress, silent
 from strapdown.sensors.uncertainty import ImuUncertainty
-from strapdown.systems.inputs import NOWHERE, Memory, moved_inputs, moved_paths
+from strapdown.systems.inputs import Memory, SavedRun, configuration_file
 from strapdown.systems.navigation_checks import channel_findings, look_through, saturated_findings
 from strapdown.systems.navigation_source import (
     NavigationSource,
@@ -67,6 +63,8 @@ from strapdown.systems.one_thread import one_thread
 from strapdown.tables import EULER, GEODETIC, VELOCITY
 
 if TYPE_CHECKING:
+    from strapdown.evaluation.control_points import ControlPointScore
+    from strapdown.navigation.outage_test import Withheld
     from strapdown.report.chart_figure import ChartFigure
 
 __all__ = ["Drive", "NavigationRun", "make_chain", "run_navigation", "withheld_aid"]
@@ -105,10 +103,6 @@ def run_navigation(
     drive : callable, optional
         Runs the pipeline, called as `run_batch`: paced, or with earlier results. The numbers must
         equal those of `run_batch`.
-
-    Returns
-    -------
-    NavigationRun
 
     Raises
     ------
@@ -150,6 +144,8 @@ def run_navigation(
         forward_differences, _ = _against_truth(run.record.trajectory, source, spec)
     points = None
     if source.points is not None:
+        from strapdown.evaluation.control_points import score_control_points
+
         points = score_control_points(
             told_by.trajectory, source.points, find_ellipsoid(spec.ellipsoid)
         )
@@ -159,6 +155,8 @@ def run_navigation(
 
     withheld: tuple[Withheld, ...] = ()
     if spec.withhold is not None:
+        from strapdown.navigation.outage_test import score_withholding
+
         begun, end = (float(run.record.trajectory.index[0]), float(source.imu.index[-1]))
         withheld = score_withholding(
             chain,
@@ -179,7 +177,6 @@ def run_navigation(
         spec.trust.repeat,
         after,
     )
-    files = () if file is None else (input_files("configuration", str(file), (file,)),)
     aligned = {one.mode: one for one in run.aligned}
     coarse, fine = aligned.get("coarse"), aligned.get("fine")
     findings = [
@@ -204,7 +201,7 @@ def run_navigation(
         points=points,
         withheld=withheld,
         trust=trust,
-        inputs=(*files, *source.inputs),
+        inputs=(*configuration_file(file), *source.inputs),
         findings=tuple(dict.fromkeys(findings)),
     )
 
@@ -218,6 +215,8 @@ def withheld_aid(spec: NavigationSpec) -> str:
 
 def _test_outages(asked: WithholdTable, begun: float, end: float) -> Sequence[Span]:
     """Spans of the GNSS outage test of a run from `begun` to `end`."""
+    from strapdown.navigation.outage_test import SETTLED, spans_to_withhold
+
     if asked.spans_s:
         return [Span(f"{e - b:g} s", b, e) for b, e in asked.spans_s]
     first = begun + SETTLED if asked.from_s is None else asked.from_s
@@ -247,18 +246,13 @@ def _against_truth(
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class NavigationRun:
+class NavigationRun(SavedRun):
     """Result of a navigation run; in memory until `save` writes it.
 
     Attributes
     ----------
     spec : NavigationSpec
         With every option of every module.
-    source : NavigationSource
-    ellipsoid : Ellipsoid
-    sensors : ImuUncertainty
-    coarse : Alignment or None
-    fine : FineResult or None
     record : NavigationRecord
         Smoothed, if specified.
     forward : NavigationRecord or None
@@ -273,9 +267,6 @@ class NavigationRun:
         The path at its control points.
     withheld : tuple of Withheld
         Test outages and their errors.
-    trust : IntegrityReport
-    inputs : tuple of InputFiles
-    findings : tuple of Finding
     memory : Memory
         Tables that are given in memory; files of the bundle.
     """
@@ -370,54 +361,11 @@ class NavigationRun:
 
         return plot(self, kind)
 
-    def save(
-        self,
-        out: str | Path,
-        *,
-        report: bool = True,
-        force: bool = False,
-        progress: Progress = silent,
-    ) -> Seal:
-        """Write the run as a sealed bundle, which `verify` runs again.
-
-        Parameters
-        ----------
-        out : str or Path
-            New folder. Tables given in memory become input files in it.
-        report : bool
-            Whether to write its pages and figures as well.
-        force : bool
-            Overwrite an existing bundle.
-        progress : callable, optional
-            Called with a stage and the completed fraction.
-
-        Returns
-        -------
-        Seal
-
-        Raises
-        ------
-        ConfigError
-            `out` exists and may not be overwritten.
-        DataError
-            An input file has changed since it was read.
-        """
+    @staticmethod
+    def _writer() -> Callable[..., Seal]:
         from strapdown.report.navigation import write_navigation
 
-        check_destination(Path(out), force)
-        with self.memory.as_files() if self.memory.tables else nullcontext(NOWHERE) as folder:
-            run = self.in_folder(NOWHERE, folder)
-            return write_navigation(run, out, report=report, force=force, progress=progress)
-
-    def in_folder(self, old: Path, new: Path) -> NavigationRun:
-        """Return the run with its inputs in memory moved from one folder to another."""
-        if not self.memory.tables or old == new:
-            return self
-        return replace(
-            self,
-            spec=NavigationSpec.checked(moved_paths(self.spec.plain(), old, new)),
-            inputs=moved_inputs(self.inputs, old, new, copied=True),
-        )
+        return write_navigation
 
     def __repr__(self) -> str:
         time, smoothed = self.trajectory.index, "" if self.forward is None else ", smoothed"
@@ -428,14 +376,10 @@ class NavigationRun:
             f"{last['heading']:.3g}°; {len(self.findings)} findings>"
         )
 
-    def _repr_html_(self) -> str:
+    def _table_html(self) -> str:
         rows = self.to_pandas().iloc[[0, -1]]
         shown = rows[[*GEODETIC, *VELOCITY, *EULER, "north_sd", "east_sd", "heading_sd"]]
-        found = "".join(f"<li>{escape(str(f))}</li>" for f in self.findings)
-        return (
-            f"<div><b>{escape(repr(self)[1:-1])}</b></div>{shown.to_html(float_format='{:.6g}'.format)}"
-            f"<ul>{found}</ul>"
-        )
+        return str(shown.to_html(float_format="{:.6g}".format))
 
 
 # The pipeline of a configuration.
@@ -451,16 +395,6 @@ def make_chain(spec: NavigationSpec, sensors: ImuUncertainty) -> NavigationPipel
     ----------
     spec : NavigationSpec
         Its pipeline takes samples and tables in body axes and on one clock.
-    sensors : ImuUncertainty
-
-    Returns
-    -------
-    NavigationPipeline
-
-    Raises
-    ------
-    ConfigError
-        A module refuses an option, or parts are incompatible.
     """
     given = {"ellipsoid": spec.ellipsoid}
     aids = make_aids(spec)

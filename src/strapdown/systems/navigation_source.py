@@ -15,11 +15,7 @@ from numpy.typing import NDArray
 
 from strapdown.bundle.seal import InputFiles, input_files, sensor_file
 from strapdown.config.choice import SLOTS
-from strapdown.config.navigation import (
-    AidSpec,
-    NavigationSpec,
-    ReceiverTable,
-)
+from strapdown.config.navigation import AidSpec, NavigationSpec, ReceiverTable
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import ConfigError, DataError, DivergenceError, Finding
 from strapdown.formats.aid_table import read_aid_table, read_control_points
@@ -29,16 +25,9 @@ from strapdown.formats.gnss_fixes import GnssOptions
 from strapdown.formats.recording import Reading, StatedStart
 from strapdown.formats.trajectory_readers import files_of_trajectory, read_trajectory
 from strapdown.navigation.measurements.measurement import TabulatedMeasurement
-from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.error_chain import child, normal
 from strapdown.systems.alignment_source import body_record
-from strapdown.tables import (
-    GEODETIC,
-    GNSS,
-    POSITION_SD,
-    VELOCITY_SD,
-    gnss_table,
-)
+from strapdown.tables import GEODETIC, GNSS, POSITION_SD, VELOCITY_SD, gnss_table
 from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
 from strapdown.tables.checks import index_of, source_of, values_of
 
@@ -46,7 +35,6 @@ if TYPE_CHECKING:
     from strapdown.simulation.earth_motion import EarthMotion
 
 __all__ = [
-    "COLUMN_UNITS",
     "NavigationSource",
     "in_file",
     "read_aid",
@@ -66,7 +54,6 @@ class NavigationSource:
 
     Attributes
     ----------
-    name, what : str
     imu : DataFrame
         Imu table, body axes, of the span that is used.
     tables : mapping of str to DataFrame
@@ -79,9 +66,6 @@ class NavigationSource:
         Control points (`read_control_points`), on the clock of the samples.
     start : StatedStart or None
         Position and attitude stated in the file.
-    readings : tuple of Reading
-    inputs : tuple of InputFiles
-    findings : tuple of Finding
     """
 
     name: str
@@ -104,15 +88,6 @@ def read_navigation_source(spec: NavigationSpec) -> NavigationSource:
     ----------
     spec : NavigationSpec
         With absolute paths.
-
-    Returns
-    -------
-    NavigationSource
-
-    Raises
-    ------
-    DataError, ConfigError
-        An input cannot be used; the message names file, row and remedy.
     """
     tables: dict[str, pd.DataFrame] = {}
     inputs: list[InputFiles] = []
@@ -171,8 +146,7 @@ def _simulated(
     inputs: list[InputFiles],
     findings: list[Finding],
 ) -> NavigationSource:
-    from strapdown.simulation import simulate_imu
-    from strapdown.systems.trajectory_source import make_motion, with_key
+    from strapdown.systems.trajectory_source import make_motion, simulate_samples, with_key
 
     asked = spec.simulation
     assert asked is not None  # one of the two is there
@@ -180,14 +154,7 @@ def _simulated(
     assert sensor is not None  # checked with the specification
     with with_key(f"{spec.name}.toml"):
         motion = make_motion(asked.motion, find_ellipsoid(spec.ellipsoid))
-        imu, _ = simulate_imu(
-            motion,
-            load_sensor(sensor).draw(asked.seed),
-            rate=asked.rate_hz,
-            sampling=asked.sampling,
-            seed=asked.seed,
-            source=spec.name,
-        )
+        imu, _ = simulate_samples(motion, asked, sensor, spec.name)
         made = {
             name: simulated_fixes(
                 motion, one, child(asked.seed, _FIXES, zlib.crc32(name.encode())), name
@@ -215,18 +182,6 @@ def _simulated(
 # The file of a measurement, as its table.
 
 
-#: Units of the columns of measurements, as in `read_aid_table`; columns without an entry here or
-#: in the measurement keep their unit.
-COLUMN_UNITS = {
-    "speed": "m/s",
-    "height": "m",
-    "heading": "deg",
-    "vx": "m/s",
-    "vy": "m/s",
-    "vz": "m/s",
-}
-
-
 def read_aid(given: AidSpec) -> pd.DataFrame:
     """Read the table of a measurement.
 
@@ -239,11 +194,6 @@ def read_aid(given: AidSpec) -> pd.DataFrame:
     -------
     DataFrame
         By the time in the file; ``attrs`` hold its clock, ``source`` and ``findings``.
-
-    Raises
-    ------
-    DataError, ConfigError
-        The file cannot be used; the message names file, row and remedy.
     """
     assert given.path is not None  # checked with the specification
     entry = SLOTS["aiding"].entries[given.kind]
@@ -258,8 +208,7 @@ def read_aid(given: AidSpec) -> pd.DataFrame:
                 repair=given.repair,
             ),
         )
-    units = {c: COLUMN_UNITS.get(c.removesuffix("_sd"), "") for c in entry.columns}
-    units |= dict(getattr(entry, "units", {}))
+    units = entry.column_units()
     return read_aid_table(given.path, units, names=given.columns, repair=given.repair)
 
 
@@ -279,8 +228,6 @@ def simulated_fixes(
 
     Parameters
     ----------
-    motion : EarthMotion
-    asked : ReceiverTable
     seed : SeedSequence
         Seed of all random numbers.
     name : str

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.bundle.seal import InputFiles, input_files, sensor_file
+from strapdown.bundle.seal import InputFiles, Seal, sensor_file
 from strapdown.config.alignment import sensors_of
 from strapdown.config.coast import CoastSpec, CoastStartTable
 from strapdown.config.navigation import NavigationSpec
@@ -23,7 +25,6 @@ from strapdown.estimation.sensor_blocks import stated_states
 from strapdown.evaluation.plane_bound import PLANE_95, plane_bound
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown
-from strapdown.nav_state import NavState
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.measurements.measurement import Measurement
 from strapdown.navigation.navigator import Navigator, NavigatorState, with_states
@@ -46,7 +47,7 @@ from strapdown.navigation.outage_test import (
     withheld_runs,
 )
 from strapdown.navigation.pipeline import NavigationPipeline, PipelineState
-from strapdown.navigation.record import NavigationChunk, Span
+from strapdown.navigation.record import NavigationChunk, Span, state_of_row
 from strapdown.navigation.recorder import record_of
 from strapdown.progress import Progress, silent
 from strapdown.sensors.catalogue import load_sensor
@@ -57,7 +58,7 @@ from strapdown.simulation.earth_motion import EarthMotion, Origin
 from strapdown.simulation.gnss import GnssReceiver, instants, simulate_gnss, velocity_of_point
 from strapdown.simulation.path_motion import Limits, Manoeuvre
 from strapdown.simulation.vehicles import Accelerate, Straight, Turn, car
-from strapdown.systems.inputs import check_part
+from strapdown.systems.inputs import Memory, SavedRun, check_part, configuration_file
 from strapdown.systems.navigation_run import make_chain
 from strapdown.systems.navigation_source import NavigationSource, read_navigation_source
 from strapdown.systems.one_thread import one_thread
@@ -65,9 +66,12 @@ from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.aiding import odometer_table
 from strapdown.tables.checks import index_of, values_of
 
+if TYPE_CHECKING:
+    from strapdown.report.chart_figure import ChartFigure
+
 __all__ = [
-    "CoastResult",
     "Drift",
+    "OutageRun",
     "RecordedCoast",
     "coast_navigator",
     "coast_of_run",
@@ -78,25 +82,23 @@ __all__ = [
 ]
 
 
-@dataclass(frozen=True, eq=False)
-class CoastResult:
-    """Result of a drift prediction.
+@dataclass(frozen=True, eq=False, repr=False)
+class OutageRun(SavedRun):
+    """Predicted drift in a GNSS outage; in memory until `save` writes it.
 
     Attributes
     ----------
-    spec : CoastSpec
     navigation : NavigationSpec or None
         The run with outages; None for a sensor along a stated motion.
     name, what : str
         Sensor or record, in words.
-    sensors : ImuUncertainty
-    forecast : Forecast
-    recorded : RecordedCoast or None
     stays : tuple of str
         Remaining measurements.
-    inputs : tuple of InputFiles
-    findings : tuple of Finding
+    memory : Memory
+        Tables of the navigation run that are given in memory; files of the bundle.
     """
+
+    configuration: ClassVar[str] = "navigation"
 
     spec: CoastSpec
     navigation: NavigationSpec | None
@@ -108,6 +110,42 @@ class CoastResult:
     stays: tuple[str, ...]
     inputs: tuple[InputFiles, ...]
     findings: tuple[Finding, ...]
+    memory: Memory = field(default=Memory({}))
+
+    @property
+    def bound_m(self) -> pd.Series:
+        """95 % bound of the horizontal position, m, by time since the outage began, s."""
+        return pd.Series(
+            self.forecast.bound, index=pd.Index(self.forecast.time, name="time"), name="bound_m"
+        )
+
+    def to_pandas(self) -> pd.DataFrame:
+        """The 95 % bound, and the motion over the outage, by time since it began."""
+        table = self.bound_m.to_frame()
+        return table.join(self.forecast.trajectory)
+
+    def plot(self) -> ChartFigure:
+        """Draw the 95 % bound over the outage.
+
+        Returns
+        -------
+        ChartFigure
+            Displays itself in a notebook; `save` writes it as SVG, PNG or PDF.
+        """
+        from strapdown.report.chart_figure import ChartFigure
+        from strapdown.report.coast_document import cone_chart
+
+        return ChartFigure(cone_chart(self))
+
+    @staticmethod
+    def _writer() -> Callable[..., Seal]:
+        from strapdown.report.coast import write_coast
+
+        return write_coast
+
+    def __repr__(self) -> str:
+        time, bound = self.forecast.time[-1], self.forecast.bound[-1]
+        return f"<OutageRun {self.name}: within {bound:.4g} m (95 %) after {time:g} s>"
 
 
 @one_thread()
@@ -116,7 +154,7 @@ def run_coast(
     navigation: NavigationSpec | None = None,
     file: Path | None = None,
     progress: Progress = silent,
-) -> CoastResult:
+) -> OutageRun:
     """Predict the drift in an outage; for a navigation run, also measure it.
 
     Parameters
@@ -130,10 +168,6 @@ def run_coast(
     progress : callable, optional
         Called with a stage and the share that is done.
 
-    Returns
-    -------
-    CoastResult
-
     Raises
     ------
     ConfigError
@@ -146,7 +180,7 @@ def run_coast(
             raise ConfigError("outage.nothing-says-sensor", quantity="sensor")
         sensors = sensor_of(spec.sensor)
         sensor = load_sensor(spec.sensor)
-        return CoastResult(
+        return OutageRun(
             spec,
             None,
             sensor.name,
@@ -161,8 +195,7 @@ def run_coast(
     progress("reading", 0.02)
     source = read_navigation_source(navigation)
     recorded = coast_of_run(spec, navigation, source, progress)
-    files = () if file is None else (input_files("configuration", str(file), (file,)),)
-    return CoastResult(
+    return OutageRun(
         spec,
         navigation,
         source.name,
@@ -171,7 +204,7 @@ def run_coast(
         recorded.forecast,
         recorded,
         recorded.stays,
-        (*files, *source.inputs),
+        (*configuration_file(file), *source.inputs),
         tuple(source.findings),
     )
 
@@ -193,7 +226,6 @@ class Drift:
 
     Attributes
     ----------
-    span : Span
     variance : mapping of str to ndarray, (m,)
         By quantity, predicted, at the cone's instants.
     bound : ndarray, (m,), m
@@ -259,14 +291,7 @@ def coast_of_run(
 
     Parameters
     ----------
-    spec : CoastSpec
-    navigation : NavigationSpec
-    source : NavigationSource
     progress : callable, optional
-
-    Returns
-    -------
-    RecordedCoast
 
     Raises
     ------
@@ -482,11 +507,6 @@ def sensor_of(name: str) -> ImuUncertainty:
     ----------
     name : str
         Name in the catalogue, or path of a file.
-
-    Raises
-    ------
-    ConfigError
-        The sensor is unknown, or its bias or noise is not stated.
     """
     sensor = load_sensor(name)
     for triad in ("gyro", "accel"):
@@ -506,14 +526,8 @@ def coast_navigator(spec: CoastSpec, sensors: ImuUncertainty, fixes: bool) -> Na
 
     Parameters
     ----------
-    spec : CoastSpec
-    sensors : ImuUncertainty
     fixes : bool
         Whether a receiver is among its measurements.
-
-    Returns
-    -------
-    Navigator
     """
     aids: tuple[Measurement, ...] = tuple(
         aid.make(name=kind, ellipsoid="wgs84") for kind, aid in spec.aiding.items()
@@ -541,13 +555,7 @@ def forecast_of_sensor(
 
     Parameters
     ----------
-    spec : CoastSpec
-    sensors : ImuUncertainty
     progress : callable, optional
-
-    Returns
-    -------
-    Forecast
 
     Raises
     ------
@@ -562,7 +570,7 @@ def forecast_of_sensor(
     time, rows = index_of(made), made.to_numpy(dtype=np.float64)
     driven = begin > 0.0
     before = coast_navigator(spec, sensors, fixes=driven)
-    state = before.begin(_first(motion), _aligned(before, sensors))
+    state = before.begin(state_of_row(motion.trajectory([0.0]).iloc[0]), _aligned(before, sensors))
     for name, table in _tables(spec, motion, begin, driven).items():
         state = before.tell(state, name, table)
     progress("the drive before", 0.2)
@@ -584,20 +592,6 @@ def forecast_of_sensor(
         spec.outage_s,
         aided=bool(navigator.aids),
         progress=lambda stage, share: progress(stage, 0.3 + 0.45 * share),
-    )
-
-
-def _first(motion: EarthMotion) -> NavState:
-    """True state at time zero."""
-    row = motion.trajectory([0.0]).iloc[0]
-    return NavState.from_degrees(
-        row["lat"],
-        row["lon"],
-        row["alt"],
-        v_n=(row["VN"], row["VE"], row["VD"]),
-        roll_deg=row["roll"],
-        pitch_deg=row["pitch"],
-        heading_deg=row["heading"],
     )
 
 
@@ -665,19 +659,10 @@ def stated_motion(spec: CoastSpec) -> tuple[EarthMotion, float]:
     of speed, which makes heading, tilts and biases observable. It ends with the heading at which
     the outage begins.
 
-    Parameters
-    ----------
-    spec : CoastSpec
-
     Returns
     -------
     motion : EarthMotion
     begin : float, s
-
-    Raises
-    ------
-    ConfigError
-        The motion exceeds 100 m/s².
     """
     asked, outage = spec.motion, spec.outage_s
     before, begin = _drive(spec.start.aided_s, asked.speed_m_per_s)
@@ -705,10 +690,7 @@ def _drive(length: float, speed: float) -> tuple[list[Manoeuvre], float]:
             (Turn(sign * 90.0, RADIUS, RAMP), turn),
         ]
     round_ = sum(t for _, t in block)
-    done: list[tuple[Manoeuvre, float]] = [
-        (Straight(5.0), 5.0),
-        (Accelerate(SPEED, 12.0), 12.0),
-    ]
+    done: list[tuple[Manoeuvre, float]] = [(Straight(5.0), 5.0), (Accelerate(SPEED, 12.0), 12.0)]
     change = max(abs(speed - SPEED) / GENTLE, 1.0)
     rounds = max(1, round((length - 30.0 - change) / round_))
     done += block * rounds

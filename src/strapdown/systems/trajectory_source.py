@@ -11,6 +11,8 @@ import numpy as np
 import pandas as pd
 
 from strapdown.config import TrajectorySpec, motions
+from strapdown.config.alignment import SimulationTable
+from strapdown.config.navigation import NavigationSimulationTable
 from strapdown.config.spec import AngleWaveSpec
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
 from strapdown.errors import ConfigError
@@ -61,6 +63,8 @@ _KEYS = {
 }
 
 
+#: Rate, sampling and seed of simulated samples.
+Sampling: TypeAlias = TrajectorySpec | SimulationTable | NavigationSimulationTable
 #: Motion, errors, and the tables Imu, Attitude and Trajectory on the same stamps.
 SimulatedTrajectory: TypeAlias = tuple[
     EarthMotion, ImuErrors, pd.DataFrame, pd.DataFrame, pd.DataFrame
@@ -70,46 +74,42 @@ SimulatedTrajectory: TypeAlias = tuple[
 def simulate_trajectory(spec: TrajectorySpec) -> SimulatedTrajectory:
     """Simulate a trajectory.
 
-    Parameters
-    ----------
-    spec : TrajectorySpec
-
     Returns
     -------
     motion : EarthMotion
     errors : ImuErrors
     imu, attitude, trajectory : DataFrame
         Imu, Attitude and Trajectory tables on the same stamps; the last two are exact.
-
-    Raises
-    ------
-    ConfigError
-        The sensor, the ellipsoid or the sampling is unknown, or the motion is not possible; the
-        message names the key.
     """
-    errors = ImuErrors() if spec.sensor is None else load_sensor(spec.sensor).draw(spec.seed)
+    errors = _errors(spec.sensor, spec.seed)
     with with_key(f"{spec.name}.toml"):
         motion = make_motion(spec.motion, find_ellipsoid(spec.ellipsoid))
-        imu, attitude = simulate_imu(
-            motion,
-            errors,
-            rate=spec.rate_hz,
-            sampling=spec.sampling,
-            seed=spec.seed,
-            source=spec.name,
-        )
+        imu, attitude = simulate_samples(motion, spec, spec.sensor, spec.name)
         trajectory = motion.trajectory(imu.index.to_numpy(dtype=np.float64), source=spec.name)
     return motion, errors, imu, attitude, trajectory
 
 
-def make_motion(spec: motions.MotionSpec, ellipsoid: Ellipsoid) -> EarthMotion:
-    """Build the motion of a specification.
+def _errors(sensor: str | None, seed: int) -> ImuErrors:
+    """Errors of one unit of a sensor; of a perfect one, if none is named."""
+    return ImuErrors() if sensor is None else load_sensor(sensor).draw(seed)
 
-    Raises
-    ------
-    ConfigError
-        It is not possible: a latitude beyond the pole, a turn too tight for its speed, etc.
-    """
+
+def simulate_samples(
+    motion: EarthMotion, asked: Sampling, sensor: str | None, name: str
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Simulate the samples of a sensor along a motion: an Imu table, and the true attitude."""
+    return simulate_imu(
+        motion,
+        _errors(sensor, asked.seed),
+        rate=asked.rate_hz,
+        sampling=asked.sampling,
+        seed=asked.seed,
+        source=name,
+    )
+
+
+def make_motion(spec: motions.MotionSpec, ellipsoid: Ellipsoid) -> EarthMotion:
+    """Build the motion of a specification."""
     if isinstance(spec, motions.WaypointsSpec):
         return _waypoints(spec, ellipsoid)
     origin = Origin(spec.lat_deg, spec.lon_deg, spec.alt_m)

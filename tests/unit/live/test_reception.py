@@ -15,7 +15,7 @@ from strapdown.config.alignment import sensors_of
 from strapdown.config.navigation import NavigationSpec
 from strapdown.errors import ConfigError
 from strapdown.formats.log_writers import LOG_WRITERS
-from strapdown.live.clock import MachineClock
+from strapdown.live.replay import MachineClock
 from strapdown.live.run import live_spec, receive, result_of, write_received
 from strapdown.live.sources import LineSource, open_source
 from strapdown.navigation.recorder import FullRecorder

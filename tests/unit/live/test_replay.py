@@ -9,8 +9,7 @@ import pytest
 from tests.contracts.test_chain_cuts import assert_same, drive, driving, navigation, tables
 
 from strapdown.errors import ConfigError
-from strapdown.live.latency import LatencyTape
-from strapdown.live.replay import Replay, parse_pace
+from strapdown.live.replay import LatencyTape, Replay, parse_pace
 from strapdown.navigation.recorder import FullRecorder
 from strapdown.navigation.replay import run_batch
 

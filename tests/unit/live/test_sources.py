@@ -9,7 +9,7 @@ from urllib.parse import urlsplit
 import pytest
 
 from strapdown.errors import ConfigError
-from strapdown.live.clock import MachineClock
+from strapdown.live.replay import MachineClock
 from strapdown.live.sources import LineSource, open_source
 
 

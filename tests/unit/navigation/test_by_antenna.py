@@ -48,7 +48,7 @@ def found(q_nb, arm, late=0.0):
     fixes = pd.DataFrame(values, index=pd.Index([10.0], name="time"), columns=GNSS)
     fixes.attrs["source"] = "fixes.csv"
     velocity = SPEED - rotation.rotate(q_nb, np.cross(TURN, arm))
-    place = here_by_fix(fixes, 10.0, q_nb, arm, WGS84, velocity, np.zeros((3, 3))).state
+    place, _ = here_by_fix(fixes, 10.0, q_nb, arm, WGS84, velocity, np.zeros((3, 3)))
     return [np.degrees(place.lat), np.degrees(place.lon), place.alt], place.v_n
 
 

@@ -57,17 +57,17 @@ def test_a_vehicle_has_gone_on_since_its_fix_and_its_antenna_is_elsewhere():
     q_nb = quaternion_from_euler([0.0, 0.0, 90.0])
     fixes = table([9.5], velocity=(3.0, 10.0, -1.0))
     v, P = np.array([3.0, 10.0, -1.0]), np.diag([0.01, 0.04, 0.09])
-    place = here_by_fix(fixes, 10.0, q_nb, np.array([2.0, 0.0, -1.0]), WGS84, v, P)
-    there = [np.degrees(place.state.lat), np.degrees(place.state.lon), place.state.alt]
+    place, covariance = here_by_fix(fixes, 10.0, q_nb, np.array([2.0, 0.0, -1.0]), WGS84, v, P)
+    there = [np.degrees(place.lat), np.degrees(place.lon), place.alt]
     # Half a second of the velocity, less the arm, which points east and up. Metres of a plane:
     # 5 m of the Earth are bent by 2e-6 m.
     ned = ned_from_geodetic(there, HERE)
     np.testing.assert_allclose(ned, [1.5, 5.0 - 2.0, -0.5 + 1.0], atol=1e-5)
-    sd = np.sqrt(np.diagonal(place.covariance))
+    sd = np.sqrt(np.diagonal(covariance))
     # 1 m/s² of acceleration over 0.5 s: 0.125 m.
     np.testing.assert_allclose(sd[:2] ** 2, 4.0 + np.array([0.05, 0.1]) ** 2 + 0.125**2)
-    np.testing.assert_allclose(place.covariance[3:, 3:], P)
-    np.testing.assert_allclose(place.covariance[:3, 3:], 0.5 * P)
+    np.testing.assert_allclose(covariance[3:, 3:], P)
+    np.testing.assert_allclose(covariance[:3, 3:], 0.5 * P)
 
 
 @pytest.mark.parametrize("wrong", [-1, -2])
@@ -78,7 +78,7 @@ def test_a_place_that_jumped_is_not_where_a_vehicle_begins(wrong):
     places[wrong] = geodetic_from_ned(v * (time[wrong] - 8.0) + [0.0, 40.0, 0.0], HERE)
     fixes = table(time, places, velocity=tuple(v))
     unit, still = np.array([1.0, 0, 0, 0]), np.zeros(3)
-    place = here_by_fix(fixes, 8.0, unit, still, WGS84, v, np.eye(3) * 1e-4)
-    there = [np.degrees(place.state.lat), np.degrees(place.state.lon), place.state.alt]
+    place, _ = here_by_fix(fixes, 8.0, unit, still, WGS84, v, np.eye(3) * 1e-4)
+    there = [np.degrees(place.lat), np.degrees(place.lon), place.alt]
     # Carried over one second, or there already; the Earth bends 10 m by 1e-5 m.
     np.testing.assert_allclose(ned_from_geodetic(there, HERE), 0.0, atol=1e-4)

@@ -12,8 +12,8 @@ from scipy import stats
 from strapdown.config.navigation import NavigationSpec
 from strapdown.ellipsoids import WGS84
 from strapdown.navigation.gyrocompass import STUDENT, north_within
-from strapdown.navigation.heading_integrity import SURE
-from strapdown.navigation.heading_witness import UNSEEN, CarriedHeading, agreeing_sources
+from strapdown.navigation.heading_integrity import SURE, HeadingCheck
+from strapdown.navigation.heading_witness import UNSEEN, agreeing_sources
 from strapdown.navigation.measurements.heading import Heading
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty
@@ -194,7 +194,7 @@ def test_two_heading_aids_that_differ_bear_nothing_out():
 def test_a_heading_aid_and_the_gyros_bear_each_other_out():
     seconds = np.arange(50.0, 101.0)
     plain, wide = np.full(51, 0.8), np.full(51, 4.0)
-    carried = CarriedHeading(50.0, seconds, np.full(51, 0.2), wide, plain)
+    carried = HeadingCheck(50.0, seconds, np.full(51, 0.2), wide, "gyrocompass", plain=plain)
     (told,) = agreeing_sources(chain_with(["a"]), record_with({"a": 0.1}), [carried])
     assert told.time[0] == 50.0
     np.testing.assert_allclose(told.sd, 0.8)

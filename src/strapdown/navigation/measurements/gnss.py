@@ -26,6 +26,7 @@ from strapdown.navigation.measurements.measurement import (
     Epochs,
     TabulatedMeasurement,
     View,
+    check_number,
 )
 from strapdown.navigation.measurements.vehicle import turn_of_body
 from strapdown.rotation import cross_matrix
@@ -82,7 +83,6 @@ class Gnss(TabulatedMeasurement):
     velocity_delay : float, s
         Delay of the velocity against the position of the same row: half of the interval for a
         mean over the preceding interval.
-    use_position, use_velocity : bool
     position_sd_factor, velocity_sd_factor : float
         Factors on the stated standard deviations.
     least_position_sd, least_velocity_sd : float, m and m/s
@@ -124,33 +124,17 @@ class Gnss(TabulatedMeasurement):
             raise ConfigError(
                 "navigation.lever-arm-not-three-numbers", quantity="lever_arm", arm=arm
             )
-        for name, least, most in (
-            ("time_offset", -math.inf, math.inf),
-            ("time_offset_sd", 0.0, LARGEST_OFFSET),
-            ("time_offset_drift", 0.0, math.inf),
-            ("velocity_delay", 0.0, math.inf),
-            ("least_position_sd", 0.0, math.inf),
-            ("least_velocity_sd", 0.0, math.inf),
-            ("position_sd_factor", 1e-6, math.inf),
-            ("velocity_sd_factor", 1e-6, math.inf),
-        ):
-            value = getattr(self, name)
-            if not (is_number(value) and math.isfinite(value) and least <= value <= most):
-                raise ConfigError(
-                    "navigation.option-not-between"
-                    if math.isfinite(most)
-                    else "navigation.option-below"
-                    if math.isfinite(least)
-                    else "navigation.option-not-finite",
-                    quantity=name,
-                    value=value,
-                    least=least,
-                    most=most,
-                )
+        check_number(self, "time_offset")
+        check_number(self, "time_offset_sd", low=0.0, high=LARGEST_OFFSET)
+        for name in ("time_offset_drift", "velocity_delay"):
+            check_number(self, name, low=0.0)
+        for name in ("least_position_sd", "least_velocity_sd"):
+            check_number(self, name, low=0.0)
+        for name in ("position_sd_factor", "velocity_sd_factor"):
+            check_number(self, name, low=1e-6)
         if not (self.use_position or self.use_velocity):
             raise ConfigError(
-                "navigation.nothing-of-fixes-used",
-                quantity="use_position, use_velocity",
+                "navigation.nothing-of-fixes-used", quantity="use_position, use_velocity"
             )
         if not set(self.qualities) <= set(QUALITIES) - {0}:
             raise ConfigError(
@@ -339,7 +323,6 @@ def moving(view: View, arm: Array, arm_name: str) -> tuple[Moving, Moving, Movin
 
     Parameters
     ----------
-    view : View
     arm : ndarray, (3,), m
         Body axes, minus the estimate of its error.
     arm_name : str

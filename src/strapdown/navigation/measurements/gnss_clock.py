@@ -75,7 +75,6 @@ def check_overlap(gnss: pd.DataFrame, imu: pd.DataFrame, offset: float = 0.0) ->
 
     Parameters
     ----------
-    gnss, imu : DataFrame
     offset : float, s
         Time stamps of the receiver minus the time of the sensors, as configured.
 
@@ -83,11 +82,6 @@ def check_overlap(gnss: pd.DataFrame, imu: pd.DataFrame, offset: float = 0.0) ->
     -------
     list of Finding
         An outage at the start or at the end, and fixes beyond the record.
-
-    Raises
-    ------
-    DataError
-        No fix is within the record; the message describes the difference of the clocks.
     """
     time, stamps = index_of(gnss) - offset, index_of(imu)
     source = source_of(gnss)
@@ -137,7 +131,6 @@ def time_offset(
 
     Parameters
     ----------
-    gnss, imu : DataFrame
     velocity_delay : float, s
         Of the receiver (`gnss_delay.velocity_delay`). Without measured velocities the mean
         between positions is used instead.
@@ -199,7 +192,6 @@ def find_time_offset(
 
     Parameters
     ----------
-    gnss, imu : DataFrame
     assumed, velocity_delay, assumed_sd : float, s
         As configured; an offset within three standard deviations is left to the filter.
 
@@ -394,7 +386,6 @@ class VelocityDelay:
     delay, sd : float, s
     changing : float, m/s²
         Root mean square of the acceleration that makes the delay observable.
-    steps : int
     """
 
     delay: float

@@ -90,12 +90,6 @@ def check_fixes(table: pd.DataFrame) -> list[Finding]:
     -------
     list of Finding
         Standard deviations of zero; gaps; positions that jump; a receiver that repeats itself.
-
-    Raises
-    ------
-    DataError
-        As `check_gnss`; fixes are missing; positions are in radians or minutes; they move
-        faster than any vehicle.
     """
     check_gnss(table)
     source = source_of(table)

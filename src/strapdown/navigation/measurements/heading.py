@@ -82,7 +82,7 @@ class Heading(TabulatedMeasurement):
         return Epochs(index_of(table)[told], values[told])
 
     def observe(self, view: View, values: Array) -> list[Observation]:
-        """Return the azimuth innovation, computed − measured; None if the axis is too steep."""
+        """Return the azimuth innovation, computed − measured; none if the axis is too steep."""
         angle = math.radians(self.axis_deg)
         axis = view.C_lb @ [math.cos(angle), math.sin(angle), 0.0]
         C_nl = view.C_ln.T

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown._kernels.compensation import errors_of_states, true_inputs
-from strapdown._kernels.level import OMEGA_EL, Q_LB, V_L
+from strapdown._kernels.level import Q_LB, V_L
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
 from strapdown.errors import ConfigError
 from strapdown.estimation.covariance import Observation, UpdateRule
@@ -95,7 +96,7 @@ class Measurement(ABC):
 
     @abstractmethod
     def observe(self, view: View, values: Array) -> list[Observation]:
-        """Return the observation at one of its epochs, or None without one.
+        """Return the observations at one of its epochs; none where it observes nothing.
 
         Parameters
         ----------
@@ -106,12 +107,25 @@ class Measurement(ABC):
         """
 
 
+#: Units of columns by their names; those of standard deviations end in ``_sd``.
+COLUMN_UNITS = {"speed": "m/s", "height": "m", "heading": "deg"}
+COLUMN_UNITS |= dict.fromkeys(("vx", "vy", "vz"), "m/s")
+
+
 @dataclass(frozen=True)
 class TabulatedMeasurement(Measurement):
     """An aid with a table of measurements."""
 
     #: Columns that its table must have.
     columns: ClassVar[tuple[str, ...]] = ()
+    #: Units of its columns, where their names do not tell them (`COLUMN_UNITS`).
+    units: ClassVar[Mapping[str, str]] = MappingProxyType({})
+
+    @classmethod
+    def column_units(cls) -> dict[str, str]:
+        """Unit of each column; empty for one that keeps its unit."""
+        known = {c: COLUMN_UNITS.get(c.removesuffix("_sd"), "") for c in cls.columns}
+        return {**known, **cls.units}
 
     @abstractmethod
     def epochs(self, table: pd.DataFrame) -> Epochs:
@@ -143,7 +157,6 @@ class ImuDerivedMeasurement(Measurement):
 
         Parameters
         ----------
-        memory : object
         time : ndarray, (k,), s
             Ends of the steps.
         rows : ndarray, (k, 10)
@@ -177,17 +190,10 @@ def check_number(
 
     Parameters
     ----------
-    aid : Aid
     name : str
         Of the option.
-    low, high : float
     above : bool
         Whether it must be more than `low`.
-
-    Raises
-    ------
-    ConfigError
-        It is not.
     """
     value = getattr(aid, name)
     good = is_number(value) and math.isfinite(value) and low <= value <= high
@@ -204,20 +210,7 @@ def check_number(
 
 
 def check_numbers(aid: Measurement, name: str, count: int, *, low: float = -math.inf) -> None:
-    """Refuse an option that is not a given count of finite numbers; return a tuple of float.
-
-    Parameters
-    ----------
-    aid : Aid
-    name : str
-    count : int
-    low : float
-
-    Raises
-    ------
-    ConfigError
-        It is not.
-    """
+    """Refuse an option that is not a given count of finite numbers; return a tuple of float."""
     value = getattr(aid, name)
     try:
         given = list(value)
@@ -238,18 +231,7 @@ def check_numbers(aid: Measurement, name: str, count: int, *, low: float = -math
 
 
 def check_block(view: View, name: str) -> None:
-    """Refuse a block of states that the filter lacks.
-
-    Parameters
-    ----------
-    view : View
-    name : str
-
-    Raises
-    ------
-    ConfigError
-        The block does not exist; the message lists the existing ones.
-    """
+    """Refuse a block of states that the filter lacks."""
     view.model.layout[name]
 
 
@@ -258,14 +240,8 @@ def check_other_name(aid: Measurement, name: str) -> None:
 
     Parameters
     ----------
-    aid : Aid
     name : str
         Of the option.
-
-    Raises
-    ------
-    ConfigError
-        It is not a text, or it is the aid's own name.
     """
     value = getattr(aid, name)
     if not isinstance(value, str) or (value and value == aid.name):
@@ -287,8 +263,6 @@ class View:
 
     Attributes
     ----------
-    mechanization : Mechanization
-    model : ErrorModel
     time : float, s
     state : ndarray
         Of the mechanization.
@@ -359,11 +333,6 @@ class View:
     def velocity(self) -> Array:
         """Relative to the Earth, level axes, (3,), m/s."""
         return self.level[V_L : V_L + 3]
-
-    @cached_property
-    def turn_of_level(self) -> Array:
-        """Rate of the level relative to the Earth, level axes, (3,), rad/s."""
-        return self.level[OMEGA_EL : OMEGA_EL + 3]
 
     @property
     def columns(self) -> int:

@@ -102,7 +102,6 @@ class StandstillAid(ImuDerivedMeasurement):
         Between observations; zero: at every sample.
     largest_speed : float, m/s
         Infinite: the detector alone decides, as on a foot.
-    gate : float
     gate_time : float, s
         After this time without an observation a rest is accepted at any speed: a filter with an
         error beyond its covariance would never accept one again. Zero: never, as for vehicles
@@ -236,8 +235,6 @@ class StandstillDetector:
 
     Attributes
     ----------
-    summary : str
-    source : str
     squares : int
         Squares a sample with an expectation of one at rest.
     of : callable
@@ -262,10 +259,6 @@ class StandstillDetector:
         rate_sd, force_sd : float
             Of the noise of a sample, in these units.
         gravity : float, m/s²
-
-        Returns
-        -------
-        float
         """
         mean = self.of(rate / rate_sd, force / force_sd, gravity / force_sd)
         return float(np.sqrt(mean / self.squares))
@@ -384,9 +377,7 @@ class StandstillThreshold(ABC):
 
         Parameters
         ----------
-        memory : NamedTuple
         time : float, s
-        statistic : float
 
         Returns
         -------

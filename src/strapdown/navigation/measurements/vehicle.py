@@ -412,7 +412,6 @@ class VehicleAxes:
 
         Parameters
         ----------
-        view : View
         name : str
             Of the aid that has the states: ``NAME.mounting``.
         velocity : ndarray, (3,)
@@ -453,7 +452,6 @@ def rate_columns(view: View, rate: Array, force: Array) -> Array:
 
     Parameters
     ----------
-    view : View
     rate, force : ndarray, (3,), rad/s and m/s²
         Measured values.
 
@@ -471,10 +469,6 @@ def rate_columns(view: View, rate: Array, force: Array) -> Array:
 
 def turn_of_body(view: View) -> tuple[Array, Array]:
     """Return the rate of the body relative to the Earth, and its errors.
-
-    Parameters
-    ----------
-    view : View
 
     Returns
     -------
@@ -496,7 +490,6 @@ def point_velocity(view: View, arm: ArrayLike) -> tuple[Array, Array]:
 
     Parameters
     ----------
-    view : View
     arm : array_like, (3,), m
         From the inertial sensors to the point, body axes.
 
