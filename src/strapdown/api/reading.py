@@ -12,7 +12,7 @@ import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -23,6 +23,9 @@ from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
 from strapdown.formats.gnss_files import GNSS_READERS, GnssOptions
 from strapdown.formats.gnss_files import read_gnss as read_gnss_table
 from strapdown.tables import ACCEL, GYRO, QUATERNION, imu_table
+
+if TYPE_CHECKING:
+    from strapdown.config.alignment import LogTable
 
 __all__ = [
     "GnssFile",
@@ -256,6 +259,8 @@ def read_imu(
     unknown = set(units or {}) - {"gyro", "accel", "time"}
     if unknown:
         raise ConfigError("api.quantity-without-unit", quantity="units", unknown=sorted(unknown)[0])
+    from strapdown.config.alignment import LogTable
+
     log = specify(
         LogTable,
         path=str(path),
@@ -381,6 +386,8 @@ def imu_input(source: Any) -> ImuFile | pd.DataFrame:
     if isinstance(source, ImuFile):
         return source
     if isinstance(source, str | Path):
+        from strapdown.config.alignment import LogTable
+
         return ImuFile(specify(LogTable, path=str(source)))
     if isinstance(source, pd.DataFrame):
         file = _unchanged(source)
@@ -416,6 +423,8 @@ def log_in(samples: ImuFile | pd.DataFrame, folder: Path) -> ImuFile:
     """Return the file of samples; those in memory are ``imu.npz`` in a folder."""
     if isinstance(samples, ImuFile):
         return samples
+    from strapdown.config.alignment import LogTable
+
     return ImuFile(specify(LogTable, path=str(folder / "imu.npz")))
 
 
