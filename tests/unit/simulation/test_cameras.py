@@ -262,6 +262,6 @@ def test_what_is_not_seen_is_told():
     ],
 )
 def test_a_camera_that_cannot_be_is_refused(more, quantity):
-    with pytest.raises(ConfigError, match="camera 'top'") as caught:
+    with pytest.raises(ConfigError) as caught:
         replace(paper_cameras()[0], **more)
     assert caught.value.finding.quantity == quantity
