@@ -26,9 +26,6 @@ from strapdown.tables.checks import (
 )
 from strapdown.tables.imu import SAMPLINGS
 
-__all__ = ["resolved_weights", "window_weights"]
-
-
 Array = NDArray[np.float64]
 
 #: Frame of the three components. ``body``: forward, right, down, rotating with the vehicle, as a
@@ -317,18 +314,6 @@ def _upto(time: Array, instant: float, sampling: str) -> Array:
         weights[k - 1] += step * (u - 0.5 * u * u)
         weights[k] += step * 0.5 * u * u
     return weights
-
-
-def resolved_weights(weights: ArrayLike, q_nb: ArrayLike, sampling: str) -> Array:
-    """Gradient of a delta-V in north-east-down with respect to the samples in body axes.
-
-    `weights`, (n,), s, as `window_weights`; `q_nb`, (n, 4), at the stamps. Returns ``G``, (n, 3,
-    3), s: an error ``e[k]`` of the samples changes the delta-V by ``sum G[k] @ e[k]``.
-    """
-    w = as_array(weights, None, "weights")
-    q = attitude_of_samples(q_nb, sampling, len(w))
-    turned: Array = w[:, None, None] * rotation.dcm_from_quaternion(q)
-    return turned
 
 
 # Sums over the unknowns of each line of an error budget.

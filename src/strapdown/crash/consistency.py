@@ -1,4 +1,4 @@
-"""Velocity increments of units at a common point, and the covariance of their differences."""
+"""Consistency of units on one vehicle: delta-V, mounting, lever arm and axes at one point."""
 
 from __future__ import annotations
 
@@ -326,7 +326,6 @@ def _root(covariances: Array) -> Array:
 
 SIGMAS = 4.0
 ROUNDS = 3
-MOUNTING_CHECKS_TINY = 1e-30
 # The mounting rotation is the estimated quantity, so its prior uncertainty is excluded.
 _TURN = (MOUNTING,)
 # Directions with a larger standard deviation count as unknown.
@@ -405,7 +404,7 @@ def _wahba(first: VelocityIncrements, second: VelocityIncrements) -> Array:
     product = np.zeros((3, 3))
     for a, b, of in _observed(first, second):
         variance = float(np.trace(difference_covariance(first, second, of=of, without=_TURN)))
-        product += a.T @ b / max(variance / a.size, MOUNTING_CHECKS_TINY)
+        product += a.T @ b / max(variance / a.size, TINY)
     u, _, vt = np.linalg.svd(product)
     return np.asarray(u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt)
 
@@ -464,7 +463,7 @@ def rotation_findings(
 # Lever arm between two units, from the difference of their forces while the vehicle turns.
 
 # Directions with a larger standard deviation count as unobserved.
-LEVER_ARM_CHECK_MOST_SD = 0.1  # m
+MOST_ARM_SD = 0.1  # m
 
 
 @dataclass(frozen=True, eq=False)
@@ -521,7 +520,7 @@ def check_lever_arm(first: VelocityIncrements, second: VelocityIncrements) -> Le
     freedom = max(left.size - int(seen.sum()), 1)
     misfit = float(np.sqrt(max(left @ np.linalg.solve(covariance, left), 0.0) / freedom))
     sd = np.where(seen, max(1.0, misfit) / np.sqrt(np.where(seen, values, 1.0)), np.inf)
-    return LeverArmCheck(correction, vectors, sd, sd < LEVER_ARM_CHECK_MOST_SD, misfit)
+    return LeverArmCheck(correction, vectors, sd, sd < MOST_ARM_SD, misfit)
 
 
 def lever_arm_findings(
@@ -575,23 +574,20 @@ class AxisMatch:
 
     `accelerometers`, `gyro`, (3, 3), map the readings of the second unit to the axes of the first
     (identity where they agree or the motion cannot decide); `..._lead`: excess chi-square of the
-    identity over it; `..._sure`: posterior probability among all 48 with equal priors. `ambiguous`:
-    axes of the first unit for which other permutations fit the accelerometers within three standard
-    deviations.
+    identity over it. `ambiguous`: axes of the first unit for which other permutations fit the
+    accelerometers within three standard deviations.
     """
 
     accelerometers: Array
     gyro: Array
     accelerometers_lead: float
     gyro_lead: float
-    accelerometers_sure: float
-    gyro_sure: float
     ambiguous: tuple[str, ...]
 
     @classmethod
     def untold(cls) -> AxisMatch:
         """Return the result where the axes are not observable."""
-        return cls(np.eye(3), np.eye(3), 0.0, 0.0, 0.0, 0.0, AXES)
+        return cls(np.eye(3), np.eye(3), 0.0, 0.0, AXES)
 
     @property
     def kind(self) -> str:
@@ -637,16 +633,16 @@ def match_axes(first: VelocityIncrements, second: VelocityIncrements) -> AxisMat
     everywhere, while forces agree only after both are moved to one point, which a wrong gyro axis
     also disturbs. A shared gyro is not judged.
     """
-    accel, lead, sure, other = _best(first, second, "force")
+    accel, lead, other = _best(first, second, "force")
     if first.borrows(second):
-        return AxisMatch(accel, np.eye(3), lead, 0.0, sure, 0.0, other)
-    gyro, gyro_lead, gyro_sure, _ = _best(first, second, "rate")
-    return AxisMatch(accel, gyro, lead, gyro_lead, sure, gyro_sure, other)
+        return AxisMatch(accel, np.eye(3), lead, 0.0, other)
+    gyro, gyro_lead, _ = _best(first, second, "rate")
+    return AxisMatch(accel, gyro, lead, gyro_lead, other)
 
 
 def _best(
     first: VelocityIncrements, second: VelocityIncrements, of: str
-) -> tuple[Array, float, float, tuple[str, ...]]:
+) -> tuple[Array, float, tuple[str, ...]]:
     candidates = signed_permutations()
     a, b = (v.values if of == "force" else v.turned for v in (first, second))
     left = (a[None] - b @ candidates.transpose(0, 2, 1)).reshape(len(candidates), -1, 1)
@@ -665,12 +661,10 @@ def _best(
     best = int(possible[np.lexsort((behind[possible], -near))[0]])
     if chi_square_tail(fit, a.size) >= FITS:
         best = identity
-    weights = np.exp(-0.5 * behind)
     differs = (candidates[possible] != candidates[best]).any(axis=2).any(axis=0)
     return (
         candidates[best],
         float(max(behind[identity] - behind[best], 0.0)) if best != identity else 0.0,
-        float(weights[best] / weights.sum()),
         tuple(name for name, d in zip(AXES, differs, strict=True) if d),
     )
 
@@ -765,7 +759,7 @@ def compare_units(
 
     Raises
     ------
-    There are fewer than two units, or they do not cover the window.
+    DataError
         There are fewer than two units, or they do not cover the window.
     ConfigError
         The window is too short, or an option is out of range.
@@ -925,14 +919,10 @@ def _against_all(
         combined,
         np.asarray(covariance),
         np.where(measured_axes(several), 0.0, np.nan),
-        _square(left, joint),
+        chi_square_along(np.eye(3), left, joint)[0],
         freedom,
         tuple(against),
     )
-
-
-def _square(difference: Array, covariance: Array) -> float:
-    return float(difference @ np.linalg.solve(floored(covariance), difference))
 
 
 def _nothing_together(units: Sequence[PointKinematics], kept: Flags) -> _Together:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,20 +14,14 @@ from strapdown.crash.acceleration import Acceleration, check_within, window_weig
 from strapdown.crash.events import CrashEvent
 from strapdown.dsp.running_integral import running_integral
 from strapdown.errors import ConfigError, DataError
-from strapdown.tables.checks import VELOCITY, index_of, source_of, values_of
-from strapdown.tables.trajectory import check_trajectory
 
 __all__ = [
     "DeltaV",
-    "MaximumDeltaV",
     "TrailingDeltaV",
     "cumulative_delta_v",
     "delta_v",
-    "event_delta_v",
-    "maximum_delta_v",
     "recorder_delta_v",
     "trailing_delta_v",
-    "trajectory_delta_v",
 ]
 
 
@@ -149,19 +143,6 @@ def delta_v(
         course.rate(np.array([start]))[0],
         course.rate(np.array([end]))[0],
     )
-
-
-def event_delta_v(
-    acceleration: Acceleration, event: CrashEvent, *, across_gaps: bool = False
-) -> DeltaV:
-    """Change of velocity over a whole event, from time zero to its end.
-
-    Parameters
-    ----------
-    across_gaps : bool
-        As `delta_v`.
-    """
-    return delta_v(acceleration, event.time_zero, event.end, across_gaps=across_gaps)
 
 
 def cumulative_delta_v(
@@ -311,36 +292,20 @@ class VelocityCourse:
         slope: Array = self._slope[k]
         return slope
 
-    def largest_change(
-        self, low: float, high: float, window: float, axes: Sequence[int] = (0, 1, 2)
-    ) -> float:
+    def largest_change(self, low: float, high: float, window: float) -> float:
         """End in [low, high] of the window in which the velocity changes most, s."""
-        time, columns, begin = self._time, list(axes), self._time[0]
+        time, begin = self._time, self._time[0]
 
         def course(at: Array) -> Polynomials:
             before = np.maximum(at - window, begin)
             return (
-                (self.velocity(at) - self.velocity(before))[:, columns],
-                (self.rate(at) - self.rate(before))[:, columns],
-                0.5 * (self.slope(at) - self.slope(before))[:, columns],
+                self.velocity(at) - self.velocity(before),
+                self.rate(at) - self.rate(before),
+                0.5 * (self.slope(at) - self.slope(before)),
             )
 
         # Between these breaks the change is a single polynomial.
         return _largest(course, np.r_[time, time + window], low, high)
-
-    def largest_since(self, start: float, end: float, axes: Sequence[int]) -> float:
-        """Instant in [start, end] at which the change since `start` is largest, s."""
-        columns = list(axes)
-        origin = self.velocity(np.array([start]))
-
-        def course(at: Array) -> Polynomials:
-            return (
-                (self.velocity(at) - origin)[:, columns],
-                self.rate(at)[:, columns],
-                0.5 * self.slope(at)[:, columns],
-            )
-
-        return _largest(course, self._time, start, end)
 
 
 def _largest(
@@ -383,25 +348,8 @@ def _largest(
 
 
 #: 563.7, Table I: delta-V every 10 ms, for 250 ms or to 30 ms after the end of the event, whichever
-#: is shorter; its maximum is searched over 300 ms or the same (563.8, Table III).
-RECORDED, SEARCHED, BEYOND_END, EVERY = 0.250, 0.300, 0.030, 0.010
-
-
-@dataclass(frozen=True)
-class MaximumDeltaV:
-    """Largest cumulative changes of velocity of an event (49 CFR 563.5(b)), m/s.
-
-    Longitudinal and lateral signed, resultant of both at one instant; times, s, and the searched
-    time from time zero.
-    """
-
-    longitudinal: float
-    lateral: float
-    resultant: float
-    longitudinal_time: float
-    lateral_time: float
-    resultant_time: float
-    searched: float
+#: is shorter.
+RECORDED, BEYOND_END, EVERY = 0.250, 0.030, 0.010
 
 
 def recorder_delta_v(acceleration: Acceleration, event: CrashEvent) -> pd.DataFrame:
@@ -428,55 +376,3 @@ def recorder_delta_v(acceleration: Acceleration, event: CrashEvent) -> pd.DataFr
     zero = event.time_zero
     stop = min(zero + RECORDED, event.end + BEYOND_END, acceleration.end)
     return cumulative_delta_v(acceleration, zero, stop, every=EVERY)
-
-
-def maximum_delta_v(acceleration: Acceleration, event: CrashEvent) -> MaximumDeltaV:
-    """Largest cumulative change of velocity since time zero, and the time to it.
-
-    In the frame ``body`` or ``impact``, over 300 ms, to 30 ms after the end of the event, or to the
-    end of the record, whichever is least (49 CFR 563.5(b), 563.8 Table III). `DataError`: time zero
-    is not in the record.
-    """
-    zero = event.time_zero
-    check_within(acceleration.time, zero, zero, acceleration.source)
-    stop = min(zero + SEARCHED, event.end + BEYOND_END, acceleration.end)
-    course = VelocityCourse(acceleration)
-    at = np.array([course.largest_since(zero, stop, axes) for axes in ((0,), (1,), (0, 1))])
-    change = course.velocity(at) - course.velocity(np.array([zero]))
-    return MaximumDeltaV(
-        float(change[0, 0]),
-        float(change[1, 1]),
-        math.hypot(float(change[2, 0]), float(change[2, 1])),
-        float(at[0]) - zero,
-        float(at[1]) - zero,
-        float(at[2]) - zero,
-        stop - zero,
-    )
-
-
-# Change of velocity of a navigated trajectory.
-
-
-def trajectory_delta_v(trajectory: pd.DataFrame, start: float, end: float) -> DeltaV:
-    """Change of velocity between two instants of a navigated trajectory, in the frame ``ned``.
-
-    The velocity is interpolated linearly; the weights are those of the velocities. `DataError`: the
-    window is empty or extends beyond the trajectory.
-    """
-    check_trajectory(trajectory)
-    time, source = index_of(trajectory), source_of(trajectory)
-    check_within(time, start, end, source)
-    if not end > start:
-        raise DataError("crash.window-empty", file=source, quantity="time", start=start, end=end)
-    velocity = values_of(trajectory, VELOCITY)
-    weights = np.zeros(len(time))
-    rates = []
-    for instant, sign in ((start, -1.0), (end, 1.0)):
-        k = int(np.clip(np.searchsorted(time, instant, side="right"), 1, len(time) - 1))
-        step = time[k] - time[k - 1]
-        u = (instant - time[k - 1]) / step
-        weights[k - 1] += sign * (1.0 - u)
-        weights[k] += sign * u
-        rates.append((velocity[k] - velocity[k - 1]) / step)
-    vector = weights @ velocity
-    return DeltaV(float(start), float(end), vector, "ned", weights, rates[0], rates[1])

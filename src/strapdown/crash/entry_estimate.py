@@ -1,4 +1,4 @@
-"""Sensitivity of the state at fixes to the state at the anchor, sensor errors and noise.
+"""Entry state by iterated least squares from GNSS fixes before a crash.
 
 Error = true - estimated. With phi about local level axes (``C_true = exp([phi x]) C``), f the
 specific force and e the sensor errors, it grows by

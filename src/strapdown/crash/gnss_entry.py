@@ -99,11 +99,11 @@ def entry_state_from_gnss(
     misalignment, g-sensitivity, antenna and time offset as far as the priors leave them open.
     The covariance of the rows includes the noise of the inertial sensors between each fix and
     the anchor and the correlated part of the receiver's error (`FixCorrelation`), so that ten
-    correlated fixes do not count as ten independent ones; `entry_adjust.adjust` solves it fix by
-    fix. Outlying fixes are down-weighted (`entry_adjust.weigh`).
+    correlated fixes do not count as ten independent ones; `entry_estimate.adjust` solves it fix by
+    fix. Outlying fixes are down-weighted (`entry_estimate.weigh`).
 
     *Fix selection.* Excluded are fixes from the impact on, fixes where the acceleration without
-    gravity exceeds 50 m/s² or the jerk 20 m/s³ (both means over 50 ms, `entry_trust.strain`) and
+    gravity exceeds 50 m/s² or the jerk 20 m/s³ (both means over 50 ms, `entry_estimate.strain`) and
     for 1 s after, and fixes of quality 0. `EntryState.fixes` gives the reason for each.
 
     *Observability.* Velocity and position are always observable. Roll and pitch are not separable

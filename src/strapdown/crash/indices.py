@@ -1,4 +1,4 @@
-"""Input of the crash indices: checks of a record and its integrals, means and filters."""
+"""Crash indices: ASI, HIC, OLC, flail space, THIV and PHD."""
 
 from __future__ import annotations
 
@@ -308,14 +308,15 @@ def asi(
     average : {'butterworth_13hz', 'mean_50ms'}
         Edition of 2010 or of 1998.
     cutoff : {'whole', 'pass'}
-        Meaning of the 13 Hz: `phaseless.four_pole`. The standard gives the frequency; its plain
+        Meaning of the 13 Hz: `four_pole`. The standard gives the frequency; its plain
         meaning is -3 dB there for the whole filter. Two passes of 13 Hz each smooth more and
         give smaller values on short pulses.
 
     Raises
     ------
     DataError
-        As `pulse.checked`; the record is shorter than 50 ms, or its steps are not uniform.
+        The shapes, values or times are not valid; the record is shorter than 50 ms, or its steps
+        are not uniform.
     ConfigError
         An option is unknown.
 
@@ -382,7 +383,7 @@ def hic(time: ArrayLike, accel: ArrayLike, *, longest: float = 0.015) -> Hic:
     Raises
     ------
     DataError
-        As `pulse.checked`.
+        The shapes, values or times are not valid.
     ConfigError
         `longest` is not a positive, finite time.
 
@@ -457,7 +458,7 @@ def olc(
     Raises
     ------
     DataError
-        As `pulse.checked`; `start` is not in the record.
+        The shapes, values or times are not valid; `start` is not in the record.
     ConfigError
         The travels do not satisfy ``0 <= free < whole``.
 
@@ -507,7 +508,7 @@ def _weak(reached: float, needed: float) -> Finding:
 
 
 FORWARD, SIDEWAYS = 0.6, 0.3  # m
-FLAIL_SPACE_WINDOW = 0.01  # s
+RIDEDOWN_WINDOW = 0.01  # s
 
 
 @dataclass(frozen=True)
@@ -559,7 +560,7 @@ def flail_space(
     Raises
     ------
     DataError
-        As `pulse.checked`; `start` is not in the record.
+        The shapes, values or times are not valid; `start` is not in the record.
     ConfigError
         A distance is not valid.
 
@@ -600,8 +601,7 @@ def flail_space(
     try:
         rest, values = from_start(t, a, at, "ORA")
         ora = [
-            largest_mean(rest, values[:, k], FLAIL_SPACE_WINDOW)[0] / STANDARD_GRAVITY
-            for k in (0, 1)
+            largest_mean(rest, values[:, k], RIDEDOWN_WINDOW)[0] / STANDARD_GRAVITY for k in (0, 1)
         ]
     except DataError:
         found = Finding("crash.record-ends-before-ora", quantity="ORA", at=at)
@@ -682,7 +682,7 @@ def thiv(
     Raises
     ------
     DataError
-        As `pulse.checked`; `start` is not in the record.
+        The shapes, values or times are not valid; `start` is not in the record.
     ConfigError
         An option is unknown, or a distance is none.
 

@@ -1,4 +1,4 @@
-"""Unknowns of one unit and their effects on the samples."""
+"""Kinematics of a unit at a point of the vehicle, and the effect of each unknown there."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ from strapdown.sensors.lever_arm import MovedImu, move_unit
 from strapdown.sensors.pre_crash import FROM_GRAVITY, Levelling, PreparedUnit
 from strapdown.sensors.rest import RestStretch
 from strapdown.sensors.unmeasured import AXES, TURNS, axis_names, unmeasured_axes, unmeasured_turns
-from strapdown.sensors.unmeasured import TURNS as ANGLES
 from strapdown.tables import ACCEL, GYRO
 
 __all__ = ["AssumedEffect", "assumed_effects"]
@@ -174,7 +173,7 @@ class _UnitEffects:
         for axis in range(3):
             if bias[axis] > 0.0:
                 what = "bias" if source is None else "bias against the lower range"
-                what, one = f"{what} {TRIAD_CURVES_AXES[axis]}", constant(bias[axis])
+                what, one = f"{what} {XYZ[axis]}", constant(bias[axis])
                 self._axis_effect(number, axis, spoke, heirs, one, what, "accelerometer bias", True)
         for name, contributor, effects in triad_curves(triad):
             for axis, label, effect in effects:
@@ -225,7 +224,7 @@ class _UnitEffects:
                 one = sd[axis] * np.where(spoke[:, axis], variance[:, axis], 0.0)
                 force = np.outer(one, self.turn[:, axis])
                 self._add(
-                    f"{triad.name} rectification {TRIAD_CURVES_AXES[axis]}",
+                    f"{triad.name} rectification {XYZ[axis]}",
                     "vibration rectification",
                     force,
                     None,
@@ -253,9 +252,7 @@ class _UnitEffects:
             bias = biases[axis]
             if bias > 0.0:
                 rate = np.tile(bias * direction, (len(self.time), 1))
-                self._add(
-                    f"gyro bias {TRIAD_CURVES_AXES[axis]}", GYRO_BIAS, None, rate, none, owner
-                )
+                self._add(f"gyro bias {XYZ[axis]}", GYRO_BIAS, None, rate, none, owner)
             for name, contributor, one in self._gyro_curves(axis):
                 self._add(name, contributor, None, np.outer(one, direction), none, owner)
             slope = sd.axis("g_sensitivity")[axis]
@@ -263,7 +260,7 @@ class _UnitEffects:
                 for j in range(3):
                     one = slope * felt[:, j]
                     self._add(
-                        f"g-sensitivity {TRIAD_CURVES_AXES[axis]} of {TRIAD_CURVES_AXES[j]}",
+                        f"g-sensitivity {XYZ[axis]} of {XYZ[j]}",
                         "gyro g-sensitivity",
                         None,
                         np.outer(one, direction),
@@ -283,7 +280,7 @@ class _UnitEffects:
         rest = self.turn @ self.rest_felt if self.has_rest else np.zeros(3)
         lent = self.lender is not self.prepared.unit
         for axis in range(3):
-            unit, name = np.eye(3)[axis], f"mounting {ANGLES[axis]}"
+            unit, name = np.eye(3)[axis], f"mounting {TURNS[axis]}"
             if angle > 0.0:
                 felt, left = self.force, rest
                 if self.prepared.bias_from[0] == FROM_GRAVITY:
@@ -302,9 +299,7 @@ class _UnitEffects:
             if mounting.position_sd > 0.0:
                 # The sensor is further along the axis, so that the arm is shorter there.
                 force = self.moved.lever @ (-mounting.position_sd * unit)
-                self._add(
-                    f"lever arm {TRIAD_CURVES_AXES[axis]}", LEVER_ARM, force, None, np.zeros(3)
-                )
+                self._add(f"lever arm {XYZ[axis]}", LEVER_ARM, force, None, np.zeros(3))
 
     def _noise(self) -> Array:
         of_both = self.prepared.noise_covariance + self.moved.added
@@ -348,7 +343,7 @@ class _UnitEffects:
         if steady > 0.0 and self.prepared.bias_from[0] == FROM_GRAVITY:
             for axis in range(3):
                 force = np.tile(steady * np.eye(3)[axis], (n, 1))
-                name = f"steady acceleration {TRIAD_CURVES_AXES[axis]}"
+                name = f"steady acceleration {XYZ[axis]}"
                 self._add(name, "accelerometer bias", force, None, np.zeros(3), VEHICLE)
 
     def _timing(self) -> None:
@@ -463,7 +458,7 @@ Curve = Callable[[Array], Array]
 #: The axis it is added to, the end of the unknown's name, the curve.
 AxisCurve = tuple[int, str, Curve]
 
-TRIAD_CURVES_AXES = "xyz"
+XYZ = "xyz"
 
 
 def triad_curves(triad: RecordedTriad) -> Iterator[tuple[str, str, list[AxisCurve]]]:
@@ -477,13 +472,13 @@ def triad_curves(triad: RecordedTriad) -> Iterator[tuple[str, str, list[AxisCurv
     yield (
         "scale",
         "scale factor",
-        [(a, f" {TRIAD_CURVES_AXES[a]}", _part(scale[a], a)) for a in range(3) if scale[a] > 0.0],
+        [(a, f" {XYZ[a]}", _part(scale[a], a)) for a in range(3) if scale[a] > 0.0],
     )
     yield (
         "misalignment",
         "misalignment",
         [
-            (a, f" {TRIAD_CURVES_AXES[j]}→{TRIAD_CURVES_AXES[a]}", _part(skew[a], j))
+            (a, f" {XYZ[j]}→{XYZ[a]}", _part(skew[a], j))
             for a in range(3)
             for j in range(3)
             if j != a and skew[a] > 0.0
@@ -492,11 +487,7 @@ def triad_curves(triad: RecordedTriad) -> Iterator[tuple[str, str, list[AxisCurv
     yield (
         "nonlinearity",
         "nonlinearity",
-        [
-            (a, f" {TRIAD_CURVES_AXES[a]}", _square(bend[a] / full[a], a))
-            for a in range(3)
-            if bend[a] > 0.0
-        ],
+        [(a, f" {XYZ[a]}", _square(bend[a] / full[a], a)) for a in range(3) if bend[a] > 0.0],
     )
 
 

@@ -1,4 +1,4 @@
-"""Integration segment of a record, forward or backward from the entry of a path."""
+"""Path of the reference point near a crash, with linear covariance and by Monte Carlo."""
 
 from __future__ import annotations
 
@@ -231,7 +231,7 @@ class CrashPath:
         Part that is independent from sample to sample.
     start : ndarray, (p, 9)
         `errors` at the entry.
-    legs : tuple of Leg
+    legs : tuple of IntegrationSegment
         Backward and forward.
     """
 

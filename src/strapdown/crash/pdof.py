@@ -24,15 +24,12 @@ __all__ = [
     "PdofConvention",
     "PdofInterval",
     "clock_of",
-    "direction_of_clock",
     "from_convention",
     "ned_pdof",
     "pdof",
     "pdof_by_shift",
     "pdof_by_window",
-    "pdof_gradient",
     "pdof_interval",
-    "pdof_sd",
     "to_convention",
 ]
 
@@ -162,30 +159,6 @@ def ned_pdof(change: DeltaV | ArrayLike, heading_deg: float) -> NedPdof:
     full = azimuth % 360.0
     # The remainder rounds a tiny negative angle up to 360.
     return NedPdof(0.0 if full >= 360.0 else full, relative, vertical)
-
-
-def pdof_gradient(change: DeltaV | ArrayLike) -> Array:
-    """Gradient of horizontal and vertical angle, (2, 3), deg per m/s, by the change of velocity.
-
-    `DataError`: the change is vertical, so that its horizontal direction has no gradient.
-    """
-    x, y, z = vector_of(change, ("body", "impact", "ned")).tolist()
-    h2 = x * x + y * y
-    if h2 == 0.0:
-        raise DataError("crash.change-velocity-vertical-no-horizontal", quantity="delta-V", z=z)
-    h, r2 = math.sqrt(h2), h2 + z * z
-    return np.degrees([[-y / h2, x / h2, 0.0], [-z * x / (h * r2), -z * y / (h * r2), h / r2]])
-
-
-def pdof_sd(change: DeltaV | ArrayLike, covariance: ArrayLike) -> tuple[float, float]:
-    """Standard deviations of horizontal and vertical angle, deg, to first order: ``sqrt(G P G^T)``.
-
-    Valid while the change is large compared with its uncertainty; `pdof_interval` has no such
-    condition.
-    """
-    gradient = pdof_gradient(change)
-    spread = gradient @ covariance_of(covariance) @ gradient.T
-    return math.sqrt(max(spread[0, 0], 0.0)), math.sqrt(max(spread[1, 1], 0.0))
 
 
 def covariance_of(given: ArrayLike) -> Array:
@@ -330,13 +303,6 @@ def clock_of(horizontal_deg: float) -> int:
     return (math.floor(_finite(horizontal_deg) / 30.0 + 0.5) - 1) % 12 + 1
 
 
-def direction_of_clock(hour: int) -> float:
-    """Middle of an hour, 1 to 12, deg in (-180, 180]: within 15 deg of the coded direction."""
-    if hour not in range(1, 13):
-        raise ConfigError("crash.no-hour", quantity="clock", hour=hour)
-    return _wrapped(30.0 * hour, False)
-
-
 def _wrapped(angle: float, full_turn: bool) -> float:
     turned = math.fmod(angle, 360.0)
     if full_turn:
@@ -440,8 +406,7 @@ def pdof_interval(
     variance n P n and mean zero if u is the truth, exceeds z standard deviations: the
     interval is ``{u: (n m)² <= z² n P n}``, z = 1.96 for 95 %. This is the angle subtended at the
     origin by the ellipse ``(x - m) P^-1 (x - m) <= z²``. Note z² = 3.84, for one degree of
-    freedom; the 95 % ellipse of the two components (5.99) would cover 98.6 %. Linearized,
-    `pdof_sd` times z is the same for small angles.
+    freedom; the 95 % ellipse of the two components (5.99) would cover 98.6 %.
     """
     if not 0.0 < level < 1.0:
         raise ConfigError("crash.no-probability", quantity="level", level=level)

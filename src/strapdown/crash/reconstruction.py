@@ -1,4 +1,4 @@
-"""Results of a reconstruction as a small table and as text lines."""
+"""Reconstruction of a crash: by each unit, and by the mean of those that agree."""
 
 from __future__ import annotations
 

@@ -295,7 +295,7 @@ def _outside(code: str, quantity: str, outside: str, **values: Any) -> Finding:
 # Only models with an identified published table are included. URGENCY and its successors
 # (Malliaris 1997, Bahouth 2004, Kononen 2011) and the MAIS3+ model of the planner by Geisslinger
 # and others (2023) are not: their coefficients were found in programs that name no table of a
-# publication. `severity_file.load_severity_model` reads them from a user who has the source.
+# publication. `load_severity_model` reads them from a user who has the source.
 
 
 WANG_NOTE = (
@@ -405,7 +405,7 @@ def load_severity_model(path: str | Path) -> SeverityModel:
         year=year,
         intercept=_number(file, table.get("intercept"), "intercept"),
         terms=terms,
-        validity=_validity_severity_file(file, table.get("validity", {}), terms),
+        validity=_ranges(file, table.get("validity", {}), terms),
         applies=_applies(file, table.get("applies", {})),
         note=note,
         **texts,
@@ -467,9 +467,7 @@ def _refuse_clash(file: Path, place: str, term: Term, other: Term) -> None:
     raise _bad(file, place, code, input=term.input, **units)
 
 
-def _validity_severity_file(
-    file: Path, given: Any, terms: tuple[Term, ...]
-) -> dict[str, tuple[float, float]]:
+def _ranges(file: Path, given: Any, terms: tuple[Term, ...]) -> dict[str, tuple[float, float]]:
     if not isinstance(given, dict):
         raise _bad(file, "validity", "crash.validity-not-a-table")
     numbers = {t.input: t for t in terms if t.equals is None}

@@ -187,7 +187,6 @@ def test_every_signed_permutation_of_the_accelerometers_is_recognised(index):
     assert np.array_equal(match.gyro, np.eye(3))
     if not np.array_equal(wrong, np.eye(3)):
         assert match.kind == "accelerometers"
-        assert match.accelerometers_sure > 0.99
         assert any(
             "the axes of its accelerometers differ" in str(f) or "its accelerometers" in str(f)
             for f in out.findings

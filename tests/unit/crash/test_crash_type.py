@@ -13,7 +13,7 @@ from strapdown.crash.crash_type import (
     classify_crashes,
     side_of,
 )
-from strapdown.crash.delta_v import event_delta_v
+from strapdown.crash.delta_v import delta_v
 from strapdown.crash.events import detect_events
 from strapdown.errors import ConfigError, DataError
 
@@ -120,7 +120,7 @@ def test_each_event_has_its_own():
         values[:, :2] += np.outer((1.0 - np.cos(2.0 * np.pi * x)) / 0.1, change)
     made = Acceleration(time, values)
     events = detect_events(made).events
-    changes = [event_delta_v(made, e) for e in events]
+    changes = [delta_v(made, e.time_zero, e.end) for e in events]
     # It rolls after the second alone.
     rate = np.radians(220.0) * np.clip((time - 0.85) / 0.2, 0.0, 1.0)
     types = classify_crashes(changes, [SMALL, SMALL], events=events, time=time, roll_rate=rate)
