@@ -231,32 +231,14 @@ def attitude_of_samples(
 def window_weights(
     time: ArrayLike, start: float, end: float, sampling: str = "instantaneous"
 ) -> Array:
-    """Weights of the samples in the integral from one instant to another.
+    """Weights, (n,), s, of the samples in the integral from one instant to another.
 
-    Parameters
-    ----------
-    time : array_like, (n,), s
-        Increasing stamps.
-    start, end : float, s
-        Within the record; where `end` is before `start`, the integral is negative.
-    sampling : {'instantaneous', 'mean'}
-        Values at the stamps: interpolated linearly (trapezoids, and parts of trapezoids at the
-        ends; second-order error in the step). Means over the interval that ends at the stamp:
-        exact from stamp to stamp; within an interval its mean is used throughout (for an end
-        inside one: error at most h²/8 of the slope there). The first row of means belongs to
-        the time before the record and has zero weight.
-
-    Returns
-    -------
-    ndarray, (n,), s
-        ``w``, such that the integral is ``w @ values``.
-
-    Raises
-    ------
-    ConfigError
-        `sampling` is unknown.
-    DataError
-        The window extends beyond the record, or time does not increase.
+    `start` and `end`, s, are within the record of stamps, (n,), s; the integral is negative where
+    `end` is before `start`. Values at the stamps are interpolated linearly (second-order error in
+    the step). Means over the interval that ends at the stamp are exact from stamp to stamp; within
+    an interval its mean is used throughout (error at most h²/8 of the slope there), and the first
+    row, which belongs to the time before the record, has zero weight. `DataError`, `ConfigError`:
+    the window extends beyond the record, time does not increase, or the sampling is unknown.
     """
     stamps = as_array(time, None, "time")
     check_time(stamps, None)
@@ -269,13 +251,7 @@ def window_weights(
 
 
 def check_within(time: Array, start: float, end: float, source: str | None) -> None:
-    """Refuse a window that is not within a record.
-
-    Raises
-    ------
-    DataError
-        The window is not within it, or the record has fewer than two samples.
-    """
+    """Refuse a window that is not within a record, or a record of fewer than two samples."""
     if len(time) < 2:
         raise DataError(
             "crash.sample-change-velocity-needs-least",

@@ -434,13 +434,7 @@ def compare_reference(
 
 @dataclass(frozen=True, eq=False)
 class SeverityAnswer:
-    """Severity by one model, or why it does not apply.
-
-    Attributes
-    ----------
-    because : Finding or None
-        Reason for a missing risk.
-    """
+    """Severity by one model, or the finding because of which it does not apply."""
 
     model: SeverityModel
     risk: InjuryRisk | None
@@ -448,13 +442,7 @@ class SeverityAnswer:
 
 
 def main_event(unit: UnitReconstruction) -> int | None:
-    """Return the number, from 0, of the event with the largest delta-v.
-
-    Returns
-    -------
-    int or None
-        None without an event.
-    """
+    """Number, from 0, of the event with the largest delta-V; None without an event."""
     if not unit.body:
         return None
     return max(range(len(unit.body)), key=lambda k: unit.body[k].event.resultant)

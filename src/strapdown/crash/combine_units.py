@@ -322,32 +322,15 @@ ROUNDING = 1e-9
 
 
 def force_weights(units: Sequence[PointKinematics]) -> Array:
-    """Weights of the units' specific forces in their mean.
+    """Weights of k units' specific forces in their mean, (k, 3, 3), summing to the identity.
 
-    Parameters
-    ----------
-    units : sequence of PointKinematics
-        k units at one point and at the same stamps.
-
-    Returns
-    -------
-    ndarray, (k, 3, 3)
-        In vehicle axes, summing to the identity. Diagonal with values from zero to one where every
-        axis that a unit lacks is a vehicle axis: the mean's change of velocity then lies between
-        those of the units, axis by axis, over every window.
-
-    Notes
-    -----
-    In each axis the nonnegative weights w of sum one that minimize ``wᵀ C w``, where C is the
-    joint covariance of the units' changes of velocity along it from 0.1 s before to 0.75 s after
-    the trigger (`velocity_covariance`). They depend on the samples only through the stated errors
-    over the whole crash. Weights per sample would bias the mean: the stated error of a scale factor
-    or a misalignment grows with the reading, so that the unit with the smaller reading would always
-    count for more, and the mean of units that ring or disagree would be smaller than each unit.
-    Weights that change in time, such as with the active range, could give a change of velocity
-    outside those of the units.
-
-    Where one unit was clipped along an axis and another was not, it does not count there.
+    Units at one point and at the same stamps. Diagonal with values from zero to one where every
+    axis that a unit lacks is a vehicle axis: the mean's change of velocity then lies between those
+    of the units, axis by axis, over every window. In each axis the nonnegative weights w of sum one
+    that minimize ``wᵀ C w``, with C the joint covariance of the changes of velocity from 0.1 s
+    before to 0.75 s after the trigger. Weights per sample would bias the mean: the stated error of
+    a scale factor grows with the reading, so that the smaller reading would always count for more.
+    A unit clipped along an axis along which another was not does not count there.
     """
     covariance = velocity_covariance(units)
     missing = [u.unmeasured for u in units]
@@ -400,9 +383,8 @@ def velocity_covariance(units: Sequence[PointKinematics]) -> Array:
 def least_variance(covariance: Array) -> Array:
     """Nonnegative weights, (k,), of sum one that minimize the variance of a mean.
 
-    ``min |Lᵀ w|² + (1 - 1ᵀ w)²`` over ``w >= 0``, with ``C = L Lᵀ``: for every direction of w the
-    best length gives ``q / (1 + q)``, where q is the variance of the weights of that direction with
-    sum one; the minimum is therefore in the wanted direction.
+    ``min |Lᵀ w|² + (1 - 1ᵀ w)²`` over ``w >= 0``, with ``C = L Lᵀ``: its minimum has the direction
+    sought.
     """
     from scipy.optimize import nnls
 

@@ -75,12 +75,7 @@ class VelocityIncrements:
     lever: Array
 
     def of_pieces(self, kept: NDArray[np.bool_]) -> VelocityIncrements:
-        """Select some of the intervals; the edges remain those of all.
-
-        Parameters
-        ----------
-        kept : ndarray of bool, (m,)
-        """
+        """Select some of the intervals, (m,); the edges remain those of all."""
         if kept.all():
             return self
         rows = np.repeat(kept, 3)
@@ -163,13 +158,7 @@ def difference_covariance(
 
 
 def floored(covariance: Array) -> Array:
-    """Make a covariance invertible: raise it by the rounding of its largest variance.
-
-    Parameters
-    ----------
-    covariance : ndarray, (..., k, k)
-        One, or several with one floor.
-    """
+    """Make covariances, (..., k, k), invertible: raised by the rounding of the largest variance."""
     largest = float(np.diagonal(covariance, axis1=-2, axis2=-1).max())
     return np.asarray(covariance + max(FLOOR * largest, TINY) * np.eye(covariance.shape[-1]))
 
@@ -179,12 +168,7 @@ def common_edges(
 ) -> Array:
     """Edges of equal intervals over a window that all units cover.
 
-    Raises
-    ------
-    DataError
-        The units have no common time, or do not cover the window.
-    ConfigError
-        An interval is shorter than two samples of a unit.
+    `DataError`: the units do not cover it. `ConfigError`: an interval is shorter than two samples.
     """
     if len(units) < 2:
         raise DataError("crash.unit-comparison-needs-two", quantity="units", count=len(units))
@@ -359,20 +343,12 @@ class MountingRotation:
 
 
 def mounting_rotation(first: VelocityIncrements, second: VelocityIncrements) -> MountingRotation:
-    """Estimate the rotation between two units from forces and rates.
+    """Estimate the rotation between two units from forces and rates between the same edges.
 
-    Parameters
-    ----------
-    first, second : VelocityIncrements
-        Between the same edges.
-
-    Notes
-    -----
-    The least-squares rotation (Wahba 1965, doi:10.1137/1007077) by singular values (Markley
-    1988, J. Astronaut. Sci. 36, 245), forces and rates weighted by their stated variances; then
-    Gauss-Newton steps with the full covariances, since a bias is common to all intervals. The
-    covariance of the estimate is the inverse of the normal matrix. Rates of a shared gyro are
-    left out.
+    Least squares (Wahba 1965, doi:10.1137/1007077) by singular values (Markley 1988, J. Astronaut.
+    Sci. 36, 245), forces and rates weighted by their stated variances; then Gauss-Newton steps with
+    the full covariances, since a bias is common to all intervals. Rates of a shared gyro are left
+    out.
     """
     C = _wahba(first, second)
     normal, step, square = np.eye(3), np.zeros(3), 0.0
@@ -488,20 +464,13 @@ class LeverArmCheck:
 
 
 def check_lever_arm(first: VelocityIncrements, second: VelocityIncrements) -> LeverArmCheck:
-    """Estimate the error of the stated relative position of two units.
+    """Estimate the error of the stated relative position of two units, moved to one point.
 
-    Parameters
-    ----------
-    first, second : VelocityIncrements
-        Moved to one point with the stated positions, between the same edges.
-
-    Notes
-    -----
-    Units moved with position errors e₁ and e₂ (true minus stated) differ by
-    ``([α×] + [ω×]²) (e₁ - e₂)``: generalized least squares, with noise and all unknowns of
-    both except the positions as covariance. The component along a fixed axis of rotation is not
-    observable; the normal matrix shows which directions are. Noise of the angular acceleration
-    biases the estimate toward zero by its share of the signal power.
+    Position errors e₁ and e₂ (true minus stated) differ by ``([α×] + [ω×]²) (e₁ - e₂)``:
+    generalized least squares, with noise and all unknowns but the positions as covariance. The
+    component along a fixed axis of rotation is not observable; the normal matrix shows which
+    directions are. Noise of the angular acceleration biases the estimate toward zero by its share
+    of the signal power.
     """
     shares = [v.lever for v in (first, second) if v.lever.any()]
     if not shares:
@@ -616,22 +585,11 @@ def signed_permutations() -> Array:
 def match_axes(first: VelocityIncrements, second: VelocityIncrements) -> AxisMatch:
     """Find the signed permutation of the second unit's axes that agrees with the first.
 
-    Parameters
-    ----------
-    first, second : VelocityIncrements
-        Between the same edges; gravity is included, so that a stationary interval separates up
-        from down.
-
-    Notes
-    -----
-    Least squares over the intervals with the full covariance of the difference, since a bias is
-    common to all intervals. The excess of the smallest residuals is added to every interval alike:
-    after moving with wrong rates, or forces that were wrong before moving, no permutation fits.
-    Among indistinguishable permutations the one nearest to the identity is taken, and the identity
-    where it fits with a probability of 1e-3 or more. Accelerometers and gyros are judged
-    separately, since either may be wired wrong: the angular rate of a rigid body is the same
-    everywhere, while forces agree only after both are moved to one point, which a wrong gyro axis
-    also disturbs. A shared gyro is not judged.
+    Least squares over the intervals, gravity included, with the full covariance of the difference.
+    The excess of the smallest residuals is added to every interval alike: after moving with wrong
+    rates no permutation fits. Among indistinguishable permutations the one nearest to the identity
+    is taken, and the identity where it fits with a probability of 1e-3 or more. Accelerometers and
+    gyros are judged separately, since either may be wired wrong; a shared gyro is not judged.
     """
     accel, lead, other = _best(first, second, "force")
     if first.borrows(second):
@@ -670,13 +628,7 @@ def _best(
 
 
 def axis_findings(match: AxisMatch, first: str, second: str) -> list[Finding]:
-    """Report swapped or inverted axes; empty where they agree.
-
-    Parameters
-    ----------
-    first, second : str
-        Names of the units.
-    """
+    """Report swapped or inverted axes of the second unit; empty where they agree."""
     kind = match.kind
     if kind == "agree":
         return []
@@ -733,36 +685,16 @@ def compare_units(
     pieces: int = 20,
     level: float = 1e-3,
 ) -> UnitComparison:
-    """Compare units pairwise and against their weighted combination.
+    """Compare two or more units of one rigid vehicle at one point, pairwise and against their mean.
 
-    Parameters
-    ----------
-    units : sequence of PointKinematics
-        Two or more, of one rigid vehicle, at one point.
-    window : (start, end), s, optional
-        Window to compare; by default -0.1 to 0.75 s, as far as all units have samples.
-    pieces : int
-        Number of equal intervals over which mean forces are compared, reduced so that each has
-        two samples. The test is equivalent to one of the delta-V curve at the interval edges.
-    level : float
-        Probability below which a difference counts as a disagreement.
-
-    Notes
-    -----
-    Only directions that both units measure are compared; assumed axes are excluded. With the
-    difference d of the velocity increments and its covariance C from all stated uncertainties,
-    ``dᵀ C⁻¹ d`` is chi-square distributed. Common errors (a shared gyro, the common leveling
-    attitude) cancel in d and in C. Structural ringing at one position only, and any other unstated
-    error, shows as a disagreement; the message gives the interval where it is largest. Intervals
-    in which either unit was clipped without a wider range are left out, and a finding reports it.
-    Each pair is checked for swapped axes, a rotated mounting and wrong positions.
-
-    Raises
-    ------
-    DataError
-        There are fewer than two units, or they do not cover the window.
-    ConfigError
-        The window is too short, or an option is out of range.
+    `window`, s, by default -0.1 to 0.75 s as far as recorded, is cut into `pieces`, fewer where
+    each would have less than two samples. With the difference d of the velocity increments and its
+    covariance C from all stated uncertainties, ``dᵀ C⁻¹ d`` is chi-square distributed; common
+    errors (a shared gyro, the leveling) cancel in both. A probability below `level` is a
+    disagreement: structural ringing at one position, or any unstated error. Assumed axes, and
+    intervals in which a unit was clipped without a wider range, are left out. Each pair is checked
+    for swapped axes, a rotated mounting and wrong positions. `DataError`, `ConfigError`: the window
+    is not covered or too short, an option out of range.
     """
     if not (pieces >= 3 and 0.0 < level < 1.0):
         raise ConfigError(

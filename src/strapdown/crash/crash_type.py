@@ -56,33 +56,16 @@ class RollMotion:
 
 @dataclass(frozen=True)
 class TippingBody:
-    """A rigid vehicle that tips about the wheels on one side.
+    """A rigid vehicle that tips about the wheels on one side; dimensions in m.
 
-    Attributes
-    ----------
-    half_track : float, m
-    stability_factor : float
-        Static stability factor: half the track divided by the height of the center of mass (49
-        CFR 575, NCAP). 1.41 is the sales-weighted mean of passenger cars of 2003, 1.17 of sport
-        utility vehicles (NHTSA, DOT HS 809 868).
-    roll_radius : float, m
-        Radius of gyration about the longitudinal axis through the center of mass.
-
-    Raises
-    ------
-    ConfigError
-        A dimension is not positive and finite.
-
-    Notes
-    -----
-    The criterion is this package's own. About the wheels at the distance ``r = hypot(c, h)``
-    (half track, height) from the center of mass, the body is at its highest at the roll
-    ``tip = atan(c / h)``. It tips over if the energy of the roll, per mass,
-    ``g r (cos(tip - |roll|) - cos tip) + (k² + r²) rate² / 2``, reaches ``g r (1 - cos tip)``; the
-    rate counts only while it turns away from level. Suspension, tires and continuing external
-    forces are neglected, so that a ratio near one decides neither way. A level passenger car
-    requires 141 deg/s. Half track and radius of gyration are rounded values for a passenger car,
-    chosen for this package.
+    `stability_factor`: half the track divided by the height of the center of mass (49 CFR 575,
+    NCAP; 1.41 is the sales-weighted mean of passenger cars of 2003, NHTSA, DOT HS 809 868);
+    `roll_radius` of gyration. The criterion is this package's own: with ``r = hypot(c, h)`` (half
+    track, height) and ``tip = atan(c / h)``, it tips over if the energy of the roll, per mass, ``g
+    r (cos(tip - |roll|) - cos tip) + (k² + r²) rate² / 2``, reaches ``g r (1 - cos tip)``; the rate
+    counts only while it turns away from level. Suspension, tires and continuing external forces are
+    neglected, so that a ratio near one decides neither way. A level passenger car requires 141
+    deg/s. `ConfigError`: a dimension is not positive and finite.
     """
 
     half_track: float = 0.75

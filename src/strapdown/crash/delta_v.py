@@ -75,17 +75,10 @@ class DeltaV:
 
 @dataclass(frozen=True, eq=False)
 class TrailingDeltaV:
-    """Change of velocity over a window that trails each sample.
+    """Change of velocity, (m, 3), m/s, over a window, s, that trails each sample.
 
-    Attributes
-    ----------
-    window : float, s
-    time : ndarray, (m,), s
-        Ends of the windows: samples with a full window before them.
-    vector : ndarray, (m, 3), m/s
-    peak : DeltaV
-        The window with the largest resultant; it may end between samples.
-    frame : {'body', 'ned', 'impact'}
+    `time`, (m,), s: ends of the windows, samples with a full window before them; `peak`: the window
+    with the largest resultant, which may end between samples.
     """
 
     window: float
@@ -150,25 +143,10 @@ def cumulative_delta_v(
 ) -> pd.DataFrame:
     """Change of velocity since an instant, over time.
 
-    Parameters
-    ----------
-    start, end : float, s
-        Within the record.
-    every : float, s, optional
-        Output step; by default the samples and the two ends. Recorders use 0.010 s.
-
-    Returns
-    -------
-    DataFrame
-        Index ``time``, s, from `start` on, at zero there; columns ``dv_x dv_y dv_z`` in the
-        frame of the acceleration, ``horizontal`` and ``resultant``, m/s.
-
-    Raises
-    ------
-    DataError
-        The window reaches beyond the record.
-    ConfigError
-        `every` is not positive.
+    From `start` to `end`, s, within the record, in steps of `every`, s, or at the samples and both
+    ends. Returns ``dv_x dv_y dv_z``, ``horizontal``, ``resultant``, m/s, by ``time``, s, from
+    `start` on, in the frame of the acceleration. `DataError`, `ConfigError`: the window or the step
+    is not possible.
     """
     check_within(acceleration.time, start, end, acceleration.source)
     if every is None:
@@ -251,13 +229,10 @@ Polynomials = tuple[Array, Array, Array]
 
 
 class VelocityCourse:
-    """Integral of an acceleration since its first stamp.
+    """Integral of an acceleration since its first stamp, at any instant.
 
-    Parameters
-    ----------
-    acceleration : Acceleration
-        Linear between instantaneous samples, constant over the interval of a mean; the velocity
-        is then the same as from `window_weights`.
+    The acceleration is linear between instantaneous samples and constant over the interval of a
+    mean; the velocity is the same as from `window_weights`.
     """
 
     def __init__(self, acceleration: Acceleration) -> None:

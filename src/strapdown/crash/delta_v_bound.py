@@ -80,21 +80,9 @@ def body_delta_v_bound(
 ) -> DeltaVBound:
     """Uncertainty of a change of velocity integrated along the rotating body axes.
 
-    Parameters
-    ----------
-    effects : SampleEffects
-        At the point of the change of velocity.
-    weights : array_like, (n,), s
-        Of each sample: the change is their product with specific force minus stationary force.
-    rest_sd : array_like, (3,), m/s²
-        Standard deviation from noise of the stationary mean that was subtracted.
-    at_ends : array_like, (e, 3), m/s, optional
-        Effect on the change of one standard deviation of each instant that bounds the window.
-
-    Returns
-    -------
-    DeltaVBound
-        Vehicle axes.
+    `weights`, (n,), s: the change is their product with specific force minus stationary force;
+    `rest_sd`, (3,), m/s²: of the stationary mean from noise; `at_ends`, (e, 3), m/s: effect on the
+    change of one standard deviation of each instant that bounds the window.
     """
     w = np.asarray(weights, dtype=np.float64)
     length = float(w.sum())
@@ -109,24 +97,9 @@ def resolved_delta_v_bound(
 ) -> DeltaVBound:
     """Uncertainty of a change of velocity in local level, gravity subtracted by the attitude.
 
-    Parameters
-    ----------
-    path : CrashPath
-    start, end : float, s
-        Within the path; errors are interpolated linearly between samples.
-    at_ends : array_like, (e, 3), m/s, optional
-        As `body_delta_v_bound`.
-
-    Returns
-    -------
-    DeltaVBound
-        North, east, down in the axes of the path. Independent of the error of the entry
-        speed.
-
-    Raises
-    ------
-    DataError
-        The window is not within the path.
+    Between two instants, s, within the path, in its axes; errors are interpolated linearly.
+    Independent of the error of the entry speed. `at_ends` as `body_delta_v_bound`. `DataError`: the
+    window is not within the path.
     """
     low, high = path.time[0] - 1e-9, path.time[-1] + 1e-9
     if not (low <= start < end <= high):
@@ -255,16 +228,9 @@ class EventChanges:
 def velocity_change(
     window: str, change: DeltaV, bound: DeltaVBound, heading_deg: float = 0.0
 ) -> VelocityChange:
-    """Combine a change of velocity, its uncertainty and its direction.
+    """Combine a change, its bound in the same axes, and its direction of force.
 
-    Parameters
-    ----------
-    window : {'peak', 'event'}
-    change : DeltaV
-    bound : DeltaVBound
-        In the same axes.
-    heading_deg : float, deg
-        Of the vehicle at the impact, for a change in north-east-down.
+    `heading_deg`: of the vehicle at the impact, for a change in north-east-down.
     """
     direction = ned_pdof(change, heading_deg) if change.frame == "ned" else pdof(change)
     return VelocityChange(window, change, bound, direction, pdof_interval(change, bound.covariance))

@@ -176,18 +176,8 @@ def _positive(value: float, name: str, code: str) -> None:
 class FixCorrelation:
     """Time correlation of the errors of fixes.
 
-    Attributes
-    ----------
-    share : float
-        Fraction of the receiver's stated variance, 0 to 1, that is a Gauss-Markov process; the
-        rest is independent for each fix.
-    time : float, s
-        Correlation time (1/e).
-
-    Raises
-    ------
-    ConfigError
-        A number is out of range.
+    `share`, 0 to 1, of the receiver's stated variance is a Gauss-Markov process of correlation time
+    (1/e) `time`, s; the rest is independent for each fix. `ConfigError`: a number is out of range.
     """
 
     share: float
@@ -683,22 +673,12 @@ _TOGETHER = 0.7
 class Problem:
     """Linearized fixes and priors: m fixes of up to w rows in filter order, p constants, s states.
 
-    Attributes
-    ----------
-    residuals, by_constants, by_states : ndarray, (m, w), (m, w, p), (m, w, s)
-        With the derivatives.
-    noise, variance : ndarray, (m, w)
-        Of the independent noise of each fix; total of the fix, which the weights scale.
-    there : ndarray of bool, (m, w)
-        Which components were measured.
-    groups : ndarray of int, (w,)
-        0 or more for rows that are weighted together, -1 for rows that keep full weight.
-    carry, driven : ndarray, (m, s, s)
-        Transition from the preceding fix (of the first from zero time); noise added on the way.
-    first : ndarray, (s, s)
-        Covariance of the states at zero time.
-    prior_sd, prior_residuals : ndarray, (p,)
-        Residuals: prior minus current parameters.
+    `residuals`, (m, w), with their derivatives `by_constants`, (m, w, p), and `by_states`, (m, w,
+    s); `noise`, (m, w): variance independent from fix to fix, `variance` the total that weights
+    scale; `there`: components that were measured; `groups`, (w,): rows weighted together, -1 for
+    full weight; `carry`, `driven`, (m, s, s): transition from the preceding fix, and noise added on
+    the way; `first`, (s, s): covariance at zero time; `prior_residuals`, (p,): prior minus current
+    parameters.
     """
 
     residuals: Array

@@ -77,13 +77,7 @@ class CrashEvent:
 
 
 def two_sds(given: float | Sequence[float], name: str) -> tuple[float, float]:
-    """Forward and right standard deviation from one number or a triad.
-
-    Raises
-    ------
-    ConfigError
-        The value is neither, or negative, or not finite.
-    """
+    """Forward and right standard deviation from one number or a triad."""
     try:
         sds = np.asarray(given, dtype=np.float64)
         sds = np.broadcast_to(sds, (3,)) if sds.ndim == 0 else sds
@@ -195,20 +189,11 @@ PART_563 = EventRule()
 
 @dataclass(frozen=True)
 class CrashEvents:
-    """Events found in a record.
+    """Events found in a record, in order of time; the last one may last beyond the record.
 
-    Attributes
-    ----------
-    events : tuple of CrashEvent
-        In order of time; the last one may last beyond the record.
-    woken : int
-        Number of times the wake threshold was exceeded without an event: potholes, curbs, doors.
-    largest_change : float, m/s
-        Largest change of the longitudinal or lateral velocity within the trigger window,
-        excluding changes that led to an event.
-    largest_axis : {'longitudinal', 'lateral'}
-    largest_time : float, s
-        End of that window; NaN without any change.
+    `woken`: number of times the wake threshold was exceeded without an event: potholes, curbs,
+    doors. `largest_change`, m/s, along `largest_axis` within the trigger window that ends at
+    `largest_time`, s (NaN without any change), excluding changes that led to an event.
     """
 
     events: tuple[CrashEvent, ...]
@@ -222,26 +207,14 @@ class CrashEvents:
 
     @property
     def first(self) -> CrashEvent:
-        """The first event.
-
-        Raises
-        ------
-        DataError
-            The record has no event; the message gives the largest change.
-        """
+        """The first event. `DataError`: there is none; the message gives the largest change."""
         if not self.events:
             raise DataError(self.findings[-1])
         return self.events[0]
 
     @property
     def strongest(self) -> CrashEvent:
-        """The event with the largest peak.
-
-        Raises
-        ------
-        DataError
-            The record has no event.
-        """
+        """The event with the largest peak. `DataError`: there is none."""
         return max(self.events, key=lambda e: e.peak) if self.events else self.first
 
     @property

@@ -70,13 +70,7 @@ def checked(
 
 
 def step_of(time: Array) -> float:
-    """Return the uniform step of a record, for a digital filter.
-
-    Raises
-    ------
-    DataError
-        The steps are not uniform.
-    """
+    """Uniform step of a record, for a digital filter. `DataError`: the steps differ."""
     steps = np.diff(time)
     step = float(time[-1] - time[0]) / steps.size
     off = np.flatnonzero(np.abs(steps - step) > SAME_STEP * step)
@@ -89,13 +83,7 @@ def step_of(time: Array) -> float:
 
 
 def from_start(time: Array, values: Array, start: float, quantity: str) -> tuple[Array, Array]:
-    """Cut a record so that it begins at `start`, interpolated there.
-
-    Raises
-    ------
-    DataError
-        `start` is not within the record.
-    """
+    """Cut a record so that it begins at `start`, interpolated there."""
     if not time[0] <= start < time[-1]:
         raise DataError(
             "crash.start-not-within-record",

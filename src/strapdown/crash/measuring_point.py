@@ -33,33 +33,16 @@ VIBRATION = 0.025  # s
 
 
 def unit_effects(prepared: PreparedUnit, moved: MovedImu, *, time_sd: float = 0.0) -> SampleEffects:
-    """List the unknowns of a unit and the effect of each at a point.
+    """List the unknowns of a unit and the effect of each at the point that it was `moved` to.
 
-    Parameters
-    ----------
-    moved : MovedImu
-        The same unit moved to the point: `move_unit`.
-    time_sd : float, s
-        Standard deviation of the unit's clock relative to the common one.
-
-    Returns
-    -------
-    SampleEffects
-        Bias, scale factor, misalignment, nonlinearity and vibration rectification of every used
-        range, including the errors that its bias estimate inherits; the same for the gyro, with
-        its g-sensitivity and its effect through the lever arm; mounting; lever arm; timing; and
-        the assumptions on unmeasured axes and rotation of the vehicle (contributors ``assumed:
-        no turning`` and ``assumed: missing axis``).
-        An unknown without a standard deviation is left out. Those of a borrowed gyro have the
-        name of its unit, and are along its axes; those of the leveling belong to the vehicle.
-
-    Notes
-    -----
-    A higher range whose bias was taken from a lower one while stationary has the lower one's error
-    there, and its own only as far as the input has changed since: with ``e_l`` and ``e_h`` the
-    errors of the two curves, ``e_l(f_rest) + e_h(f) - e_h(f_rest)``. The gyro bias was estimated
-    while stationary, so that its g-sensitivity acts on ``f - f_rest``. Vibration is the variance
-    about a moving mean of 25 ms.
+    Bias, scale factor, misalignment, nonlinearity and vibration rectification (of the variance
+    about a moving mean of 25 ms) of every used range; the same for the gyro, with its
+    g-sensitivity, and through the lever arm; mounting; lever arm; timing, with `time_sd`, s,
+    relative to the common clock; and assumptions. An unknown without a standard deviation is left
+    out; those of a borrowed gyro have the name of its unit, and those of the leveling belong to the
+    vehicle. A range whose bias was taken from a lower one while stationary has the lower one's
+    error there, and its own only as far as the input has changed since: ``e_l(f_rest) + e_h(f) -
+    e_h(f_rest)``.
     """
     return _UnitEffects(prepared, moved, time_sd).collect()
 
@@ -373,13 +356,7 @@ def _sd(covariances: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class AssumedEffect:
-    """Effect of one standard deviation of an unknown on the samples, vehicle axes.
-
-    Attributes
-    ----------
-    force : ndarray, (n, 3), m/s², or None
-    rate : ndarray, (n, 3), rad/s, or None
-    """
+    """Effect of one standard deviation of an unknown: force, m/s², and rate, rad/s, (n, 3)."""
 
     name: str
     contributor: str
@@ -388,20 +365,14 @@ class AssumedEffect:
 
 
 def assumed_effects(prepared: PreparedUnit) -> Iterator[AssumedEffect]:
-    """List the unknowns of a unit's assumptions.
+    """List the unknowns of a unit's assumptions, as unknowns of the vehicle.
 
-    Of the vehicle: units that lack the same axes have the same unknowns. For rotation, two time
-    functions about each vehicle axis (`Assumed`) and the second-order effect; for missing axes, two
-    along each.
-
-    Notes
-    -----
-    A specific force f rotated by φ about e keeps ``f - φ²/2 (f - e (e·f))`` to second order:
-    rotations of 5 deg always shorten a change of velocity by 0.4 %, while the first order only
-    deflects it. ``φ²/2`` has the mean ``sd²/2`` and the standard deviation ``sd²/√2``. The means of
-    all axes are one unknown about zero, the deviations one each, so that the total mean square is
-    right; as it is one-sided, 6.5 % lie beyond the 95 % bound. Products of a rotation and a missing
-    axis are neglected: 4 deg and 0.8 m/s give 0.03 m/s.
+    For rotation, two time functions about each vehicle axis (`Assumed`) and the second-order
+    effect; for missing axes, two along each. A specific force f rotated by φ about e keeps ``f -
+    φ²/2 (f - e (e·f))`` to second order: ``φ²/2`` has the mean ``sd²/2`` and the standard deviation
+    ``sd²/√2``. The means of all axes are one unknown about zero, the deviations one each; as it is
+    one-sided, 6.5 % lie beyond the 95 % bound. Products of a rotation and a missing axis are
+    neglected: 4 deg and 0.8 m/s give 0.03 m/s.
     """
     unit = prepared.unit
     time = prepared.imu.index.to_numpy(dtype=np.float64)
@@ -529,24 +500,11 @@ MISSING_AXIS = "assumed: missing axis"
 class SampleEffects:
     """Effect of one standard deviation of each of p unknowns on n samples, in vehicle axes.
 
-    Attributes
-    ----------
-    names : tuple of str
-        Unknowns of the same name are one unknown, in whatever unit they appear.
-    contributors : tuple of str
-        The line of the error budget that each belongs to.
-    force : ndarray, (p, n, 3), m/s²
-        Added to the specific force at the point.
-    rate : ndarray, (p, n, 3), rad/s
-        Added to the rate of the vehicle.
-    rest_force : ndarray, (p, 3), m/s²
-        Added to the mean stationary specific force.
-    tilt : ndarray, (p, 3), rad
-        Rotation vector of the effect on the leveled attitude, in local level with forward as
-        north.
-    force_noise : ndarray, (n, 3), m/s²
-        Standard deviation of the part independent from sample to sample.
-    rate_noise : ndarray, (n, 3), rad/s
+    Unknowns of the same name are one unknown, in whatever unit they appear; `contributors`: the
+    line of the error budget of each. `force`, (p, n, 3), m/s², at the point; `rate`, (p, n, 3),
+    rad/s; `rest_force`, (p, 3), m/s², on the stationary mean; `tilt`, (p, 3), rad, on the leveled
+    attitude, in local level with forward as north. `force_noise`, `rate_noise`, (n, 3): standard
+    deviation of the part independent from sample to sample.
     """
 
     names: tuple[str, ...]
@@ -585,20 +543,10 @@ NO_GYRO = "no gyro"
 class PointKinematics:
     """Kinematics from a unit, or the mean of several, at a point of the vehicle.
 
-    Attributes
-    ----------
-    imu : DataFrame
-        Imu table in vehicle axes, time from the common trigger.
-    rest : RestStretch, optional
-    rest_accel_sd : float, m/s²
-        Standard deviation of the vehicle's own acceleration over the stationary interval.
-    prepared : PreparedUnit, optional
-        The source unit; None for a mean of several.
-    moved : MovedImu, optional
-        Data of the move to the point.
-    unmeasured, unmeasured_turns : ndarray, (3, 3), optional
-        Projections onto the directions, in vehicle axes, along which the specific force, and
-        about which the rotation, is assumed instead of measured; None where all are measured.
+    `imu` in vehicle axes, time from the common trigger; `rest_accel_sd`, m/s²: of the vehicle's own
+    acceleration over the stationary interval; `prepared` and `moved` are None for a mean of
+    several; `unmeasured`, `unmeasured_turns`, (3, 3): projections onto the directions along which
+    the force, and about which the rotation, is assumed; None where all are measured.
     """
 
     name: str
@@ -647,11 +595,7 @@ class PointKinematics:
     def resting_force(self, gravity: float) -> tuple[Array, Array]:
         """Mean specific force before the crash and its standard deviation, (3,) each, m/s².
 
-        Without a stationary interval, gravity in the stated attitude.
-
-        Parameters
-        ----------
-        gravity : float, m/s²
+        Without a stationary interval, gravity, m/s², in the stated attitude.
         """
         rest, level = self.rest, self.levelling
         if rest is None:

@@ -46,19 +46,9 @@ class IntegrationSegment:
 
     A backward segment is a motion of its own, with opposite velocity on an Earth that rotates the
     other way; `errors`, `noise_covariance` and values read from `nominal` are reversed by the code
-    that joins them.
-
-    Attributes
-    ----------
-    time : ndarray, (k + 1,), s
-        In the order of integration.
-    state, rows, nominal : ndarray
-        Kernel state at the start, motion increments (k, 10), states (k + 1, 10).
-    effects : ndarray, (p, 6, k)
-        Effect of one standard deviation of each unknown on angle and velocity of each step.
-    noise_sd : ndarray, (6, k)
-    earth, options : ndarray
-        Kernel arguments.
+    that joins them. `time`, (k + 1,), s, is in the order of integration; `rows`, (k, 10), and
+    `nominal`, (k + 1, 10), are the kernel's increments and states; `effects`, (p, 6, k): of one
+    standard deviation of each unknown on angle and velocity of each step; `noise_sd`, (6, k).
     """
 
     backward: bool

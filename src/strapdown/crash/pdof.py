@@ -84,15 +84,7 @@ class NedPdof:
 
 
 def vector_of(change: DeltaV | ArrayLike, frames: Sequence[str]) -> Array:
-    """Return the three components of a delta-V with a direction.
-
-    Raises
-    ------
-    ConfigError
-        The frame is another one.
-    DataError
-        The components are not three finite numbers, or all zero.
-    """
+    """Three components of a delta-V with a direction, in one of the frames."""
     if isinstance(change, DeltaV) and change.frame not in frames:
         raise ConfigError(
             "crash.delta-v-frame-needed", quantity="frame", frame=change.frame, frames=frames
@@ -162,13 +154,7 @@ def ned_pdof(change: DeltaV | ArrayLike, heading_deg: float) -> NedPdof:
 
 
 def covariance_of(given: ArrayLike) -> Array:
-    """Return a covariance of three components.
-
-    Raises
-    ------
-    DataError
-        The matrix is not (3, 3), symmetric, finite and without a negative variance.
-    """
+    """A covariance, (3, 3): symmetric, finite, without a negative variance."""
     matrix = np.asarray(given, dtype=np.float64)
     good = matrix.shape == (3, 3) and bool(np.isfinite(matrix).all())
     if good:
@@ -329,13 +315,9 @@ def _finite(angle: float) -> float:
 class AngleInterval:
     """All directions consistent with the measurement.
 
-    Attributes
-    ----------
-    low_deg, high_deg : float, deg
-        Continuous about the estimate, so that ``low <= estimate <= high``; either may lie
-        beyond 180. The whole range where `undetermined`.
-    undetermined : bool
-        No direction can be excluded: the change of velocity may be zero.
+    `low_deg <= estimate <= high_deg`, continuous about it, so that either may lie beyond 180.
+    `undetermined`: no direction can be excluded, as the change may be zero; the range is then
+    whole.
     """
 
     low_deg: float
@@ -354,13 +336,7 @@ class AngleInterval:
 
 @dataclass(frozen=True)
 class PdofInterval:
-    """Intervals of the two angles of a direction of force.
-
-    Attributes
-    ----------
-    level : float
-        Coverage probability of each.
-    """
+    """Intervals of the two angles of a direction of force, each with coverage `level`."""
 
     horizontal: AngleInterval
     vertical: AngleInterval

@@ -315,13 +315,7 @@ OPTIONS = (
 
 
 def checked_options(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the options after checking their names.
-
-    Raises
-    ------
-    ConfigError
-        An option is unknown.
-    """
+    """Options after a check of their names."""
     for name in options:
         if name not in OPTIONS:
             raise ConfigError(
@@ -335,13 +329,7 @@ def checked_options(options: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def check_options(unit: str, **given: Any) -> None:
-    """Check the options of a unit's preparation.
-
-    Raises
-    ------
-    ConfigError
-        An option is out of range, or of the wrong type.
-    """
+    """Refuse options that are out of range, or of the wrong type."""
     gravity, rest, levelling = given["gravity"], given["rest"], given["levelling"]
     if not (finite(gravity) and 9.7 < gravity < 9.9):
         raise ConfigError(
@@ -588,13 +576,7 @@ def rest_findings(
     levelled: bool,
     steady_acceleration: float,
 ) -> list[Finding]:
-    """Report a missing stationary interval, or only a steady one.
-
-    Raises
-    ------
-    DataError
-        There is neither, and no leveling is stated.
-    """
+    """Report a missing or only steady interval. `DataError`: none, and no stated leveling."""
     if rest is None:
         late = time[0] > impact - SHORTEST
         said = {"begin": time[0], "impact": impact}
@@ -618,12 +600,9 @@ def rest_findings(
 
 
 def length_findings(unit: CrashUnit, rest: RestStretch, gravity: float) -> list[Finding]:
-    """Report a stationary force that is in g, points down, or contradicts its stated errors.
+    """Report a stationary force that points down or contradicts its stated errors.
 
-    Raises
-    ------
-    DataError
-        Its length is near one.
+    `DataError`: it is in g.
     """
     assert rest.accel_mean is not None
     mean = np.asarray(rest.accel_mean)

@@ -48,12 +48,8 @@ Row = tuple[str, str, float, float, float]
 def summary_table(units: Sequence[UnitReconstruction]) -> pd.DataFrame:
     """Changes of velocity, directions of force and ends of the path, with 95 % bounds.
 
-    Returns
-    -------
-    DataFrame
-        Indexed by ``unit``, ``part`` (number and type of the event, or ``path``) and
-        ``quantity``; ``value``, ``low`` and ``high`` in the unit that the quantity names, with
-        95 % bounds.
+    By ``unit``, ``part`` (number and type of the event, or ``path``) and ``quantity``, which names
+    the unit: ``value``, ``low`` and ``high``.
     """
     index, rows = [], []
     for unit in units:
@@ -342,13 +338,7 @@ SLOPE_DEG = 4.0
 
 
 def check_standing(at_point: PointKinematics, entry: Entry | None) -> None:
-    """Refuse a start at zero speed where the vehicle may have been driving.
-
-    Raises
-    ------
-    DataError
-        No entry is given, and the quiet interval may be one of driving at speed.
-    """
+    """Refuse a start at zero speed where the quiet interval may be one of driving."""
     rest = at_point.rest
     if entry is None and rest is not None and rest.grade == "steady":
         raise DataError(
@@ -367,14 +357,7 @@ def entry_findings(
     events: CrashEvents,
     mechanization: NorthEastDown | None,
 ) -> list[Finding]:
-    """Report an entry during the crash, or a speed that the record contradicts.
-
-    Parameters
-    ----------
-    path : CrashPath
-        The path from this entry.
-    mechanization : NorthEastDown, optional
-    """
+    """Report an entry during the crash, or a speed that the record contradicts."""
     if entry is None:
         return []
     found = _slope(at_point, entry, path)
@@ -665,15 +648,7 @@ def check_crash_options(
     gravity: object,
     mechanization: object,
 ) -> None:
-    """Check the arguments that no later stage would report by kind or size.
-
-    Raises
-    ------
-    DataError
-        No unit is given.
-    ConfigError
-        An argument is of another kind, or out of range.
-    """
+    """Refuse arguments that no later stage would report by kind or size."""
     _check_units(units)
     if not (entry is None or isinstance(entry, Entry | GnssEntry)):
         raise _wrong_type("entry", entry)

@@ -52,20 +52,9 @@ Left = list[tuple[str, str]]
 class Clock:
     """Time base of a part.
 
-    Attributes
-    ----------
-    column, unit, why : str
-        Name of the column (empty without one), its unit (empty where not settled), the evidence.
-    step : float
-        Mean, in the clock's own unit; NaN without time.
-    rate : float, Hz
-        In the likeliest unit.
-    candidates : str
-        Possible units, in words, where `unit` is empty.
-    stated : bool
-        The case must state the rate: a table without a clock column, or rounded stamps.
-    rate_why : str
-        Evidence for the rate of rounded stamps.
+    `column` is empty without one, `unit` where not settled: `candidates` then names the possible
+    ones; `step`, in the clock's own unit, NaN without time; `rate`, Hz, in the likeliest unit, with
+    the evidence `rate_why` for rounded stamps; `stated`: the case must state the rate.
     """
 
     column: str
@@ -82,38 +71,12 @@ class Clock:
 class Part:
     """Triad of channels, possibly incomplete.
 
-    Attributes
-    ----------
-    path : str
-        Of the record, as in the case.
-    kind : str
-        ``acceleration``, ``rate`` or ``velocity`` (delta-V of event data recorders).
-    channels : dict of str to str
-        Axis to name of the channel, without missing axes.
-    unit, why : str
-        Unit (empty where not settled); evidence for kind and axes.
-    time : ndarray, (n,), s
-        In the likeliest unit of the clock.
-    values : ndarray, (n, 3)
-        In SI, by the likeliest unit; NaN for missing axes.
-    candidates : str
-        Possible units, in words, where `unit` is empty.
-    label : str
-        Distinguishes the triad from others of its record.
-    unit_why : tuple of str
-        Evidence for the unit.
-    zeroed : bool
-        Gravity at rest has been subtracted.
-    sampling : str
-        Empty where the record does not state it.
-    named : bool
-        The record names the axes.
-    place : str
-        Position of the sensor, as far as the record states it.
-    uncertainty : dict of str to float
-        Error model, by keys of the sensor catalogue; `basis` gives its grounds.
-    notes, remarks : tuple of str
-        Further lines for a comment; remarks in the record.
+    `path` as in the case; `kind` is ``acceleration``, ``rate`` or ``velocity`` (delta-V of event
+    data recorders); `channels`: axis to name, without missing axes; `unit` is empty where not
+    settled, with `candidates`, and `unit_why` is its evidence; `time`, (n,), s, and `values`, (n,
+    3), SI, by the likeliest units, NaN for missing axes; `label` distinguishes triads of one
+    record; `zeroed`: gravity at rest has been subtracted; `named`: the record names the axes;
+    `uncertainty`: error model by keys of the sensor catalogue, with its grounds `basis`.
     """
 
     path: str
@@ -316,17 +279,8 @@ class Group(NamedTuple):
 def table_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skipped]]:
     """Find the triads of a table: values as recorded, kind and unit as far as headings state them.
 
-    Parameters
-    ----------
-    path : str
-        As in the case.
-    record : CrashRecord
-        With columns as channels.
-
-    Raises
-    ------
-    DataError
-        Fewer than eight samples, time that does not advance, or an invalid sensor value.
+    `path` as in the case. `DataError`: fewer than eight samples, time that does not advance, or an
+    invalid sensor value.
     """
     columns: dict[str, Array] = {}
     headings: dict[str, Heading] = {}
@@ -897,16 +851,8 @@ def agreement(a: Part, b: Part, axes: Sequence[int] = (0, 1, 2)) -> tuple[float,
 def settle_units(parts: Sequence[Part]) -> list[Part]:
     """Determine kind and unit of every triad: by heading, rest, or one with the same motion.
 
-    Parameters
-    ----------
-    parts : sequence of Part
-        With values as recorded, and kind and unit as far as the headings state them.
-
-    Returns
-    -------
-    list of Part
-        In the same order, with values in SI; in the likeliest unit where `Part.unit` is empty.
-        Delta-V of event data recorders as mean accelerations.
+    From values as recorded to values in SI, in the same order; in the likeliest unit where
+    `Part.unit` is empty. Delta-V of event data recorders become mean accelerations.
     """
     parts = [_timed(p) for p in parts]
     out: list[Part | None] = [_stated(p) for p in parts]
@@ -1125,15 +1071,7 @@ LABORATORY = {
 
 
 def laboratory_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skipped]]:
-    """Find the triads of a test, and the failed and redundant channels and those of other bodies.
-
-    Parameters
-    ----------
-    path : str
-        As in the case.
-    record : CrashRecord
-        Its channels state quantity, axis, position and body.
-    """
+    """Find the triads of a test, and the failed, redundant and foreign channels."""
     places: dict[tuple[str, str], list[CrashChannel]] = {}
     skipped: list[Skipped] = []
     elsewhere: dict[str, list[str]] = {}

@@ -61,20 +61,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Draft:
-    """Proposed case file.
-
-    Attributes
-    ----------
-    text : str
-        Text of the file.
-    found : tuple of str
-        Lines for the user.
-    asked, to_check : tuple of Asked
-        Questions that the user has to answer, and consequences of found or assumed values to
-        confirm.
-    findings : tuple of Finding
-        Findings about the records.
-    """
+    """Proposed case file: text, lines for the user, questions, consequences to confirm."""
 
     text: str
     found: tuple[str, ...]
@@ -85,15 +72,7 @@ class Draft:
 
 
 def read_records(paths: Sequence[str | Path]) -> list[CrashRecord]:
-    """Read the records for a proposed case.
-
-    Raises
-    ------
-    ConfigError
-        A file does not exist, or is named twice.
-    DataError
-        A file cannot be read.
-    """
+    """Read the records for a proposed case. `ConfigError`: a file is named twice."""
     seen: dict[Path, str] = {}
     records = []
     for given in paths:
@@ -328,18 +307,9 @@ _RANGE_WORDS = re.compile(
 class Unit:
     """Recorder found in the records.
 
-    Attributes
-    ----------
-    accelerometers : tuple of Part
-        In order of increasing range.
-    gyro_from : str
-        Name of the unit whose gyro it uses; empty if it has its own or none.
-    ends : tuple of RangeEnds
-        Of each accelerometer, and of the gyro last.
-    why : tuple of str
-        Grounds for the grouping.
-    heading_deg, heading_why : float or None, str
-        Heading of its mounting with the reason; or None, with the meaning of each right angle.
+    Accelerometers in order of increasing range; `gyro_from`: unit whose gyro it uses, empty if
+    none; `ends`: of each accelerometer, and of the gyro last; `why`: grounds for the grouping;
+    heading of the mounting with the reason, or None with the meaning of each right angle.
     """
 
     name: str
@@ -683,28 +653,13 @@ BEGUN, QUIET = 0.2, 0.02  # s
 
 
 class Impact(NamedTuple):
-    """Impact as measured by accelerometers.
+    """Impact as measured by accelerometers, on their clock.
 
-    Attributes
-    ----------
-    trigger, trigger_sd : float, s
-        On their clock; without an event, the begin of the largest pulse.
-    at_zero : bool
-        The record counts from its trigger.
-    found : bool
-        Whether an event as defined by 49 CFR 563 was found.
-    largest : float, m/s
-        Horizontal delta-V of the event; without one, the largest within 150 ms.
-    peak : float, m/s²
-        Of the resultant, without gravity.
-    change : ndarray, (3,), m/s
-        Delta-V in sensor axes, over 150 ms from the trigger, with the resting value subtracted.
-    base : ndarray, (3,), m/s²
-        The resting value.
-    rest, grade : (float, float) or None, s; str
-        ``still``, ``steady``, or empty.
-    more : int
-        Events after the first.
+    `trigger`, s, is without an event (`found`, by 49 CFR 563) the begin of the largest pulse;
+    `at_zero`: the record counts from its trigger; `largest`, m/s: horizontal delta-V of the event,
+    without one the largest within 150 ms; `peak`, m/s², of the resultant without gravity; `change`,
+    (3,), m/s: over 150 ms in sensor axes; `base`, (3,), m/s²: the resting value; `rest`, s, with
+    `grade` ``still``, ``steady`` or empty; `more`: events after the first.
     """
 
     trigger: float
@@ -844,14 +799,9 @@ def sitting_at_rest(force: Array) -> Sitting | None:
     """Find roll and pitch of a mounting from the mean specific force at rest, (3,), m/s².
 
     None where its magnitude is not that of gravity. An axis within 20° of the vertical is taken to
-    be along it: the rest is the tilt of vehicle and sensor together, which the leveling finds.
-
-    Notes
-    -----
-    The vehicle's up, ``(0, 0, -1)``, is in sensor axes
-    ``C_vsᵀ (0, 0, -1) = (sin p, -sin r cos p, -cos r cos p)`` whatever the heading; so
-    ``p = asin u_x`` and ``r = atan2(-u_y, -u_z)``. With x along the vertical, roll and heading
-    turn about one axis, and roll is zero.
+    be along it. The vehicle's up is in sensor axes ``C_vsᵀ (0, 0, -1) = (sin p, -sin r cos p, -cos
+    r cos p)`` whatever the heading; with x along the vertical, roll and heading turn about one
+    axis: roll is zero.
     """
     length = float(np.linalg.norm(force))
     if not LEAST_LENGTH <= length / STANDARD_GRAVITY <= MOST_LENGTH:
