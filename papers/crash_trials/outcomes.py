@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 from papers.crash_trials.cases import TrialCase, TrialPriors, Untold, draw_case
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash import (
+    CrashOptions,
     EventChanges,
+    Preparation,
     UnitReconstruction,
     VelocityChange,
     at_point,
@@ -143,9 +145,11 @@ def reconstruct_case(
     """
     there = float(gravity(case.entry.lat_deg, case.entry.alt)[2])
     unit = synchronise([case.unit], sampling=sampling).units[0]
-    prepared = prepare_unit(unit.unit, gravity=there)
+    prepared = prepare_unit(unit.unit, Preparation(gravity=there))
     return reconstruct_unit(
-        at_point(prepared, point, time_sd=unit.time_sd), case.entry, window=WINDOW, gravity=there
+        at_point(prepared, point, time_sd=unit.time_sd),
+        case.entry,
+        CrashOptions(window=WINDOW, gravity=there),
     )
 
 

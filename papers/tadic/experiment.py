@@ -21,7 +21,7 @@ from papers.reproduction import (
     Trace,
     amount,
 )
-from strapdown import CrashReconstruction, reconstruct_crash
+from strapdown import CrashOptions, CrashReconstruction, reconstruct_crash
 from strapdown.crash import Entry, PathComparison, UnitReconstruction, compare_with_reference
 from strapdown.earth import gravity
 from strapdown.sensors import CrashUnit, child
@@ -143,7 +143,7 @@ def run_experiment(seed: int, scenario: CrashScenario | None = None) -> Experime
         )
         units.append(unit)
     entry = pole_entry(crash, SPEED_SD, float(draw))
-    found = reconstruct_crash(units, entry, combine=False, gravity=gravity_at(entry))
+    found = reconstruct_crash(units, entry, CrashOptions(combine=False, gravity=gravity_at(entry)))
     path = film_path(crash, lens)
     return Experiment(
         seed,
@@ -429,7 +429,7 @@ def without_low_g(made: Experiment, name: str) -> float:
     only = replace(unit, accelerometers=unit.accelerometers[1:])
     level = (0.0, 0.0, STOOD)
     found = reconstruct_crash(
-        [only], entry, gravity=gravity_at(entry), preparation={"levelling": level}
+        [only], entry, CrashOptions(gravity=gravity_at(entry), preparation={"levelling": level})
     )
     return float(np.linalg.norm(_end_error(made, found.main.path.table)))
 

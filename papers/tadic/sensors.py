@@ -21,7 +21,7 @@ from papers.reproduction import (
 from papers.tadic.displacement import DECIMETRES, budget
 from papers.tadic.experiment import END, IMUS, SPEED_SD, Experiments, gravity_at
 from papers.tadic.simplifications import TRIPS, error_course, sensor_increments
-from strapdown import reconstruct_crash
+from strapdown import CrashOptions, reconstruct_crash
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash import Entry, FixCorrelation, GnssEntry
 from strapdown.mechanization import NorthEastDown
@@ -487,7 +487,9 @@ def _errors(
     crash: CrashScenario, unit: CrashUnit, entry: Entry | GnssEntry, there: float
 ) -> tuple[Array, Array]:
     """Distance from the true way since the entry, and what is told of it, at two times, m."""
-    path = reconstruct_crash([unit], entry, window=(-0.1, LATER), gravity=there).main.path
+    path = reconstruct_crash(
+        [unit], entry, CrashOptions(window=(-0.1, LATER), gravity=there)
+    ).main.path
     rows = [int(np.argmin(np.abs(path.time - t))) for t in (END, LATER)]
     exact = ExactAnswers(crash.motion, crash.start)
     true, _ = exact.course(np.r_[path.entry.time, path.time[rows]])

@@ -14,7 +14,7 @@ from tests.unit.crash.assumed_case import (
 )
 
 from strapdown.crash.entry import Entry
-from strapdown.crash.reconstruction import reconstruct_crash
+from strapdown.crash.reconstruction import CrashOptions, reconstruct_crash
 from strapdown.sensors.crash_unit import Assumed, Mounting
 from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.simulation.crash_motion import find_crash
@@ -97,7 +97,7 @@ class Crash:
 
     def reconstruct(self, unit):
         options = {"levelling": (0.0, 0.0, 0.5)}
-        return reconstruct_crash([unit], self.entry, preparation=options).main
+        return reconstruct_crash([unit], self.entry, CrashOptions(preparation=options)).main
 
     def error(self, path, instant):
         """Place less the true one at an instant, m, and its standard deviation."""

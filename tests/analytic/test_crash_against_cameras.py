@@ -7,7 +7,7 @@ import pytest
 
 from strapdown.crash.entry import Entry
 from strapdown.crash.path import compare_with_reference
-from strapdown.crash.reconstruction import reconstruct_crash
+from strapdown.crash.reconstruction import CrashOptions, reconstruct_crash
 from strapdown.simulation import point_kinematics
 from strapdown.simulation.cameras import film, paper_cameras, path_from_cameras
 from strapdown.simulation.crash_motion import find_crash
@@ -27,7 +27,7 @@ def comparisons():
     speed = float(point_kinematics(CRASH.motion, MARKER, np.array([IMPACT])).velocity[0, 0])
     for seed in range(SEEDS):
         units = [record_crash(CRASH.motion, d, impact=IMPACT, seed=seed)[0] for d in designs]
-        answer = reconstruct_crash(units, Entry.from_speed(speed, 0.02), point=MARKER)
+        answer = reconstruct_crash(units, Entry.from_speed(speed, 0.02), CrashOptions(point=MARKER))
         cameras = paper_cameras()
         tracks = [
             film(

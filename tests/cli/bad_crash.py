@@ -11,7 +11,15 @@ from pathlib import Path
 
 import numpy as np
 
-from strapdown import Assumed, Entry, Mounting, read_nhtsa, reconstruct_crash, sample_paths
+from strapdown import (
+    Assumed,
+    CrashOptions,
+    Entry,
+    Mounting,
+    read_nhtsa,
+    reconstruct_crash,
+    sample_paths,
+)
 from strapdown.crash.path import compare_with_reference
 from strapdown.crash.severity import find_severity_model, injury_risk
 from strapdown.dsp.channel_class import cfc_filter
@@ -77,7 +85,7 @@ def starts_in_the_crash():
 def starts_in_the_crash_and_levelled():
     short = changed(UNIT, None, after(0.0))
     level = {"levelling": (0.0, 0.0, 1.5)}
-    return reconstruct_crash([short], ENTRY, window=(0.0, 0.75), preparation=level)
+    return reconstruct_crash([short], ENTRY, CrashOptions(window=(0.0, 0.75), preparation=level))
 
 
 def only_coasting():
@@ -123,12 +131,16 @@ def assumed_and_not_levelled():
 def assumed():
     stated = Assumed(turn_sd_deg=(2.0, 2.0, 5.0), delta_v_sd=1.0, because="the marks are straight")
     unit = replace(without(UNIT, "accel_y"), assumed=stated)
-    return reconstruct_crash([unit], ENTRY, preparation={"levelling": (0.0, 0.0, 1.0)})
+    return reconstruct_crash(
+        [unit], ENTRY, CrashOptions(preparation={"levelling": (0.0, 0.0, 1.0)})
+    )
 
 
 def assumed_where_the_impact_is():
     unit = replace(without(record("side"), "accel_y"), assumed=Assumed(5.0, 1.0))
-    return reconstruct_crash([unit], ENTRY, preparation={"levelling": (0.0, 0.0, 1.0)})
+    return reconstruct_crash(
+        [unit], ENTRY, CrashOptions(preparation={"levelling": (0.0, 0.0, 1.0)})
+    )
 
 
 def assumed_in_one_range():
@@ -213,7 +225,7 @@ def trigger_of_another_clock():
 
 def late_trigger():
     late = replace(UNIT, trigger=UNIT.trigger + 0.05)
-    return reconstruct_crash([late], ENTRY, window=(-0.2, 0.5))
+    return reconstruct_crash([late], ENTRY, CrashOptions(window=(-0.2, 0.5)))
 
 
 def unknown_lender():
@@ -268,15 +280,15 @@ def speed_in_km_h():
 
 
 def window():
-    return reconstruct_crash([UNIT], ENTRY, window=(-0.1, 5.0))
+    return reconstruct_crash([UNIT], ENTRY, CrashOptions(window=(-0.1, 5.0)))
 
 
 def misspelt_option():
-    return reconstruct_crash([UNIT], ENTRY, preparation={"leveling": (0.0, 0.0, 1.0)})
+    return reconstruct_crash([UNIT], ENTRY, CrashOptions(preparation={"leveling": (0.0, 0.0, 1.0)}))
 
 
 def stretch_in_the_crash():
-    return reconstruct_crash([UNIT], ENTRY, preparation={"rest": (0.0, 0.1)})
+    return reconstruct_crash([UNIT], ENTRY, CrashOptions(preparation={"rest": (0.0, 0.1)}))
 
 
 def class_beyond_the_rate():

@@ -17,7 +17,7 @@ import pytest
 from strapdown.crash.combine_units import combine_units
 from strapdown.crash.delta_v import delta_v
 from strapdown.crash.entry import Entry
-from strapdown.crash.reconstruction import reconstruct_crash, reconstruct_unit
+from strapdown.crash.reconstruction import CrashOptions, reconstruct_crash, reconstruct_unit
 from strapdown.errors import DataError
 from strapdown.formats.nhtsa import read_nhtsa
 from strapdown.sensors.catalogue import load_sensor
@@ -77,11 +77,9 @@ def reconstruct(units, rate, sampling, **options):
     return reconstruct_crash(
         units,
         ENTRY,
-        rate=rate,
-        sampling=sampling,
-        window=(-0.03, 0.2),
-        preparation=PREPARATION,
-        **options,
+        CrashOptions(
+            rate=rate, sampling=sampling, window=(-0.03, 0.2), preparation=PREPARATION, **options
+        ),
     )
 
 
@@ -98,7 +96,7 @@ def mean_of(crash):
     assert crash.combined is None
     assert any("no mean is given" in f.what for f in crash.findings)
     return reconstruct_unit(
-        combine_units([u.at_point for u in crash.units]), ENTRY, window=(-0.03, 0.2)
+        combine_units([u.at_point for u in crash.units]), ENTRY, CrashOptions(window=(-0.03, 0.2))
     )
 
 

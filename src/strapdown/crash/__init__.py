@@ -23,11 +23,12 @@ if TYPE_CHECKING:
     from strapdown.crash.measuring_point import at_point
     from strapdown.crash.path import PathComparison, compare_with_reference, sample_paths
     from strapdown.crash.pdof import NedPdof, Pdof, ned_pdof, pdof
-    from strapdown.crash.preparation import prepare_unit
-    from strapdown.crash.reconstruction import UnitReconstruction, reconstruct_unit
+    from strapdown.crash.preparation import Preparation, prepare_unit
+    from strapdown.crash.reconstruction import CrashOptions, UnitReconstruction, reconstruct_unit
 
 __all__ = [
     "Acceleration",
+    "CrashOptions",
     "Entry",
     "EventChanges",
     "FixCorrelation",
@@ -35,6 +36,7 @@ __all__ = [
     "NedPdof",
     "PathComparison",
     "Pdof",
+    "Preparation",
     "UnitReconstruction",
     "VelocityChange",
     "at_point",
@@ -66,7 +68,7 @@ load_on_first_use(
         "measuring_point": "at_point",
         "path": "PathComparison compare_with_reference sample_paths",
         "pdof": "NedPdof Pdof ned_pdof pdof",
-        "preparation": "prepare_unit",
-        "reconstruction": "UnitReconstruction reconstruct_unit",
+        "preparation": "Preparation prepare_unit",
+        "reconstruction": "CrashOptions UnitReconstruction reconstruct_unit",
     },
 )

@@ -25,6 +25,7 @@ from strapdown.crash.path import (
     sample_paths,
 )
 from strapdown.crash.reconstruction import (
+    CrashOptions,
     CrashReconstruction,
     UnitReconstruction,
     reconstruct_crash,
@@ -136,16 +137,18 @@ def run_case(
     made = reconstruct_crash(
         units,
         entry,
-        point=spec.point.position_m,
-        window=options.window_s,
-        rate=options.rate_hz,
-        sampling=options.sampling,
-        clock=options.clock,
-        combine=options.combine,
-        preparation=_preparation(spec),
-        peak_window=options.peak_window_s,
-        rule=EventRule(zero_at=options.zero_at),
-        gravity=options.gravity_m_per_s2,
+        CrashOptions(
+            point=spec.point.position_m,
+            window=options.window_s,
+            rate=options.rate_hz,
+            sampling=options.sampling,
+            clock=options.clock,
+            combine=options.combine,
+            preparation=_preparation(spec),
+            peak_window=options.peak_window_s,
+            rule=EventRule(zero_at=options.zero_at),
+            gravity=options.gravity_m_per_s2,
+        ),
     )
     findings += made.findings
     progress("drawing possible paths", 0.4)

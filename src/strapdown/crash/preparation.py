@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.acceleration import force_at_rest
 from strapdown.crash.entry import Entry
 from strapdown.crash.measuring_point import PointKinematics, at_point
@@ -40,43 +41,15 @@ from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.sensors.unmeasured import assumed_findings, with_filled_axes, with_gyro
 from strapdown.tables import ACCEL, imu_table
 
-__all__ = [
-    "OPTIONS",
-    "check_options",
-    "checked_options",
-    "from_stated_attitude",
-    "gravity_correction",
-    "level_at_rest",
-    "prepare_unit",
-    "with_gravity",
-]
-
-
 Array = NDArray[np.float64]
 
 
-def prepare_unit(
-    unit: CrashUnit,
-    *,
-    gravity: float = 9.80665,
-    rest: str | tuple[float, float] = "auto",
-    levelling: tuple[float, float, float] | None = None,
-    impact: float = 0.0,
-    moving_at_impact: bool = True,
-    steady_acceleration: float = 0.3,
-    steady_rate: float = 0.01,
-    match_gravity: bool = True,
-    margin: float = 0.1,
-    hysteresis: float = 0.1,
-    fade: float = 0.0,
-) -> PreparedUnit:
-    """Remove biases, merge ranges, rotate into vehicle axes and level.
+@dataclass(frozen=True)
+class Preparation:
+    """Options of `prepare_unit`.
 
-    Parameters
+    Attributes
     ----------
-    unit : CrashUnit
-        On the common clock, zero at the trigger; all triads at the same stamps, in the unit's
-        axes, with its own or a borrowed gyro; axes listed in its `assumed` may be missing.
     gravity : float, m/s²
         At the site. Along assumed axes of the unit the gravity component is added.
     rest : 'auto' or (start, end), s
@@ -100,6 +73,80 @@ def prepare_unit(
         Whether the specific force while stationary is scaled to the length of gravity.
     margin, hysteresis, fade
         As `merge_ranges`.
+    """
+
+    gravity: float = STANDARD_GRAVITY
+    rest: str | tuple[float, float] = "auto"
+    levelling: tuple[float, float, float] | None = None
+    impact: float = 0.0
+    moving_at_impact: bool = True
+    steady_acceleration: float = 0.3
+    steady_rate: float = 0.01
+    match_gravity: bool = True
+    margin: float = 0.1
+    hysteresis: float = 0.1
+    fade: float = 0.0
+
+    @classmethod
+    def of(cls, given: Mapping[str, Any]) -> Preparation:
+        """Options by name. `ConfigError`: a name is unknown."""
+        known = [f.name for f in fields(cls)]
+        for name in given:
+            if name not in known:
+                raise ConfigError(
+                    "crash.preparation-option-unknown",
+                    quantity="preparation",
+                    name=name,
+                    word=str(name),
+                    known=known,
+                )
+        return cls(**given)
+
+    def check(self, unit: str) -> None:
+        """Refuse options of a unit that are out of range, or of the wrong type."""
+        if not (finite(self.gravity) and 9.7 < self.gravity < 9.9):
+            raise ConfigError(
+                "crash.gravity-nowhere-ground", file=unit, quantity="gravity", gravity=self.gravity
+            )
+        if not (isinstance(self.rest, str) and self.rest == "auto") and not _is_stretch(self.rest):
+            raise ConfigError("crash.no-stretch", file=unit, quantity="rest", rest=self.rest)
+        if self.levelling is not None:
+            code = "crash.levelling-not-three-numbers"
+            _, pitch, sd = triple(self.levelling, "levelling", code, unit)
+            if abs(pitch) > 90.0 or sd < 0.0:
+                raise ConfigError(
+                    "crash.levelling-out-of-range",
+                    file=unit,
+                    quantity="levelling",
+                    levelling=repr(self.levelling),
+                )
+        for name in ("impact", "margin", "hysteresis", "fade"):
+            value = getattr(self, name)
+            if not finite(value):
+                raise ConfigError(
+                    "crash.preparation-not-a-number", file=unit, quantity=name, given=value
+                )
+        check_sd(self.steady_acceleration, "steady_acceleration", "m/s²", unit)
+        check_sd(self.steady_rate, "steady_rate", "rad/s", unit)
+
+
+def _is_stretch(given: Any) -> bool:
+    try:
+        start, end = given
+    except (TypeError, ValueError):
+        return False
+    return finite(start) and finite(end) and start < end
+
+
+def prepare_unit(unit: CrashUnit, options: Preparation = Preparation()) -> PreparedUnit:
+    """Remove biases, merge ranges, rotate into vehicle axes and level.
+
+    Parameters
+    ----------
+    unit : CrashUnit
+        On the common clock, zero at the trigger; all triads at the same stamps, in the unit's
+        axes, with its own or a borrowed gyro; axes listed in its `assumed` may be missing.
+    options : Preparation
 
     Raises
     ------
@@ -111,18 +158,9 @@ def prepare_unit(
     ConfigError
         An option is out of range.
     """
-    check_options(
-        unit.name,
-        gravity=gravity,
-        rest=rest,
-        levelling=levelling,
-        impact=impact,
-        steady_acceleration=steady_acceleration,
-        steady_rate=steady_rate,
-        margin=margin,
-        hysteresis=hysteresis,
-        fade=fade,
-    )
+    options.check(unit.name)
+    gravity, levelling = options.gravity, options.levelling
+    steady_acceleration = options.steady_acceleration
     unit = with_gyro(with_filled_axes(unit))
     data = with_gravity(unit, check_unit(unit), levelling, gravity)
     assert unit.gyro is not None
@@ -135,13 +173,11 @@ def prepare_unit(
     findings += saturation_findings(unit, data, limits, gyro_limits)
     limits = [_with_held(limit, t) for limit, t in zip(limits, triads, strict=True)]
 
-    own = _find_rest(unit, data, rest, impact, moving_at_impact, noise[0], gyro_noise)
-    findings += rest_findings(
-        unit, data.time, impact, own, levelling is not None, steady_acceleration
-    )
+    own = _find_rest(unit, data, options, noise[0], gyro_noise)
+    findings += rest_findings(unit, data.time, own, options)
     unknown = steady_acceleration if own is not None and own.grade == "steady" else 0.0
     turn = _where_there(
-        gyro_bias_from(own, gyro.axis("bias"), steady_rate=steady_rate), unit.gyro.absent
+        gyro_bias_from(own, gyro.axis("bias"), steady_rate=options.steady_rate), unit.gyro.absent
     )
 
     bias, bias_from, bias_sd = _range_biases(unit, data, limits, own)
@@ -154,9 +190,9 @@ def prepare_unit(
         noise,
         bias=bias,
         bandwidth=[t.uncertainty.bandwidth for t in triads],
-        margin=margin,
-        hysteresis=hysteresis,
-        fade=fade,
+        margin=options.margin,
+        hysteresis=options.hysteresis,
+        fade=options.fade,
     )
     findings += step_findings(unit, merged)
 
@@ -181,7 +217,7 @@ def prepare_unit(
     matched = bias_from[0] == FROM_GRAVITY
     # Missing axes are not corrected.
     whole = not triads[0].absent
-    if match_gravity and whole and standing is not None and not matched:
+    if options.match_gravity and whole and standing is not None and not matched:
         found = gravity_correction(standing, triads[0].uncertainty, unknown, gravity)
         if found is not None:
             matched, (correction, along) = True, found
@@ -212,9 +248,7 @@ def prepare_unit(
 def _find_rest(
     unit: CrashUnit,
     data: UnitArrays,
-    rest: str | tuple[float, float],
-    impact: float,
-    moving: bool,
+    options: Preparation,
     noise: Array,
     gyro_noise: Array,
 ) -> RestStretch | None:
@@ -222,12 +256,12 @@ def _find_rest(
     table = imu_table(
         data.time, data.gyro, data.accelerometers[0], sampling=data.sampling, source=unit.name
     )
-    if not isinstance(rest, str):
-        return rest_between(table, *rest)
+    if not isinstance(options.rest, str):
+        return rest_between(table, *options.rest)
     return find_pre_crash_rest(
         table,
-        impact=impact,
-        moving_at_impact=moving,
+        impact=options.impact,
+        moving_at_impact=options.moving_at_impact,
         accel_noise=float(np.median(noise, axis=0).max()),
         gyro_noise=float(np.median(gyro_noise, axis=0).max()),
     )
@@ -296,74 +330,6 @@ def _stated_sd(uncertainty: TriadUncertainty, C: Array) -> Array:
     return np.asarray(np.sqrt(C**2 @ np.asarray(uncertainty.axis("bias")) ** 2))
 
 
-# Options of `prepare_unit`.
-
-
-OPTIONS = (
-    "gravity",
-    "rest",
-    "levelling",
-    "impact",
-    "moving_at_impact",
-    "steady_acceleration",
-    "steady_rate",
-    "match_gravity",
-    "margin",
-    "hysteresis",
-    "fade",
-)
-
-
-def checked_options(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Options after a check of their names."""
-    for name in options:
-        if name not in OPTIONS:
-            raise ConfigError(
-                "crash.preparation-option-unknown",
-                quantity="preparation",
-                name=name,
-                word=str(name),
-                known=OPTIONS,
-            )
-    return dict(options)
-
-
-def check_options(unit: str, **given: Any) -> None:
-    """Refuse options that are out of range, or of the wrong type."""
-    gravity, rest, levelling = given["gravity"], given["rest"], given["levelling"]
-    if not (finite(gravity) and 9.7 < gravity < 9.9):
-        raise ConfigError(
-            "crash.gravity-nowhere-ground", file=unit, quantity="gravity", gravity=gravity
-        )
-    if not (isinstance(rest, str) and rest == "auto") and not _is_stretch(rest):
-        raise ConfigError("crash.no-stretch", file=unit, quantity="rest", rest=rest)
-    if levelling is not None:
-        code = "crash.levelling-not-three-numbers"
-        _, pitch, sd = triple(levelling, "levelling", code, unit)
-        if abs(pitch) > 90.0 or sd < 0.0:
-            raise ConfigError(
-                "crash.levelling-out-of-range",
-                file=unit,
-                quantity="levelling",
-                levelling=repr(levelling),
-            )
-    for name in ("impact", "margin", "hysteresis", "fade"):
-        if not finite(given[name]):
-            raise ConfigError(
-                "crash.preparation-not-a-number", file=unit, quantity=name, given=given[name]
-            )
-    check_sd(given["steady_acceleration"], "steady_acceleration", "m/s²", unit)
-    check_sd(given["steady_rate"], "steady_rate", "rad/s", unit)
-
-
-def _is_stretch(given: Any) -> bool:
-    try:
-        start, end = given
-    except (TypeError, ValueError):
-        return False
-    return finite(start) and finite(end) and start < end
-
-
 # Joint preparation of units of one vehicle: units without a stationary interval are leveled
 # from units with one.
 
@@ -394,7 +360,7 @@ def prepare_together(
                 own["levelling"] = lent
         hint = _gyro_to_borrow(unit, turning)
         try:
-            prepared = prepare_unit(unit.unit, **checked_options(own))
+            prepared = prepare_unit(unit.unit, Preparation.of(own))
         except DataError as error:
             if hint is None or error.finding.quantity != "gyro":
                 raise
@@ -569,18 +535,13 @@ NEAR_ONE = (0.8, 1.2)
 
 
 def rest_findings(
-    unit: CrashUnit,
-    time: Array,
-    impact: float,
-    rest: RestStretch | None,
-    levelled: bool,
-    steady_acceleration: float,
+    unit: CrashUnit, time: Array, rest: RestStretch | None, options: Preparation
 ) -> list[Finding]:
     """Report a missing or only steady interval. `DataError`: none, and no stated leveling."""
     if rest is None:
-        late = time[0] > impact - SHORTEST
-        said = {"begin": time[0], "impact": impact}
-        if not levelled:
+        late = time[0] > options.impact - SHORTEST
+        said = {"begin": time[0], "impact": options.impact}
+        if options.levelling is None:
             code = "crash.record-starts-in-crash" if late else "crash.no-rest"
             raise DataError(code, file=unit.name, quantity="rest", data=said)
         code = "crash.record-starts-in-crash-levelled" if late else "crash.no-rest-levelled"
@@ -593,7 +554,7 @@ def rest_findings(
                 quantity="rest",
                 end=rest.end - rest.start,
                 start=rest.start,
-                steady_acceleration=steady_acceleration,
+                steady_acceleration=options.steady_acceleration,
             )
         ]
     return []

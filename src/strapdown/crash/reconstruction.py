@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -38,9 +38,6 @@ from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.sensors.synchronise import SynchronisedUnits, synchronise
 from strapdown.sensors.triad_errors import FARTHEST, finite, triple
 from strapdown.tables import NED
-
-__all__ = ["check_crash_options", "check_standing", "entry_findings", "summary_table", "unit_line"]
-
 
 Row = tuple[str, str, float, float, float]
 
@@ -116,8 +113,6 @@ def unit_line(unit: UnitReconstruction) -> str:
 
 Array = NDArray[np.float64]
 
-#: Length of the trailing window: Tadic and Vukajlovic (2016), section 4.
-PEAK_WINDOW = 0.030
 NO_ROLL = "whether it rolled over cannot be determined without a gyro about the forward axis"
 
 
@@ -168,15 +163,80 @@ class UnitReconstruction:
         return max(changes, key=lambda change: change.resultant) if changes else None
 
 
+@dataclass(frozen=True)
+class CrashOptions:
+    """Options of a reconstruction.
+
+    Attributes
+    ----------
+    point : sequence of float, (3,), m
+        Reference point in vehicle axes (forward, right, down) from the vehicle's origin.
+    window : (float, float), s, optional
+        Of the path, from the trigger; -0.1 to 0.75 s, as far as a unit's record has them, if not
+        given.
+    rate : float, Hz
+        Of the common stamps. Faster channels are decimated without aliasing.
+    sampling : {'instantaneous', 'mean'}
+        Meaning of the samples at the common stamps: values of a band-limited signal, or true means
+        over the step, which preserve the delta-v of a fast channel.
+    clock : {'trigger', 'correlation'}
+        As `synchronise`.
+    combine : bool
+        Also reconstruct the weighted mean of the units, if they agree; if they contradict, a
+        finding reports it. `combine_units` computes the mean in any case.
+    preparation : mapping, optional
+        Options of `Preparation` by name, for all units; under the name of a unit, a mapping of its
+        own options.
+    peak_window : float, s
+        Window of the delta-v that usually rates severity: Tadic and Vukajlovic (2016), section 4.
+    rule : EventRule
+        Definition of an event: 49 CFR 563 by default.
+    gravity : float, m/s²
+        Local gravity.
+    mechanization : NorthEastDown, optional
+
+    Raises
+    ------
+    ConfigError
+        An option is of another kind, or out of range.
+    """
+
+    point: Sequence[float] = (0.0, 0.0, 0.0)
+    window: Sequence[float] | None = None
+    rate: float = 200.0
+    sampling: str = "instantaneous"
+    clock: str = "trigger"
+    combine: bool = True
+    preparation: Mapping[str, Any] | None = None
+    peak_window: float = 0.030
+    rule: EventRule = PART_563
+    gravity: float = STANDARD_GRAVITY
+    mechanization: NorthEastDown | None = None
+
+    def __post_init__(self) -> None:
+        place = triple(self.point, "point", "sensors.point-not-three-numbers")
+        if math.hypot(*place) > FARTHEST:
+            raise ConfigError(
+                "crash.vehicle-origin", quantity="point", place=place, hypot=math.hypot(*place)
+            )
+        if self.window is not None:
+            _check_window(self.window)
+        if not (finite(self.peak_window) and self.peak_window > 0.0):
+            raise ConfigError(
+                "crash.no-length", quantity="peak_window", peak_window=self.peak_window
+            )
+        for name, kind in (
+            ("preparation", Mapping | None),
+            ("rule", EventRule),
+            ("gravity", int | float),
+            ("mechanization", NorthEastDown | None),
+        ):
+            if not isinstance(getattr(self, name), kind):
+                raise _wrong_type(name, getattr(self, name))
+
+
 def reconstruct_unit(
-    at_point: PointKinematics,
-    entry: Entry | None,
-    *,
-    window: Sequence[float] | None = None,
-    peak_window: float = PEAK_WINDOW,
-    rule: EventRule = PART_563,
-    gravity: float = STANDARD_GRAVITY,
-    mechanization: NorthEastDown | None = None,
+    at_point: PointKinematics, entry: Entry | None, options: CrashOptions = CrashOptions()
 ) -> UnitReconstruction:
     """Find the events of a unit, its changes of velocity and its path.
 
@@ -185,13 +245,8 @@ def reconstruct_unit(
     at_point : PointKinematics
     entry : Entry or None
         As `reconstruct_path`.
-    window : (float, float), s, optional
-        Of the path.
-    peak_window : float, s
-    rule : EventRule
-    gravity : float, m/s²
-        At the site.
-    mechanization : NorthEastDown, optional
+    options : CrashOptions
+        Window, peak window, rule, gravity and mechanization are used.
 
     Returns
     -------
@@ -203,13 +258,18 @@ def reconstruct_unit(
     DataError, DivergenceError
         As `reconstruct_path`.
     """
+    gravity, mechanization, peak_window = (
+        options.gravity,
+        options.mechanization,
+        options.peak_window,
+    )
     check_standing(at_point, entry)
     at_rest, rest_sd = at_point.resting_force(gravity)
     acceleration = body_acceleration(at_point.imu, at_rest.tolist())
     effects = at_point.effects
     events = detect_events(
         acceleration,
-        rule,
+        options.rule,
         noise=tuple(float(x) for x in np.median(effects.force_noise, axis=0)),
         bias_sd=tuple(float(x) for x in rest_sd),
     )
@@ -219,7 +279,7 @@ def reconstruct_unit(
         at_point.levelling,
         None if at_point.rest is None else at_point.rest.end,
         entry,
-        window=window,
+        window=options.window,
         mechanization=mechanization,
         zeroed_at_rest=at_point.rest is not None,
     )
@@ -518,18 +578,7 @@ class CrashReconstruction:
 def reconstruct_crash(
     units: Sequence[CrashUnit],
     entry: Entry | GnssEntry | None,
-    *,
-    point: Sequence[float] = (0.0, 0.0, 0.0),
-    window: Sequence[float] | None = None,
-    rate: float = 200.0,
-    sampling: str = "instantaneous",
-    clock: str = "trigger",
-    combine: bool = True,
-    preparation: Mapping[str, Any] | None = None,
-    peak_window: float = PEAK_WINDOW,
-    rule: EventRule = PART_563,
-    gravity: float = STANDARD_GRAVITY,
-    mechanization: NorthEastDown | None = None,
+    options: CrashOptions = CrashOptions(),
 ) -> CrashReconstruction:
     """Reconstruct a crash.
 
@@ -542,31 +591,7 @@ def reconstruct_crash(
         from which each unit finds them together with its biases (the mean of the units then uses
         the entry of the first). None: the vehicle was stationary at the beginning of the record,
         and the path is given in its axes at the trigger.
-    point : sequence of float, (3,), m
-        Reference point in vehicle axes (forward, right, down) from the vehicle's origin.
-    window : (float, float), s, optional
-        Of the path, from the trigger; -0.1 to 0.75 s, as far as a unit's record has them, if not
-        given.
-    rate : float, Hz
-        Of the common stamps. Faster channels are decimated without aliasing.
-    sampling : {'instantaneous', 'mean'}
-        Meaning of the samples at the common stamps: values of a band-limited signal, or true means
-        over the step, which preserve the delta-v of a fast channel.
-    clock : {'trigger', 'correlation'}
-        As `synchronise`.
-    combine : bool
-        Also reconstruct the weighted mean of the units, if they agree; if they contradict, a
-        finding reports it. `combine_units` computes the mean in any case.
-    preparation : mapping, optional
-        Options of `prepare_unit`, for all units; under the name of a unit, a mapping of its own
-        options.
-    peak_window : float, s
-        Window of the delta-v that usually rates severity.
-    rule : EventRule
-        Definition of an event: 49 CFR 563 by default.
-    gravity : float, m/s²
-        Local gravity.
-    mechanization : NorthEastDown, optional
+    options : CrashOptions
 
     Returns
     -------
@@ -583,12 +608,16 @@ def reconstruct_crash(
     DivergenceError
         A path left the range of vehicle motion.
     """
-    check_crash_options(
-        units, entry, point, window, preparation, peak_window, rule, gravity, mechanization
+    _check_units(units)
+    if not (entry is None or isinstance(entry, Entry | GnssEntry)):
+        raise _wrong_type("entry", entry)
+    _check_preparation(options.preparation or {}, {unit.name for unit in units})
+    point, combine = options.point, options.combine
+    together = synchronise(
+        units, method=options.clock, rate=options.rate, sampling=options.sampling, cut=False
     )
-    together = synchronise(units, method=clock, rate=rate, sampling=sampling, cut=False)
     findings = list(together.findings)
-    there = prepare_together(together, point, gravity, preparation or {})
+    there = prepare_together(together, point, options.gravity, options.preparation or {})
     for of in there:
         findings += () if of.prepared is None else of.prepared.findings
     # Before each unit estimates its own biases, which absorbs part of the differences.
@@ -599,21 +628,12 @@ def reconstruct_crash(
             there[k], tied[k], state = start_from_gnss(of, entry, point)
             findings += state.findings
 
-    def answers(of: PointKinematics, start: Entry | None) -> UnitReconstruction:
-        return reconstruct_unit(
-            of,
-            start,
-            window=window,
-            peak_window=peak_window,
-            rule=rule,
-            gravity=gravity,
-            mechanization=mechanization,
-        )
-
-    found = tuple(answers(of, start) for of, start in zip(there, tied, strict=True))
+    found = tuple(
+        reconstruct_unit(of, start, options) for of, start in zip(there, tied, strict=True)
+    )
     combined = None
     if combine and comparison is not None and comparison.agree:
-        combined = answers(combine_units(there), tied[0])
+        combined = reconstruct_unit(combine_units(there), tied[0], options)
     for reconstruction in (*found, *(() if combined is None else (combined,))):
         findings += reconstruction.findings
     if comparison is not None:
@@ -634,53 +654,21 @@ def _no_mean(units: Sequence[PointKinematics]) -> Finding:
     )
 
 
-# Checks of the arguments of `reconstruct_crash` before any work.
+# Checks of the arguments before any work: those that no later stage would report.
 
 
-def check_crash_options(
-    units: object,
-    entry: object,
-    point: object,
-    window: object,
-    preparation: object,
-    peak_window: object,
-    rule: object,
-    gravity: object,
-    mechanization: object,
-) -> None:
-    """Refuse arguments that no later stage would report by kind or size."""
-    _check_units(units)
-    if not (entry is None or isinstance(entry, Entry | GnssEntry)):
-        raise _wrong_type("entry", entry)
-    place = triple(point, "point", "sensors.point-not-three-numbers")
-    if math.hypot(*place) > FARTHEST:
-        raise ConfigError(
-            "crash.vehicle-origin", quantity="point", place=place, hypot=math.hypot(*place)
-        )
-    if window is not None:
-        _check_window(window)
-    if not (preparation is None or isinstance(preparation, Mapping)):
-        raise _wrong_type("preparation", preparation)
-    names = {unit.name for unit in units}  # type: ignore[attr-defined]
-    for name, given in (preparation or {}).items():
-        if name in names and not isinstance(given, Mapping):
+def _check_preparation(preparation: Mapping[str, Any], units: Collection[str]) -> None:
+    for name, given in preparation.items():
+        if name in units and not isinstance(given, Mapping):
             raise ConfigError(
                 "crash.preparation-of-unit-of-wrong-type",
                 quantity=f"preparation, {name}",
                 type=type(given).__name__,
             )
-        if name not in names and isinstance(given, Mapping):
+        if name not in units and isinstance(given, Mapping):
             raise ConfigError(
                 "crash.preparation-of-unknown-unit", quantity="preparation", name=name
             )
-    if not (finite(peak_window) and peak_window > 0.0):  # type: ignore[operator]
-        raise ConfigError("crash.no-length", quantity="peak_window", peak_window=peak_window)
-    if not isinstance(rule, EventRule):
-        raise _wrong_type("rule", rule)
-    if not isinstance(gravity, int | float):
-        raise _wrong_type("gravity", gravity)
-    if not (mechanization is None or isinstance(mechanization, NorthEastDown)):
-        raise _wrong_type("mechanization", mechanization)
 
 
 def _check_units(units: object) -> None:

@@ -16,7 +16,7 @@ from strapdown import rotation
 from strapdown.crash.entry import Entry
 from strapdown.crash.measuring_point import at_point
 from strapdown.crash.path import reconstruct_path
-from strapdown.crash.preparation import prepare_unit
+from strapdown.crash.preparation import Preparation, prepare_unit
 from strapdown.sensors.crash_unit import Assumed, CrashUnit, RecordedTriad, assumed_shapes
 from strapdown.sensors.uncertainty import TriadUncertainty
 
@@ -97,7 +97,7 @@ def unit_of(truth, k, axes, assumed, name="EDR", uncertainty=PERFECT):
 
 def path_of(unit):
     """Its path, and what it says at the point."""
-    at = at_point(prepare_unit(unit, levelling=LEVEL), (0.0, 0.0, 0.0))
+    at = at_point(prepare_unit(unit, Preparation(levelling=LEVEL)), (0.0, 0.0, 0.0))
     entry = Entry(time=0.0, velocity=(SPEED, 0.0, 0.0), heading_deg=0.0)
     path = reconstruct_path(at.imu, at.effects, at.levelling, None, entry, window=(-0.02, END))
     return at, path

@@ -24,8 +24,8 @@ from strapdown.crash.entry import Entry
 from strapdown.crash.gnss_entry import GnssEntry, start_from_gnss
 from strapdown.crash.measuring_point import MISSING_AXIS, NO_TURNING
 from strapdown.crash.path import sample_paths
-from strapdown.crash.preparation import prepare_unit
-from strapdown.crash.reconstruction import reconstruct_crash
+from strapdown.crash.preparation import Preparation, prepare_unit
+from strapdown.crash.reconstruction import CrashOptions, reconstruct_crash
 from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.crash_unit import Assumed, CrashUnit, Mounting, RecordedTriad, assumed_shapes
 from strapdown.sensors.uncertainty import TriadUncertainty
@@ -47,7 +47,7 @@ def straight():
 
 def reconstruct(*units, **options):
     settings = {"rate": 200.0, "sampling": "mean", "preparation": PREPARATION, **options}
-    return reconstruct_crash(list(units), ENTRY, **settings)
+    return reconstruct_crash(list(units), ENTRY, CrashOptions(**settings))
 
 
 def edr(*, axes="xy", name="EDR", assumed=ASSUMED, rate=100.0, pulse=(-11.0, 3.0, 0.0), **options):
@@ -107,7 +107,7 @@ class TestTables:
     def test_gravity_is_put_where_the_attitude_says(self):
         unit, _ = edr(axes="x")
         roll, pitch = np.radians([3.0, -2.0])
-        made = prepare_unit(unit, levelling=(3.0, -2.0, 0.5)).imu
+        made = prepare_unit(unit, Preparation(levelling=(3.0, -2.0, 0.5))).imu
         expected = 9.80665 * np.array(
             [-np.cos(pitch) * np.sin(roll), -np.cos(pitch) * np.cos(roll)]
         )

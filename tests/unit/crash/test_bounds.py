@@ -16,7 +16,7 @@ from strapdown.crash.delta_v_bound import body_delta_v_bound, resolved_delta_v_b
 from strapdown.crash.entry import Entry, angle_rates
 from strapdown.crash.measuring_point import PointKinematics, at_point
 from strapdown.crash.path import VELOCITY, compare_with_reference, sample_paths
-from strapdown.crash.reconstruction import reconstruct_unit
+from strapdown.crash.reconstruction import CrashOptions, reconstruct_unit
 from strapdown.errors import DataError
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.simulation import ImuErrors, simulate_imu
@@ -137,7 +137,7 @@ def test_without_a_crash_there_is_a_path_and_a_word(at):
 
 
 def test_an_event_beyond_the_path_has_no_resolved_change(at):
-    found = reconstruct_unit(at, Entry.from_speed(7.1, 0.05), window=(-0.05, 0.05))
+    found = reconstruct_unit(at, Entry.from_speed(7.1, 0.05), CrashOptions(window=(-0.05, 0.05)))
     assert found.ned == (None,)
     assert any("outside the path" in f.what for f in found.findings)
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from strapdown import Entry, reconstruct_crash, rotation
+from strapdown import CrashOptions, Entry, reconstruct_crash, rotation
 from strapdown.crash.acceleration import window_weights
 from strapdown.crash.combine_units import combine_units, least_variance
 from strapdown.crash.consistency import (
@@ -296,7 +296,9 @@ def test_a_car_that_is_spun_by_a_blow_from_the_side_is_no_disagreement(seed):
     # Its rate comes within 60 ms, and with arms that are a metre apart 15 % of the angular
     # acceleration are 23 mm/s in a piece: chi-square 114 to 155 of 60 in these records.
     units = [of.unit for of in record_case(CASES["side"], seed=seed).units]
-    assert reconstruct_crash(units, Entry.from_speed(0.0, 0.05), combine=False).comparison.agree
+    assert reconstruct_crash(
+        units, Entry.from_speed(0.0, 0.05), CrashOptions(combine=False)
+    ).comparison.agree
 
 
 def test_a_mean_lies_between_units_that_disagree_and_is_not_told_of_them():
@@ -306,7 +308,9 @@ def test_a_mean_lies_between_units_that_disagree_and_is_not_told_of_them():
     assert found.combined is None
     assert found.main is found.units[0]
     assert sum("no mean is given" in f.what for f in found.findings) == 1
-    silent = reconstruct_crash(units, Entry.from_speed(0.0, 0.05), combine=False).findings
+    silent = reconstruct_crash(
+        units, Entry.from_speed(0.0, 0.05), CrashOptions(combine=False)
+    ).findings
     assert not any("no mean is given" in f.what for f in silent)
     there = [u.at_point for u in found.units]
     mean = combine_units(there)

@@ -11,7 +11,7 @@ from strapdown.crash.entry_estimate import FixCorrelation
 from strapdown.crash.gnss_entry import CONTRIBUTOR, GnssEntry, start_from_gnss
 from strapdown.crash.measuring_point import at_point
 from strapdown.crash.path import reconstruct_path
-from strapdown.crash.preparation import prepare_unit
+from strapdown.crash.preparation import Preparation, prepare_unit
 from strapdown.crash.reconstruction import reconstruct_crash
 from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.crash_unit import Mounting
@@ -142,7 +142,7 @@ def test_priors_are_of_the_vehicles_axes(monkeypatch):
         accelerometers=(replace(low, uncertainty=told), *own.accelerometers[1:]),
         gyro=replace(gyro, uncertainty=replace(gyro.uncertainty, bias=(0.01, 0.02, 0.03))),
     )
-    at = at_point(prepare_unit(own, levelling=(0.0, 0.0, 1.0)), (0.0, 0.0, 0.0))
+    at = at_point(prepare_unit(own, Preparation(levelling=(0.0, 0.0, 1.0))), (0.0, 0.0, 0.0))
     seen = {}
 
     def stop(*_, priors, **__):

@@ -13,7 +13,7 @@ import pytest
 
 from strapdown.crash.consistency import compare_units
 from strapdown.crash.measuring_point import at_point
-from strapdown.crash.preparation import prepare_unit
+from strapdown.crash.preparation import Preparation, prepare_unit
 from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.sensors.pre_crash import FROM_GRAVITY
@@ -98,7 +98,7 @@ def test_a_bias_of_the_low_range_along_the_vertical_is_gone_and_the_others_stay(
     out = prepare_unit(made)
     assert out.gravity_correction == pytest.approx(0.15)
     assert np.abs(force_of(out) - force).max() <= 1e-12
-    out = prepare_unit(made, match_gravity=False)
+    out = prepare_unit(made, Preparation(match_gravity=False))
     assert not out.gravity_matched
     assert force_of(out)[0, 2] == pytest.approx(-G + 0.15)
 
@@ -110,7 +110,7 @@ def test_a_stated_attitude_gives_the_bias_of_the_lowest_range():
     )
     with pytest.raises(DataError, match="give levelling"):
         prepare_unit(made)
-    out = prepare_unit(made, levelling=(1.0, -2.0, 0.2), steady_acceleration=0.0)
+    out = prepare_unit(made, Preparation(levelling=(1.0, -2.0, 0.2), steady_acceleration=0.0))
     assert out.bias_from == (FROM_GRAVITY, 0)
     assert not out.levelling.from_rest
     assert out.levelling.sd_deg == 0.2
@@ -122,14 +122,14 @@ def test_zeroed_channels_get_gravity_back():
     made, force, _ = unit(noisy=False, start=-0.1, driven=False, low=replace(LOW, bias=8.0))
     at_rest = force[0]
     made = changed(made, 0, lambda t: t - at_rest)
-    out = prepare_unit(made, levelling=(1.0, -2.0, 0.5))
+    out = prepare_unit(made, Preparation(levelling=(1.0, -2.0, 0.5)))
     # Clipped at 2 g after the zero: the high range speaks there and hangs on the low one.
     assert np.abs(force_of(out) - force).max() <= 1e-12
 
 
 def test_a_better_known_sensor_is_not_corrected_by_a_poor_attitude():
     made, _, _ = unit()
-    out = prepare_unit(made, levelling=(0.0, 0.0, 5.0))
+    out = prepare_unit(made, Preparation(levelling=(0.0, 0.0, 5.0)))
     assert out.bias_from == (None, 0)
     assert out.levelling.roll_deg == 0.0
 
@@ -141,14 +141,14 @@ def test_a_steady_stretch_says_so_and_is_graded():
     assert out.rest_accel_sd == 0.3
     assert out.levelling.sd_deg == pytest.approx(math.degrees(0.3 / G), rel=0.01)
     assert "may be at speed" in words(out)
-    assert prepare_unit(made, moving_at_impact=False).levelling.sd_deg < 0.1
+    assert prepare_unit(made, Preparation(moving_at_impact=False)).levelling.sd_deg < 0.1
 
 
 def test_a_record_that_starts_in_the_crash():
     made, _, _ = unit(start=0.01)
     with pytest.raises(DataError, match=r"IMU1, rest: the record starts at 0.01 s, within"):
         prepare_unit(made)
-    out = prepare_unit(made, levelling=(0.0, 0.0, 1.5))
+    out = prepare_unit(made, Preparation(levelling=(0.0, 0.0, 1.5)))
     assert out.rest is None
     assert out.gyro_bias_sd == (0.05,) * 3
     assert out.bias_from == (None, None)
@@ -166,7 +166,7 @@ def test_no_quiet_stretch():
 
 def test_a_stated_rest_is_taken():
     made, _, _ = unit()
-    out = prepare_unit(made, rest=(-8.0, -6.0))
+    out = prepare_unit(made, Preparation(rest=(-8.0, -6.0)))
     assert out.rest.grade == "stated"
     assert out.rest.end == -6.0
 
@@ -208,7 +208,9 @@ def test_a_low_range_that_is_never_clear():
     made, _, _ = unit(low_bias=(40.0, 40.0, 40.0))
     with pytest.raises(DataError, match="levelling"):
         prepare_unit(made)
-    assert "the two cannot be compared" in words(prepare_unit(made, levelling=(0, 0, 1)))
+    assert "the two cannot be compared" in words(
+        prepare_unit(made, Preparation(levelling=(0, 0, 1)))
+    )
 
 
 def test_gravity_in_g():
@@ -357,7 +359,7 @@ def test_a_low_range_that_rings_into_its_end_does_not_speak_behind_a_low_pass(sa
 def test_options_out_of_range(options, says):
     made, _, _ = unit()
     with pytest.raises(ConfigError, match=says):
-        prepare_unit(made, **options)
+        prepare_unit(made, Preparation(**options))
 
 
 def test_two_prepared_units_agree_at_a_common_point():

@@ -7,7 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from strapdown import CrashUnit, Entry, Mounting, TriadUncertainty, reconstruct_crash, sample_paths
+from strapdown import (
+    CrashOptions,
+    CrashUnit,
+    Entry,
+    Mounting,
+    TriadUncertainty,
+    reconstruct_crash,
+    sample_paths,
+)
 from strapdown.crash.path import compare_with_reference
 from strapdown.errors import ConfigError, DataError
 from strapdown.simulation.crash_motion import CRASHES, CrashMotion, HaversinePulse
@@ -87,7 +95,7 @@ class TestEntry:
 
     def test_an_instant_in_the_crash_is_told(self, unit):
         late = replace(unit, trigger=unit.trigger + 0.05)
-        findings = reconstruct_crash([late], ENTRY, window=(-0.2, 0.5)).findings
+        findings = reconstruct_crash([late], ENTRY, CrashOptions(window=(-0.2, 0.5))).findings
         assert any(f.quantity == "entry" and "50.46 ms before" in f.what for f in findings)
 
     @pytest.mark.parametrize(("late", "told"), [(0.018, False), (0.022, True)])
@@ -95,7 +103,7 @@ class TestEntry:
         # Time zero of this record is 0.5 ms before its trigger, and the window has 20 ms: an
         # entry at the touch, 18.5 ms after, is in order; one 22.5 ms after is not.
         late = replace(unit, trigger=unit.trigger + late)
-        findings = reconstruct_crash([late], ENTRY, window=(-0.2, 0.5)).findings
+        findings = reconstruct_crash([late], ENTRY, CrashOptions(window=(-0.2, 0.5))).findings
         said = [f for f in findings if f.quantity == "entry" and "ms before" in f.what]
         assert bool(said) == told
         if said:
@@ -112,7 +120,7 @@ class TestEntry:
         )
         with pytest.raises(DataError, match="the entry speed is not stated"):
             reconstruct_crash([short], None)
-        reconstruct_crash([short], None, preparation={"moving_at_impact": False})
+        reconstruct_crash([short], None, CrashOptions(preparation={"moving_at_impact": False}))
         reconstruct_crash([short], ENTRY)
 
     def test_a_level_velocity_on_a_slope_is_told(self):
@@ -129,7 +137,7 @@ class TestEntry:
         unit, _ = record_crash(motion, DESIGNS["IMU1"], impact=2.0, seed=1)
         # It coasts, and so is level to what the sensors leave: 2 deg.
         options = {"preparation": {"steady_acceleration": 0.0}}
-        level = reconstruct_crash([unit], ENTRY, **options).findings
+        level = reconstruct_crash([unit], ENTRY, CrashOptions(**options)).findings
         (told,) = (f for f in level if f.quantity == "entry")
         assert "is 0 m/s upward" in told.what
         assert "the vehicle pitches" in told.what
@@ -195,9 +203,10 @@ class TestArguments:
         ],
     )
     def test_are_named(self, unit, options, words):
-        given = {"units": [unit], "entry": ENTRY, **options}
+        own = dict(options)
+        units, entry = own.pop("units", [unit]), own.pop("entry", ENTRY)
         with pytest.raises((ConfigError, DataError), match=words) as error:
-            reconstruct_crash(**given)
+            reconstruct_crash(units, entry, CrashOptions(**own))
         assert error.value.finding.remedy
 
     def test_one_unit_is_no_list(self, unit):

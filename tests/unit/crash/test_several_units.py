@@ -11,8 +11,8 @@ from strapdown.crash.combine_units import combine_units
 from strapdown.crash.entry import Entry
 from strapdown.crash.measuring_point import at_point, unit_effects
 from strapdown.crash.path import reconstruct_path
-from strapdown.crash.preparation import prepare_unit
-from strapdown.crash.reconstruction import reconstruct_crash, reconstruct_unit
+from strapdown.crash.preparation import Preparation, prepare_unit
+from strapdown.crash.reconstruction import CrashOptions, reconstruct_crash, reconstruct_unit
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.sensors.lever_arm import move_unit
 from strapdown.sensors.synchronise import synchronise
@@ -110,7 +110,11 @@ def both_level(at):
 def test_medians_and_stated_attitudes_are_reconstructed_too(four, preparation):
     units, _ = four
     there = [
-        at_point(prepare_unit(u.unit, **(preparation or {})), (0.0, 0.0, 0.0), time_sd=u.time_sd)
+        at_point(
+            prepare_unit(u.unit, Preparation(**(preparation or {}))),
+            (0.0, 0.0, 0.0),
+            time_sd=u.time_sd,
+        )
         for u in synchronise(units).units
     ]
     for method in ("weighted", "median"):
@@ -162,7 +166,7 @@ def test_swapped_axes_are_found(four):
     wrong = replace(
         units[3], accelerometers=tuple(column(t, swap) for t in units[3].accelerometers)
     )
-    found = reconstruct_crash([units[2], wrong], ENTRY, combine=False)
+    found = reconstruct_crash([units[2], wrong], ENTRY, CrashOptions(combine=False))
     assert not found.comparison.agree
     words = [str(f) for f in found.comparison.findings]
     assert any("IMU2, axes: the axes of its accelerometers differ" in w for w in words)
@@ -175,7 +179,7 @@ def test_a_wrong_lever_arm_is_found(four, off):
     right = units[3].mounting
     position = tuple(float(x) for x in np.add(right.position, off))
     wrong = replace(units[3], mounting=replace(right, position=position))
-    found = reconstruct_crash([units[2], wrong], ENTRY, combine=False)
+    found = reconstruct_crash([units[2], wrong], ENTRY, CrashOptions(combine=False))
     assert any(f.quantity == "position" for f in found.comparison.findings)
     check = found.comparison.pairs[0].lever_arm
     told = check.directions[:, check.told]

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from strapdown import CrashUnit, Entry, Mounting, RecordedTriad, reconstruct_crash
+from strapdown import CrashOptions, CrashUnit, Entry, Mounting, RecordedTriad, reconstruct_crash
 from strapdown.config.crash_case import CaseSpec
 from strapdown.sensors.catalogue import KEYS, load_sensor
 from strapdown.sensors.uncertainty import SPREADS, uncertainty_of
@@ -37,11 +37,13 @@ def reconstruct(folder):
     return reconstruct_crash(
         [unit(folder, u) for u in spec.units],
         entry,
-        point=spec.point.position_m,
-        rate=spec.options.rate_hz,
-        sampling=spec.options.sampling,
-        clock=spec.options.clock,
-        gravity=spec.options.gravity_m_per_s2,
+        CrashOptions(
+            point=spec.point.position_m,
+            rate=spec.options.rate_hz,
+            sampling=spec.options.sampling,
+            clock=spec.options.clock,
+            gravity=spec.options.gravity_m_per_s2,
+        ),
     )
 
 

@@ -19,7 +19,7 @@ from strapdown.config.crash_case import (
 from strapdown.crash.case import CaseResult, ReferenceAnswer, SeverityAnswer
 from strapdown.crash.entry import Entry
 from strapdown.crash.path import compare_with_reference, sample_paths
-from strapdown.crash.reconstruction import reconstruct_crash
+from strapdown.crash.reconstruction import CrashOptions, reconstruct_crash
 from strapdown.crash.severity import find_severity_model, injury_risk
 from strapdown.report.crash_figures import crash_figures
 from strapdown.sensors.crash_unit import Mounting
@@ -58,7 +58,7 @@ def _run(name, units, window, end):
     state = crash.motion.trajectory(np.array([impact])).iloc[0]
     speed = float(np.hypot(state["VN"], state["VE"]))
     entry = Entry.from_speed(speed, SPEED_SD)
-    found = reconstruct_crash(recorded, entry, window=window)
+    found = reconstruct_crash(recorded, entry, CrashOptions(window=window))
     path = found.main.path
     references = [_path_reference(crash, impact, found.main)]
     severity = []
