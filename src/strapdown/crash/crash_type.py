@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,18 +16,6 @@ from strapdown.crash.pdof import AngleInterval, Pdof, pdof, pdof_interval
 from strapdown.dsp.running_integral import running_integral
 from strapdown.errors import ConfigError, DataError
 from strapdown.tables.checks import as_array, check_rows, check_same_length, check_time
-
-__all__ = [
-    "BORDERS",
-    "PASSENGER_CAR",
-    "CrashType",
-    "RollMotion",
-    "TippingBody",
-    "classify_crash",
-    "classify_crashes",
-    "side_of",
-]
-
 
 # Rollover criterion: a rigid body about the wheels on one side.
 
@@ -52,6 +40,27 @@ class RollMotion:
     peak_rate_deg_s: float
     peak_roll_deg: float
     quarter_turns: int
+
+
+@dataclass(frozen=True, eq=False)
+class RollRecord:
+    """Rate about the forward axis, bias removed, and the roll that it starts from.
+
+    `time`, (n,), s; `rate`, (n,), rad/s, with the standard deviation `rate_sd` of a constant error;
+    `start_deg`, `start_sd_deg`: roll at the first sample.
+    """
+
+    time: ArrayLike
+    rate: ArrayLike
+    rate_sd: float = 0.0
+    start_deg: float = 0.0
+    start_sd_deg: float = 0.0
+
+    def until(self, end: float) -> RollRecord:
+        """The samples up to an instant, s."""
+        stamps = np.asarray(self.time, dtype=np.float64)
+        own = stamps <= end
+        return replace(self, time=stamps[own], rate=np.asarray(self.rate)[own])
 
 
 @dataclass(frozen=True)
@@ -90,37 +99,28 @@ class TippingBody:
         share: Array = (lifted + moving) / (weight * (1.0 - math.cos(tip)))
         return share
 
-    def roll_motion(
-        self,
-        time: ArrayLike,
-        roll_rate: ArrayLike,
-        *,
-        start_roll_deg: float = 0.0,
-        rate_sd: float = 0.0,
-        start_sd_deg: float = 0.0,
-        since: float | None = None,
-    ) -> RollMotion:
+    def roll_motion(self, record: RollRecord, *, since: float | None = None) -> RollMotion:
         """Compute the roll of a record and its ratio to tipping over.
 
-        The roll is the integral of the rate about the forward axis, (n,), rad/s, bias removed,
-        valid while the pitch is small: at 10 deg of pitch and 100 deg/s of yaw, 17 deg/s of roll
-        are missed. `rate_sd`, rad/s, of a constant error; samples before `since`, s, are integrated
-        but not counted. `DataError`: lengths differ, or no sample is left.
+        The roll is the integral of the rate, valid while the pitch is small: at 10 deg of pitch and
+        100 deg/s of yaw, 17 deg/s of roll are missed. Samples before `since`, s, are integrated but
+        not counted. `DataError`: lengths differ, or no sample is left.
         """
-        stamps, rate = as_array(time, None, "time"), as_array(roll_rate, None, "roll_rate")
+        stamps, rate = as_array(record.time, None, "time"), as_array(record.rate, None, "roll_rate")
         check_same_length(None, time=stamps, roll_rate=rate)
         check_time(stamps, None)
         check_rows(rate[:, None], ["roll_rate"], None)
+        start_sd, rate_sd = TWO_SIDED_95 * record.start_sd_deg, TWO_SIDED_95 * record.rate_sd
         first = -math.inf if since is None else since
         counted = stamps >= first
         if not counted.any():
             raise DataError("crash.no-rate-roll", quantity="roll_rate", first=first)
-        roll = math.radians(start_roll_deg) + running_integral(stamps, rate)
+        roll = math.radians(record.start_deg) + running_integral(stamps, rate)
         share = self.energy_share(roll, rate)[counted]
         best = int(np.argmax(share))
         bounds = [float(share[best])]
-        for drift in (-TWO_SIDED_95 * rate_sd, TWO_SIDED_95 * rate_sd):
-            for tilt in (-TWO_SIDED_95 * start_sd_deg, TWO_SIDED_95 * start_sd_deg):
+        for drift in (-rate_sd, rate_sd):
+            for tilt in (-start_sd, start_sd):
                 moved = roll + math.radians(tilt) + drift * (stamps - stamps[0])
                 bounds.append(float(self.energy_share(moved, rate + drift)[counted].max()))
         turned = roll[counted]
@@ -193,12 +193,8 @@ def classify_crash(
     change: DeltaV | ArrayLike,
     covariance: ArrayLike | None = None,
     *,
-    event: CrashEvent | None = None,
-    time: ArrayLike | None = None,
-    roll_rate: ArrayLike | None = None,
-    start_roll_deg: float = 0.0,
-    roll_rate_sd: float = 0.0,
-    start_roll_sd_deg: float = 0.0,
+    roll: RollRecord | None = None,
+    since: float | None = None,
     body: TippingBody = PASSENGER_CAR,
 ) -> CrashType:
     """Classify one event.
@@ -209,16 +205,10 @@ def classify_crash(
         Of the whole event, along vehicle axes or those of the impact.
     covariance : array_like, (3, 3), m²/s², optional
         Of its error.
-    event : CrashEvent, optional
-        With the rates: roll is examined from its time zero on. Without, over all samples given.
-    time, roll_rate : array_like, (n,), s and rad/s, optional
-        Rate about the forward axis (``gyro_x``, bias removed). A rollover continues after its
-        event; give all samples up to the next event.
-    start_roll_deg : float, deg
-        Roll at the first of these.
-    roll_rate_sd : float, rad/s
-        Of a constant error of the rate over the record (bias).
-    start_roll_sd_deg : float, deg
+    roll : RollRecord, optional
+        A rollover continues after its event: all samples up to the next event.
+    since : float, s, optional
+        Time zero of the event, from which on the roll counts; by default from its first sample.
     body : TippingBody
         Dimensions of the vehicle.
 
@@ -230,28 +220,15 @@ def classify_crash(
 
     Raises
     ------
-    ConfigError
-        One of `time` and `roll_rate` is missing, or their lengths differ.
     DataError
-        As `pdof` and `pdof_interval`.
+        As `pdof` and `pdof_interval`, or the roll rates are not valid.
     """
     direction = pdof(change)
     side, margin, beyond = side_of(direction.horizontal_deg)
     interval = None if covariance is None else pdof_interval(change, covariance).horizontal
-    roll = None
-    if time is not None or roll_rate is not None:
-        if time is None or roll_rate is None:
-            raise ConfigError("crash.rates-need-their-stamps-stamps", quantity="roll_rate")
-        roll = body.roll_motion(
-            time,
-            roll_rate,
-            start_roll_deg=start_roll_deg,
-            rate_sd=roll_rate_sd,
-            start_sd_deg=start_roll_sd_deg,
-            since=None if event is None else event.time_zero,
-        )
-    name, reason = _decide(side, margin, beyond, interval, roll)
-    return CrashType(name, side, direction, interval, margin, beyond, roll, reason)
+    motion = None if roll is None else body.roll_motion(roll, since=since)
+    name, reason = _decide(side, margin, beyond, interval, motion)
+    return CrashType(name, side, direction, interval, margin, beyond, motion, reason)
 
 
 def _decide(
@@ -287,18 +264,13 @@ def classify_crashes(
     covariances: Sequence[ArrayLike] | None = None,
     *,
     events: Sequence[CrashEvent],
-    time: ArrayLike | None = None,
-    roll_rate: ArrayLike | None = None,
-    start_roll_deg: float = 0.0,
-    roll_rate_sd: float = 0.0,
-    start_roll_sd_deg: float = 0.0,
-    body: TippingBody = PASSENGER_CAR,
+    roll: RollRecord | None = None,
 ) -> tuple[CrashType, ...]:
     """Classify each event of a record: changes and covariances, one per event in order of time.
 
-    Other arguments as `classify_crash`, over the whole record: the roll before an event is carried
-    over to it, and each event uses the roll from its own time zero to that of the next.
-    `ConfigError`: the number of changes or covariances differs from that of events.
+    The roll before an event is carried over to it, and each event uses the roll from its own time
+    zero to that of the next. `ConfigError`: the number of changes or covariances differs from that
+    of events.
     """
     if len(changes) != len(events) or (covariances is not None and len(covariances) != len(events)):
         raise ConfigError(
@@ -307,24 +279,13 @@ def classify_crashes(
             count=len(changes),
             count_2=len(events),
         )
-    types = []
-    for k, event in enumerate(events):
-        stamps, rates = time, roll_rate
-        if time is not None and roll_rate is not None and k + 1 < len(events):
-            stamps, rates = np.asarray(time, dtype=np.float64), np.asarray(roll_rate)
-            own = stamps <= events[k + 1].time_zero
-            stamps, rates = stamps[own], rates[own]
-        types.append(
-            classify_crash(
-                changes[k],
-                None if covariances is None else covariances[k],
-                event=event,
-                time=stamps,
-                roll_rate=rates,
-                start_roll_deg=start_roll_deg,
-                roll_rate_sd=roll_rate_sd,
-                start_roll_sd_deg=start_roll_sd_deg,
-                body=body,
-            )
+    ends = [event.time_zero for event in events[1:]] + [math.inf]
+    return tuple(
+        classify_crash(
+            changes[k],
+            None if covariances is None else covariances[k],
+            roll=None if roll is None else roll.until(ends[k]),
+            since=event.time_zero,
         )
-    return tuple(types)
+        for k, event in enumerate(events)
+    )

@@ -21,9 +21,6 @@ from strapdown.sensors.rest import RestStretch
 from strapdown.sensors.unmeasured import AXES, TURNS, axis_names, unmeasured_axes, unmeasured_turns
 from strapdown.tables import ACCEL, GYRO
 
-__all__ = ["AssumedEffect", "assumed_effects"]
-
-
 Array = NDArray[np.float64]
 
 # Contributors common to all units of one vehicle.
@@ -112,13 +109,12 @@ class _UnitEffects:
         owner: str = "",
         tilt: Array | None = None,
         through_arm: bool = True,
-        of_all_axes: bool = False,
     ) -> None:
         n = len(self.time)
         added = np.zeros((n, 3)) if force is None else force
         if rate is not None and through_arm and self.moved.lever_arm.any():
             added = added + self.moved.of_rate(rate)
-        if not of_all_axes:
+        if contributor not in (MISSING_AXIS, LEVELLING):
             # Sensor and lever-arm errors do not affect an assumed axis.
             added, rest = added @ self.measured, rest @ self.measured
         # Matching the stationary force to the length of gravity cancels the component of an
@@ -290,15 +286,7 @@ class _UnitEffects:
 
     def _assumed(self) -> None:
         for of in assumed_effects(self.prepared):
-            self._add(
-                of.name,
-                of.contributor,
-                of.force,
-                of.rate,
-                np.zeros(3),
-                VEHICLE,
-                of_all_axes=of.contributor == MISSING_AXIS,
-            )
+            self._add(of.name, of.contributor, of.force, of.rate, np.zeros(3), VEHICLE)
 
     def _levelling(self) -> None:
         sd = np.radians(self.prepared.levelling.sd_deg)
@@ -312,16 +300,7 @@ class _UnitEffects:
                 shift = self.unmeasured @ shift
             if sd > 0.0:
                 force = np.tile(shift, (n, 1))
-                self._add(
-                    f"levelling {name}",
-                    "levelling",
-                    force,
-                    None,
-                    shift,
-                    VEHICLE,
-                    tilt,
-                    of_all_axes=True,
-                )
+                self._add(f"levelling {name}", LEVELLING, force, None, shift, VEHICLE, tilt)
         steady = self.prepared.rest_accel_sd
         if steady > 0.0 and self.prepared.bias_from[0] == FROM_GRAVITY:
             for axis in range(3):
@@ -490,6 +469,7 @@ def constant(value: float) -> Curve:
 
 #: Lines of the error budget that other modules look up.
 GYRO_BIAS = "gyro bias"
+LEVELLING = "levelling"
 LEVER_ARM = "lever arm"
 MOUNTING = "mounting"
 NO_TURNING = "assumed: no turning"

@@ -332,7 +332,7 @@ def reconstruct_path(
     """
     time = imu.index.to_numpy(dtype=np.float64)
     mechanization = mechanization or NorthEastDown()
-    origin = entry or Entry(time=0.0, velocity=(0.0, 0.0, 0.0), heading_deg=0.0)
+    origin = entry or _standing()
     first, anchor, last = path_rows(imu, origin.time, window)
     # Without an entry the velocity belongs to the sample, at whatever instant.
     there = to_stamp(imu, effects, float(time[anchor]) if entry is None else origin.time, anchor)
@@ -347,8 +347,6 @@ def reconstruct_path(
             levelling,
             level_time,
             entry,
-            origin,
-            anchor,
             there,
             mechanization,
             zeroed_at_rest and level_time is not None,
@@ -381,6 +379,11 @@ class _Begin:
     missing: Array
 
 
+def _standing() -> Entry:
+    """The entry of a vehicle that was stationary, in its axes at time zero."""
+    return Entry(time=0.0, velocity=(0.0, 0.0, 0.0), heading_deg=0.0)
+
+
 _NO_NAMES: tuple[str, ...] = ()
 _NOTHING = (_NO_NAMES, _NO_NAMES, np.zeros((0, 9)), np.zeros(3))
 
@@ -404,13 +407,12 @@ def _carried(
     levelling: Levelling,
     level_time: float | None,
     entry: Entry | None,
-    origin: Entry,
-    anchor: int,
     there: ToStamp,
     mechanization: NorthEastDown,
     zeroed: bool,
 ) -> _Begin:
     """Propagate the attitude and its errors from the leveling to the entry."""
+    origin, anchor = entry or _standing(), there.row
     time = imu.index.to_numpy(dtype=np.float64)
     at = anchor if level_time is None else int(np.searchsorted(time, level_time - 1e-9))
     if at > anchor:
@@ -594,13 +596,14 @@ def _usual(time: Array, at: float) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False)
 class ToStamp:
-    """Motion from the instant of an entry to a sample, `length` s later (negative: earlier).
+    """Motion from the instant of an entry to a sample, `row`, `length` s later (or earlier).
 
     `turn`, (3,), rad, rotation vector in body axes; `push`, (3,), m/s, integral of the specific
     force in body axes at mid-interval; with the effect of one standard deviation of each unknown on
     them, (p, 3).
     """
 
+    row: int
     length: float
     turn: Array
     push: Array
@@ -654,6 +657,7 @@ def to_stamp(imu: pd.DataFrame, effects: SampleEffects, instant: float, row: int
     near = np.flatnonzero(weights)
     few = weights[near]
     return ToStamp(
+        row,
         length,
         few @ imu[GYRO].to_numpy(dtype=np.float64)[near],
         few @ imu[ACCEL].to_numpy(dtype=np.float64)[near],

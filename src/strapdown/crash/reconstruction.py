@@ -15,7 +15,7 @@ from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.crash.acceleration import Acceleration, body_acceleration, resolved_acceleration
 from strapdown.crash.combine_units import combine_units
 from strapdown.crash.consistency import UnitComparison, compare_units
-from strapdown.crash.crash_type import CrashType, classify_crashes
+from strapdown.crash.crash_type import CrashType, RollRecord, classify_crashes
 from strapdown.crash.delta_v import DeltaV, delta_v, trailing_delta_v
 from strapdown.crash.delta_v_bound import (
     EventChanges,
@@ -330,18 +330,19 @@ def reconstruct_unit(
                 )
             )
     # An assumed roll gives no information on a rollover.
-    rolled = "roll" not in at_point.assumed_axes
+    roll = None
+    if "roll" not in at_point.assumed_axes:
+        level, rate = at_point.levelling, at_point.imu["gyro_x"].to_numpy(dtype=np.float64)
+        roll = RollRecord(
+            acceleration.time, rate, effects.roll_bias_sd, level.roll_deg, level.sd_deg
+        )
     types = classify_crashes(
         [changes.event.delta_v for changes in body],
         [changes.event.bound.covariance for changes in body],
         events=events.events,
-        time=acceleration.time if rolled else None,
-        roll_rate=at_point.imu["gyro_x"].to_numpy(dtype=np.float64) if rolled else None,
-        start_roll_deg=at_point.levelling.roll_deg,
-        roll_rate_sd=effects.roll_bias_sd,
-        start_roll_sd_deg=at_point.levelling.sd_deg,
+        roll=roll,
     )
-    if not rolled:
+    if roll is None:
         types = tuple(replace(t, reason=f"{t.reason}; {NO_ROLL}") for t in types)
     return UnitReconstruction(
         at_point.name,

@@ -8,6 +8,7 @@ import pytest
 from strapdown.crash.acceleration import Acceleration
 from strapdown.crash.crash_type import (
     PASSENGER_CAR,
+    RollRecord,
     TippingBody,
     classify_crash,
     classify_crashes,
@@ -93,12 +94,12 @@ def test_the_share_does_not_change_along_a_free_roll():
 def test_a_rollover_goes_before_the_side():
     time = np.arange(0.0, 0.75, 0.005)
     rate = np.radians(200.0) * np.clip(time / 0.2, 0.0, 1.0)
-    found = classify_crash((0.0, 6.0, 0.0), SMALL, time=time, roll_rate=rate)
+    found = classify_crash((0.0, 6.0, 0.0), SMALL, roll=RollRecord(time, rate))
     assert (found.name, found.side) == ("rollover", "left") and found.roll is not None
     # 200 deg/s over 0.65 s: the trapezoid of the ramp is exact.
     assert found.roll.peak_roll_deg == pytest.approx(200.0 * (0.745 - 0.1), rel=1e-9)
     assert found.roll.quarter_turns == 1 and found.roll.peak_rate_deg_s == pytest.approx(200.0)
-    calm = classify_crash((0.0, 6.0, 0.0), SMALL, time=time, roll_rate=0.2 * rate)
+    calm = classify_crash((0.0, 6.0, 0.0), SMALL, roll=RollRecord(time, 0.2 * rate))
     assert calm.name == "left" and calm.roll is not None and calm.roll.share < 1.0
 
 
@@ -106,7 +107,7 @@ def test_a_roll_near_the_border_is_undetermined():
     time = np.arange(0.0, 0.2, 0.005)
     level = np.radians(141.0)
     found = classify_crash(
-        (0.0, 6.0, 0.0), SMALL, time=time, roll_rate=np.r_[level, np.zeros(39)], roll_rate_sd=0.1
+        (0.0, 6.0, 0.0), SMALL, roll=RollRecord(time, np.r_[level, np.zeros(39)], rate_sd=0.1)
     )
     assert found.name == "undetermined" and "rolls over" in found.reason
     assert found.roll is not None and found.roll.low < 1.0 < found.roll.high
@@ -123,7 +124,7 @@ def test_each_event_has_its_own():
     changes = [delta_v(made, e.time_zero, e.end) for e in events]
     # It rolls after the second alone.
     rate = np.radians(220.0) * np.clip((time - 0.85) / 0.2, 0.0, 1.0)
-    types = classify_crashes(changes, [SMALL, SMALL], events=events, time=time, roll_rate=rate)
+    types = classify_crashes(changes, [SMALL, SMALL], events=events, roll=RollRecord(time, rate))
     assert [t.name for t in types] == ["front", "rollover"]
     assert [t.side for t in types] == ["front", "left"]
     plain = classify_crashes(changes, events=events)
@@ -133,11 +134,9 @@ def test_each_event_has_its_own():
 
 
 def test_bad_rates_are_refused():
-    with pytest.raises(ConfigError, match="both time and roll_rate"):
-        classify_crash((-5.0, 0.0, 0.0), time=[0.0, 0.1])
     with pytest.raises(DataError, match="roll_rate"):
-        classify_crash((-5.0, 0.0, 0.0), time=[0.0, 0.1], roll_rate=[0.0, np.nan])
+        classify_crash((-5.0, 0.0, 0.0), roll=RollRecord([0.0, 0.1], [0.0, np.nan]))
     with pytest.raises(DataError, match="no roll rate from 3 s"):
-        PASSENGER_CAR.roll_motion([0.0, 0.1], [0.0, 0.0], since=3.0)
+        PASSENGER_CAR.roll_motion(RollRecord([0.0, 0.1], [0.0, 0.0]), since=3.0)
     with pytest.raises(ConfigError, match="half_track"):
         TippingBody(half_track=-1.0)
