@@ -49,19 +49,6 @@ from strapdown.sensors.crash_unit import Assumed, CrashUnit, Mounting, RecordedT
 from strapdown.sensors.uncertainty import stated_uncertainty
 from strapdown.systems.one_thread import one_thread
 
-__all__ = [
-    "CaseResult",
-    "ReferenceAnswer",
-    "SeverityAnswer",
-    "case_severity",
-    "case_unit",
-    "compare_reference",
-    "main_event",
-    "run_case",
-    "whole_records",
-]
-
-
 # Most numbers of a Monte Carlo in memory: half a gigabyte.
 MOST_NUMBERS = 64_000_000
 

@@ -17,17 +17,6 @@ from strapdown.sensors.pre_crash import Levelling
 from strapdown.sensors.rest import LEAST_SAMPLES, RestStretch, rest_between
 from strapdown.tables import imu_table
 
-__all__ = [
-    "COMBINATIONS",
-    "SampleWeights",
-    "by_none",
-    "combine_effects",
-    "combine_units",
-    "crash_steps",
-    "force_weights",
-]
-
-
 Array = NDArray[np.float64]
 
 COMBINATIONS = ("weighted", "median")

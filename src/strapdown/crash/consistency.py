@@ -15,40 +15,6 @@ from strapdown.crash.acceleration import window_weights
 from strapdown.crash.measuring_point import LEVER_ARM, MOUNTING, PointKinematics
 from strapdown.errors import ConfigError, DataError, Finding
 
-__all__ = [
-    "TINY",
-    "AxisMatch",
-    "LeverArmCheck",
-    "MountingRotation",
-    "NoiseOfSums",
-    "UnitAgainstAll",
-    "UnitComparison",
-    "UnitPair",
-    "VelocityIncrements",
-    "axis_findings",
-    "check_lever_arm",
-    "chi_square_along",
-    "chi_square_tail",
-    "clipped_axes",
-    "clipped_pieces",
-    "common_edges",
-    "compare_units",
-    "difference_covariance",
-    "floored",
-    "joint_covariance",
-    "lever_arm_findings",
-    "match_axes",
-    "measured_axes",
-    "measured_by_all",
-    "measured_by_any",
-    "mounting_rotation",
-    "noise_of_sums",
-    "rotation_findings",
-    "signed_permutations",
-    "velocity_increments",
-]
-
-
 Array = NDArray[np.float64]
 
 # Relative to the largest variance: smaller covariances are rounding.

@@ -15,16 +15,6 @@ from strapdown.crash.events import CrashEvent
 from strapdown.dsp.running_integral import running_integral
 from strapdown.errors import ConfigError, DataError
 
-__all__ = [
-    "DeltaV",
-    "TrailingDeltaV",
-    "cumulative_delta_v",
-    "delta_v",
-    "recorder_delta_v",
-    "trailing_delta_v",
-]
-
-
 Array = NDArray[np.float64]
 
 #: The window of Tadic and Vukajlovic (2016), section 4.

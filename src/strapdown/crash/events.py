@@ -16,9 +16,6 @@ from strapdown.crash.acceleration import Acceleration
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.tables.imu import SAMPLINGS
 
-__all__ = ["PART_563", "CrashEvent", "CrashEvents", "EventDetector", "EventRule", "detect_events"]
-
-
 # One event of a crash.
 
 

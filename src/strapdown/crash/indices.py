@@ -12,22 +12,6 @@ from strapdown.constants import STANDARD_GRAVITY
 from strapdown.dsp.running_integral import running_integral
 from strapdown.errors import ConfigError, DataError, Finding
 
-__all__ = [
-    "ASI_AVERAGES",
-    "PHD_AVERAGES",
-    "Asi",
-    "FlailSpace",
-    "Hic",
-    "Olc",
-    "Thiv",
-    "asi",
-    "flail_space",
-    "hic",
-    "olc",
-    "thiv",
-]
-
-
 Array = NDArray[np.float64]
 # Stamps are rounded; steps that differ by more than this fraction are not uniform.
 SAME_STEP = 0.02

@@ -16,24 +16,6 @@ from strapdown.crash.delta_v import DeltaV, delta_v
 from strapdown.errors import ConfigError, DataError
 from strapdown.rotation import within_half_turn
 
-__all__ = [
-    "CONVENTIONS",
-    "AngleInterval",
-    "NedPdof",
-    "Pdof",
-    "PdofConvention",
-    "PdofInterval",
-    "clock_of",
-    "from_convention",
-    "ned_pdof",
-    "pdof",
-    "pdof_by_shift",
-    "pdof_by_window",
-    "pdof_interval",
-    "to_convention",
-]
-
-
 Array = NDArray[np.float64]
 
 

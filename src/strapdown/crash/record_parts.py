@@ -28,22 +28,6 @@ from strapdown.formats.inference.rotation_rate import infer_gyro
 from strapdown.formats.named_columns import read_reference_path
 from strapdown.sensors.saturation import find_limits
 
-__all__ = [
-    "FULL_SCALES",
-    "Clock",
-    "KnownPath",
-    "Part",
-    "Skipped",
-    "agreement",
-    "known_path",
-    "laboratory_parts",
-    "quiet_part",
-    "read_heading",
-    "settle_units",
-    "stated_rate",
-    "table_parts",
-]
-
 Array = NDArray[np.float64]
 Left = list[tuple[str, str]]
 

@@ -11,18 +11,6 @@ from typing import Any
 
 from strapdown.errors import ConfigError, DataError, Finding
 
-__all__ = [
-    "SEVERITY_MODELS",
-    "SPEEDS",
-    "InjuryRisk",
-    "SeverityModel",
-    "Term",
-    "find_severity_model",
-    "injury_risk",
-    "load_severity_model",
-]
-
-
 #: Units of speed, in m/s. Inputs with these units are given in m/s; others in their stated unit.
 SPEEDS: dict[str, float] = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
 TRANSFORMS = ("identity", "log", "square")

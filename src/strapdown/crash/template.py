@@ -54,8 +54,6 @@ from strapdown.sensors.pre_crash import find_pre_crash_rest
 from strapdown.sensors.saturation import find_limits
 from strapdown.tables import ACCEL, GYRO
 
-__all__ = ["Draft", "draft_case", "read_records"]
-
 Array = NDArray[np.float64]
 
 
