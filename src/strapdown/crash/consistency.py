@@ -723,9 +723,11 @@ def _pair(
         axes, turned, lever = AxisMatch.untold(), MountingRotation.untold(), LeverArmCheck.untold()
     agree = probability >= level
     if not kept.any():
-        findings.append(_nothing_whole(first, second))
+        code = "crash.no-piece-record-neither-end"
+        findings.append(Finding(code, file=first.name, quantity="comparison", name=second.name))
     elif freedom == 0:
-        findings.append(_nothing_in_common(first, second))
+        code = "crash.measure-no-axis-common-not"
+        findings.append(Finding(code, file=first.name, quantity="delta-V", name=second.name))
     elif not agree:
         findings.append(_disagreement(first, second, edges, curve, sd, chi, freedom, probability))
     found = axis_findings(axes, first.name, second.name)
@@ -891,21 +893,6 @@ def _left_out(unit: PointKinematics, edges: Array, cut: Flags) -> Finding:
     )
 
 
-def _nothing_whole(first: PointKinematics, second: PointKinematics) -> Finding:
-    return Finding(
-        "crash.no-piece-record-neither-end",
-        file=first.name,
-        quantity="comparison",
-        name=second.name,
-    )
-
-
-def _nothing_in_common(first: PointKinematics, second: PointKinematics) -> Finding:
-    return Finding(
-        "crash.measure-no-axis-common-not", file=first.name, quantity="delta-V", name=second.name
-    )
-
-
 def _odd_one(units: Sequence[PointKinematics], pairs: Sequence[UnitPair]) -> list[Finding]:
     """Of three or more units, find the one without which the others agree."""
     if len(units) < 3 or all(p.agree for p in pairs):
@@ -1065,17 +1052,13 @@ def clipped_pieces(unit: PointKinematics, edges: Array) -> Flags:
     time = prepared.imu.index.to_numpy(dtype=np.float64)
     arm = unit.moved is not None and bool(unit.moved.lever_arm.any())
     wide = unit.moved.slope.slope.shape[1] // 2 if arm and unit.moved is not None else 0
-    cut = _spread(_any(prepared.clipped), 1)
+    cut = _spread(prepared.clipped.any(axis=1), 1)
     # A clipped gyro affects the accelerometer readings only through a lever arm.
-    cut |= _spread(_any(prepared.gyro_clipped), wide + 1) if arm else False
+    cut |= _spread(prepared.gyro_clipped.any(axis=1), wide + 1) if arm else False
     at = time[cut]
     return np.asarray(
         np.searchsorted(at, edges[1:], side="right") > np.searchsorted(at, edges[:-1], side="left")
     )
-
-
-def _any(flags: Flags) -> Flags:
-    return np.asarray(flags.any(axis=1))
 
 
 def _spread(flags: Flags, by: int) -> Flags:

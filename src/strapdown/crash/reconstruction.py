@@ -640,18 +640,13 @@ def reconstruct_crash(
     if comparison is not None:
         findings += comparison.findings
         if combine and not comparison.agree:
-            findings.append(_no_mean(there))
+            names = ", ".join(u.name for u in there)
+            findings.append(
+                Finding("crash.units-disagree-no-mean-told", file=names, quantity="combine")
+            )
     x, y, z = (float(v) for v in point)
     return CrashReconstruction(
         (x, y, z), together, found, comparison, combined, tuple(dict.fromkeys(findings))
-    )
-
-
-def _no_mean(units: Sequence[PointKinematics]) -> Finding:
-    return Finding(
-        "crash.units-disagree-no-mean-told",
-        file=", ".join(u.name for u in units),
-        quantity="combine",
     )
 
 
