@@ -1052,9 +1052,9 @@ def clipped_pieces(unit: PointKinematics, edges: Array) -> Flags:
     time = prepared.imu.index.to_numpy(dtype=np.float64)
     arm = unit.moved is not None and bool(unit.moved.lever_arm.any())
     wide = unit.moved.slope.slope.shape[1] // 2 if arm and unit.moved is not None else 0
-    cut = _spread(prepared.clipped.any(axis=1), 1)
+    cut = _spread(prepared.clipped, 1)
     # A clipped gyro affects the accelerometer readings only through a lever arm.
-    cut |= _spread(prepared.gyro_clipped.any(axis=1), wide + 1) if arm else False
+    cut |= _spread(prepared.gyro_clipped, wide + 1) if arm else False
     at = time[cut]
     return np.asarray(
         np.searchsorted(at, edges[1:], side="right") > np.searchsorted(at, edges[:-1], side="left")
@@ -1062,5 +1062,7 @@ def clipped_pieces(unit: PointKinematics, edges: Array) -> Flags:
 
 
 def _spread(flags: Flags, by: int) -> Flags:
-    """Flags extended by so many neighbors on either side."""
-    return np.asarray(np.convolve(flags, np.ones(2 * by + 1), mode="same") > 0.5)
+    """Samples with a flag, (n, 3), along any axis, and so many neighbors on either side."""
+    return np.asarray(
+        np.convolve(np.asarray(flags.any(axis=1)), np.ones(2 * by + 1), mode="same") > 0.5
+    )
