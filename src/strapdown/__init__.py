@@ -147,78 +147,36 @@ __all__ = [
     "write_trajectory",
 ]
 
-# Loaded on first use: numba alone takes longer to import than most commands take to run.
-_HOMES = {
-    "FineAlignment": "strapdown.alignment.fine",
-    "Site": "strapdown.alignment.alignment",
-    "AlignmentRun": "strapdown.api.alignment",
-    "OutageRun": "strapdown.api.alignment",
-    "align": "strapdown.api.alignment",
-    "coast": "strapdown.api.alignment",
-    "Attitude": "strapdown.api.attitude",
-    "AttitudeComparison": "strapdown.api.attitude",
-    "AttitudeOptions": "strapdown.api.attitude",
-    "OrientationFilter": "strapdown.api.attitude",
-    "attitude": "strapdown.api.attitude",
-    "compare_attitude": "strapdown.api.attitude",
-    "CrashRun": "strapdown.api.crash",
-    "reconstruct": "strapdown.api.crash",
-    "Barometer": "strapdown.api.navigation",
-    "BodyVelocity": "strapdown.api.navigation",
-    "Gnss": "strapdown.api.navigation",
-    "Heading": "strapdown.api.navigation",
-    "Measurement": "strapdown.api.navigation",
-    "NavigationRun": "strapdown.api.navigation",
-    "NonHolonomic": "strapdown.api.navigation",
-    "Odometer": "strapdown.api.navigation",
-    "ZeroAngularRate": "strapdown.api.navigation",
-    "ZeroVelocity": "strapdown.api.navigation",
-    "navigate": "strapdown.api.navigation",
-    "GnssFixes": "strapdown.api.reading",
-    "Imu": "strapdown.api.reading",
-    "Streams": "strapdown.api.reading",
-    "read": "strapdown.api.reading",
-    "read_gnss": "strapdown.api.reading",
-    "read_imu": "strapdown.api.reading",
-    "CrashOptions": "strapdown.crash.reconstruction",
-    "CrashReconstruction": "strapdown.crash.reconstruction",
-    "Simulation": "strapdown.api.simulation",
-    "simulate": "strapdown.api.simulation",
-    "Entry": "strapdown.crash.entry",
-    "sample_paths": "strapdown.crash.path",
-    "trajectory_differences": "strapdown.evaluation.trajectory_differences",
-    "summarise_differences": "strapdown.evaluation.trajectory_differences",
-    "read_log": "strapdown.formats",
-    "read_crash_record": "strapdown.formats.crash_records",
-    "read_nhtsa": "strapdown.formats.nhtsa",
-    "read_trajectory": "strapdown.formats.trajectory_readers",
-    "write_trajectory": "strapdown.formats.trajectory_writers",
-    "motion_increments": "strapdown.increments",
-    "NavTracker": "strapdown.mechanization",
-    "NorthEastDown": "strapdown.mechanization",
-    "WanderAzimuth": "strapdown.mechanization",
-    "run_mechanization": "strapdown.mechanization",
-    "NavState": "strapdown.nav_state",
-    "verify": "strapdown.report.verify",
-    "Assumed": "strapdown.sensors.crash_unit",
-    "CrashUnit": "strapdown.sensors.crash_unit",
-    "Mounting": "strapdown.sensors.crash_unit",
-    "RecordedTriad": "strapdown.sensors.crash_unit",
-    "check_imu_channels": "strapdown.sensors.imu_health",
-    "ImuUncertainty": "strapdown.sensors.uncertainty",
-    "vote_units": "strapdown.sensors.redundant_units",
-    "TriadUncertainty": "strapdown.sensors.uncertainty",
-    "reconstruct_crash": "strapdown.crash.reconstruction",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name in _HOMES:
-        from importlib import import_module
-
-        return getattr(import_module(_HOMES[name]), name)
-    raise AttributeError(f"module 'strapdown' has no attribute '{name}'")
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+# numba alone takes longer to import than most commands take to run.
+load_on_first_use(
+    __name__,
+    {
+        "alignment.alignment": "Site",
+        "alignment.fine": "FineAlignment",
+        "api.alignment": "AlignmentRun OutageRun align coast",
+        "api.attitude": "Attitude AttitudeComparison AttitudeOptions OrientationFilter attitude "
+        "compare_attitude",
+        "api.crash": "CrashRun reconstruct",
+        "api.navigation": "Barometer BodyVelocity Gnss Heading Measurement NavigationRun "
+        "NonHolonomic Odometer ZeroAngularRate ZeroVelocity navigate",
+        "api.reading": "GnssFixes Imu Streams read read_gnss read_imu",
+        "api.simulation": "Simulation simulate",
+        "crash.entry": "Entry",
+        "crash.path": "sample_paths",
+        "crash.reconstruction": "CrashOptions CrashReconstruction reconstruct_crash",
+        "evaluation.trajectory_differences": "trajectory_differences summarise_differences",
+        "formats": "read_log",
+        "formats.crash_records": "read_crash_record",
+        "formats.nhtsa": "read_nhtsa",
+        "formats.trajectory_readers": "read_trajectory",
+        "formats.trajectory_writers": "write_trajectory",
+        "increments": "motion_increments",
+        "mechanization": "NavTracker NorthEastDown WanderAzimuth run_mechanization",
+        "nav_state": "NavState",
+        "report.verify": "verify",
+        "sensors.crash_unit": "Assumed CrashUnit Mounting RecordedTriad",
+        "sensors.imu_health": "check_imu_channels",
+        "sensors.redundant_units": "vote_units",
+        "sensors.uncertainty": "ImuUncertainty TriadUncertainty",
+    },
+)
