@@ -30,7 +30,7 @@ from strapdown.errors import ConfigError
 if TYPE_CHECKING:
     from strapdown.config.alignment import AlignmentSpec
     from strapdown.progress import Progress
-    from strapdown.systems.alignment_run import AlignmentRun, run_alignment
+    from strapdown.systems.alignment_run import AlignmentRun
 
 EPILOG = (
     "Example: strapdown align log.csv --lat 55.75 --lon 37.62 --alt 150 --sensor fog-1000\n\n"
@@ -116,6 +116,7 @@ def align(
         source_name,
     )
     from strapdown.config.alignment import AlignmentSpec
+    from strapdown.systems.alignment_run import run_alignment
 
     given: dict[str, Any] = {
         **asdict(flags),
