@@ -15,8 +15,10 @@ from typing import ClassVar
 
 
 def _table(table, prefix=""):
-    """Return the columns of a table, and its index, as arrays by quantity."""
-    out = {f"{prefix}{table.index.name or 'row'}": table.index.to_numpy()}
+    """Return the columns of a table, and its index if it is numbers, as arrays by quantity."""
+    out = {}
+    if table.index.dtype.kind in "fiu":
+        out[f"{prefix}{table.index.name or 'row'}"] = table.index.to_numpy()
     for name in table.columns:
         if table[name].dtype.kind in "fiub":
             out[f"{prefix}{name}"] = table[name].to_numpy()

@@ -346,3 +346,19 @@ def test_a_run_that_ended_has_its_key_and_a_failed_one_has_none(program, tmp_pat
     )
     assert broken == ["bad"]
     assert [file.name for file in tmp_path.iterdir()] == ["good.key"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("gnss.position.csv/s_down_m", "gnss.position.csv/s_down_m2"),
+        ("gnss.velocity.csv/s_VN_m_s", "gnss.velocity.csv/s_VN_m2_s2"),
+        ("gnss.velocity.csv/weight_VN_m_s", "gnss.velocity.csv/weight_VN"),
+        ("doppler.csv/weight_down_m_s", "doppler.csv/weight_down"),
+        ("quiet.csv/s_x_rad_s", "quiet.csv/s_x_rad2_s2"),
+        ("compass.csv/nu_heading_rad", "compass.csv/nu_heading_rad"),
+    ],
+)
+def test_innovations_have_one_name_in_both(record, old, new):
+    before = record["adapter_0_1"].ADAPTER.quantity(f"nav/innovations/{old}")
+    assert before == record["adapter"].ADAPTER.quantity(f"nav/innovations/{new}")
