@@ -151,8 +151,12 @@ def read_hdf5(found, path, file):
 
 
 def read_matlab(found, path, file):
+    import h5py
     from scipy.io import loadmat
 
+    if h5py.is_hdf5(file):  # version 7.3
+        read_hdf5(found, path, file)
+        return
     for name, values in loadmat(file).items():
         if getattr(values, "dtype", np.dtype(object)).kind in "fiu":
             found.number(f"{path}/{name}", values)
