@@ -23,7 +23,7 @@ from strapdown.report.chart import (
     Mark,
     Panel,
 )
-from strapdown.report.chart_figure import ChartFigure
+from strapdown.report.chart_svg import ChartFigure
 from strapdown.simulation import point_kinematics
 from strapdown.simulation.crash_motion import find_crash
 from strapdown.simulation.crash_recording import paper_units, record_crash

@@ -11,7 +11,7 @@ import numpy as np
 
 from strapdown.estimation.robust import INFLUENCES, RobustUpdate
 from strapdown.report.chart import BLACK, BLUE, GREEN, ORANGE, VERMILLION, Chart, Line, Panel
-from strapdown.report.chart_figure import ChartFigure
+from strapdown.report.chart_svg import ChartFigure
 
 LOOKS = {
     "none": (BLACK, "dot"),

@@ -12,7 +12,7 @@ import pandas as pd
 
 from strapdown.prefilter import RobustFir
 from strapdown.report.chart import BLACK, Chart, Panel, curve
-from strapdown.report.chart_figure import ChartFigure
+from strapdown.report.chart_svg import ChartFigure
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.simulation import Origin, StationaryMotion
 from strapdown.simulation.imu import simulate_imu

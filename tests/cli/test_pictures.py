@@ -20,12 +20,12 @@ from strapdown.config.alignment import LogTable
 from strapdown.config.navigation import NavigationSpec
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.report.attitude_charts import charts
-from strapdown.report.chart_figure import ChartFigure
+from strapdown.report.chart_svg import ChartFigure
 from strapdown.report.document import drawings
 from strapdown.report.navigation_document import navigation_document
-from strapdown.report.navigation_found import told_of
+from strapdown.report.navigation_evaluation import evaluation_of
 from strapdown.report.simulation import simulation_chart
-from strapdown.report.verdict_document import light_picture
+from strapdown.report.verdict import light_chart
 from strapdown.systems.navigation_draft import draft_navigation
 from strapdown.systems.navigation_run import run_navigation
 from strapdown.systems.trajectory_source import make_motion
@@ -56,7 +56,7 @@ def test_a_picture_of_the_manual_is_what_is_drawn_now(name, tmp_path):
 
 def drawn_of(spec):
     """The charts of the report of a run, without its page."""
-    return drawings(navigation_document(told_of(run_navigation(spec)), ""))
+    return drawings(navigation_document(evaluation_of(run_navigation(spec)), ""))
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +90,7 @@ def test_the_picture_of_a_smoothed_run_is_what_is_drawn_now(smoothed, tmp_path):
 
 
 def compare(drawings_of_run, name, folder):
-    (chart,) = [d.chart for d in drawings_of_run if d.chart.slug == name]
+    (chart,) = [d for d in drawings_of_run if d.slug == name]
     compare_chart(chart, f"navigate_{name}.svg", folder)
 
 
@@ -120,15 +120,13 @@ def test_the_crash_of_the_readme_is_what_is_drawn_now(sealed_crash):
 
 
 def test_the_drive_of_the_readme_is_what_is_drawn_now(driven, tmp_path):
-    drawn = drawings(navigation_document(told_of(driven), ""))
-    (chart,) = [d.chart for d in drawn if d.chart.slug == "plan"]
+    drawn = drawings(navigation_document(evaluation_of(driven), ""))
+    (chart,) = [d for d in drawn if d.slug == "plan"]
     compare_chart(chart, "drive_plan.svg", tmp_path)
 
 
 def test_the_light_of_the_manual_is_what_is_drawn_now(driven, tmp_path):
-    now = tmp_path / "now.svg"
-    now.write_text(light_picture(driven).svg, encoding="utf-8")
-    compare_picture(now, "trust_light.svg")
+    compare_chart(light_chart(driven), "trust_light.svg", tmp_path)
 
 
 def test_the_walk_of_the_manual_is_what_is_drawn_now(recordings, tmp_path):
@@ -138,7 +136,7 @@ def test_the_walk_of_the_manual_is_what_is_drawn_now(recordings, tmp_path):
     text = draft.text.replace('lat_deg = "?"', "lat_deg = 41.0")
     (tmp_path / "foot.toml").write_text(f"{text}\n[control_points]\npath = '{path}'\n")
     drawn = drawn_of(NavigationSpec.read(tmp_path / "foot.toml"))
-    (chart,) = [d.chart for d in drawn if d.chart.slug == "plan"]
+    (chart,) = [d for d in drawn if d.slug == "plan"]
     compare_chart(chart, "walking_plan.svg", tmp_path)
 
 

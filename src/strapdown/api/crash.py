@@ -17,10 +17,10 @@ from strapdown.crash.case import CaseResult, run_case
 from strapdown.crash.reconstruction import UnitReconstruction
 from strapdown.errors import ConfigError
 from strapdown.progress import Progress, silent
-from strapdown.report.crash_case import write_crash
+from strapdown.report.crash_case import CRASH
 
 if TYPE_CHECKING:
-    from strapdown.report.chart_figure import ChartFigure
+    from strapdown.report.chart_svg import ChartFigure
 
 __all__ = ["CrashRun", "reconstruct"]
 
@@ -92,14 +92,13 @@ class CrashRun(CaseResult):
         ConfigError
             The chart does not exist for this case.
         """
-        from strapdown.report.chart_figure import ChartFigure
+        from strapdown.report.chart import Chart
+        from strapdown.report.chart_svg import ChartFigure
         from strapdown.report.crash_document import crash_document
-        from strapdown.report.crash_figures import crash_figures
-        from strapdown.report.document import ChartBlock
+        from strapdown.report.document import drawings
 
-        document = crash_document(self, crash_figures(self), "")
-        blocks = [*document.front, *(b for s in document.sections for b in s.blocks)]
-        charts = {b.chart.slug: b.chart for b in blocks if isinstance(b, ChartBlock)}
+        drawn = drawings(crash_document(self, ""))
+        charts = {one.slug: one for one in drawn if isinstance(one, Chart)}
         if kind not in charts:
             raise ConfigError(
                 "api.unknown-case-chart", quantity="kind", kind=kind, word=kind, known=charts
@@ -142,11 +141,11 @@ class CrashRun(CaseResult):
             An input file has changed since it was read.
         """
         if not self.others:
-            return write_crash(self, out, report=report, force=force, progress=progress)
+            return CRASH.write(self, out, report=report, force=force, progress=progress)
         for number in self.runs:
             check_destination(Path(out) / number, force)
         seals = [
-            write_crash(run, Path(out) / number, report=report, force=force, progress=progress)
+            CRASH.write(run, Path(out) / number, report=report, force=force, progress=progress)
             for number, run in self.runs.items()
         ]
         return seals[0]

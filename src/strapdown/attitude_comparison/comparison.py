@@ -77,7 +77,7 @@ from strapdown.tables import GYRO
 if TYPE_CHECKING:
     from strapdown.evaluation.position_references import PositionScore
     from strapdown.evaluation.second_log import SecondLog
-    from strapdown.report.chart_figure import ChartFigure
+    from strapdown.report.chart_svg import ChartFigure
 
 __all__ = ["AttitudeComparison", "run_comparison"]
 

@@ -190,7 +190,7 @@ def print_alignment(result: AlignmentRun) -> None:
     """Print the result of an alignment, and its limits."""
     from strapdown.cli.console import console, print_block
     from strapdown.report import alignment_document as tables
-    from strapdown.report.alignment_trust import trust
+    from strapdown.report.alignment_document import trust
     from strapdown.report.values import spaced
 
     out = console()

@@ -287,7 +287,7 @@ def print_comparison(bench: AttitudeComparison) -> None:
     """Print the input of the run, its tables, and the answer last, where it is visible."""
     from strapdown.cli.console import console, print_table
     from strapdown.report import attitude_tables as tables
-    from strapdown.report import attitude_words as words
+    from strapdown.report import attitude_tables as words
     from strapdown.report.attitude_tables import offer_lines, place_table
 
     page = console()

@@ -257,7 +257,7 @@ def _flag(place: str) -> str:
 def print_coast(result: OutageRun) -> None:
     """Print the predicted drift, its sources, and the measured drifts."""
     from strapdown.cli.console import console, print_block
-    from strapdown.report import coast_words as words
+    from strapdown.report import coast_document as words
     from strapdown.report.coast_document import budget_table, drift_table, time_table
     from strapdown.report.values import spaced
 

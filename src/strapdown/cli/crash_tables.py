@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from strapdown.cli.console import console, print_block
 from strapdown.crash.case import CaseResult
-from strapdown.report.crash_limits import limitations
 from strapdown.report.crash_tables import answers_table, comparison_table, path_table
-from strapdown.report.crash_words import headline
+from strapdown.report.crash_words import headline, limitations
 from strapdown.report.values import spaced
 
 __all__ = ["print_crash"]

@@ -22,7 +22,7 @@ from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
 from strapdown.live.replay import MachineClock
 from strapdown.live.run import LiveRun, live_spec, receive, result_of
 from strapdown.live.sources import open_source
-from strapdown.report.navigation import write_navigation
+from strapdown.report.navigation import NAVIGATION
 
 
 def navigate_live(
@@ -88,7 +88,7 @@ def _sealed(
             result = result_of(live, received, file, report)
             if live.run is None and live.error is not None:
                 raise live.error
-            seal = write_navigation(result, folder, force=force, progress=report)
+            seal = NAVIGATION.write(result, folder, force=force, progress=report)
             report.stop()
             write_timing(seal, report.seconds)
             write_latency(seal, live.told())

@@ -8,10 +8,9 @@ from dataclasses import replace
 from strapdown.cli.console import WORDS, console, print_block, print_findings, print_table
 from strapdown.errors import Finding
 from strapdown.live.replay import Latency
-from strapdown.report.alignment_trust import MOST_SAID
-from strapdown.report.document import TableBlock
-from strapdown.report.navigation_found import NavigationFound, examine, told_of
-from strapdown.report.navigation_tables import (
+from strapdown.report.document import MOST_SAID, TableBlock
+from strapdown.report.navigation_document import (
+    cautions,
     end_table,
     error_table,
     observation_table,
@@ -20,16 +19,19 @@ from strapdown.report.navigation_tables import (
     state_table,
     withheld_table,
 )
-from strapdown.report.navigation_trust import trust
-from strapdown.report.navigation_words import cautions
-from strapdown.report.values import (
+from strapdown.report.navigation_evaluation import (
+    NavigationEvaluation,
     distance_over_ground,
+    evaluation_of,
+    trust,
+)
+from strapdown.report.values import (
     duration_words,
     length_words,
     plain,
     spaced,
 )
-from strapdown.report.verdict_words import terminal_lines
+from strapdown.report.verdict import terminal_lines
 from strapdown.rotation import within_half_turn
 from strapdown.systems.navigation_run import NavigationRun
 
@@ -60,7 +62,7 @@ def print_navigation(
     start's and the sensors' tables, every caution and every finding.
     """
     out = console()
-    found = examine(told_of(result))
+    found = evaluation_of(result)
     verdict = trust(found)
     trajectory = result.record.trajectory
     time = trajectory.index
@@ -100,7 +102,7 @@ def print_navigation(
     print_findings(others, _fitting(others, room, out.width))
 
 
-def _end(found: NavigationFound) -> TableBlock:
+def _end(found: NavigationEvaluation) -> TableBlock:
     """Start and end with 95 % bounds, and the errors of the run where the truth is known."""
     block = end_table(found)
     errors = error_table(found)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -11,77 +10,50 @@ import numpy as np
 import pandas as pd
 
 from strapdown.alignment.alignment import Alignment
-from strapdown.bundle.seal import Seal, to_json
+from strapdown.bundle.seal import to_json
 from strapdown.config.alignment import AlignmentSpec
-from strapdown.progress import Progress, silent
-from strapdown.report.alignment_document import CONVENTIONS, alignment_document, limits
-from strapdown.report.alignment_trust import answer_error, trust
-from strapdown.report.document import draw_stills, finding_json, write_drawings, write_text
-from strapdown.report.document_html import document_page
-from strapdown.report.report_bundle import report_bundle, write_table
+from strapdown.progress import Progress
+from strapdown.report.alignment_document import (
+    CONVENTIONS,
+    alignment_document,
+    answer_error,
+    limits,
+    trust,
+)
+from strapdown.report.document import finding_json, write_text
+from strapdown.report.report_bundle import (
+    ReportBundle,
+    file_of,
+    json_number,
+    with_file,
+    write_report,
+    write_table,
+)
 from strapdown.systems.alignment_run import AlignmentRun, run_alignment
-from strapdown.systems.one_thread import one_thread
 from strapdown.tables import EULER
 
 
-def rerun_alignment(configuration: dict[str, Any], out: Path, *, report: bool = True) -> Seal:
-    """Re-run a sealed alignment from its configuration, with or without its page."""
+def _configuration(result: AlignmentRun) -> dict[str, Any]:
+    return with_file({"alignment": result.spec.plain()}, result)
+
+
+def _run(configuration: dict[str, Any]) -> AlignmentRun:
     spec = AlignmentSpec.checked(configuration["alignment"])
-    path = configuration.get("file_path")
-    name = str(configuration["name"])
-    return write_alignment(
-        run_alignment(spec, None if path is None else Path(path)), out, name=name, report=report
-    )
+    return run_alignment(spec, file_of(configuration))
 
 
-@one_thread()
-def write_alignment(
-    result: AlignmentRun,
-    out: str | Path,
-    *,
-    name: str | None = None,
-    report: bool = True,
-    force: bool = False,
-    progress: Progress = silent,
-) -> Seal:
-    """Write an alignment as a sealed bundle.
+def _write(result: AlignmentRun, folder: Path, name: str, report: bool, progress: Progress) -> None:
+    write_text(folder / "align.json", to_json(alignment_json(result)))
+    told = {key.lower().replace(" ", "_"): text for key, text in CONVENTIONS}
+    write_table(_attitude(result), folder / "attitude.csv", told)
+    if result.fine is not None:
+        write_table(_history(result.fine.history), folder / "fine.csv", told)
+    if report:
+        write_report(alignment_document(result, name), folder, progress)
 
-    Parameters
-    ----------
-    result : AlignmentRun
-    out : str or Path
-        Folder to create.
-    name : str, optional
-        Folder name shown in the report; by default that of `out`.
-    report : bool
-        Whether to write the page and the figures.
-    force : bool
-        Overwrite an existing bundle.
-    progress : callable, optional
 
-    Raises
-    ------
-    ConfigError
-        `out` exists and may not be replaced.
-    """
-    name = Path(out).absolute().name if name is None else name
-    seals: list[Seal] = []
-    with report_bundle(
-        result, out, "align", key="alignment", name=name, force=force, seals=seals, report=report
-    ) as folder:
-        write_text(folder / "align.json", to_json(alignment_json(result)))
-        told = {key.lower().replace(" ", "_"): text for key, text in CONVENTIONS}
-        write_table(_attitude(result), folder / "attitude.csv", told)
-        if result.fine is not None:
-            write_table(_history(result.fine.history), folder / "fine.csv", told)
-        if report:
-            progress("drawing the figures", 0.75)
-            document = alignment_document(result, name)
-            stills = draw_stills(document)
-            write_drawings(document, stills, folder / "figures")
-            progress("writing the page", 0.9)
-            write_text(folder / "report.html", document_page(document, stills=stills))
-    return seals[0]
+#: Page, JSON, tables and figures of an alignment.
+ALIGNMENT = ReportBundle("align", _configuration, _run, _write)
 
 
 def _attitude(result: AlignmentRun) -> pd.DataFrame:
@@ -122,7 +94,6 @@ def alignment_json(result: AlignmentRun) -> dict[str, Any]:
     dict
         Angles and their standard deviations in degrees, biases in rad/s and m/s².
     """
-    found = trust(result)
     known = answer_error(result)
     spec = result.spec
     return {
@@ -142,11 +113,7 @@ def alignment_json(result: AlignmentRun) -> dict[str, Any]:
         },
         "start": _attitude_alignment_json(result.start),
         "end": _attitude_alignment_json(result.end),
-        "trust": {
-            "verdict": found.verdict,
-            "for": [finding_json(f) for f in found.supporting],
-            "against": [finding_json(f) for f in found.against],
-        },
+        "trust": trust(result).json(),
         "limits": [f"{head}: {text}" for head, text in limits(result)],
         "coarse": {"method": result.coarse.method, **_attitude_alignment_json(result.coarse)},
         "fine": None if result.fine is None else _fine(result),
@@ -155,7 +122,7 @@ def alignment_json(result: AlignmentRun) -> dict[str, Any]:
         else {
             "name": known[0],
             "sd_deg": known[2],
-            "off_deg": {a: _number(x) for a, x in zip(EULER, known[1], strict=True)},
+            "off_deg": {a: json_number(x) for a, x in zip(EULER, known[1], strict=True)},
         },
         "prefilter": _prefilter(result),
         "readiness": {
@@ -239,11 +206,6 @@ def _thinned(table: pd.DataFrame) -> pd.DataFrame:
 
 def _rows(table: pd.DataFrame) -> list[dict[str, float | None]]:
     return [
-        {"time_s": time} | {f"{k}_deg": _number(v) for k, v in row.items()}
+        {"time_s": time} | {f"{k}_deg": json_number(v) for k, v in row.items()}
         for time, row in zip(table.index.tolist(), table.to_dict("records"), strict=True)
     ]
-
-
-def _number(value: Any) -> float | None:
-    number = float(value)
-    return number if math.isfinite(number) else None

@@ -1,47 +1,427 @@
-"""Report of an alignment: the answer first, then its basis."""
+"""Judge whether an alignment can be trusted, from the evidence in its own record."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
-from numpy.typing import NDArray
+import pandas as pd
 
 from strapdown import __version__, rotation
+from strapdown.alignment.alignment import Alignment
+from strapdown.alignment.fine import ROCKS
 from strapdown.constants import DEG_PER_HOUR, MICRO_G, TWO_SIDED_95
 from strapdown.errors import Finding
 from strapdown.estimation.sensor_blocks import resting_sd
-from strapdown.report import alignment_charts as charts
-from strapdown.report.alignment_trust import ORDER, answer_error, bounds_hold, trust
+from strapdown.report.chart import (
+    AXIS_COLOURS,
+    BLACK,
+    BLUE,
+    GREY,
+    ORANGE,
+    SKY,
+    Array,
+    Chart,
+    Fill,
+    Level,
+    Line,
+    Mark,
+    Panel,
+    curve,
+)
 from strapdown.report.document import (
-    Block,
-    ChartBlock,
     Document,
     Facts,
     Items,
     KeyFigure,
     KeyFigures,
     Paragraph,
-    Section,
     TableBlock,
+    Trust,
+    blocks,
     findings_list,
+    reason,
+    run_again,
+    section,
+    taken_for_given,
 )
-from strapdown.report.values import (
-    GAP,
-    NOT_KNOWN,
-    about,
-    angle_bound,
-    force_words,
-    plain,
-    rate_words,
-    small,
-)
-from strapdown.report.values import (
-    alignment_values_instant as instant,
-)
-from strapdown.systems.alignment_run import AlignmentRun
+from strapdown.report.values import GAP, about, force_words, plain, rate_words, small
+from strapdown.report.values import stamp as instant
+from strapdown.rotation import within_half_turn
+from strapdown.systems.alignment_run import AlignmentRun, reference_offset
 from strapdown.tables import ACCEL, EULER, GYRO, QUATERNION
 from strapdown.tables.checks import values_of
+
+ORDER = (2, 1, 0)  # heading first: it is the hardest to determine
+
+
+def answer_error(result: AlignmentRun) -> tuple[str, Array, float] | None:
+    """Return the error against the truth or a reference, deg, with the reference's sd.
+
+    Returns
+    -------
+    tuple or None
+        ``truth`` or the reference's name; roll, pitch, heading; standard deviation in deg.
+    """
+    if result.source.truth is not None:
+        known = result.source.truth
+        row = int(np.argmin(np.abs(known.index.to_numpy() - result.end.time)))
+        off = result.end.roll_pitch_heading - values_of(known, EULER)[row]
+        return "the truth", np.asarray(within_half_turn(off)), 0.0
+    stated = result.spec.reference
+    if stated is None:
+        return None
+    off = reference_offset(result.attitude, stated)
+    return stated.source or "the reference", off, stated.sd_deg
+
+
+def trust(result: AlignmentRun) -> Trust:
+    """Judge the answer by the evidence in its own record."""
+    reasons: list[Finding] = []
+    known = answer_error(result)
+    sd = result.end.sd_deg
+    if known is not None:
+        name, off, own = known
+        bound = TWO_SIDED_95 * np.hypot(sd, own)
+        for k in ORDER:
+            if math.isfinite(off[k]):
+                good = bool(abs(off[k]) <= 3.0 / TWO_SIDED_95 * bound[k])
+                within = bool(abs(off[k]) <= bound[k])
+                reasons.append(
+                    reason(
+                        good,
+                        "alignment.error-within-bound"
+                        if within
+                        else "alignment.error-beyond-bound",
+                        angle=EULER[k],
+                        reference=name,
+                        off_deg=off[k],
+                        bound_deg=bound[k],
+                    )
+                )
+    # Causes come before their effects.
+    told = [*result.unread, *result.coarse.findings]
+    told += () if result.fine is None else result.fine.findings
+    reasons += [f for f in told if f.severity == "warning" and not _allowed(f, result)]
+    reasons += _agreement(result)
+    reasons += _surprises(result)
+    against = [one for one in reasons if one.severity == "warning"]
+    verdict = "trusted" if not against else "reserve"
+    # A finding that the bound already includes does not contradict the bound.
+    counted = sum(bool(one.data.get("in_bound")) for one in against)
+    wrong = known is not None and bool(against) and reasons[0].severity == "warning"
+    if len(against) - counted > 1 or wrong:
+        verdict = "distrusted"
+    return Trust(verdict, tuple(reasons), _short(result, known is not None))
+
+
+def bounds_hold(result: AlignmentRun) -> bool:
+    """Whether the record is consistent with the bounds."""
+    return all(one.severity == "note" for one in (*_agreement(result), *_surprises(result)))
+
+
+def _allowed(finding: Finding, result: AlignmentRun) -> bool:
+    """Whether the coarse alignment method is designed for the condition of a finding."""
+    return finding.code == ROCKS and result.coarse.method == "inertial_frame"
+
+
+def _short(result: AlignmentRun, known: bool) -> tuple[Finding, ...]:
+    codes = ["alignment.near-known"] if known else []
+    if result.fine is not None:
+        codes += ["alignment.coarse-and-fine-agree", "alignment.sensors-as-expected"]
+    else:
+        codes.append("alignment.not-contradicted")
+    return tuple(reason(True, code) for code in codes)
+
+
+def _agreement(result: AlignmentRun) -> list[Finding]:
+    """Compare coarse and fine alignment at the end of the coarse alignment."""
+    if result.fine is None:
+        return []
+    time = result.attitude.index.to_numpy()
+    row = int(np.argmin(np.abs(time - result.coarse.time)))
+    here = values_of(result.attitude, EULER)[row]
+    off = within_half_turn(result.coarse.roll_pitch_heading - here)
+    bound = TWO_SIDED_95 * np.hypot(result.coarse.sd_deg, result.end.sd_deg)
+    out = []
+    for k in ORDER:
+        good = bool(abs(off[k]) <= bound[k])
+        out.append(
+            reason(
+                good,
+                "alignment.angle-agrees" if good else "alignment.angle-disagrees",
+                angle=EULER[k],
+                off_deg=off[k],
+                bound_deg=bound[k],
+            )
+        )
+    return out
+
+
+def _surprises(result: AlignmentRun) -> list[Finding]:
+    """Check the size of the fine-alignment innovations against their expected covariance."""
+    if result.fine is None:
+        return []
+    out = []
+    for name, table in result.fine.innovations.items():
+        labels = [c.removeprefix("nu ") for c in table.columns if c.startswith("nu ")]
+        ratios = [float(np.sqrt(np.mean(table[f"nu {x}"] ** 2 / table[f"s {x}"]))) for x in labels]
+        worst = max(ratios, default=0.0)
+        good = worst < 2.0
+        out.append(
+            reason(
+                good,
+                "alignment.innovations-as-expected"
+                if good
+                else "alignment.innovations-larger-than-expected",
+                name=name,
+                ratio=worst,
+            )
+        )
+    return out
+
+
+# Charts of an alignment: readiness, signals, attitude, gyro and accelerometer biases.
+
+
+_TIME = "time, s"
+_NAMES = ("x, forward", "y, right", "z, down")
+#: Smallest difference drawn, as a share of the smallest bound.
+LEAST = 0.02
+BEGUN = (
+    " The fine one begins at the coarse attitude and is near it in its first seconds; its bound "
+    "there takes none of that for granted."
+)
+_OFF = {
+    "truth": "error",
+    "reference": "off the reference",
+    "answer": "off the final answer",
+}
+_OFF_WORDS = {
+    "truth": "Dots and the thin line: the error against the truth of the simulation.",
+    "reference": "Dots and the thin line: the difference from the reference that is stated.",
+    "answer": "Dots and the thin line: how far each is from the answer of the whole record, which "
+    "is no truth, and which they come to by themselves.",
+}
+
+
+def readiness_chart(result: AlignmentRun) -> Chart:
+    """Accuracy against alignment time, coarse and fine."""
+    found = result.readiness
+    length = result.spec.coarse.duration_s
+    off = _OFF[found.against]
+    panels = []
+    for title, angles in (("Heading", ("heading",)), ("Roll and pitch", ("roll", "pitch"))):
+        lines: list[Line] = []
+        sds = [f"{a}_sd" for a in angles]
+        bounds = [t[sds].to_numpy() for t in (found.coarse, found.fine) if not t.empty]
+        least = LEAST * TWO_SIDED_95 * min(float(b.min()) for b in bounds) if bounds else 0.0
+        for name, table, colour, dash in (
+            ("coarse", found.coarse, ORANGE, "dash"),
+            ("fine", found.fine, BLUE, "solid"),
+        ):
+            if table.empty:
+                continue
+            time = table.index.to_numpy(dtype=np.float64)
+            kept = time > 0.0
+            sd = table[sds].to_numpy().max(axis=1)
+            size = np.abs(table[[f"{a}_off" for a in angles]].to_numpy()).max(axis=1)
+            size = np.maximum(size, least)
+            if found.against == "answer" and name == "fine":
+                # The last estimate is the reference itself.
+                size[time > 0.9 * time[-1]] = np.nan
+            lines.append(
+                Line(f"{name}: 95 % bound", time[kept], TWO_SIDED_95 * sd[kept], colour, dash, 2.4)
+            )
+            dots = name == "coarse"
+            lines.append(
+                Line(
+                    f"{name}: {off}",
+                    time[kept],
+                    size[kept],
+                    colour if dots else SKY,
+                    width=1.1,
+                    points=dots,
+                    dots=dots,
+                    symbol="circle",
+                    size=6.0,
+                )
+            )
+        panels.append(Panel("deg", tuple(lines), log=True, title=title, height=1.2))
+    begun = "" if result.fine is None else BEGUN
+    return Chart(
+        "readiness",
+        "Readiness: alignment time against accuracy",
+        "Bounds hold 95 % (1.96 standard deviations); of roll and pitch the larger one. The coarse "
+        f"alignment was run anew over each length. {_OFF_WORDS[found.against]}{begun}",
+        "time since the start, s",
+        tuple(panels),
+        () if length is None or result.fine is None else (Mark(length, "fine alignment begins"),),
+        log_x=True,
+    )
+
+
+def signal_chart(result: AlignmentRun) -> Chart:
+    """Angular rate and specific force: as recorded, as aligned, and 1 s means."""
+    panels = []
+    for columns, factor, label in (
+        (GYRO, DEG_PER_HOUR, "rate, deg/h"),
+        (ACCEL, 1.0, "force, m/s²"),
+    ):
+        for k, column in enumerate(columns):
+            lines = [_signal("recorded", result.source.imu, column, factor, GREY, 0.8)]
+            if result.prefilter is not None:
+                lines.append(_signal("pre-filtered", result.imu, column, factor, SKY, 1.0))
+            lines.append(_means(result.imu, column, factor))
+            panels.append(Panel(label, tuple(lines), title=_NAMES[k]))
+    told = "The thin curves are single samples, the black ones means over a second"
+    if result.prefilter is not None:
+        told += f", after the pre-filter '{result.prefilter.name}'"
+    return Chart(
+        "signals",
+        "Signals in body axes",
+        f"{told}. At rest the rate is the Earth's, and the force is gravity's reaction.",
+        _TIME,
+        tuple(panels),
+    )
+
+
+def _signal(
+    name: str, imu: pd.DataFrame, column: str, factor: float, colour: str, width: float
+) -> Line:
+    time = imu.index.to_numpy(dtype=np.float64)
+    return curve(name, time, factor * imu[column].to_numpy(), colour, width=width, buckets=500)
+
+
+def _means(imu: pd.DataFrame, column: str, factor: float) -> Line:
+    time = imu.index.to_numpy(dtype=np.float64)
+    size = max(1, round(1.0 / float(np.median(np.diff(time)))))
+    count = max(1, len(time) // size)
+    size = min(size, len(time))
+    cut = slice(0, count * size)
+    value = factor * imu[column].to_numpy()[cut].reshape(count, size).mean(axis=1)
+    middle = time[cut].reshape(count, size).mean(axis=1)
+    return curve("mean over 1 s", middle, value, BLACK, width=1.1, buckets=500)
+
+
+def attitude_chart(result: AlignmentRun) -> Chart:
+    """Attitude over the record: the aligned attitude propagated by the gyros."""
+    table = result.attitude
+    time = table.index.to_numpy(dtype=np.float64)
+    panels = []
+    carried = NOT_KNOWN not in [angle_bound(result.start, k) for k in (0, 1)]
+    for k, angle in enumerate(EULER):
+        values = table[angle].to_numpy()
+        if angle == "heading":
+            values = np.degrees(np.unwrap(np.radians(values)))
+        lines = [curve("attitude", time, values, BLUE, buckets=800)]
+        truth = result.source.truth
+        if truth is not None:
+            known = truth[angle].to_numpy()
+            if angle == "heading":
+                known = np.degrees(np.unwrap(np.radians(known)))
+            lines.append(curve("truth", truth.index.to_numpy(), known, BLACK, "dot", buckets=800))
+        halves = TWO_SIDED_95 * np.array([result.start.sd_deg[k], result.end.sd_deg[k]])
+        half = np.interp(time[:: max(1, len(time) // 400)], time[[0, -1]], halves)
+        step = max(1, len(time) // 400)
+        x, y = time[::step], values[::step]
+        band = Fill("95 % bound", x, y - half, y + half, BLUE)
+        panels.append(Panel(f"{angle}, deg", tuple(lines), fills=(band,) if carried else ()))
+    return Chart(
+        "attitude",
+        "Attitude over the record",
+        "The answer, carried to every sample by the gyros, with its bound of 95 %; what rocks here "
+        "is the body."
+        if carried
+        else f"The answer holds at {instant(result.end.time)} alone. These gyros cannot carry it "
+        "to the start, where nothing is known of it: what turns here may be their bias.",
+        _TIME,
+        tuple(panels),
+    )
+
+
+def bias_charts(result: AlignmentRun) -> tuple[Chart, ...]:
+    """Gyro and accelerometer biases over the fine alignment."""
+    if result.fine is None:
+        return ()
+    history = result.fine.history
+    time = history.index.to_numpy(dtype=np.float64)
+    out = []
+    for sensor, factor, unit, what in (
+        ("gyro", DEG_PER_HOUR, "deg/h", "Drifts of the gyros"),
+        ("accel", MICRO_G, "µg", "Biases of the accelerometers"),
+    ):
+        panels = []
+        for k, axis in enumerate("xyz"):
+            value = factor * history[f"{sensor}_bias_{axis}"].to_numpy()
+            half = TWO_SIDED_95 * factor * history[f"{sensor}_bias_{axis}_sd"].to_numpy()
+            colour = AXIS_COLOURS[k]
+            panels.append(
+                Panel(
+                    f"{unit}",
+                    (curve(f"{_NAMES[k]}", time, value, colour, width=1.8),),
+                    title=_NAMES[k],
+                    fills=(Fill("95 % bound", time, value - half, value + half, colour),),
+                )
+            )
+        out.append(
+            Chart(
+                f"{sensor}-biases",
+                f"{what}: estimates with their bounds",
+                "A band that does not narrow belongs to a bias that this rest cannot tell from "
+                "an attitude: a horizontal accelerometer bias from a tilt, an east drift from the "
+                "heading.",
+                _TIME,
+                tuple(panels),
+            )
+        )
+    return tuple(out)
+
+
+def innovation_chart(result: AlignmentRun) -> Chart | None:
+    """Innovation of each epoch in its own standard deviations."""
+    if result.fine is None:
+        return None
+    panels = []
+    for name, table in result.fine.innovations.items():
+        time = table.index.to_numpy(dtype=np.float64)
+        labels = [c.removeprefix("nu ") for c in table.columns if c.startswith("nu ")]
+        lines = []
+        for k, label in enumerate(labels):
+            ratio = values_of(table, [f"nu {label}"])[:, 0] / np.sqrt(table[f"s {label}"])
+            lines.append(curve("xyz"[k % 3], time, ratio, AXIS_COLOURS[k % 3], width=0.9))
+        levels = (Level(TWO_SIDED_95, ""), Level(-TWO_SIDED_95, "95 %"))
+        panels.append(Panel("in sd", tuple(lines), title=name.capitalize(), levels=levels))
+    return Chart(
+        "innovations",
+        "Innovations of the fine alignment",
+        "Observed less expected, in the standard deviation that was expected; 95 of 100 belong "
+        "between the levels.",
+        _TIME,
+        tuple(panels),
+    )
+
+
+#: Half widths of roll, pitch and heading, in deg, that exclude no angle.
+ANY = (180.0, 90.0, 180.0)
+
+
+NOT_KNOWN = "not known"
+
+
+def angle_bound(alignment: Alignment, which: int) -> str:
+    """Format an angle with its bound: ``90.60° ± 0.12°``; in words if it is undetermined."""
+    value = float(alignment.roll_pitch_heading[which])
+    half = TWO_SIDED_95 * float(alignment.sd_deg[which])
+    if not half < ANY[which]:
+        return NOT_KNOWN
+    if which == 2:
+        value %= 360.0
+    return about(value, half, "°")
+
+
+# Report of an alignment: the answer first, then its basis.
+
 
 CONVENTIONS = (
     ("Body axes", "forward, right, down; local level: north, east, down"),
@@ -59,43 +439,89 @@ CONVENTIONS = (
 
 
 def alignment_document(result: AlignmentRun, name: str) -> Document:
-    """Return the report of an alignment.
-
-    Parameters
-    ----------
-    result : AlignmentRun
-    name : str
-        Folder name, for the verification command.
-    """
+    """Return the report of an alignment; `name` is that of its folder, to verify it."""
     found = trust(result)
     site = result.site
-    facts = (
-        ("Record", f"{result.source.name}, {result.source.what}"),
-        ("Place", f"{site.lat_deg:.6f}°, {site.lon_deg:.6f}°, {site.alt:g} m"),
-        ("Sensors", _sensors(result)),
-        ("Made with", f"strapdown {__version__}"),
-    )
-    front: tuple[Block, ...] = (
-        KeyFigures(key_figures(result)),
-        Paragraph(found.sentence, "lead" if found.verdict == "trusted" else "warning"),
-        Items(tuple((head, text) for head, text in limits(result))),
-        ChartBlock(charts.readiness_chart(result)),
-        readiness_table(result),
-    )
+    refused = result.readiness.refused
+    biases = bias_table(result)
+    turns = turn_table(result)
     sections = (
-        Section("answer", "The answer", _answer(result, found.reasons)),
-        Section(
-            "attitude", "Attitude over the record", (ChartBlock(charts.attitude_chart(result)),)
+        section(
+            "answer",
+            "The answer",
+            answer_table(result),
+            *found.blocks,
+            Paragraph("What limits it:"),
+            Items(limits(result)),
         ),
-        *_biases(result),
-        *_more(result),
-        Section("signals", "Signals", (ChartBlock(charts.signal_chart(result)),)),
-        Section("findings", "Findings", _findings(result)),
-        Section("method", "Method and assumptions", _method(result, name)),
-        Section("conventions", "Conventions", (Facts(CONVENTIONS),)),
+        section("attitude", "Attitude over the record", attitude_chart(result)),
+        section(
+            "sensors", "Drifts and biases", biases, *bias_charts(result), innovation_chart(result)
+        ),
+        section(
+            "more",
+            "What would make more known",
+            None
+            if turns is None
+            else Paragraph(
+                "A body that only stands cannot tell a horizontal accelerometer bias from a tilt, "
+                "nor an east gyro drift from the heading. A turn can: the bias goes with the body, "
+                "and the tilt does not."
+            ),
+            turns,
+        ),
+        section("signals", "Signals", signal_chart(result)),
+        section(
+            "findings",
+            "Findings",
+            findings_list(result.findings),
+            None
+            if not refused
+            else Items(
+                (
+                    (
+                        "readiness",
+                        f"{len(refused)} shorter lengths, up to {max(r[0] for r in refused):.3g} "
+                        f"s, gave no attitude: {refused[-1][1].sentence()}.",
+                    ),
+                )
+            ),
+        ),
+        section(
+            "method",
+            "Method and assumptions",
+            Facts(method_rows(result)),
+            *taken_for_given(
+                "The body stays at its place; it may rock and sway about it as far as the coarse "
+                "alignment allows.",
+                "The errors of the sensors are as stated: every bound rests on them.",
+                "Normal gravity of the ellipsoid: a deflection of the vertical of 5 arc seconds is "
+                "0.0014° of tilt, and is not in the bounds.",
+            ),
+            *run_again(name),
+        ),
+        section("conventions", "Conventions", Facts(CONVENTIONS)),
     )
     title = result.spec.title or f"Alignment of {result.source.name}"
-    return Document(title, headline(result), facts, front, sections, title)
+    return Document(
+        title,
+        headline(result),
+        (
+            ("Record", f"{result.source.name}, {result.source.what}"),
+            ("Place", f"{site.lat_deg:.6f}°, {site.lon_deg:.6f}°, {site.alt:g} m"),
+            ("Sensors", _sensors(result)),
+            ("Made with", f"strapdown {__version__}"),
+        ),
+        blocks(
+            KeyFigures(key_figures(result)),
+            found.paragraph,
+            Items(limits(result)),
+            readiness_chart(result),
+            readiness_table(result),
+        ),
+        tuple(s for s in sections if s.blocks),
+        title,
+    )
 
 
 def _sensors(result: AlignmentRun) -> str:
@@ -103,82 +529,6 @@ def _sensors(result: AlignmentRun) -> str:
     stated = [*(f"gyro {k}" for k in given.gyro), *(f"accel {k}" for k in given.accel)]
     parts = [given.sensor or ""] + ([f"stated: {', '.join(stated)}"] if stated else [])
     return "; ".join(p for p in parts if p)
-
-
-def _answer(result: AlignmentRun, reasons: tuple[Finding, ...]) -> tuple[Block, ...]:
-    said = tuple(
-        ("For it" if one.severity == "note" else "Against it", f"{one.sentence()}.")
-        for one in reasons
-    )
-    blocks: list[Block] = [answer_table(result)]
-    if said:
-        blocks += [Paragraph("What speaks for the answer, and what against it:"), Items(said)]
-    blocks += [Paragraph("What limits it:"), Items(limits(result))]
-    return tuple(blocks)
-
-
-def _more(result: AlignmentRun) -> tuple[Section, ...]:
-    """Section on the accuracy that a turn of the body would add."""
-    table = turn_table(result)
-    if table is None:
-        return ()
-    said = (
-        "A body that only stands cannot tell a horizontal accelerometer bias from a tilt, nor an "
-        "east gyro drift from the heading. A turn can: the bias goes with the body, and the tilt "
-        "does not."
-    )
-    return (Section("more", "What would make more known", (Paragraph(said), table)),)
-
-
-def _biases(result: AlignmentRun) -> tuple[Section, ...]:
-    table: TableBlock | None = bias_table(result)
-    if table is None:
-        return ()
-    innovations = charts.innovation_chart(result)
-    blocks: list[Block] = [table, *(ChartBlock(c) for c in charts.bias_charts(result))]
-    blocks += [] if innovations is None else [ChartBlock(innovations)]
-    return (Section("sensors", "Drifts and biases", tuple(blocks)),)
-
-
-def _findings(result: AlignmentRun) -> tuple[Block, ...]:
-    blocks: list[Block] = [findings_list(result.findings)]
-    refused = result.readiness.refused
-    if refused:
-        text = (
-            f"{len(refused)} shorter lengths, up to {max(r[0] for r in refused):.3g} s, gave "
-            f"no attitude: {refused[-1][1].sentence()}."
-        )
-        blocks.append(Items((("readiness", text),)))
-    return tuple(blocks)
-
-
-def _method(result: AlignmentRun, name: str) -> tuple[Block, ...]:
-    taken = [
-        (
-            "",
-            "The body stays at its place; it may rock and sway about it as far as the coarse "
-            "alignment allows.",
-        ),
-        ("", "The errors of the sensors are as stated: every bound rests on them."),
-        (
-            "",
-            "Normal gravity of the ellipsoid: a deflection of the vertical of 5 arc seconds is "
-            "0.0014° of tilt, and is not in the bounds.",
-        ),
-    ]
-    return (
-        Facts(method_rows(result)),
-        Paragraph("Taken for given:"),
-        Items(tuple(taken)),
-        Paragraph("To run it again and compare every byte:"),
-        Paragraph(f"strapdown verify {name}", "mono"),
-    )
-
-
-# Results of an alignment in sentences, shared by terminal and page.
-
-
-Array = NDArray[np.float64]
 
 
 def headline(result: AlignmentRun) -> str:
@@ -231,8 +581,8 @@ def limits(result: AlignmentRun) -> tuple[tuple[str, str], ...]:
         (
             "The bias of the accelerometers limits roll and pitch",
             f"{force_words(tilt)} too much, one standard deviation of bias, scale and "
-            f"misalignment, are {small(math.degrees(tilt / g))}° of tilt; at one attitude no "
-            "alignment can tell them apart.",
+            f"misalignment, are {small(math.degrees(tilt / g))}° of tilt; at one attitude they "
+            "are not separable.",
         )
     )
     return tuple(out)

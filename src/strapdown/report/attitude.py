@@ -18,13 +18,13 @@ from strapdown.bundle.writing import write_bundle
 from strapdown.errors import ConfigError
 from strapdown.evaluation.reference_points import Score
 from strapdown.formats import csv
-from strapdown.report import attitude_words as words
-from strapdown.report.attitude_charts import charts, share_basis
+from strapdown.report import attitude_tables as words
+from strapdown.report.attitude_charts import charts
 from strapdown.report.attitude_document import attitude_document
-from strapdown.report.attitude_tables import places_json, source_of
-from strapdown.report.chart_figure import ChartFigure
-from strapdown.report.document import draw_stills, finding_json, write_drawings, write_text
-from strapdown.report.document_html import document_page
+from strapdown.report.attitude_tables import places_json, share_basis, source_of
+from strapdown.report.chart_svg import ChartFigure
+from strapdown.report.document import finding_json, write_text
+from strapdown.report.report_bundle import write_report
 from strapdown.tables import EULER, GYRO, QUATERNION
 
 
@@ -40,7 +40,6 @@ def write_attitude(
 
     Parameters
     ----------
-    bench : AttitudeComparison
     out : str or Path
         Folder to create.
     report : bool
@@ -66,20 +65,15 @@ def write_attitude(
         force=force,
         seals=seals,
     ) as folder:
-        (folder / "attitude.json").write_text(
-            to_json(attitude_json(bench)), encoding="utf-8", newline="\n"
-        )
+        write_text(folder / "attitude.json", to_json(attitude_json(bench)))
         _write_csv(bench, folder / "attitude.csv")
         if len(bench.sweep):
             _write_sweep(bench, folder / "sweep.csv")
         if report:
             drawn = charts(bench)
-            document = attitude_document(bench, drawn)
-            stills = draw_stills(document)
-            write_drawings(document, stills, folder / "figures")
+            write_report(attitude_document(bench, drawn), folder)
             for chart in drawn if png else ():
                 ChartFigure(chart).save(folder / "figures" / f"{chart.slug}.png")
-            write_text(folder / "report.html", document_page(document, stills=stills))
     return seals[0]
 
 
@@ -313,7 +307,6 @@ def write_c(bench: AttitudeComparison, path: Path, *, force: bool = False) -> st
 
     Parameters
     ----------
-    bench : AttitudeComparison
     path : Path
         File to write.
     force : bool

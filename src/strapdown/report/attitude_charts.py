@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 
 from strapdown.attitude_comparison.comparison import AttitudeComparison
 from strapdown.attitude_comparison.references import PeerRun
 from strapdown.evaluation.differences import error_angles
-from strapdown.report.attitude_words import (
+from strapdown.report.attitude_tables import (
     MEANINGS,
     full_rate_errors,
     largest_known,
     like_with_like,
+    share_basis,
 )
 from strapdown.report.chart import (
     AXIS_COLOURS,
@@ -32,7 +34,7 @@ from strapdown.report.chart import (
     curve,
     look,
 )
-from strapdown.report.path_marks import place_labels
+from strapdown.report.plan import place_labels
 from strapdown.tables import EULER, GYRO
 
 _TIME = "time, s"
@@ -40,34 +42,27 @@ _TIME = "time, s"
 
 def charts(bench: AttitudeComparison) -> list[Chart]:
     """Return the charts for which this bench has data, in page order."""
-    return [
-        *answer_charts(bench),
-        *log_charts(bench),
-        *error_charts(bench),
-        *judgement_charts(bench),
-    ]
+    found = (
+        _cost(bench) if bench.costs else None,
+        _sweep(bench) if len(bench.sweep) else None,
+        _gyro(bench),
+        _attitude(bench),
+        None if bench.truth is None else _error(bench),
+        _reference_error(bench) if len(bench.references) else None,
+        _difference(bench) if len(bench.runs) > 1 else None,
+        _share(bench) if bench.shares else None,
+        None if bench.trials is None else _trials(bench),
+        _peers(bench) if any(peer.scores for peer in bench.peers) else None,
+    )
+    return [chart for chart in found if chart is not None]
 
 
-def log_charts(bench: AttitudeComparison) -> list[Chart]:
-    """Return the charts of signals and attitudes over time."""
-    return [_gyro(bench), _attitude(bench)]
-
-
-def error_charts(bench: AttitudeComparison) -> list[Chart]:
-    """Return the charts of errors and differences over time."""
-    found = []
-    if bench.truth is not None:
-        found.append(_error(bench))
-    if len(bench.references):
-        found.append(_reference_error(bench))
-    if len(bench.runs) > 1:
-        found.append(_difference(bench))
-    return found
-
-
-def _buckets(bench: AttitudeComparison) -> int:
-    """Points per curve, reduced for many curves to limit the page size."""
-    return min(BUCKETS, 4500 // max(1, len(bench.runs)))
+def _of_run(bench: AttitudeComparison, k: int, time: pd.Index, values: Array) -> Line:
+    """Curve of the k-th algorithm, of fewer points the more there are, to limit the page size."""
+    buckets = min(BUCKETS, 4500 // max(1, len(bench.runs)))
+    at, style = time.to_numpy(dtype=np.float64), look(k)
+    name = bench.runs[k].algorithm
+    return curve(name, at, values, style["colour"], style["dash"], buckets=buckets)
 
 
 def _marks(bench: AttitudeComparison) -> tuple[Mark, ...]:
@@ -112,14 +107,7 @@ def _attitude(bench: AttitudeComparison) -> Chart:
     panels = []
     for angle in EULER:
         lines = [
-            curve(
-                run.algorithm,
-                run.attitude.index.to_numpy(dtype=np.float64),
-                break_jumps(run.attitude[angle].to_numpy()),
-                look(k)["colour"],
-                look(k)["dash"],
-                buckets=_buckets(bench),
-            )
+            _of_run(bench, k, run.attitude.index, break_jumps(run.attitude[angle].to_numpy()))
             for k, run in enumerate(bench.runs)
         ]
         if bench.truth is not None:
@@ -144,7 +132,7 @@ def _attitude(bench: AttitudeComparison) -> Chart:
         "attitude",
         "Attitude",
         "Body forward-right-down relative to north-east-down, 3-2-1 angles. Heading 0–360°, "
-        "clockwise from north; where nothing tells north, from the initial heading.",
+        "clockwise from north; without a north reference, from the initial heading.",
         _TIME,
         tuple(panels),
         _marks(bench),
@@ -157,16 +145,7 @@ def _error(bench: AttitudeComparison) -> Chart:
     lines = []
     for k, run in enumerate(bench.runs):
         errors = error_angles(run.attitude, scored)
-        lines.append(
-            curve(
-                run.algorithm,
-                errors.index.to_numpy(dtype=np.float64),
-                np.maximum(errors.to_numpy(), LEAST_ERROR),
-                look(k)["colour"],
-                look(k)["dash"],
-                buckets=_buckets(bench),
-            )
-        )
+        lines.append(_of_run(bench, k, errors.index, np.maximum(errors.to_numpy(), LEAST_ERROR)))
     return Chart(
         "error",
         "Error against the truth",
@@ -203,13 +182,11 @@ def _reference_error(bench: AttitudeComparison) -> Chart:
 def _difference(bench: AttitudeComparison) -> Chart:
     base = next((r for r in bench.runs if r.algorithm == "quaternion"), bench.runs[-1])
     lines = [
-        curve(
-            run.algorithm,
-            run.attitude.index.to_numpy(dtype=np.float64),
+        _of_run(
+            bench,
+            k,
+            run.attitude.index,
             np.maximum(error_angles(run.attitude, base.attitude).to_numpy(), LEAST_ERROR),
-            look(k)["colour"],
-            look(k)["dash"],
-            buckets=_buckets(bench),
         )
         for k, run in enumerate(bench.runs)
         if run is not base
@@ -230,22 +207,6 @@ def _difference(bench: AttitudeComparison) -> Chart:
 # A logarithmic axis has no zero; smaller values are drawn here.
 LEAST_ERROR, LEAST_WORDS = 1e-6, "10⁻⁶°"
 _FAINT = "#c3c9d0"
-
-
-def answer_charts(bench: AttitudeComparison) -> list[Chart]:
-    """Return the charts for the top of the page: error against cost, and against rate."""
-    found = [_cost(bench)] if bench.costs else []
-    return [*found, _sweep(bench)] if len(bench.sweep) else found
-
-
-def judgement_charts(bench: AttitudeComparison) -> list[Chart]:
-    """Return the charts for the end of the page: error shares, trials and other libraries."""
-    found = [_share(bench)] if bench.shares else []
-    if bench.trials is not None:
-        found.append(_trials(bench))
-    if any(peer.scores for peer in bench.peers):
-        found.append(_peers(bench))
-    return found
 
 
 def _shown(values: object) -> Array:
@@ -447,22 +408,6 @@ def _share(bench: AttitudeComparison) -> Chart:
         (Panel("", lines, categories=names),),
         log_x=True,
     )
-
-
-def share_basis(bench: AttitudeComparison) -> str:
-    """Return whether the shares are exact or estimates."""
-    if bench.specification["source"]["kind"] == "scenario":
-        return (
-            "Exact: simulated, so that each algorithm also ran on samples without the sensor's "
-            "errors."
-        )
-    own = (
-        "Estimate: the algorithm's own part is its difference from the most accurate algorithm "
-        "on the same samples"
-    )
-    if any(share.sensor_deg is not None for share in bench.shares):
-        return own + ", and the sensor's is what that one differs from the truth."
-    return own + "; the sensor's is not known without a truth."
 
 
 def _trials(bench: AttitudeComparison) -> Chart:

@@ -8,113 +8,124 @@ from html import escape
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown import __version__
 from strapdown.attitude_comparison.comparison import AttitudeComparison
 from strapdown.errors import ConfigError
 from strapdown.evaluation.differences import attitude_at
 from strapdown.report import attitude_tables as tables
-from strapdown.report import attitude_words as words
 from strapdown.report.attitude_charts import charts
-from strapdown.report.attitude_tables import result_tables
-from strapdown.report.attitude_words import MEANINGS, chosen_run, full_rate_errors, sweep_grid
-from strapdown.report.chart import AXIS_COLOURS, BLACK, GREY, Chart
-from strapdown.report.chart_figure import ChartFigure
+from strapdown.report.attitude_tables import (
+    MEANINGS,
+    chosen_run,
+    full_rate_errors,
+    result_tables,
+    sweep_grid,
+)
+from strapdown.report.chart import (
+    AXIS_COLOURS,
+    BLACK,
+    GREY,
+    Array,
+    Chart,
+    Scene,
+    SceneBody,
+    SceneLine,
+    SceneWord,
+)
+from strapdown.report.chart_svg import ChartFigure
 from strapdown.report.document import (
     Animation,
     Block,
-    ChartBlock,
     Document,
     Facts,
     Items,
     KeyFigure,
     KeyFigures,
     Paragraph,
-    Section,
     TableBlock,
+    blocks,
     findings_list,
+    section,
 )
-from strapdown.report.scene import Scene, SceneBody, SceneLine, SceneWord
-
-Array = NDArray[np.float64]
 
 
 def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None = None) -> Document:
     """Return the report of a bench; its charts are drawn here unless they are given."""
     made = {c.slug: c for c in (charts(bench) if drawn is None else drawn)}
-
-    def shown(*slugs: str) -> list[Block]:
-        return [ChartBlock(made[slug]) for slug in slugs if slug in made]
-
-    def kept(*blocks: Block | None) -> list[Block]:
-        return [block for block in blocks if block is not None]
-
+    chart = made.get
     answer = bench.answer
-    front = kept(
-        _key_figures(bench),
-        Paragraph(answer.sentence, "lead"),
-        Paragraph(words.standing(bench)),
-        *_named_items("Why:", answer.why),
-        *_named_items("What would help:", answer.helps),
-        None if bench.scores else Paragraph(words.HOW_TO_REFERENCE),
-        *_named_items(
-            "These rests look alike, and could be reference points:", tables.offer_lines(bench)
+    sections = (
+        section(
+            "rates",
+            "Cost, rate and error",
+            chart("cost"),
+            chart("sweep"),
+            *tables.sweep_tables(bench),
         ),
-    )
-    sections: tuple[tuple[str, str, list[Block]], ...] = (
-        ("rates", "Cost, rate and error", [*shown("cost", "sweep"), *tables.sweep_tables(bench)]),
-        (
+        section(
             "results",
             "Results",
-            kept(
-                *tables.result_tables(bench),
-                tables.condition_table(bench),
-                tables.cost_table(bench),
-            ),
+            *tables.result_tables(bench),
+            tables.condition_table(bench),
+            tables.cost_table(bench),
         ),
-        ("log", "Signals and attitude", [*shown("gyro", "attitude"), body_animation(bench)]),
-        (
+        section(
+            "log", "Signals and attitude", chart("gyro"), chart("attitude"), body_animation(bench)
+        ),
+        section(
             "errors",
             "Errors over time",
-            kept(
-                *shown("error", "reference-error", "difference"),
-                tables.difference_table(bench),
-                *_named_items("Reference points:", words.reference_lines(bench)),
-            ),
+            chart("error"),
+            chart("reference-error"),
+            chart("difference"),
+            tables.difference_table(bench),
+            *_named_items("Reference points:", tables.reference_lines(bench)),
         ),
-        (
+        section(
             "parts",
             "Parts of the error, trials and other libraries",
-            kept(
-                *shown("share", "trials"),
-                tables.trial_table(bench),
-                tables.place_table(bench),
-                *shown("peers"),
-                tables.peer_table(bench),
-            ),
+            chart("share"),
+            chart("trials"),
+            tables.trial_table(bench),
+            tables.place_table(bench),
+            chart("peers"),
+            tables.peer_table(bench),
         ),
-        ("findings", "Findings", [findings_list(bench.findings)]),
-        ("inputs", "Inputs and assumptions", [Facts(tuple(words.facts(bench))), *_readings(bench)]),
-        ("conventions", "Conventions", [Facts(words.CONVENTIONS)]),
-        (
+        section("findings", "Findings", findings_list(bench.findings)),
+        section(
+            "inputs",
+            "Inputs and assumptions",
+            Facts(tuple(tables.facts(bench))),
+            *_readings(bench),
+        ),
+        section("conventions", "Conventions", Facts(tables.CONVENTIONS)),
+        section(
             "again",
             "Run it again",
-            [
-                Paragraph(
-                    "This folder is sealed: manifest.json holds the configuration and the SHA-256 "
-                    "of every input and output."
-                ),
-                Paragraph("strapdown verify FOLDER", "mono"),
-            ],
+            Paragraph(
+                "This folder is sealed: manifest.json holds the configuration and the SHA-256 of "
+                "every input and output."
+            ),
+            Paragraph("strapdown verify FOLDER", "mono"),
         ),
     )
     return Document(
         bench.source,
         "Attitude bench",
         (("Made with", f"strapdown {__version__}"),),
-        tuple(front),
-        tuple(Section(slug, title, tuple(blocks)) for slug, title, blocks in sections if blocks),
+        blocks(
+            _key_figures(bench),
+            Paragraph(answer.sentence, "lead"),
+            Paragraph(tables.standing(bench)),
+            *_named_items("Why:", answer.why),
+            *_named_items("What would help:", answer.helps),
+            None if bench.scores else Paragraph(tables.HOW_TO_REFERENCE),
+            *_named_items(
+                "These rests look alike, and could be reference points:", tables.offer_lines(bench)
+            ),
+        ),
+        tuple(s for s in sections if s.blocks),
         bench.source,
     )
 
@@ -138,7 +149,7 @@ def _key_figures(bench: AttitudeComparison) -> KeyFigures | None:
         error = full_rate_errors(bench).get(answer.algorithm, math.nan)
     whose = "its own error, without a reference" if answer.verdict == "own" else "largest error"
     bound = f"tolerance {answer.tolerance_deg:g}°"
-    figures.append(KeyFigure(whose.capitalize(), words.degrees(error), bound))
+    figures.append(KeyFigure(whose.capitalize(), tables.degrees(error), bound))
     return KeyFigures(tuple(figures))
 
 
@@ -148,7 +159,7 @@ def _named_items(title: str, lines: Sequence[str]) -> list[Block]:
 
 def _readings(bench: AttitudeComparison) -> list[Block]:
     rows = tuple(
-        (r.source, r.quantity, r.unit, words.first_value(r), r.why) for r in bench.readings
+        (r.source, r.quantity, r.unit, tables.first_value(r), r.why) for r in bench.readings
     )
     columns = ("column", "taken as", "unit", "first value", "because")
     title = "How the log was read"
@@ -174,7 +185,7 @@ _SPACE = 1.3
 
 
 def body_animation(bench: AttitudeComparison) -> Animation:
-    """Animate the body by the chosen algorithm (`attitude_numbers.chosen_run`).
+    """Animate the body by the chosen algorithm (`chosen_run`).
 
     A wireframe follows the truth, where it is known.
     """
@@ -268,7 +279,6 @@ def plot(bench: AttitudeComparison, kind: str = "cost") -> ChartFigure:
 
     Parameters
     ----------
-    bench : AttitudeComparison
     kind : str
         One of `KINDS`.
 
@@ -305,7 +315,7 @@ def short_html(bench: AttitudeComparison) -> str:
     parts = [
         f"<div><b>{escape(bench.source)}</b></div>",
         f'<p style="font-size:1.25em;margin:.3em 0"><b>{escape(bench.answer.sentence)}</b></p>',
-        f'<p style="margin:.3em 0">{escape(words.standing(bench))}</p>',
+        f'<p style="margin:.3em 0">{escape(tables.standing(bench))}</p>',
         *(_table(table) for table in result_tables(bench)),
     ]
     return "<div>" + "".join(parts) + "</div>"

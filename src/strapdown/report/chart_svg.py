@@ -7,13 +7,17 @@ attributes: of a panel its scales, of a group the name of its series, of a label
 from __future__ import annotations
 
 import math
+import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from strapdown.errors import ConfigError
 from strapdown.report.chart import (
+    Array,
     Band,
     Bars,
     Chart,
@@ -25,15 +29,14 @@ from strapdown.report.chart import (
     steady_range,
     strip_range,
 )
-from strapdown.report.path_marks import LONGEST_BESIDE, label_rows, label_side
-from strapdown.report.plan_view import nice_step, tick_words
+from strapdown.report.plan import LONGEST_BESIDE, label_rows, label_side, nice_step, tick_words
 from strapdown.report.svg_drawing import INK, Box, Drawing, number, overlap, text_width
 
 # Points, legend samples and patterns of a static chart.
 
 
 _SIZE = 10.0  # pixels, font size
-_STILL_MARKS_ROW, _SAMPLE, _GAP = 15.0, 24.0, 16.0
+_LEGEND_ROW, _SAMPLE, _GAP = 15.0, 24.0, 16.0
 _POINT, _RIM = 0.4, 0.5  # radius of a point over its size, and its rim in pixels
 _HATCH = 6.0  # pixels between the lines of a pattern
 
@@ -138,7 +141,7 @@ def _placed(legend: list[Entry], left: float, right: float) -> Iterator[tuple[En
 def legend_height(legend: list[Entry], left: float, right: float) -> float:
     """Return the height of a legend below the panels, in pixels."""
     rows = [row for _, _, row in _placed(legend, left, right)]
-    return _STILL_MARKS_ROW * (rows[-1] + 1) + 4.0 if rows else 0.0
+    return _LEGEND_ROW * (rows[-1] + 1) + 4.0 if rows else 0.0
 
 
 def write_legend(
@@ -146,7 +149,7 @@ def write_legend(
 ) -> None:
     """Write a legend from a height downward."""
     for entry, x, row in _placed(legend, left, right):
-        y = top + _STILL_MARKS_ROW * (row + 0.5)
+        y = top + _LEGEND_ROW * (row + 0.5)
         with drawing.group(data_entry=entry.name):
             _sample(drawing, entry.shown, x, y)
             drawing.text((x + _SAMPLE, y), entry.name, _SIZE)
@@ -178,7 +181,7 @@ RED = "#b42318"
 #: Pixels: tick labels, axis names, names of levels and marks, tick length.
 TICK, AXIS, LEVEL, LONG = 10.0, 10.5, 9.5, 3.5
 _FAINT, _GRID, _SHADE = "#8a939e", "#e6e9ed", "#0072B2"
-_STILL_PANEL_POINT = 96.0 / 72.0  # pixels
+_PT = 96.0 / 72.0  # pixels
 _SIDE, _RISE = 9.0, 13.0  # pixels of a label from its point
 
 
@@ -188,12 +191,10 @@ class Frame:
 
     Attributes
     ----------
-    panel : Panel
     box : Box
         Left, top, right, bottom of the area between the axes.
     x, y : Scale
         `y` from the bottom upward; for categories from the top downward.
-    x_ticks, y_ticks : list of Tick
     x_named, y_named : bool
         Whether the tick labels are written here.
     group : str
@@ -319,7 +320,7 @@ class Frame:
             if line.inside:
                 drawing.area(at[run], line.colour, line.inside)
             if not line.points:
-                drawing.curve(at[run], line.colour, _STILL_PANEL_POINT * line.width, line.dash)
+                drawing.curve(at[run], line.colour, _PT * line.width, line.dash)
         if line.low is not None and line.high is not None:
             self._reaches(drawing, line, line.low, line.high)
         if line.points or line.dots:
@@ -399,8 +400,6 @@ class Frame:
                     drawing.text((x, y - 8.0 * side), label, TICK, anchor="middle")
 
 
-Array = NDArray[np.float64]
-
 _WIDTH = 643.0  # pixels: 170 mm
 _INCH = 96.0
 _EDGE, _BETWEEN = 4.0, 7.0  # pixels
@@ -416,7 +415,6 @@ def still(chart: Chart, *, title: bool = False, caption: bool = False) -> str:
 
     Parameters
     ----------
-    chart : Chart
     title, caption : bool
         Whether to write them in the picture; a document writes them itself.
 
@@ -743,7 +741,6 @@ def fitted(values: Sequence[ArrayLike], log: bool = False, margin: float = 0.05)
     ----------
     values : sequence of array_like
         Values that are not finite, or not positive on a logarithmic axis, are ignored.
-    log : bool
     margin : float
         As a share of the span of the values.
     """
@@ -766,7 +763,6 @@ def ticks(scale: Scale, most: int, *, step: float = 0.0, between: float = 30.0) 
 
     Parameters
     ----------
-    scale : Scale
     most : int
         Maximum number of steps.
     step : float
@@ -804,3 +800,79 @@ def _even(scale: Scale, step: float) -> list[Tick]:
 
 def _short(value: float) -> str:
     return f"{value:g}".replace("-", "−")
+
+
+# A chart alone: shown by a notebook, or written as SVG, PNG or PDF.
+
+
+_PPI = 200
+_TYPST = '#set page(width: auto, height: auto, margin: 4pt)\n#image("chart.svg")\n'
+
+
+@dataclass(frozen=True)
+class ChartFigure:
+    """A chart as a picture; `panels` hold its data: lines, bands and bars with their values.
+
+    A notebook displays it; `save` writes it.
+    """
+
+    chart: Chart
+
+    @property
+    def panels(self) -> tuple[Panel, ...]:
+        """Panels with their data, from the top."""
+        return self.chart.panels
+
+    def svg(self, *, caption: bool = False) -> str:
+        """Return the picture as SVG, with its title and, if wanted, its caption below."""
+        return still(self.chart, title=True, caption=caption)
+
+    def save(self, path: str | Path, *, caption: bool = False) -> None:
+        """Write the picture: SVG, PNG or PDF by the ending of the file's name.
+
+        Parameters
+        ----------
+        path : str or Path
+        caption : bool
+            Whether to write the caption in the picture, for use without a page.
+
+        Raises
+        ------
+        ConfigError
+            Another ending.
+        """
+        path = Path(path)
+        ending = path.suffix.lower().lstrip(".")
+        if ending == "svg":
+            path.write_text(self.svg(caption=caption), encoding="utf-8", newline="\n")
+        elif ending in ("png", "pdf"):
+            path.write_bytes(_typeset(self.svg(caption=caption), ending))
+        else:
+            raise ConfigError("report.unknown-picture", file=str(path), word=ending)
+
+    def _repr_svg_(self) -> str:
+        return self.svg()
+
+    def __repr__(self) -> str:
+        """Return the title and the number of panels."""
+        return f"<ChartFigure: {self.chart.title}; {len(self.panels)} panels>"
+
+
+def _typeset(svg: str, ending: str) -> bytes:
+    """Draw an SVG with the fonts inside typst: the same bytes on every machine."""
+    from strapdown.report.document_pdf import shown, typst_library
+
+    with tempfile.TemporaryDirectory(prefix="strapdown-") as name:
+        folder = Path(name)
+        (folder / "chart.svg").write_text(shown(svg), encoding="utf-8", newline="\n")
+        (folder / "chart.typ").write_text(_TYPST, encoding="utf-8", newline="\n")
+        made: bytes = typst_library().compile(
+            str(folder / "chart.typ"),
+            root=str(folder),
+            font_paths=[],
+            ignore_system_fonts=True,
+            format=ending,
+            ppi=_PPI,
+            timestamp=0,
+        )
+    return made

@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown.bundle.configuration_paths import resolved
 from strapdown.bundle.reading import read_manifest, unsealed_changes
-from strapdown.bundle.seal import Seal, to_json
+from strapdown.bundle.seal import to_json
 from strapdown.config.coast import CoastSpec
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.spec import specify
@@ -19,15 +18,27 @@ from strapdown.config.toml_file import read_toml
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import csv
 from strapdown.navigation.outage import QUANTITIES
-from strapdown.progress import Progress, silent
-from strapdown.report.coast_document import coast_document
-from strapdown.report.coast_words import end_bound, headline, inside_words, remedy, start_words
-from strapdown.report.document import draw_stills, finding_json, write_drawings, write_text
-from strapdown.report.document_html import document_page
-from strapdown.report.report_bundle import report_bundle
+from strapdown.progress import Progress
+from strapdown.report.coast_document import (
+    coast_document,
+    course,
+    drifts_of,
+    end_bound,
+    headline,
+    inside_words,
+    remedy,
+    start_words,
+)
+from strapdown.report.document import finding_json, write_text
+from strapdown.report.report_bundle import (
+    ReportBundle,
+    file_of,
+    json_number,
+    with_file,
+    write_report,
+)
 from strapdown.report.values import spaced
 from strapdown.sensors.catalogue import SENSORS
-from strapdown.systems.one_thread import one_thread
 from strapdown.systems.outage_run import OutageRun, run_coast
 
 
@@ -41,9 +52,8 @@ def read_coasting_run(source: str | Path) -> tuple[NavigationSpec | None, Path |
 
     Returns
     -------
-    spec : NavigationSpec or None
-    file : Path or None
-        The configuration file, if there is one.
+    tuple of (NavigationSpec or None, Path or None)
+        The specification, and its configuration file, if there is one.
 
     Raises
     ------
@@ -98,77 +108,31 @@ def _of_bundle(path: Path) -> tuple[NavigationSpec, Path | None]:
     return spec, None if file is None else Path(file)
 
 
-def rerun_coast(configuration: dict[str, Any], out: Path, *, report: bool = True) -> Seal:
-    """Re-run a sealed outage prediction from its configuration, with or without its page."""
+def _configuration(result: OutageRun) -> dict[str, Any]:
+    beside = {} if result.navigation is None else {"navigation": result.navigation.plain()}
+    return with_file({"coast": result.spec.plain(), **beside}, result)
+
+
+def _run(configuration: dict[str, Any]) -> OutageRun:
     table = configuration.get("navigation")
     navigation = None if table is None else NavigationSpec.checked(table)
-    path = configuration.get("file_path")
     spec = specify(CoastSpec, **configuration["coast"])
-    result = run_coast(spec, navigation, None if path is None else Path(path))
-    return write_coast(result, out, name=str(configuration["name"]), report=report)
+    return run_coast(spec, navigation, file_of(configuration))
 
 
-@one_thread()
-def write_coast(
-    result: OutageRun,
-    out: str | Path,
-    *,
-    name: str | None = None,
-    report: bool = True,
-    force: bool = False,
-    progress: Progress = silent,
-) -> Seal:
-    """Write an outage prediction as a sealed bundle.
+def _write(result: OutageRun, folder: Path, name: str, report: bool, progress: Progress) -> None:
+    write_text(folder / "coast.json", to_json(coast_json(result)))
+    write_coast_tables(result, folder)
+    if report:
+        write_report(coast_document(result, name), folder, progress)
 
-    Parameters
-    ----------
-    result : OutageRun
-    out : str or Path
-        Folder to create.
-    name : str, optional
-        Folder name shown in the report; by default that of `out`.
-    report : bool
-        Whether to write the page and the figures.
-    force : bool
-        Overwrite an existing bundle.
-    progress : callable, optional
 
-    Raises
-    ------
-    ConfigError
-        `out` exists and may not be replaced.
-    """
-    name = Path(out).absolute().name if name is None else name
-    beside = {} if result.navigation is None else {"navigation": result.navigation}
-    seals: list[Seal] = []
-    with report_bundle(
-        result,
-        out,
-        "coast",
-        key="coast",
-        name=name,
-        force=force,
-        seals=seals,
-        beside=beside,
-        report=report,
-    ) as folder:
-        progress("writing the tables", 0.78)
-        write_text(folder / "coast.json", to_json(coast_json(result)))
-        write_coast_tables(result, folder)
-        if report:
-            progress("drawing the figures", 0.8)
-            document = coast_document(result, name)
-            stills = draw_stills(document)
-            write_drawings(document, stills, folder / "figures")
-            progress("writing the page", 0.95)
-            write_text(folder / "report.html", document_page(document, stills=stills))
-    return seals[0]
+#: Page, JSON and cone of the drift of an outage prediction.
+COAST = ReportBundle("coast", _configuration, _run, _write)
 
 
 # JSON and tables of an outage prediction.
 
-
-Array = NDArray[np.float64]
 
 #: Names with units, and factors from SI.
 SHOWN = {
@@ -189,8 +153,8 @@ def coast_json(result: OutageRun) -> dict[str, Any]:
     dict
         Lengths in m, times in s, angles in deg; sizes of error sources in SI.
     """
-    found, recorded = result.forecast, result.recorded
-    whole = {q: float(v[-1]) for q, v in _variances(result).items()}
+    found, variances = result.forecast, course(result)[2]
+    whole = {q: float(v[-1]) for q, v in variances.items()}
     budget = found.variance("horizontal")[-1]
     return {
         "name": result.name,
@@ -217,7 +181,7 @@ def coast_json(result: OutageRun) -> dict[str, Any]:
                         q: float(one.variance[q][-1] / _positive(found.variance(q)[-1]))
                         for q in QUANTITIES
                     },
-                    "alone_m": _number(float(one.alone["horizontal"][-1])),
+                    "alone_m": json_number(float(one.alone["horizontal"][-1])),
                 }
                 for one in found.shares
             ],
@@ -238,8 +202,7 @@ def coast_json(result: OutageRun) -> dict[str, Any]:
                 "foretold_95_m": float(d.bound[-1]),
                 "inside_95": float(d.inside.mean()),
             }
-            for d in (() if recorded is None else recorded.drifts)
-            if d.time.size
+            for d in drifts_of(result)
         ],
         "findings": [finding_json(f) for f in result.findings],
     }
@@ -250,18 +213,12 @@ def write_coast_tables(result: OutageRun, folder: Path) -> None:
 
     Parameters
     ----------
-    result : OutageRun
     folder : Path
         ``cone.csv``, ``budget.csv``, and ``drifts.csv`` if there were fixes.
     """
     told = {"coasting": result.name, "outage_s": f"{result.spec.outage_s:g}"}
-    recorded = result.recorded
-    time = result.forecast.time if recorded is None else recorded.time
-    bound = result.forecast.bound if recorded is None else recorded.bound
-    sds = {
-        SHOWN[q][0]: SHOWN[q][1] * np.sqrt(np.maximum(v, 0.0))
-        for q, v in _variances(result).items()
-    }
+    time, bound, variances = course(result)
+    sds = {SHOWN[q][0]: SHOWN[q][1] * np.sqrt(np.maximum(v, 0.0)) for q, v in variances.items()}
     csv.write(folder / "cone.csv", {"time_s": time, "horizontal_95_m": bound, **sds}, told)
     found = result.forecast
     parts = {f"{_column(one.source.name)}_m2": one.variance["horizontal"] for one in found.shares}
@@ -270,7 +227,7 @@ def write_coast_tables(result: OutageRun, folder: Path) -> None:
     parts["all_m2"] = found.variance("horizontal")
     of = {**told, "of": "variance of the horizontal drift", "outage_from_s": f"{found.begin:.9g}"}
     csv.write(folder / "budget.csv", {"time_s": found.time, **parts}, of)
-    drifts = [] if recorded is None else [d for d in recorded.drifts if d.time.size]
+    drifts = drifts_of(result)
     if drifts:
         columns = {
             "outage_from_s": np.concatenate([np.full(len(d.time), d.span.begin) for d in drifts]),
@@ -283,19 +240,9 @@ def write_coast_tables(result: OutageRun, folder: Path) -> None:
         csv.write(folder / "drifts.csv", columns, {**told, "sign": "computed less fix"})
 
 
-def _variances(result: OutageRun) -> dict[str, Array]:
-    if result.recorded is not None:
-        return result.recorded.variance
-    return {q: result.forecast.variance(q) for q in QUANTITIES}
-
-
 def _column(name: str) -> str:
     return name.replace(".", "_")
 
 
 def _positive(value: float) -> float:
     return float(value) if value > 0.0 else math.inf
-
-
-def _number(value: float) -> float | None:
-    return value if math.isfinite(value) else None

@@ -1,15 +1,16 @@
-"""Report of a GNSS outage prediction: the answer first, then its basis."""
+"""Results of an outage prediction in words: the answer, its limiting sources, and remedies."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strapdown import __version__
-from strapdown.constants import TWO_SIDED_95
+from strapdown.constants import DEG_PER_HOUR, MICRO_G, TWO_SIDED_95
+from strapdown.formats.crash_record import QUANTITIES
+from strapdown.navigation.outage import Share
 from strapdown.report.chart import (
     BLACK,
     BLUE,
@@ -17,132 +18,332 @@ from strapdown.report.chart import (
     GREY,
     SERIES_COLOURS,
     VERMILLION,
+    Array,
     Bars,
     Chart,
     Fill,
     Line,
     Panel,
 )
-from strapdown.report.coast_words import (
-    aids_name,
-    at_start,
-    headline,
-    inside_words,
-    key_figures,
-    motion_words,
-    outage_words,
-    remedy,
-    source_words,
-    start_words,
-)
 from strapdown.report.document import (
-    Block,
-    ChartBlock,
     Document,
     Facts,
-    Items,
+    KeyFigure,
     KeyFigures,
     Paragraph,
-    Section,
     TableBlock,
+    blocks,
+    paragraph,
+    run_again,
+    section,
+    taken_for_given,
 )
-from strapdown.report.plan_view import ellipse
-from strapdown.report.values import GAP, duration_words, half, length_words, plain, share_words
+from strapdown.report.plan import ellipse
+from strapdown.report.values import (
+    GAP,
+    KMH,
+    duration_words,
+    half,
+    length_words,
+    plain,
+    share_words,
+    shown_unit,
+)
 from strapdown.systems.outage_run import Drift, OutageRun
+
+_WORDS = {
+    "position": "position at the start",
+    "velocity": "velocity at the start",
+    "tilt": "tilt at the start",
+    "heading": "heading at the start",
+    "gyro_noise": "gyro white noise",
+    "accel_noise": "accelerometer white noise",
+    "gyro_bias": "gyro bias at the start",
+    "accel_bias": "accelerometer bias at the start",
+    "gyro_instability": "gyro bias instability",
+    "accel_instability": "accelerometer bias instability",
+    "gyro_scale": "gyro scale factor",
+    "accel_scale": "accelerometer scale factor",
+    "gyro_misalignment": "gyro misalignment",
+    "accel_misalignment": "accelerometer misalignment",
+    "g_sensitivity": "gyro g-sensitivity",
+}
+_REMEDIES = {
+    "position": "the drift is hardly more than what is not known of the place where it "
+    "begins: a better place there would help",
+    "velocity": "velocities by Doppler, or more fixes, before the outage would help; so would an "
+    "odometer that stays",
+    "tilt": "a drive with turns and changes of speed, or a standstill, shortly before the outage "
+    "separates tilt from accelerometer bias; a less biased accelerometer would help more",
+    "heading": "turns or changes of speed before the outage make the heading known; a second "
+    "antenna or a better gyro would help more",
+    "gyro_noise": "no calibration takes white noise off: a gyro with less angle random walk would "
+    "help, or an aid that stays",
+    "accel_noise": "no calibration takes white noise off: an accelerometer with less noise "
+    "would help, or an aid that stays",
+    "gyro_bias": "a standstill before the outage determines the gyro biases; else a gyro with "
+    "a more stable bias would help",
+    "accel_bias": "turns and changes of speed before the outage separate accelerometer biases "
+    "from tilts; else an accelerometer whose bias is smaller would help",
+    "gyro_instability": "the bias changes within the outage and cannot be calibrated before: a "
+    "gyro with a more stable bias would help",
+    "accel_instability": "the bias changes within the outage and cannot be calibrated before: an "
+    "accelerometer with a more stable bias would help",
+    "gyro_scale": "turns to both sides before the outage, or a calibration, would determine it",
+    "accel_scale": "changes of speed before the outage, or a calibration, would determine it",
+    "gyro_misalignment": "a calibration of the axes would take it off",
+    "accel_misalignment": "a calibration of the axes would take it off",
+    "g_sensitivity": "a calibration of the gyros under tilt would take it off",
+}
+aids_name = "noise of the aids that stay"
+
+
+def source_words(name: str) -> str:
+    """Name of a drift source in words."""
+    aid, dot, own = name.rpartition(".")
+    if dot:
+        return f"{aid}: {own.replace('_', ' ')}"
+    return _WORDS.get(name, name.replace("_", " "))
+
+
+def at_start(share: Share, result: OutageRun) -> str:
+    """Size of an error source at the start of the outage, with its unit."""
+    name = share.source.name
+    triad = result.sensors.gyro if name.startswith("gyro") else result.sensors.accel
+    if name.endswith("_noise"):
+        density = float(np.max(triad.axis("noise_density")))
+        if name.startswith("gyro"):
+            return f"{_three(density * DEG_PER_HOUR / 60.0)}{GAP}deg/√h"
+        return f"{_three(density * MICRO_G)}{GAP}µg/√Hz"
+    if name.endswith("_instability"):
+        gyro = name.startswith("gyro")
+        drift = result.sensors.gyro_drift if gyro else result.sensors.accel_drift
+        size = max(drift.triad)
+        if not size or math.isinf(drift.correlation_time):
+            return "–"
+        factor, unit = shown_unit("rad/s" if gyro else "m/s²", size)
+        return f"{_three(factor * size)}{GAP}{unit} over {duration_words(drift.correlation_time)}"
+    if not share.sd.size:
+        return "–"
+    low, high = float(share.sd.min()), float(share.sd.max())
+    factor, unit = shown_unit(share.source.unit, high)
+    if high <= 1.2 * low:
+        return f"{_three(factor * high)}{GAP}{unit}"
+    return f"{_three(factor * low)} to {_three(factor * high)}{GAP}{unit}"
+
+
+def _three(value: float) -> str:
+    """Format a number to three digits."""
+    if value == 0.0 or not math.isfinite(value):
+        return "0"
+    return plain(value, min(6, max(0, 2 - math.floor(math.log10(abs(value))))))
+
+
+def course(result: OutageRun) -> tuple[Array, Array, Mapping[str, Array]]:
+    """Return time, s, 95 % bound, m, and variances of the drift; of all outage tests, if any."""
+    found, recorded = result.forecast, result.recorded
+    if recorded is None:
+        return found.time, found.bound, {q: found.variance(q) for q in QUANTITIES}
+    return recorded.time, recorded.bound, recorded.variance
+
+
+def drifts_of(result: OutageRun) -> list[Drift]:
+    """Return the observed drifts."""
+    return [] if result.recorded is None else [d for d in result.recorded.drifts if d.time.size]
+
+
+def end_bound(result: OutageRun) -> float:
+    """95 % bound at the end of the outage, m; over all outage tests, if there were any."""
+    return float(course(result)[1][-1])
+
+
+def motion_words(result: OutageRun) -> str:
+    """The motion in words."""
+    if result.navigation is not None:
+        return "along its own trajectory"
+    asked = result.spec.motion
+    speed, to = asked.speed_m_per_s, asked.to_speed_m_per_s
+    if to is not None and to != speed:
+        return f"from {_speed(speed)} to {_speed(to)}"
+    if not speed:
+        return "standing"
+    if asked.turn_rate_deg_per_s:
+        side = "right" if asked.turn_rate_deg_per_s > 0.0 else "left"
+        rate = plain(abs(asked.turn_rate_deg_per_s), 1)
+        return f"at {_speed(speed)}, turning {side} with {rate}{GAP}deg/s"
+    return f"straight on at {_speed(speed)}"
+
+
+def _speed(value: float) -> str:
+    return f"{value:g}{GAP}m/s ({plain(KMH * value, 0)}{GAP}km/h)"
+
+
+def start_words(result: OutageRun) -> str:
+    """Knowledge of the state at the start of the outage, and its origin."""
+    if result.recorded is not None:
+        return "what its filter knew at each outage, with all that binds its errors"
+    start, begin = result.spec.start, result.forecast.begin
+    stated = [
+        name.partition("_sd_")[0].replace("_", " ")
+        for name in type(start).model_fields
+        if "_sd_" in name and not name.startswith("fix") and getattr(start, name) is not None
+    ]
+    if not begin:
+        text = "what an alignment leaves, and the data sheet"
+    else:
+        text = (
+            f"what a filter knows after {duration_words(begin)} of driving with fixes of "
+            f"{start.fix_position_sd_m:g}{GAP}m and {start.fix_velocity_sd_m_per_s:g}{GAP}m/s "
+            "each second"
+        )
+    return text if not stated else f"{text}; stated: {', '.join(stated)}"
+
+
+def outage_words(result: OutageRun) -> str:
+    """Length of the outage: ``60 s``."""
+    seconds = result.spec.outage_s
+    return f"{seconds:g}{GAP}s" if seconds < 600.0 else duration_words(seconds)
+
+
+def headline(result: OutageRun) -> str:
+    """Return the answer in a sentence."""
+    outage = outage_words(result)
+    said = (
+        f"after {outage} {motion_words(result)}, 95 % are within {length_words(end_bound(result))}"
+    )
+    if result.stays:
+        said += f", with {', '.join(result.stays)}"
+    return f"{result.name}: {said}"
+
+
+def remedy(result: OutageRun) -> str:
+    """Return the largest contributor to the drift, and its remedy."""
+    found = result.forecast
+    whole = float(found.variance("horizontal")[-1])
+    first = found.shares[0]
+    share = first.variance["horizontal"][-1] / whole
+    if found.aids and float(found.aids["horizontal"][-1]) / whole > share:
+        share = float(found.aids["horizontal"][-1]) / whole
+        return (
+            f"The largest share, {share_words(share)} of the variance, is {aids_name}: what they "
+            "say is what limits it."
+        )
+    words = _REMEDIES.get(first.source.name, "what states it better would help")
+    return (
+        f"The largest share, {share_words(float(share))} of the variance, is "
+        f"{source_words(first.source.name)} ({at_start(first, result)}): {words}."
+    )
+
+
+def inside_words(result: OutageRun) -> str:
+    """Number of observed drifts within the predicted bound; empty if none were observed."""
+    drifts = drifts_of(result)
+    if not drifts:
+        return ""
+    fixes = np.concatenate([d.inside for d in drifts])
+    ends = [bool(d.inside[-1]) for d in drifts]
+    middle = float(np.median([d.horizontal[-1] for d in drifts]))
+    worst = max(float(d.horizontal[-1]) for d in drifts)
+    return (
+        f"Tried at {len(drifts)} {'places' if len(drifts) > 1 else 'place'}: the drift at the end "
+        f"was {length_words(middle)} in the median and {length_words(worst)} at worst; "
+        f"{sum(ends)} of {len(ends)} ends and {share_words(float(fixes.mean()))} of "
+        f"{len(fixes)} fixes are within their 95 %."
+    )
+
+
+def key_figures(result: OutageRun) -> tuple[KeyFigure, ...]:
+    """Return the key figures."""
+    said = "95 % at the end"
+    variances = course(result)[2]
+
+    def sd(quantity: str) -> float:
+        return math.sqrt(max(float(variances[quantity][-1]), 0.0))
+
+    figures = [
+        KeyFigure("Horizontal", length_words(end_bound(result)), said),
+        KeyFigure("Along the way", f"±{GAP}{length_words(half(sd('along')))}", said),
+        KeyFigure("Across it", f"±{GAP}{length_words(half(sd('across')))}", said),
+        KeyFigure("Vertical", f"±{GAP}{length_words(half(sd('vertical')))}", said),
+        KeyFigure("Heading", f"±{GAP}{_three(math.degrees(half(sd('heading'))))}°", said),
+    ]
+    drifts = drifts_of(result)
+    if drifts:
+        fixes = np.concatenate([d.inside for d in drifts])
+        figures.append(
+            KeyFigure(
+                "Inside 95 %",
+                share_words(float(fixes.mean())),
+                f"of {len(fixes)} fixes in {len(drifts)} outages",
+            )
+        )
+    return tuple(figures)
+
+
+# Report of a GNSS outage prediction: the answer first, then its basis.
 
 
 def coast_document(result: OutageRun, name: str) -> Document:
-    """Return the report of an outage prediction.
-
-    Parameters
-    ----------
-    result : OutageRun
-    name : str
-        Folder name, for the verification command.
-    """
-    came = inside_words(result)
-    front: tuple[Block | None, ...] = (
-        KeyFigures(key_figures(result)),
-        Paragraph(remedy(result), "lead"),
-        Paragraph(came) if came else None,
-        ChartBlock(cone_chart(result)),
+    """Return the report of an outage prediction; `name` is that of its folder, to verify it."""
+    sections = (
+        section("over-time", "Over the outage", time_table(result), parts_chart(result)),
+        section("budget", "Error budget of the drift", budget_table(result), budget_chart(result)),
+        section("tried", "What came", drift_table(result)),
+        section("plane", "From above", plane_chart(result)),
+        section(
+            "method",
+            "Method and assumptions",
+            *taken_for_given(*_assumptions(result)),
+            Facts(CONVENTIONS),
+            *run_again(name),
+        ),
     )
-    drifts = drift_table(result)
-    sections = [
-        Section(
-            "over-time",
-            "Over the outage",
-            (time_table(result), ChartBlock(parts_chart(result))),
-        ),
-        Section(
-            "budget",
-            "What makes the drift",
-            (budget_table(result), ChartBlock(budget_chart(result))),
-        ),
-        Section("plane", "From above", (ChartBlock(plane_chart(result)),)),
-        Section("method", "Method and assumptions", _method(result, name)),
-    ]
-    if drifts is not None:
-        sections.insert(2, Section("tried", "What came", (drifts,)))
     title = f"Coasting of {result.name} for {outage_words(result)}"
     return Document(
         title,
         headline(result),
-        _facts(result),
-        tuple(block for block in front if block is not None),
-        tuple(sections),
+        (
+            ("Sensor" if result.navigation is None else "Record", f"{result.name}: {result.what}"),
+            ("Motion", motion_words(result)),
+            ("Start", start_words(result)),
+            ("Aids that stay", ", ".join(result.stays) or "none"),
+            ("Made with", f"strapdown {__version__}"),
+        ),
+        blocks(
+            KeyFigures(key_figures(result)),
+            Paragraph(remedy(result), "lead"),
+            paragraph(inside_words(result)),
+            cone_chart(result),
+        ),
+        tuple(s for s in sections if s.blocks),
         title,
     )
 
 
-def _facts(result: OutageRun) -> tuple[tuple[str, str], ...]:
-    return (
-        ("Sensor" if result.navigation is None else "Record", f"{result.name}: {result.what}"),
-        ("Motion", motion_words(result)),
-        ("Start", start_words(result)),
-        ("Aids that stay", ", ".join(result.stays) or "none"),
-        ("Made with", f"strapdown {__version__}"),
-    )
+CONVENTIONS = (
+    ("Horizontal, 95 %", "longer half axis of the ellipse that holds 95 % of places"),
+    ("Horizontal, 1 sd", "root of the sum of both variances"),
+    ("Along, across", "along the velocity; along the heading where it stands"),
+    ("Sign of a drift", "computed less true, or less the fix"),
+)
 
 
-def _method(result: OutageRun, name: str) -> tuple[Block, ...]:
+def _assumptions(result: OutageRun) -> list[str]:
     taken = [
-        (
-            "",
-            "The covariance of the filter itself, run over the outage; no formula of its own. What "
-            "each source adds is how that covariance answers to its size, by runs in which it is "
-            "larger and smaller.",
-        ),
-        (
-            "",
-            "Errors are small and normal, and the sensors as their data sheet or configuration "
-            "states: noise, bias, its instability, scale factors and misalignments where they are "
-            "known. Shaking beyond it is not in the forecast.",
-        ),
-        ("", "Normal gravity: a deflection of the vertical is not in it."),
+        "The covariance of the filter itself, run over the outage; no formula of its own. What "
+        "each source adds is how that covariance answers to its size, by runs in which it is "
+        "larger and smaller.",
+        "Errors are small and normal, and the sensors as their data sheet or configuration "
+        "states: noise, bias, its instability, scale factors and misalignments where they are "
+        "known. Shaking beyond it is not in the forecast.",
+        "Normal gravity: a deflection of the vertical is not in it.",
     ]
     if result.navigation is None:
         taken.append(
-            (
-                "",
-                "Before the outage a car goes round blocks to both sides, with changes of speed. A "
-                "drive without turns leaves more unknown, and a standstill less.",
-            )
+            "Before the outage a car goes round blocks to both sides, with changes of speed. A "
+            "drive without turns leaves more unknown, and a standstill less."
         )
-    return (
-        Paragraph("Taken for given:"),
-        Items(tuple(taken)),
-        Facts(
-            (
-                ("Horizontal, 95 %", "longer half axis of the ellipse that holds 95 % of places"),
-                ("Horizontal, 1 sd", "root of the sum of both variances"),
-                ("Along, across", "along the velocity; along the heading where it stands"),
-                ("Sign of a drift", "computed less true, or less the fix"),
-            )
-        ),
-        Paragraph("To run it again and compare every byte:"),
-        Paragraph(f"strapdown verify {name}", "mono"),
-    )
+    return taken
 
 
 # Tables of an outage prediction: drift over time, error budget, observed drifts.
@@ -158,13 +359,11 @@ _LEAST = 5e-4
 
 def time_table(result: OutageRun) -> TableBlock:
     """Drift over the outage."""
-    found, recorded = result.forecast, result.recorded
-    grid = found.time if recorded is None else recorded.time
-    bound = found.bound if recorded is None else recorded.bound
+    recorded = result.recorded
+    grid, bound, variances = course(result)
 
     def sd(quantity: str, at: float) -> float:
-        values = found.variance(quantity) if recorded is None else recorded.variance[quantity]
-        return math.sqrt(max(float(np.interp(at, grid, values)), 0.0))
+        return math.sqrt(max(float(np.interp(at, grid, variances[quantity])), 0.0))
 
     rows = []
     for share in _AT:
@@ -248,8 +447,7 @@ def _part(part: float) -> tuple[str, str]:
 
 def drift_table(result: OutageRun) -> TableBlock | None:
     """Table of the outage tests."""
-    recorded = result.recorded
-    drifts = [] if recorded is None else [d for d in recorded.drifts if d.time.size]
+    drifts = drifts_of(result)
     if not drifts:
         return None
     rows = [
@@ -276,13 +474,11 @@ def drift_table(result: OutageRun) -> TableBlock | None:
 # Charts of an outage prediction: the cone over time and from above, and its error budget.
 
 
-Array = NDArray[np.float64]
-
 TIME = "time since the outage began, s"
 #: Error sources drawn separately; the others are joined.
 MOST = 7
 #: Share of the total variance below which a source is joined with the others.
-_COAST_CHARTS_LEAST = 0.005
+_LEAST_PART = 0.005
 #: Fractions of the outage at which the plan has an ellipse.
 _RINGS = (0.25, 0.5, 0.75, 1.0)
 _CORNERS = 90
@@ -292,11 +488,8 @@ _INSIDE, _OUTSIDE = "a drift that came, within its 95 %", "outside of it"
 def cone_chart(result: OutageRun) -> Chart:
     """Cone over time with the observed drifts, and its error budget."""
     found, recorded = result.forecast, result.recorded
-    if recorded is None:
-        time, bound, sd = found.time, found.bound, found.sd("horizontal")
-    else:
-        time, bound = recorded.time, recorded.bound
-        sd = np.sqrt(np.maximum(recorded.variance["horizontal"], 0.0))
+    time, bound, variances = course(result)
+    sd = np.sqrt(np.maximum(variances["horizontal"], 0.0))
     lines = [
         *_came(result, lambda d: d.horizontal),
         Line("1 standard deviation", time, sd, BLUE, "dash", 1.6),
@@ -339,9 +532,7 @@ def _tried(drifts: Sequence[Drift]) -> str:
 def _came(result: OutageRun, value: object) -> list[Line]:
     """Observed drifts over time."""
     lines = []
-    for d in () if result.recorded is None else result.recorded.drifts:
-        if not d.time.size:
-            continue
+    for d in drifts_of(result):
         y = np.asarray(value(d))  # type: ignore[operator]
         lines.append(Line(_INSIDE, d.time, y, GREY, "solid", 1.0))
         if not d.inside.all():
@@ -369,14 +560,12 @@ def _stack(result: OutageRun) -> tuple[tuple[Fill, ...], str]:
         parts.append((aids_name, found.aids["horizontal"]))
     signed = [(name, v / whole) for name, v in parts]
     most = {name: float(np.max(v)) for name, v in signed}
-    shown = [n for n in sorted(most, key=lambda n: -most[n]) if most[n] > _COAST_CHARTS_LEAST][
-        :MOST
-    ]
+    shown = [n for n in sorted(most, key=lambda n: -most[n]) if most[n] > _LEAST_PART][:MOST]
     drawn = [(n, np.maximum(v, 0.0)) for n, v in signed if n in shown]
     rest = np.sum(
         [np.maximum(v, 0.0) for n, v in signed if n not in shown] or [0.0 * whole], axis=0
     )
-    if float(rest.max()) > _COAST_CHARTS_LEAST:
+    if float(rest.max()) > _LEAST_PART:
         drawn.append(("all others", rest))
     total = np.maximum(np.sum([v for _, v in drawn], axis=0), 1e-30)
     sd = found.sd("horizontal")
@@ -387,7 +576,7 @@ def _stack(result: OutageRun) -> tuple[tuple[Fill, ...], str]:
         colour = GREY if name == "all others" else SERIES_COLOURS[k % len(SERIES_COLOURS)]
         fills.append(Fill(name, found.time, below, above, colour, 0.55))
         below = above
-    cancels = any(float(np.min(v)) < -_COAST_CHARTS_LEAST for _, v in signed)
+    cancels = any(float(np.min(v)) < -_LEAST_PART for _, v in signed)
     note = " Shares below zero, of errors that cancel, are not drawn." if cancels else ""
     if result.recorded is not None and len(result.recorded.drifts) > 1:
         note += f" Of the outage from {result.forecast.begin:.1f} s, the middle one by its bound."
@@ -427,22 +616,11 @@ def plane_chart(result: OutageRun) -> Chart:
                 inside=0.06,
             )
         )
-    for d in () if recorded is None else recorded.drifts:
-        if d.time.size:
-            lines.append(Line(_INSIDE, d.across, d.along, GREY, "solid", 1.0))
-            end = slice(len(d.time) - 1, len(d.time))
-            colour = GREY if d.inside[-1] else VERMILLION
-            lines.append(
-                Line(
-                    "its end" if d.inside[-1] else _OUTSIDE,
-                    d.across[end],
-                    d.along[end],
-                    colour,
-                    points=True,
-                    symbol="circle",
-                    size=7.0,
-                )
-            )
+    for d in drifts_of(result):
+        lines.append(Line(_INSIDE, d.across, d.along, GREY, "solid", 1.0))
+        name, colour = ("its end", GREY) if d.inside[-1] else (_OUTSIDE, VERMILLION)
+        ends = d.across[-1:], d.along[-1:]
+        lines.append(Line(name, *ends, colour, points=True, symbol="circle", size=7.0))
     panel = Panel("along the way, m", tuple(lines), x_label="across it, to the right, m")
     return Chart(
         "plane",
@@ -456,12 +634,11 @@ def plane_chart(result: OutageRun) -> Chart:
 
 def parts_chart(result: OutageRun) -> Chart:
     """Along-track, cross-track, height, speed and heading over the outage."""
-    found, recorded = result.forecast, result.recorded
-    time = found.time if recorded is None else recorded.time
+    time, _, variances = course(result)
 
     def bound(quantity: str, factor: float = 1.0) -> Array:
-        values = found.variance(quantity) if recorded is None else recorded.variance[quantity]
-        return np.asarray(factor * TWO_SIDED_95 * np.sqrt(np.maximum(values, 0.0)))
+        values = np.maximum(variances[quantity], 0.0)
+        return np.asarray(factor * TWO_SIDED_95 * np.sqrt(values))
 
     place = (
         Line("along", time, bound("along"), VERMILLION, "solid", 1.8),
@@ -493,9 +670,9 @@ def budget_chart(result: OutageRun) -> Chart:
     ]
     if found.aids:
         parts.append((aids_name, float(found.aids["horizontal"][-1]) / whole))
-    kept = sorted((p for p in parts if abs(p[1]) >= _COAST_CHARTS_LEAST), key=lambda p: -p[1])
+    kept = sorted((p for p in parts if abs(p[1]) >= _LEAST_PART), key=lambda p: -p[1])
     rest = sum(p for _, p in parts) - sum(p for _, p in kept)
-    if abs(rest) >= _COAST_CHARTS_LEAST:
+    if abs(rest) >= _LEAST_PART:
         kept.append(("all others", rest))
     values = 100.0 * np.array([p for _, p in kept])
     bars = Bars(
@@ -508,7 +685,7 @@ def budget_chart(result: OutageRun) -> Chart:
     )
     return Chart(
         "budget",
-        "What makes the drift",
+        "Error budget of the drift",
         "Shares of the variance of the horizontal drift at the end of the outage. They add up to "
         "100 %; below zero is what cancels others.",
         "share of the variance, %",

@@ -9,21 +9,27 @@ from itertools import pairwise
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown import rotation
 from strapdown.crash.events import CrashEvent
 from strapdown.crash.path import CrashPath
-from strapdown.report.chart import BLUE, GREY, VERMILLION
+from strapdown.report.chart import (
+    BLUE,
+    GREY,
+    VERMILLION,
+    Array,
+    Scene,
+    SceneBody,
+    SceneLine,
+    SceneWord,
+)
 from strapdown.report.crash_outline import Outline, path_moments
 from strapdown.report.document import Animation, Picture
-from strapdown.report.plan_view import hull, nice_step, tick_words
-from strapdown.report.scene import Scene, SceneBody, SceneLine, SceneWord
+from strapdown.report.plan import hull, nice_step, tick_words
 from strapdown.report.svg_drawing import INK, SMALL, Drawing
 from strapdown.report.values import plain
 from strapdown.tables import NED
-
-Array = NDArray[np.float64]
 
 #: A slider on a page cannot resolve more frames.
 MOST_FRAMES = 120
@@ -45,17 +51,14 @@ def path_animation(
 
     Parameters
     ----------
-    path : CrashPath
     outline : Outline
         In vehicle axes.
-    events : sequence of CrashEvent
     point : sequence of float, (3,), m
         Reference point of the path, in vehicle axes.
     names : (str, str)
         Of the first two axes of the path.
     reference : DataFrame, optional
         ``north east down`` of the point in the axes of the path, m.
-    reference_name : str
 
     Returns
     -------
@@ -181,9 +184,6 @@ def crash_stills(
 
     Parameters
     ----------
-    path : CrashPath
-    body : VehicleBody
-    events : sequence of CrashEvent
     point : sequence of float, (3,), m
         Reference point in vehicle axes.
     ground : float, m
@@ -222,7 +222,7 @@ def crash_stills(
         shadow = places.copy()
         shadow[:, 2] = ground
         with out.within((left, top + _HEAD, left + width, top + _HEAD + height)):
-            _ground_crash_stills(out, pixels, (places, corners), ground)
+            _ground_lines(out, pixels, (places, corners), ground)
             out.shape(pixels(shadow), "#8a939e", 1.0, "dash", closed=False)
             out.shape(pixels(shadow[: row + 1]), BLUE, 2.2, closed=False)
             _body(out, body, corners[k], flat, pixels)
@@ -290,7 +290,7 @@ def _step(places: Array, corners: list[Array]) -> float:
     return nice_step(float(np.ptp(every, axis=0).max()) / 12.0)
 
 
-def _ground_crash_stills(
+def _ground_lines(
     out: Drawing, pixels: Callable[[Array], Array], shown: tuple[Array, list[Array]], ground: float
 ) -> None:
     places, corners = shown

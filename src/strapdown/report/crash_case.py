@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown import __version__
 from strapdown.bundle.configuration_paths import names_file
-from strapdown.bundle.seal import Seal, to_json
+from strapdown.bundle.seal import to_json
 from strapdown.config.crash_case import CaseSpec
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.case import CaseResult, ReferenceAnswer, SeverityAnswer, main_event, run_case
@@ -26,85 +25,44 @@ from strapdown.crash.pdof import NedPdof
 from strapdown.crash.reconstruction import UnitReconstruction
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.formats.crash_writers import write_mme
-from strapdown.progress import Progress, silent
-from strapdown.report import crash_limits, crash_words
+from strapdown.progress import Progress
+from strapdown.report import crash_words
+from strapdown.report.chart import Array
 from strapdown.report.crash_document import crash_document
-from strapdown.report.crash_figures import crash_figures
-from strapdown.report.crash_limits import CONVENTIONS
-from strapdown.report.document import draw_stills, finding_json, write_drawings, write_text
-from strapdown.report.document_html import document_page
+from strapdown.report.crash_words import CONVENTIONS
+from strapdown.report.document import finding_json, write_text
 from strapdown.report.document_pdf import write_pdf
-from strapdown.report.report_bundle import report_bundle, write_table
+from strapdown.report.report_bundle import (
+    ReportBundle,
+    file_of,
+    with_file,
+    write_report,
+    write_table,
+)
 from strapdown.report.values import spaced
-from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, EULER, GYRO, NED, VELOCITY
 
 
-def rerun_crash(configuration: dict[str, Any], out: Path, *, report: bool = True) -> Seal:
-    """Re-run a sealed case from its configuration, with or without its report."""
+def _configuration(result: CaseResult) -> dict[str, Any]:
+    return with_file({"case": result.spec.plain()}, result, "case", "case_path")
+
+
+def _run(configuration: dict[str, Any]) -> CaseResult:
     spec = CaseSpec.model_validate(configuration["case"])
-    path = configuration.get("case_path")
-    name = str(configuration["name"])
-    result = run_case(spec, None if path is None else Path(path))
-    return write_crash(result, out, name=name, report=report)
+    return run_case(spec, file_of(configuration, "case_path"))
 
 
-@one_thread()
-def write_crash(
-    result: CaseResult,
-    out: str | Path,
-    *,
-    name: str | None = None,
-    report: bool = True,
-    force: bool = False,
-    progress: Progress = silent,
-) -> Seal:
-    """Write the report of a case as a sealed bundle.
+def _write(result: CaseResult, folder: Path, name: str, report: bool, progress: Progress) -> None:
+    _write_numbers(result, folder)
+    if report:
+        document = crash_document(result, name)
+        stills = write_report(document, folder, progress)
+        progress("setting the PDF", 0.95)
+        write_pdf(document, folder / "report.pdf", stills=stills)
 
-    Parameters
-    ----------
-    result : CaseResult
-    out : str or Path
-        Folder to create.
-    name : str, optional
-        Folder name shown in the report; by default that of `out`.
-    report : bool
-        Whether to write page, PDF and figures.
-    force : bool
-        Overwrite an existing bundle.
-    progress : callable, optional
 
-    Raises
-    ------
-    ConfigError
-        `out` exists and may not be replaced.
-    """
-    name = Path(out).absolute().name if name is None else name
-    seals: list[Seal] = []
-    with report_bundle(
-        result,
-        out,
-        "crash",
-        key="case",
-        name=name,
-        force=force,
-        seals=seals,
-        role="case",
-        path_key="case_path",
-        report=report,
-    ) as folder:
-        _write_numbers(result, folder)
-        if report:
-            progress("drawing the report", 0.55)
-            document = crash_document(result, crash_figures(result), name)
-            progress("drawing the figures", 0.65)
-            stills = draw_stills(document)
-            write_drawings(document, stills, folder / "figures")
-            progress("writing the page", 0.85)
-            write_text(folder / "report.html", document_page(document, stills=stills))
-            progress("setting the PDF", 0.9)
-            write_pdf(document, folder / "report.pdf", stills=stills)
-    return seals[0]
+#: Page, PDF, JSON, tables and figures of a crash case.
+CRASH = ReportBundle("crash", _configuration, _run, _write)
 
 
 def _write_numbers(result: CaseResult, folder: Path) -> None:
@@ -128,7 +86,6 @@ def file_name(name: str, made: set[str]) -> str:
 
     Parameters
     ----------
-    name : str
     made : set of str
         The new name is added.
     """
@@ -161,15 +118,15 @@ def crash_json(result: CaseResult) -> dict[str, Any]:
         "strapdown": __version__,
         "title": result.spec.title,
         "number": result.spec.number,
-        "conventions": dict(crash_limits.CONVENTIONS),
+        "conventions": dict(crash_words.CONVENTIONS),
         "headline": spaced(crash_words.headline(result)),
         "main": made.main.name,
         "answers": [_unit(unit) for unit in made.answers],
         "comparison": None if made.comparison is None else _comparison(made.comparison),
         "severity": [_severity(s) for s in result.severity],
         "references": [_reference(r) for r in result.references],
-        "assumptions": _pairs(crash_limits.assumptions(result)),
-        "limitations": _pairs(crash_limits.limitations(result)),
+        "assumptions": _pairs(crash_words.assumptions(result)),
+        "limitations": _pairs(crash_words.limitations(result)),
         "findings": [finding_json(f) for f in result.findings],
         "case": _named(result.spec.model_dump(mode="json", exclude_none=True)),
     }
@@ -391,9 +348,6 @@ def signals_table(unit: UnitReconstruction) -> pd.DataFrame:
 # Signals of the recorders at the reference point, as one crash record for ISO MME.
 
 
-Array = NDArray[np.float64]
-
-
 def signal_record(
     title: str, point: str, answers: Sequence[UnitReconstruction], rate_hz: float
 ) -> CrashRecord:
@@ -405,7 +359,6 @@ def signal_record(
         Of the case.
     point : str
         Name of the reference point.
-    answers : sequence of UnitReconstruction
     rate_hz : float, Hz
         Sample rate of the common stamps.
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.crash.acceleration import Acceleration, window_weights
+from strapdown.crash.case import ReferenceAnswer
 from strapdown.crash.consistency import UnitComparison
 from strapdown.crash.delta_v import VelocityCourse, cumulative_delta_v
 from strapdown.crash.delta_v_bound import DeltaVBound, VelocityChange, body_delta_v_bound
@@ -28,6 +28,7 @@ from strapdown.report.chart import (
     GREEN,
     GREY,
     PURPLE,
+    Array,
     Band,
     Bars,
     Chart,
@@ -39,37 +40,22 @@ from strapdown.report.chart import (
     look,
 )
 from strapdown.report.crash_outline import AROUND, crash_span, event_marks, unit_look
-from strapdown.report.values import MEAN, plain
+from strapdown.report.values import KMH, MEAN, plain
 from strapdown.rotation import within_half_turn
 from strapdown.tables import NED
 
-Array = NDArray[np.float64]
-
 AXES = ("forward", "right", "down", "resultant")
-KMH = 3.6
 # Instants at which the bound is computed; it is smooth between them.
 _INSTANTS = 31
 _SYMBOLS = ("square", "diamond", "triangle-up", "star", "pentagon", "cross")
 
 
-@dataclass(frozen=True)
-class StatedDeltaV:
-    """A delta-V stated by another source.
-
-    Attributes
-    ----------
-    time : float, s
-        From the trigger; the delta-V is from time zero to this instant.
-    value, sd : float, m/s
-    name : str
-    axis : {'forward', 'right', 'down', 'resultant'}
-    """
-
-    time: float
-    value: float
-    sd: float
-    name: str
-    axis: str = "forward"
+def answers_of(
+    units: Sequence[UnitReconstruction], combined: UnitReconstruction | None
+) -> list[tuple[UnitReconstruction, str, dict[str, str]]]:
+    """Return each unit and their mean, if there is one, with its name and look in every chart."""
+    found = [(u, u.name, unit_look(k, len(units) == 1)) for k, u in enumerate(units)]
+    return found if combined is None else [*found, (combined, MEAN, unit_look(None))]
 
 
 def delta_v_course(acceleration: Acceleration, zero: float, low: float, high: float) -> Array:
@@ -77,7 +63,6 @@ def delta_v_course(acceleration: Acceleration, zero: float, low: float, high: fl
 
     Parameters
     ----------
-    acceleration : Acceleration
     zero, low, high : float, s
         `zero` is the origin of the change; `low` and `high` are clipped to the record.
 
@@ -110,7 +95,6 @@ def delta_v_half_widths(
 
     Parameters
     ----------
-    unit : UnitReconstruction
     zero, zero_sd : float, s
     instants : ndarray, (n,), s
         After `zero`; taken as exact, as clock times.
@@ -145,20 +129,19 @@ def delta_v_chart(
     event: int = 0,
     *,
     gravity: float = STANDARD_GRAVITY,
-    stated: Sequence[StatedDeltaV] = (),
+    stated: Sequence[ReferenceAnswer] = (),
 ) -> Chart | None:
     """Chart the change of velocity since time zero of an event.
 
     Parameters
     ----------
-    units : sequence of UnitReconstruction
     combined : UnitReconstruction or None
         Mean of the units, whose event and bound are drawn; if None, those of the first unit.
     event : int
         Index into the events of the mean, from 0.
     gravity : float, m/s²
-    stated : sequence of StatedDeltaV
-        Drawn with their 95 % bounds.
+    stated : sequence of ReferenceAnswer
+        Changes of velocity stated by others, drawn with their 95 % bounds.
 
     Returns
     -------
@@ -172,13 +155,14 @@ def delta_v_chart(
     zero, end = found.time_zero, min(found.end, main.acceleration.end)
     span = (zero - 0.4 * AROUND[0], end + AROUND[1])
     lines: list[list[Line]] = [[] for _ in AXES]
-    for k, unit in enumerate(units):
-        if unit.acceleration.begin <= zero < unit.acceleration.end:
-            look = unit_look(k, len(units) == 1)
-            _add_course(lines, unit, (zero, *span), unit.name, look, 2.2 if unit is main else 1.3)
+    for unit, name, drawn in answers_of(units, combined):
+        if unit is combined or unit.acceleration.begin <= zero < unit.acceleration.end:
+            course = delta_v_course(unit.acceleration, zero, *span)
+            at, style = 1e3 * course[:, 0], (drawn["colour"], drawn["dash"])
+            width = 2.2 if unit is main else 1.3
+            for k in range(len(AXES)):
+                lines[k].append(curve(name, at, KMH * course[:, 1 + k], *style, width))
     own = unit_look(None if combined is not None else 0)["colour"]
-    if combined is not None:
-        _add_course(lines, combined, (zero, *span), MEAN, unit_look(None), 2.2)
     last = min(span[1], main.acceleration.end)
     instants = np.unique(np.r_[np.linspace(zero, last, _INSTANTS)[1:], end])
     half = KMH * delta_v_half_widths(main, zero, found.time_zero_sd, instants, gravity)
@@ -198,7 +182,6 @@ def delta_v_chart(
             np.r_[0.0, middle + half[:, k]],
             own,
             0.15,
-            legend=k == 0,
         )
         words = f"{axis}: {plain(KMH * values[k], 1)} ± {plain(KMH * halves[k], 1)} km/h "
         words += f"({plain(values[k], 2)} ± {plain(halves[k], 2)} m/s)"
@@ -214,10 +197,9 @@ def delta_v_chart(
                 points=True,
                 symbol="circle",
                 size=8.0,
-                legend=k == 0,
             ),
         ]
-        given = _stated_lines([s for s in stated if s.axis == axis])
+        given = _stated_lines([s for s in stated if s.spec.axis == axis])
         panels.append(
             Panel(
                 f"{axis}, km/h", (*lines[k], *marks, *given), title=words, fills=(fill,), height=0.8
@@ -245,40 +227,18 @@ def _caption(stated: bool) -> str:
     )
 
 
-def _add_course(
-    lines: list[list[Line]],
-    unit: UnitReconstruction,
-    times: tuple[float, float, float],
-    name: str,
-    look: Mapping[str, str],
-    width: float,
-) -> None:
-    course = delta_v_course(unit.acceleration, *times)
-    for k in range(len(AXES)):
-        made = curve(
-            name, 1e3 * course[:, 0], KMH * course[:, 1 + k], look["colour"], look["dash"], width
-        )
-        lines[k].append(replace(made, legend=k == 0))
-
-
-def _stated_lines(stated: Sequence[StatedDeltaV]) -> list[Line]:
+def _stated_lines(stated: Sequence[ReferenceAnswer]) -> list[Line]:
     out = []
     for k, one in enumerate(stated):
-        at = np.array([1e3 * one.time])
-        reach = TWO_SIDED_95 * one.sd
-        ends = KMH * np.array([one.value - reach, one.value + reach])
+        value, reach = one.spec.delta_v_m_per_s or 0.0, TWO_SIDED_95 * one.spec.delta_v_sd_m_per_s
+        at = np.array([1e3 * one.span[1]])
+        ends = KMH * np.array([value - reach, value + reach])
         colour = PURPLE if k == 0 else GREY
         out.append(Line("bar", np.repeat(at, 2), ends, colour, width=1.8, legend=False))
+        symbol = _SYMBOLS[k % len(_SYMBOLS)]
+        value_at = np.array([KMH * value])
         out.append(
-            Line(
-                one.name,
-                at,
-                np.array([KMH * one.value]),
-                colour,
-                points=True,
-                symbol=_SYMBOLS[k % len(_SYMBOLS)],
-                hollow=True,
-            )
+            Line(one.spec.name, at, value_at, colour, points=True, symbol=symbol, hollow=True)
         )
     return out
 
@@ -330,7 +290,6 @@ def place_budget_chart(path: CrashPath, names: tuple[str, str] = ("forward", "ri
 
     Parameters
     ----------
-    path : CrashPath
     names : (str, str)
         Of the first two axes of the path.
     """
@@ -411,7 +370,6 @@ def pdof_by_window_chart(
 
     Parameters
     ----------
-    units : sequence of UnitReconstruction
     combined : UnitReconstruction or None
         Mean of the units, whose event it is; if None, the first unit.
     event : int
@@ -495,25 +453,21 @@ def _lines(
     main = units[0] if combined is None else combined
     middle = main.types[event].direction.horizontal_deg
     lines = []
-    named: list[tuple[UnitReconstruction, int | None]] = [(u, k) for k, u in enumerate(units)]
-    if combined is not None:
-        named.append((combined, None))
-    for unit, number in named:
+    for unit, name, drawn in answers_of(units, combined):
         try:
             found = table(unit)
         except DataError:
             # The record of this unit covers none of the windows.
             continue
-        look = unit_look(number, len(units) == 1)
         line = Line(
-            MEAN if number is None else unit.name,
+            name,
             1e3 * found.index.to_numpy(dtype=np.float64),
             _near(found["horizontal_deg"].to_numpy(dtype=np.float64), middle),
-            look["colour"],
-            look["dash"],
+            drawn["colour"],
+            drawn["dash"],
             2.2 if unit is main else 1.3,
             dots=True,
-            symbol=look["symbol"],
+            symbol=drawn["symbol"],
             size=6.0,
         )
         lines.append(line)
@@ -547,7 +501,6 @@ def differences_chart(comparison: UnitComparison, names: Sequence[str]) -> Chart
 
     Parameters
     ----------
-    comparison : UnitComparison
     names : sequence of str
         Of all units in the order of the report, for their colours.
 
@@ -558,7 +511,6 @@ def differences_chart(comparison: UnitComparison, names: Sequence[str]) -> Chart
     """
     edges = 1e3 * comparison.edges
     panels = []
-    named: set[str] = set()
     for k, axis in enumerate(_AXES):
         lines: list[Line] = []
         fills: list[Fill] = []
@@ -566,13 +518,10 @@ def differences_chart(comparison: UnitComparison, names: Sequence[str]) -> Chart
         for one in measured:
             look = unit_look(list(names).index(one.name))
             y, half = one.difference[:, k], TWO_SIDED_95 * one.sd[:, k]
-            made = curve(one.name, edges, y, look["colour"], look["dash"], 1.8)
-            lines.append(replace(made, legend=one.name not in named))
-            named.add(one.name)
+            lines.append(curve(one.name, edges, y, look["colour"], look["dash"], 1.8))
             for edge in (half, -half):
-                made = curve(one.name, edges, edge, look["colour"], "dot", 0.9)
-                lines.append(replace(made, legend=False))
-            fills.append(Fill(one.name, edges, -half, half, look["colour"], 0.05, legend=False))
+                lines.append(curve(one.name, edges, edge, look["colour"], "dot", 0.9))
+            fills.append(Fill(one.name, edges, -half, half, look["colour"], 0.05))
         if measured:
             panels.append(Panel(f"{axis}, m/s", tuple(lines), fills=tuple(fills), height=0.9))
     if not panels:
@@ -608,27 +557,16 @@ def accelerations_chart(
     span = crash_span(events, main.acceleration.begin, main.acceleration.end)
     rows: list[list[Line]] = [[], [], []]
     filtered = False
-    drawn: list[tuple[UnitReconstruction, int | None]] = [(u, k) for k, u in enumerate(units)]
-    if combined is not None:
-        drawn.append((combined, None))
-    for unit, number in drawn:
+    for unit, name, drawn in answers_of(units, combined):
         time, values = unit.acceleration.time, unit.acceleration.values / STANDARD_GRAVITY
         step = float(np.median(np.diff(time)))
         if step * LEAST_RATE * _CLASS <= 1.0 and not unit.acceleration.gaps(time[0], time[-1]):
             values, filtered = cfc_filter(values, step, _CLASS), True
         inside = (time >= span[0]) & (time <= span[1])
-        look = unit_look(number, len(units) == 1)
-        name = MEAN if number is None else unit.name
+        at, style = 1e3 * time[inside], (drawn["colour"], drawn["dash"])
         for k in range(3):
-            made = curve(
-                name,
-                1e3 * time[inside],
-                values[inside, k],
-                look["colour"],
-                look["dash"],
-                2.0 if number is None else 1.3,
-            )
-            rows[k].append(replace(made, legend=k == 0))
+            width = 2.0 if unit is combined else 1.3
+            rows[k].append(curve(name, at, values[inside, k], *style, width))
     how = f"after a phaseless low-pass of class CFC {_CLASS}" if filtered else "as sampled"
     return Chart(
         "accelerations",
@@ -648,7 +586,6 @@ def accelerations_chart(
 _POINTS = 121
 # Upper end of a model without a stated range, as a multiple of this case's delta-V.
 _BEYOND = 2.5
-_KMH = 3.6
 
 
 def risk_chart(
@@ -661,7 +598,6 @@ def risk_chart(
 
     Parameters
     ----------
-    risks : sequence of InjuryRisk
     delta_v, sd : float, m/s
         Inputs of the models.
     inputs : mapping, optional
@@ -683,7 +619,7 @@ def risk_chart(
             continue
         style = look(len(lines) // 3)
         lines.append(Line(_name(model), x, 100.0 * y, style["colour"], style["dash"], 1.8))
-        at = np.array([_KMH * delta_v])
+        at = np.array([KMH * delta_v])
         bound = 100.0 * np.array([risk.low, risk.high])
         upright = np.repeat(at, 2)
         lines.append(Line("bar", upright, bound, style["colour"], width=2.4, legend=False))
@@ -696,8 +632,8 @@ def risk_chart(
                 style["colour"],
                 points=True,
                 symbol=style["symbol"],
-                low=np.array([_KMH * max(delta_v - reach, 0.0)]),
-                high=np.array([_KMH * (delta_v + reach)]),
+                low=np.array([KMH * max(delta_v - reach, 0.0)]),
+                high=np.array([KMH * (delta_v + reach)]),
                 legend=False,
             )
         )
@@ -730,7 +666,7 @@ def _curve(
         except StrapdownError:
             # A logarithm is undefined at zero, or an input is missing.
             continue
-        x.append(_KMH * value)
+        x.append(KMH * value)
         y.append(risk.probability)
     return np.array(x), np.array(y)
 

@@ -1,33 +1,65 @@
-"""Report of a crash case: page one and the sections after it."""
+"""Report of a crash case: page one and the sections after it, with its charts and pictures."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
 from strapdown import __version__
-from strapdown.crash.case import CaseResult
+from strapdown.constants import TWO_SIDED_95
+from strapdown.crash.case import CaseResult, ReferenceAnswer, main_event
+from strapdown.crash.path import CrashPath
+from strapdown.crash.reconstruction import UnitReconstruction
 from strapdown.report import crash_tables
-from strapdown.report.chart import Chart
-from strapdown.report.crash_figures import CrashFigures
-from strapdown.report.crash_limits import (
+from strapdown.report.crash_animation import path_animation
+from strapdown.report.crash_charts import (
+    accelerations_chart,
+    delta_v_budget_chart,
+    delta_v_chart,
+    differences_chart,
+    pdof_by_shift_chart,
+    pdof_by_window_chart,
+    place_budget_chart,
+    risk_chart,
+)
+from strapdown.report.crash_outline import vehicle_outline
+from strapdown.report.crash_pictures import Direction, MountingPoint, conventions_picture, pdof_dial
+from strapdown.report.crash_plan import path_plan
+from strapdown.report.crash_signals import (
+    attitude_chart,
+    place_chart,
+    reference_chart,
+    unit_signals,
+    velocity_chart,
+)
+from strapdown.report.crash_words import (
     CONVENTIONS,
     assumptions,
     grave_limitations,
+    headline,
     how_to_verify,
+    key_figures,
+    lead,
     limitations,
     method,
+    notes,
+    record_facts,
 )
-from strapdown.report.crash_words import headline, key_figures, lead, notes, record_facts
 from strapdown.report.document import (
     Block,
-    ChartBlock,
     Document,
     Facts,
     Items,
     KeyFigures,
     Paragraph,
-    Section,
-    TableBlock,
+    blocks,
+    section,
 )
-from strapdown.report.values import GAP, plain
+from strapdown.report.values import GAP, axis_names, plain
+from strapdown.tables import NED
 
 SIGNALS = (
     "Specific force is what an accelerometer feels: −1 g downward at rest, 1 g = 9.80665 m/s². It "
@@ -38,118 +70,168 @@ SIGNALS = (
 )
 
 
-def crash_document(result: CaseResult, figures: CrashFigures, name: str) -> Document:
-    """Return the report of a case.
+def crash_document(result: CaseResult, name: str) -> Document:
+    """Return the report of a case; `name` is that of its folder, to verify it.
 
-    Parameters
-    ----------
-    result : CaseResult
-    figures : CrashFigures
-    name : str
-        Folder name, for the verification command.
+    Time is from the trigger, ms (s in overviews). Axes are the turning axes of the vehicle; those
+    of the path are north, east, down or, without a stated heading, forward, right, down of the
+    vehicle at the entry. Every bound holds 95 %.
     """
-    spec = result.spec
-    facts = [
+    spec, found = result.spec, result.reconstruction
+    main, which = found.main, main_event(found.main)
+    path, events, units = main.path, main.events.events, (found.units, found.combined)
+    names = axis_names(result)[:2]
+    outline, point = vehicle_outline(spec.vehicle), found.point
+    paths = [r for r in result.references if r.path is not None and r.unit == main.name]
+    reference = reference_in_path_axes(path, paths[0]) if paths else None
+    shown = paths[0].spec.name if paths else "reference"
+    seen: Any = {
+        "events": events,
+        "point": point,
+        "names": names,
+        "reference": reference,
+        "reference_name": shown,
+    }
+    sampled: Any = {"samples": result.samples, "events": events}
+    directions = _directions(main, which)
+    happened = any(unit.body for unit in found.answers)
+    described = [Paragraph(text) for text in spec.description.split("\n\n") if text.strip()]
+    sections = (
+        section(
+            "case", "The case", *described, crash_tables.records_table(result), *_records(result)
+        ),
+        section("signals", "Signals", Paragraph(SIGNALS), *_signals(result)),
+        section(
+            "delta-v",
+            "Delta-V",
+            crash_tables.answers_table(result),
+            *(
+                delta_v_chart(
+                    *units,
+                    k,
+                    gravity=spec.options.gravity_m_per_s2,
+                    stated=[s for s in _stated(result, main) if _belongs(main, k, s.span[1])],
+                )
+                for k in range(len(events))
+            ),
+            None if happened else Paragraph(headline(result)),
+        ),
+        section(
+            "direction",
+            "Direction of force",
+            crash_tables.direction_table(result),
+            None if which is None else pdof_by_window_chart(*units, which),
+            None if which is None else pdof_by_shift_chart(*units, which),
+            None
+            if happened
+            else Paragraph("Without an event the direction of force is not defined."),
+        ),
+        section(
+            "path",
+            "Path",
+            crash_tables.path_table(result),
+            path_plan(path, outline, **seen),
+            path_animation(path, outline, **seen),
+            place_chart(path, names, reference=reference, reference_name=shown, **sampled),
+            velocity_chart(path, names, **sampled),
+            attitude_chart(path, **sampled),
+        ),
+        section("agreement", "Sensors against each other", *_agreement(result)),
+        section(
+            "budget",
+            "Error budget",
+            Paragraph(
+                "What makes the bounds: every unknown was carried through the whole "
+                "computation, and those of one kind are added up here."
+            ),
+            None if which is None else delta_v_budget_chart(main.body[which].event),
+            place_budget_chart(path, names),
+            crash_tables.budget_table(result),
+        ),
+        section("severity", "Severity", *_severity(result, which)),
+        section(
+            "references",
+            "Reference comparison",
+            *crash_tables.reference_tables(result),
+            *(
+                reference_chart(r.path, r.spec.name, names, k)
+                for k, r in enumerate(paths, start=1)
+                if r.path is not None
+            ),
+            *_sources(result),
+        ),
+        section(
+            "assumptions",
+            "Method and assumptions",
+            Items(tuple(("", step) for step in method(result)), numbered=True),
+            Paragraph("Taken for given:"),
+            Items(assumptions(result)),
+        ),
+        section(
+            "sensors",
+            "Sensors",
+            crash_tables.units_table(result),
+            crash_tables.sensors_table(result),
+        ),
+        section(
+            "conventions",
+            "Conventions",
+            conventions_picture(
+                outline,
+                [MountingPoint(u.name, u.mounting.position, k) for k, u in enumerate(result.units)],
+                point=point,
+                point_name=spec.point.name,
+            ),
+            Facts(CONVENTIONS),
+        ),
+        section(
+            "limitations",
+            "Limitations",
+            Paragraph("Written from what happened in this case; the gravest first."),
+            Items(limitations(result)),
+        ),
+        section("findings", "Notes on the records", *_findings(result)),
+        section(
+            "verify",
+            "How to verify",
+            Items(how_to_verify()),
+            Paragraph(f"strapdown verify {name}", "mono"),
+            crash_tables.inputs_table(result),
+        ),
+    )
+    facts = (
         ("Case", spec.number),
         ("Vehicle", _vehicle(result)),
         ("Reference point", spec.point.name + _place(spec.point.position_m)),
         ("Recorders", ", ".join(u.name for u in result.units)),
         ("Author", spec.author),
         ("Made with", f"strapdown {__version__}"),
-    ]
-    sections = (
-        Section("case", "The case", _case(result)),
-        Section("signals", "Signals", _signals(result, figures)),
-        Section(
-            "delta-v",
-            "Delta-V",
-            _blocks(_if_any(crash_tables.answers_table(result)), *_charts(*figures.delta_v))
-            or (Paragraph(headline(result)),),
-        ),
-        Section(
-            "direction",
-            "Direction of force",
-            _blocks(
-                _if_any(crash_tables.direction_table(result)),
-                *_charts(figures.pdof_by_window, figures.pdof_by_time_zero),
-            )
-            or (Paragraph("Without an event there is no direction of force to tell."),),
-        ),
-        Section(
-            "path",
-            "Path",
-            _blocks(
-                crash_tables.path_table(result),
-                figures.path,
-                figures.motion,
-                *_charts(figures.place, figures.velocity, figures.attitude),
-            ),
-        ),
-        Section("agreement", "Sensors against each other", _agreement(result, figures)),
-        Section(
-            "budget",
-            "Error budget",
-            _blocks(
-                Paragraph(
-                    "What makes the bounds: every unknown was carried through the whole "
-                    "computation, and those of one kind are added up here."
-                ),
-                *_charts(figures.delta_v_budget, figures.place_budget),
-                crash_tables.budget_table(result),
-            ),
-        ),
-        Section("severity", "Severity", _severity(result, figures)),
-        Section("references", "Reference comparison", _references(result, figures)),
-        Section(
-            "assumptions",
-            "Method and assumptions",
-            _blocks(
-                Items(tuple(("", step) for step in method(result)), numbered=True),
-                Paragraph("Taken for given:"),
-                Items(assumptions(result)),
-            ),
-        ),
-        Section(
-            "sensors",
-            "Sensors",
-            _blocks(crash_tables.units_table(result), crash_tables.sensors_table(result)),
-        ),
-        Section("conventions", "Conventions", _blocks(figures.conventions, Facts(CONVENTIONS))),
-        Section("limitations", "Limitations", _limitations(result)),
-        Section("findings", "Notes on the records", _findings(result)),
-        Section("verify", "How to verify", _verify(result, name)),
     )
+    dial = pdof_dial(outline, directions, point=point, point_name=spec.point.name, small=True)
+    grave = grave_limitations(result)
     return Document(
         title=spec.title,
         subtitle="Crash reconstruction from inertial records",
         facts=tuple((head, text) for head, text in facts if text),
-        front=(
-            KeyFigures(key_figures(result), figures.front),
+        front=blocks(
+            KeyFigures(
+                key_figures(result),
+                (*((dial,) if directions else ()), path_plan(path, outline, small=True, **seen)),
+            ),
             Paragraph(lead(result), "lead"),
-            *((Paragraph(f"Mind: {_worst(result)}", "warning"),) if _worst(result) else ()),
+            Paragraph(f"Mind: {'; '.join(grave)} (see Limitations).", "warning") if grave else None,
         ),
-        sections=tuple(s for s in sections if s.blocks),
+        sections=sections,
         footer=spec.number or spec.title,
     )
 
 
-def _blocks(*found: Block | None) -> tuple[Block, ...]:
-    return tuple(block for block in found if block is not None)
-
-
-def _if_any(table: TableBlock) -> TableBlock | None:
-    return table if table.rows else None
-
-
-def _charts(*found: Chart | None) -> tuple[ChartBlock, ...]:
-    return tuple(ChartBlock(chart) for chart in found if chart is not None)
-
-
-def _signals(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:
-    charts = _charts(
-        *(c for unit in figures.signals for c in (unit.overview, unit.crash, unit.rates))
-    )
-    return (Paragraph(SIGNALS), *charts)
+def _signals(result: CaseResult) -> Iterator[Block]:
+    found = result.reconstruction
+    by_name = {unit.name: unit for unit in result.units}
+    for k, unit in enumerate(found.units):
+        there = found.synchronised.unit(unit.name)
+        yield from unit_signals(by_name[unit.name], there, unit, k, found.main.events.events)
 
 
 def _place(position: tuple[float, float, float]) -> str:
@@ -167,58 +249,54 @@ def _vehicle(result: CaseResult) -> str:
     return ", ".join(part for part in (vehicle.name, mass, size) if part)
 
 
-def _worst(result: CaseResult) -> str:
-    found = grave_limitations(result)
-    return "; ".join(found) + " (see Limitations)." if found else ""
-
-
-def _case(result: CaseResult) -> tuple[Block, ...]:
-    described = [Paragraph(text) for text in result.spec.description.split("\n\n") if text.strip()]
-    facts: list[Block] = []
+def _records(result: CaseResult) -> Iterator[Block]:
     for record in result.records.values():
         rows = record_facts(record)
         if rows:
-            facts += [Paragraph(f"What {record.path.name} says of itself:"), Facts(rows)]
-    return _blocks(*described, crash_tables.records_table(result), *facts)
+            yield Paragraph(f"What {record.path.name} says of itself:")
+            yield Facts(rows)
 
 
-def _agreement(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:
-    table = crash_tables.comparison_table(result)
-    if table is None:
+def _agreement(result: CaseResult) -> tuple[Block | None, ...]:
+    found = result.reconstruction
+    comparison = found.comparison
+    if comparison is None:
         return (Paragraph("There is one recorder, and nothing to hold it against."),)
-    comparison = result.reconstruction.comparison
-    assert comparison is not None
     words = notes(comparison.findings, result, remedies=False)
     remedies = dict.fromkeys(text for f in comparison.findings if (text := f.advice("file")))
-    return _blocks(
-        table,
-        *_charts(figures.units, figures.accelerations),
+    return (
+        crash_tables.comparison_table(result),
+        differences_chart(comparison, [u.name for u in found.units]),
+        accelerations_chart(found.units, found.combined, found.main.events.events),
         Items(words) if words else None,
         Paragraph(f"What can be done: {'; '.join(remedies)}.") if remedies else None,
     )
 
 
-def _severity(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:
+def _severity(result: CaseResult, which: int | None) -> tuple[Block | None, ...]:
     table = crash_tables.severity_table(result)
     if table is None:
-        return (Paragraph("Without an event there is no severity to tell."),)
-    notes = dict.fromkeys(a.model.note for a in result.severity if a.model.note)
-    return _blocks(table, *_charts(figures.severity), *(Paragraph(note, "note") for note in notes))
+        return (Paragraph("Without an event the severity is not defined."),)
+    remarks = dict.fromkeys(a.model.note for a in result.severity if a.model.note)
+    risks = [answer.risk for answer in result.severity if answer.risk is not None]
+    chart = None
+    if which is not None and risks:
+        main = result.reconstruction.main
+        change = main.body[which].event
+        chart = risk_chart(
+            risks,
+            change.resultant,
+            change.resultant_bound / TWO_SIDED_95,
+            {"crash_type": main.types[which].name, **result.spec.options.severity_inputs},
+        )
+    return table, chart, *(Paragraph(remark, "note") for remark in remarks)
 
 
-def _references(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:
-    tables = crash_tables.reference_tables(result)
-    if not tables:
+def _sources(result: CaseResult) -> tuple[Block, ...]:
+    if not result.references:
         return (Paragraph("No reference was given."),)
     sources = tuple((r.name, r.source) for r in result.spec.references if r.source)
-    return _blocks(*tables, *_charts(*figures.references), Facts(sources) if sources else None)
-
-
-def _limitations(result: CaseResult) -> tuple[Block, ...]:
-    return (
-        Paragraph("Written from what happened in this case; the gravest first."),
-        Items(limitations(result)),
-    )
+    return (Facts(sources),) if sources else ()
 
 
 def _findings(result: CaseResult) -> tuple[Block, ...]:
@@ -238,9 +316,56 @@ def _findings(result: CaseResult) -> tuple[Block, ...]:
     )
 
 
-def _verify(result: CaseResult, name: str) -> tuple[Block, ...]:
-    return (
-        Items(how_to_verify()),
-        Paragraph(f"strapdown verify {name}", "mono"),
-        crash_tables.inputs_table(result),
-    )
+def reference_in_path_axes(path: CrashPath, answer: ReferenceAnswer) -> pd.DataFrame:
+    """Positions of a reference path, shifted to agree with the reconstruction at the entry.
+
+    Parameters
+    ----------
+    path : CrashPath
+        Reconstructed path of the comparison.
+    answer : ReferenceAnswer
+        Answer with a reference path.
+
+    Returns
+    -------
+    DataFrame
+        ``north east down``, m, indexed by time, s, as used in the comparison.
+    """
+    assert answer.path is not None
+    from scipy.interpolate import CubicHermiteSpline
+
+    errors = answer.path.errors
+    own = CubicHermiteSpline(path.time, path.table[NED].to_numpy(), path.table[["VN", "VE", "VD"]])
+    at = errors.index.to_numpy(dtype=np.float64)
+    return pd.DataFrame(own(at) - errors[NED].to_numpy(), index=errors.index, columns=NED)
+
+
+def _directions(main: UnitReconstruction, which: int | None) -> list[Direction]:
+    return [
+        Direction(
+            f"event {k + 1}",
+            kind.direction.horizontal_deg,
+            changes.event.interval.horizontal,
+            kind.direction.clock,
+            changes.event.resultant,
+            k == which,
+        )
+        for k, (changes, kind) in enumerate(zip(main.body, main.types, strict=True))
+    ]
+
+
+def _stated(result: CaseResult, main: UnitReconstruction) -> list[ReferenceAnswer]:
+    """Delta-V stated by other sources, at the end of the main event if no time is stated."""
+    if main_event(main) is None:
+        return []
+    return [
+        answer
+        for answer in result.references
+        if answer.unit == main.name and answer.spec.delta_v_m_per_s is not None
+    ]
+
+
+def _belongs(main: UnitReconstruction, event: int, at: float) -> bool:
+    """Whether the time zero of this event is the last one before an instant."""
+    zeros = [e.time_zero for e in main.events.events]
+    return event == max((k for k, zero in enumerate(zeros) if zero <= at), default=0)

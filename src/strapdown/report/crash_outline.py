@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown.config.crash_case import VehicleSpec
 from strapdown.crash.events import CrashEvent
 from strapdown.crash.path import CrashPath
 from strapdown.crash.pdof import AngleInterval
 from strapdown.crash.reconstruction import UnitReconstruction
-from strapdown.report.chart import BLACK, Mark, look
+from strapdown.report.chart import BLACK, Array, Mark, look
 from strapdown.report.svg_drawing import Drawing
 from strapdown.report.values import plain
-
-Array = NDArray[np.float64]
 
 # Half of a generic car, along (0 the rear, 1 the front) and to the side (1 the widest): its
 # body, and the details that mark its front.
@@ -85,11 +83,15 @@ class Outline:
         def moved(points: Array) -> Array:
             return np.asarray((points - origin) @ turn + there)
 
+        return self.mapped(moved)
+
+    def mapped(self, move: Callable[[Array], Array]) -> Outline:
+        """Map every point, (n, 2), such as to pixels."""
         return replace(
             self,
-            body=moved(self.body),
-            windows=tuple(moved(w) for w in self.windows),
-            folds=tuple(moved(f) for f in self.folds),
+            body=move(self.body),
+            windows=tuple(move(w) for w in self.windows),
+            folds=tuple(move(f) for f in self.folds),
         )
 
     def edge(self, point: ArrayLike, direction_deg: float) -> float:
@@ -159,8 +161,6 @@ def draw_outline(
 
     Parameters
     ----------
-    drawing : Drawing
-    pixels : Outline
     colour, width, dash
         Style of its edge.
     fill, opacity

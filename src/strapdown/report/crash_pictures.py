@@ -31,12 +31,10 @@ class Direction:
 
     Attributes
     ----------
-    name : str
     horizontal_deg : float, deg
         Direction from which the force came, clockwise from the front.
     interval : AngleInterval or None
         The 95 % interval.
-    clock : int
     delta_v : float, m/s
         Length of the change of velocity.
     main : bool
@@ -69,7 +67,6 @@ def pdof_dial(
         One per event, in time order.
     point : sequence of float, m
         Reference point in vehicle axes, at the center of the dial.
-    point_name : str
     small : bool
         Draw the dial alone, for a page with the numbers beside it.
 
@@ -174,12 +171,8 @@ def _vehicle(out: Drawing, centre: Point, outline: Outline, point: Sequence[floa
     origin = np.array(centre)
     # Forward is up the page: a heading of -90 deg in axes x right, y down.
     there = outline.placed((0.0, 0.0), -90.0, point)
-    pixels = Outline(
-        origin + scale * there.body,
-        tuple(origin + scale * w for w in there.windows),
-        tuple(origin + scale * f for f in there.folds),
-    )
-    draw_outline(out, pixels, "#3d5166", 1.4, fill="#e9edf2")
+    pixels = there.mapped(lambda points: origin + scale * points)
+    draw_outline(out, pixels, _BODY, 1.4, fill="#e9edf2")
 
 
 def _arrow(
@@ -204,16 +197,12 @@ def _arrow(
     )
 
 
-def _clock_words(d: Direction) -> str:
-    return f"{d.clock} o'clock"
-
-
 def _words(d: Direction) -> str:
     angle, ends = interval_words(d.horizontal_deg, d.interval)
     if ends == "undetermined":
         return f"{d.name}: undetermined"
     around = f" ({ends})" if ends else ""
-    return f"{d.name}: {angle}{around}, {_clock_words(d)}"
+    return f"{d.name}: {angle}{around}, {d.clock} o'clock"
 
 
 def _numbers(out: Drawing, at: float, d: Direction, many: bool) -> float:
@@ -228,7 +217,7 @@ def _numbers(out: Drawing, at: float, d: Direction, many: bool) -> float:
         out.text((14.0, at), f"{title}undetermined", 17.0, INK, bold=True)
         out.text((14.0, at + 20.0), "the change of velocity is within its bound", 11.0, _SOFT)
     else:
-        out.text((14.0, at), f"{title}{angle}, {_clock_words(d)}", 17.0, INK, bold=True)
+        out.text((14.0, at), f"{title}{angle}, {d.clock} o'clock", 17.0, INK, bold=True)
         out.text((14.0, at + 20.0), f"95 %: {ends}" if ends else "", 11.5, INK)
     out.text((14.0, at + 37.0), f"change of velocity {speed}", 11.0, _SOFT)
     return at + 64.0
@@ -237,12 +226,12 @@ def _numbers(out: Drawing, at: float, d: Direction, many: bool) -> float:
 # Picture of the axes, angles, origin and mounting points of a vehicle, in three views.
 
 
-_CRASH_CONVENTIONS_WIDTH, _HEIGHT = 640.0, 376.0
+_PICTURE_WIDTH, _HEIGHT = 640.0, 376.0
 _TOP_VIEW = (172.0, 196.0)
 _SIDE_VIEW, _REAR_VIEW = (458.0, 92.0), (458.0, 272.0)
 _LONG, _ACROSS = 196.0, 96.0  # pixels available to the longest side, and to the width
 _CLOCK = 150.0
-_CRASH_CONVENTIONS_SOFT, _BODY = "#4a525c", "#3d5166"
+_BODY = "#3d5166"
 _FORWARD, _RIGHT, _DOWN = AXIS_COLOURS
 _FORCE = "#882255"
 _EXAMPLE = 40.0  # deg, of the example force that shows the sign of the angle
@@ -254,7 +243,6 @@ class MountingPoint:
 
     Attributes
     ----------
-    name : str
     position : sequence of float, (3,), m
         Vehicle axes, from the vehicle's origin.
     number : int
@@ -279,10 +267,8 @@ def conventions_picture(
     ----------
     outline : Outline
         In vehicle axes.
-    units : sequence of MountingPoint
     point : sequence of float, (3,), m
         Reference point, in vehicle axes from the vehicle's origin.
-    point_name : str
 
     Returns
     -------
@@ -295,7 +281,7 @@ def conventions_picture(
         f"nose up, heading clockwise from above; {point_name} at {_place(point)}; {where}"
     )
     rows = -(-(2 + len(units)) // 2)
-    out = Drawing(_CRASH_CONVENTIONS_WIDTH, _HEIGHT + 16.0 * rows + 4.0, alt)
+    out = Drawing(_PICTURE_WIDTH, _HEIGHT + 16.0 * rows + 4.0, alt)
     low, high = outline.low, outline.high
     length, width = (high - low).tolist()
     scale = min(_LONG / length, _ACROSS / width)
@@ -345,28 +331,23 @@ def _draw_above(out: Drawing, outline: Outline, view: Project, point: Sequence[f
     def pixels(points: np.ndarray) -> np.ndarray:
         return np.array([view(p) for p in points.tolist()], dtype=np.float64)
 
-    drawn = Outline(
-        pixels(outline.body),
-        tuple(pixels(w) for w in outline.windows),
-        tuple(pixels(f) for f in outline.folds),
-    )
-    draw_outline(out, drawn, _BODY, 1.4, fill="#eef1f5", opacity=1.0)
+    draw_outline(out, outline.mapped(pixels), _BODY, 1.4, fill="#eef1f5", opacity=1.0)
     centre = _TOP_VIEW
     out.circle(centre, _CLOCK, "#c3cad2", 1.0)
     for hour in range(1, 13):
-        ends = _polar(centre, _CLOCK, 30.0 * hour), _polar(centre, _CLOCK - 5.0, 30.0 * hour)
-        out.line(*ends, _CRASH_CONVENTIONS_SOFT, 1.0)
-        at = _polar(centre, _CLOCK + 11.0, 30.0 * hour)
+        ends = _at(centre, _CLOCK, 30.0 * hour), _at(centre, _CLOCK - 5.0, 30.0 * hour)
+        out.line(*ends, _SOFT, 1.0)
+        at = _at(centre, _CLOCK + 11.0, 30.0 * hour)
         out.text(at, str(hour), 10.5, INK, anchor="middle", bold=hour % 3 == 0)
     target = view(point)
     reach = _CLOCK - 9.0
-    tail = _polar(centre, reach, _EXAMPLE)
+    tail = _at(centre, reach, _EXAMPLE)
     away = math.hypot(tail[0] - target[0], tail[1] - target[1])
     share = max(0.0, 1.0 - 62.0 / away)
     tip = (tail[0] + share * (target[0] - tail[0]), tail[1] + share * (target[1] - tail[1]))
     out.line(tip, target, _FORCE, 0.9, "dot")
     out.arrow(tail, tip, _FORCE, 3.0)
-    _arc_crash_conventions(out, centre, _CLOCK - 16.0, 3.0, _EXAMPLE - 3.0, _FORCE)
+    _turn_arrow(out, centre, _CLOCK - 16.0, 3.0, _EXAMPLE - 3.0, _FORCE)
     out.text((centre[0] + 26.0, centre[1] - _CLOCK + 36.0), "PDOF +", SMALL, _FORCE, halo=True)
 
 
@@ -376,8 +357,8 @@ def _axes(out: Drawing, outline: Outline, above: Project, side: Project, behind:
     reach = max(y - above((front, 0.0, 0.0))[1], 0.0) + 20.0
     out.arrow((x, y), (x, y - reach), _FORWARD, 2.2)
     out.text((x + 6.0, y - reach + 2.0), "x", 11.0, _FORWARD, bold=True, halo=True)
-    _arc_crash_conventions(out, (x, y), reach - 8.0, -34.0, -4.0, INK)
-    out.text(_polar((x, y), reach + 2.0, -36.0), "heading +", SMALL, INK, anchor="end", halo=True)
+    _turn_arrow(out, (x, y), reach - 8.0, -34.0, -4.0, INK)
+    out.text(_at((x, y), reach + 2.0, -36.0), "heading +", SMALL, INK, anchor="end", halo=True)
     wide = max(above((0.0, right, 0.0))[0] - x, 0.0) + 26.0
     out.arrow((x, y), (x + wide, y), _RIGHT, 2.2)
     out.text((x + wide + 4.0, y), "y right", SMALL, _RIGHT, bold=True, halo=True)
@@ -388,8 +369,8 @@ def _axes(out: Drawing, outline: Outline, above: Project, side: Project, behind:
     out.text((x + reach + 4.0, y), "x forward", SMALL, _FORWARD, bold=True, halo=True)
     # Seen from the right, with the nose on the right, a nose-up pitch is counterclockwise.
     turn = math.degrees(34.0 / reach)
-    _arc_crash_conventions(out, (x, y), reach - 8.0, 84.0, 84.0 - turn, INK)
-    at = _polar((x, y), reach - 8.0, 84.0 - turn)
+    _turn_arrow(out, (x, y), reach - 8.0, 84.0, 84.0 - turn, INK)
+    at = _at((x, y), reach - 8.0, 84.0 - turn)
     out.text((at[0] + 6.0, at[1] - 4.0), "pitch +", SMALL, INK, halo=True)
     _down(out, side, (x, y))
     _through(out, (x, y), _RIGHT, True)
@@ -399,8 +380,8 @@ def _axes(out: Drawing, outline: Outline, above: Project, side: Project, behind:
     out.text((x + reach + 4.0, y), "y right", SMALL, _RIGHT, bold=True, halo=True)
     # Seen from behind, the right side goes down: clockwise.
     turn = math.degrees(38.0 / reach)
-    _arc_crash_conventions(out, (x, y), reach - 8.0, 84.0 - turn, 84.0, INK)
-    at = _polar((x, y), reach - 8.0, 84.0 - turn)
+    _turn_arrow(out, (x, y), reach - 8.0, 84.0 - turn, 84.0, INK)
+    at = _at((x, y), reach - 8.0, 84.0 - turn)
     out.text((at[0] + 6.0, at[1] - 4.0), "roll +", SMALL, INK, halo=True)
     _down(out, behind, (x, y))
     _through(out, (x, y), _FORWARD, False)
@@ -451,7 +432,7 @@ def _legend(
     for k in range(2 + len(units)):
         x, y = 22.0 + 316.0 * (k % 2), _HEIGHT + 4.0 + 16.0 * (k // 2)
         if k == 0:
-            out.circle((x, y), 6.0, _CRASH_CONVENTIONS_SOFT, 1.8, fill="#ffffff")
+            out.circle((x, y), 6.0, _SOFT, 1.8, fill="#ffffff")
             words = "origin of the vehicle, from which positions are"
         elif k == 1:
             _target(out, (x, y))
@@ -463,12 +444,7 @@ def _legend(
         out.text((x + 13.0, y), words, SMALL, INK)
 
 
-def _polar(centre: tuple[float, float], radius: float, angle_deg: float) -> tuple[float, float]:
-    a = math.radians(angle_deg)
-    return centre[0] + radius * math.sin(a), centre[1] - radius * math.cos(a)
-
-
-def _arc_crash_conventions(
+def _turn_arrow(
     out: Drawing,
     centre: tuple[float, float],
     radius: float,
@@ -478,7 +454,7 @@ def _arc_crash_conventions(
 ) -> None:
     """Draw an arc with an arrowhead at its end; angles clockwise from up."""
     angles = np.linspace(start_deg, end_deg, 24).tolist()
-    points = [_polar(centre, radius, a) for a in angles]
+    points = [_at(centre, radius, a) for a in angles]
     out.shape(points[:-3], colour, 1.5, closed=False)
     out.arrow(points[-5], points[-1], colour, 1.5)
 
@@ -488,7 +464,6 @@ def _arc_crash_conventions(
 
 #: Maps a position in vehicle axes, m, to pixels.
 Project = Callable[[Sequence[float]], tuple[float, float]]
-_CRASH_SILHOUETTE_BODY = "#3d5166"
 # Generic car from its side, along its length (0 the rear) and down from its origin, m; from
 # behind, in half widths.
 _SIDE = (
@@ -512,21 +487,17 @@ def draw_side(out: Drawing, outline: Outline, view: Project, scale: float) -> No
     )
     if outline.stated:
         shape = [(low, z) for _, z in _BOX] + [(high, z) for _, z in reversed(_BOX)]
-        out.shape(
-            [view((x, 0.0, z)) for x, z in shape], _CRASH_SILHOUETTE_BODY, 1.4, fill="#eef1f5"
-        )
+        out.shape([view((x, 0.0, z)) for x, z in shape], _BODY, 1.4, fill="#eef1f5")
         return
 
     def at(part: tuple[tuple[float, float], ...]) -> list[tuple[float, float]]:
         return [view((low + share * (high - low), 0.0, z)) for share, z in part]
 
-    out.shape(at(_SIDE), _CRASH_SILHOUETTE_BODY, 1.4, fill="#eef1f5")
-    out.shape(
-        at(_SIDE_GLASS), _CRASH_SILHOUETTE_BODY, 0.6, fill=_CRASH_SILHOUETTE_BODY, opacity=0.35
-    )
+    out.shape(at(_SIDE), _BODY, 1.4, fill="#eef1f5")
+    out.shape(at(_SIDE_GLASS), _BODY, 0.6, fill=_BODY, opacity=0.35)
     for share in (0.19, 0.81):
         wheel = view((low + share * (high - low), 0.0, 0.5 - _WHEEL))
-        out.circle(wheel, scale * _WHEEL, _CRASH_SILHOUETTE_BODY, 1.2, fill="#c5cdd6")
+        out.circle(wheel, scale * _WHEEL, _BODY, 1.2, fill="#c5cdd6")
 
 
 def draw_behind(out: Drawing, outline: Outline, view: Project) -> None:
@@ -542,14 +513,12 @@ def draw_behind(out: Drawing, outline: Outline, view: Project) -> None:
         return [view((0.0, middle + half * y, z)) for y, z in both]
 
     if outline.stated:
-        out.shape(whole(_BOX), _CRASH_SILHOUETTE_BODY, 1.4, fill="#eef1f5")
+        out.shape(whole(_BOX), _BODY, 1.4, fill="#eef1f5")
         return
     for y in (-0.82, 0.82):
         x = view((0.0, middle + half * y, 0.0))[0]
         top = view((0.0, 0.0, 0.5 - 2.0 * _WHEEL))[1]
         tyre = [(x - 5.0, top), (x + 5.0, top), (x + 5.0, ground), (x - 5.0, ground)]
-        out.shape(tyre, _CRASH_SILHOUETTE_BODY, 1.0, fill="#c5cdd6")
-    out.shape(whole(_REAR), _CRASH_SILHOUETTE_BODY, 1.4, fill="#eef1f5")
-    out.shape(
-        whole(_REAR_GLASS), _CRASH_SILHOUETTE_BODY, 0.6, fill=_CRASH_SILHOUETTE_BODY, opacity=0.25
-    )
+        out.shape(tyre, _BODY, 1.0, fill="#c5cdd6")
+    out.shape(whole(_REAR), _BODY, 1.4, fill="#eef1f5")
+    out.shape(whole(_REAR_GLASS), _BODY, 0.6, fill=_BODY, opacity=0.25)

@@ -8,20 +8,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown.crash.events import CrashEvent
 from strapdown.crash.path import PLACE, CrashPath
-from strapdown.report.chart import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
+from strapdown.report.chart import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION, Array
 from strapdown.report.crash_outline import Outline, draw_outline, path_moments
 from strapdown.report.document import Picture
-from strapdown.report.plan_view import PlanView, envelope
+from strapdown.report.plan import PlanView, envelope
 from strapdown.report.svg_drawing import INK, SMALL, Box, Drawing, text_width
 from strapdown.report.values import plain
 from strapdown.tables import NED
-
-Array = NDArray[np.float64]
-
 
 _WIDTH, _SMALL_WIDTH, _LEFT, _TOP = 640.0, 370.0, 58.0, 12.0
 _HEIGHTS = (170.0, 380.0)
@@ -73,17 +69,14 @@ def path_plan(
 
     Parameters
     ----------
-    path : CrashPath
     outline : Outline
         In vehicle axes.
-    events : sequence of CrashEvent
     point : sequence of float, m
         Reference point of the path, in vehicle axes.
     names : (str, str)
         Of the first two axes of the path.
     reference : DataFrame, optional
         ``north east`` of the point in the axes of the path, m, indexed by time.
-    reference_name : str
     small : bool
         Draw for half a page width, with letters as large as at the whole width.
 
@@ -126,11 +119,7 @@ def path_plan(
         last = k == len(cars) - 1
         draw_outline(
             out,
-            Outline(
-                view.pixels(car.body),
-                tuple(view.pixels(w) for w in car.windows),
-                tuple(view.pixels(f) for f in car.folds),
-            ),
+            car.mapped(view.pixels),
             moment.colour,
             1.5 if last else 1.2,
             moment.dash,

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -23,6 +23,7 @@ from strapdown.report.chart import (
     ORANGE,
     SKY,
     VERMILLION,
+    Array,
     Band,
     Chart,
     Fill,
@@ -43,33 +44,10 @@ from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
 from strapdown.sensors.synchronise import SynchronisedUnit
 from strapdown.tables import ACCEL, EULER, GYRO, NED, VELOCITY
 
-Array = NDArray[np.float64]
-
 _AXES = ("forward", "right", "down")
 _TURNS = ("roll", "pitch", "yaw")
 _ANGLES = ("roll", "pitch", "heading")
 _RAW = ((GREY, "solid"), (SKY, "dash"), (GREY, "dot"))
-
-
-@dataclass(frozen=True)
-class UnitSignals:
-    """Charts of one unit.
-
-    Attributes
-    ----------
-    name : str
-    crash : Chart
-        Specific force about the crash: as recorded and merged.
-    rates : Chart or None
-        Rates about the crash; None if the unit has no gyro of its own.
-    overview : Chart
-        The whole record.
-    """
-
-    name: str
-    crash: Chart
-    rates: Chart | None
-    overview: Chart
 
 
 def unit_signals(
@@ -78,34 +56,32 @@ def unit_signals(
     unit: UnitReconstruction,
     number: int,
     events: Sequence[CrashEvent],
-) -> UnitSignals:
-    """Chart the record of a unit.
+) -> list[Chart]:
+    """Chart the record of a unit: as a whole, specific force and rates about the crash.
 
     Parameters
     ----------
     recorded : CrashUnit
-        On its own clock.
-    synchronised : SynchronisedUnit
-    unit : UnitReconstruction
+        On its own clock; without a gyro of its own there is no chart of rates.
     number : int
         Index of the unit, from 0; sets its color.
     events : sequence of CrashEvent
         Events of the crash, from the mean of the units.
     """
-    if unit.at_point.prepared is None:
+    prepared = unit.at_point.prepared
+    if prepared is None:
         raise ValueError(f"{unit.name} is a mean of units, which recorded nothing")
-    imu = unit.at_point.prepared.imu
-    time = np.asarray(imu.index.to_numpy(), dtype=np.float64)
+    time = np.asarray(prepared.imu.index.to_numpy(), dtype=np.float64)
     span = crash_span(events, float(time[0]), float(time[-1]))
-    crash = _about_the_crash(recorded, synchronised, unit, number, span)
-    rates = None
+    about = [_about_the_crash(recorded, synchronised, unit, number, span)]
     if synchronised.lender is None and recorded.gyro is not None:
-        rates = _rates(recorded.gyro, recorded, synchronised, unit, number, span)
+        about.append(_rates(recorded.gyro, recorded, synchronised, unit, number, span))
     marks = event_marks(events, *span)
     bands = tuple(Band(1e3 * e.time_zero, 1e3 * e.end, "event") for e in events)
-    crash = replace(crash, marks=marks, bands=bands)
-    rates = None if rates is None else replace(rates, marks=marks, bands=bands)
-    return UnitSignals(unit.name, crash, rates, _overview(unit, number, events))
+    return [
+        _overview(unit, number, events),
+        *(replace(chart, marks=marks, bands=bands) for chart in about),
+    ]
 
 
 def _about_the_crash(
@@ -132,7 +108,6 @@ def _about_the_crash(
             g,
             span,
             _RAW[j % len(_RAW)],
-            lambda k: k == 0,
         )
         for k in range(3):
             rows[k] += lines[k]
@@ -149,8 +124,7 @@ def _about_the_crash(
     for k in range(3):
         if _AXES[k] in assumed:
             continue
-        line = curve(name, 1e3 * time[inside], force[inside, k], look["colour"], width=2.0)
-        rows[k].append(replace(line, legend=k == 0))
+        rows[k].append(curve(name, 1e3 * time[inside], force[inside, k], look["colour"], width=2.0))
         if cut[:, k].any():
             x, y = 1e3 * time[cut[:, k]], force[cut[:, k], k]
             rows[k].append(
@@ -204,17 +178,15 @@ def _rates(
     if there is not None:
         flags = (there.triad.table.index.to_numpy(dtype=np.float64), np.asarray(there.clipped))
     C = recorded.mounting.C_vs
-    rows = triad_lines(
-        gyro, flags, recorded, synchronised.offset, degree, span, _RAW[0], lambda k: k == 0
-    )
+    rows = triad_lines(gyro, flags, recorded, synchronised.offset, degree, span, _RAW[0])
     levels = [near_levels(gyro, C, rows[k][:1], k, degree, "deg/s") for k in range(3)]
     inside = (time >= span[0]) & (time <= span[1])
     rate = prepared.imu[GYRO].to_numpy(dtype=np.float64) / degree
     for k in range(3):
-        line = curve(
-            "bias taken off", 1e3 * time[inside], rate[inside, k], unit_look(number)["colour"]
+        colour = unit_look(number)["colour"]
+        rows[k].append(
+            curve("bias taken off", 1e3 * time[inside], rate[inside, k], colour, width=2.0)
         )
-        rows[k].append(replace(line, width=2.0, legend=k == 0))
     return Chart(
         f"rates-{number + 1}",
         f"{unit.name}: rates about the crash",
@@ -241,10 +213,7 @@ def _overview(unit: UnitReconstruction, number: int, events: Sequence[CrashEvent
     ):
         values = prepared.imu[columns].to_numpy(dtype=np.float64) / scale
         lines = [
-            replace(
-                curve(axis, time, values[:, k], AXIS_COLOURS[k], dash, buckets=BUCKETS),
-                legend=columns is ACCEL,
-            )
+            curve(axis, time, values[:, k], AXIS_COLOURS[k], dash, buckets=BUCKETS)
             for k, (axis, dash) in enumerate(zip(_AXES, ("solid", "dash", "dot"), strict=True))
             if named[k] not in assumed
         ]
@@ -308,7 +277,6 @@ def triad_lines(
     scale: float,
     span: tuple[float, float],
     look: tuple[str, str],
-    legend: Callable[[int], bool],
 ) -> list[list[Line]]:
     """Curves of one triad as recorded, by vehicle axis, with symbols at the end of its range."""
     C = unit.mounting.C_vs
@@ -323,8 +291,7 @@ def triad_lines(
     out = []
     for k in range(3):
         name = f"{triad.name}, as recorded"
-        line = curve(name, 1e3 * stamps[inside], values[:, k], look[0], look[1], 1.1, BUCKETS)
-        lines = [replace(line, legend=legend(k))]
+        lines = [curve(name, 1e3 * stamps[inside], values[:, k], *look, 1.1, BUCKETS)]
         held = at[ends[:, k]]
         if held.size and inside.any():
             found = np.interp(held, stamps[inside], values[:, k])
@@ -387,15 +354,12 @@ def place_chart(
 
     Parameters
     ----------
-    path : CrashPath
     names : (str, str)
         Of the first two axes of the path.
     samples : PathSamples, optional
         Monte Carlo samples, whose 95 % bounds are drawn beside the linear ones.
-    events : sequence of CrashEvent
     reference : DataFrame, optional
         ``north east down`` in the axes of the path, m, indexed by time.
-    reference_name : str
     """
     labels = [f"{name}, m" for name in (*names, "down")]
     panels = _panels(path, NED, labels, _sampled(samples, 6))
@@ -403,7 +367,7 @@ def place_chart(
         at = 1e3 * reference.index.to_numpy(dtype=np.float64)
         for k, column in enumerate(NED):
             y = reference[column].to_numpy(dtype=np.float64)
-            line = replace(curve(reference_name, at, y, VERMILLION, "dash", 1.6), legend=k == 0)
+            line = curve(reference_name, at, y, VERMILLION, "dash", 1.6)
             panels[k] = replace(panels[k], lines=(*panels[k].lines, line))
     return _chart(
         "place",
@@ -465,7 +429,6 @@ def reference_chart(
 
     Parameters
     ----------
-    comparison : PathComparison
     name : str
         Of the reference.
     names : (str, str)
@@ -478,8 +441,8 @@ def reference_chart(
     for k, axis in enumerate(NED):
         y = comparison.errors[axis].to_numpy(dtype=np.float64)
         half = comparison.bound[axis].to_numpy(dtype=np.float64)
-        line = replace(curve("path less reference", time, y, BLUE, width=1.8), legend=k == 0)
-        fill = Fill("95 % of path and reference", time, -half, half, BLUE, legend=k == 0)
+        line = curve("path less reference", time, y, BLUE, width=1.8)
+        fill = Fill("95 % of path and reference", time, -half, half, BLUE)
         label = f"{(*names, 'down')[k]}, m"
         panels.append(Panel(label, (line,), fills=(fill,), height=0.8))
     return Chart(
@@ -531,23 +494,13 @@ def _panels(
             # A heading of 359.9 deg at the entry is shown as -0.1 deg.
             y = y - 360.0 * np.round(y[path.anchor] / 360.0)
         half = TWO_SIDED_95 * sd[column].to_numpy(dtype=np.float64)
-        first = k == 0
-        lines = [replace(curve("reconstructed", time, y, BLACK, width=1.8), legend=first)]
-        fill = Fill("95 %, linear", time, y - half, y + half, BLUE, legend=first)
+        lines = [curve("reconstructed", time, y, BLACK, width=1.8)]
+        fill = Fill("95 %, linear", time, y - half, y + half, BLUE)
         if sampled is not None:
-            for j, edge in enumerate(sampled[k]):
+            for edge in sampled[k]:
                 there = np.isfinite(edge)
-                lines.append(
-                    Line(
-                        "95 %, Monte Carlo",
-                        time[there],
-                        (y + edge)[there],
-                        ORANGE,
-                        "dash",
-                        1.2,
-                        legend=first and j == 0,
-                    )
-                )
+                y_there = (y + edge)[there]
+                lines.append(Line("95 %, Monte Carlo", time[there], y_there, ORANGE, "dash", 1.2))
         panels.append(Panel(label, tuple(lines), fills=(fill,), height=0.8, steady=_STEADY))
     return panels
 

@@ -52,7 +52,6 @@ def write_crash_simulation(
 
     Parameters
     ----------
-    spec : CrashSimulationSpec
     out : Path
         Folder to create.
     force : bool
@@ -423,7 +422,6 @@ def case_text(recorded: RecordedCase, places: Mapping[str, PartPlace], seed: int
 
     Parameters
     ----------
-    recorded : RecordedCase
     places : mapping of str to PartPlace
         By `part_file`.
     seed : int

@@ -35,7 +35,7 @@ FROM_THE_ENTRY = (
 )
 
 
-def answers_table(result: CaseResult) -> TableBlock:
+def answers_table(result: CaseResult) -> TableBlock | None:
     """Delta-V of every event, by every recorder."""
     rows: list[tuple[str, ...]] = []
     strong = []
@@ -59,6 +59,8 @@ def answers_table(result: CaseResult) -> TableBlock:
                     about(KMH * changes.peak.resultant, KMH * changes.peak.resultant_bound, ""),
                 )
             )
+    if not rows:
+        return None
     ms = 1e3 * result.spec.options.peak_window_s
     return TableBlock(
         (
@@ -80,7 +82,7 @@ def answers_table(result: CaseResult) -> TableBlock:
     )
 
 
-def direction_table(result: CaseResult) -> TableBlock:
+def direction_table(result: CaseResult) -> TableBlock | None:
     """Directions of force by window, along the axes of the vehicle and of the path."""
     rows: list[tuple[str, ...]] = []
     ground = over_ground(result)
@@ -106,6 +108,8 @@ def direction_table(result: CaseResult) -> TableBlock:
                         *path,
                     )
                 )
+    if not rows:
+        return None
     axes = "over ground, azimuth" if ground else "against the entry"
     told = (
         "the same over ground, from north"

@@ -10,8 +10,16 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from strapdown.report.document import Block, Document, Items, Links, Paragraph, Picture, Section
-from strapdown.report.document_html import document_page
+from strapdown.report.document import (
+    Block,
+    Document,
+    Items,
+    Links,
+    Paragraph,
+    Picture,
+    Section,
+    document_page,
+)
 from strapdown.report.values import plain
 
 _MS_TO_KMH = 3.6
@@ -33,8 +41,6 @@ class Shown:
         A, B or C: one of the three systems.
     slug : str
         Its folder beside the page.
-    title : str
-    question : str
     command : str
         Command that reproduces it, typed beside the page's own folder.
     figures : tuple of str
@@ -79,7 +85,6 @@ def shown_truth(bundle: Path, records: Path | None = None) -> str | None:
 
     Parameters
     ----------
-    bundle : Path
     records : Path, optional
         Of a simulated crash.
 
@@ -105,7 +110,6 @@ def demo_page(shown: Sequence[Shown], folder: Path, missing: str | None = None) 
     ----------
     shown : sequence of Shown
         Runs with their bundles in `folder`.
-    folder : Path
     missing : str, optional
         Missing parts, and the reason.
 

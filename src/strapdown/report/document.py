@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
+import json
 import re
 import unicodedata
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
+from importlib.resources import files
 from itertools import count
 from pathlib import Path
 from typing import Any, TypeVar
 from xml.etree import ElementTree
 
 from strapdown.errors import DataError, Finding, Words
-from strapdown.report.chart import Chart
+from strapdown.report.chart import Chart, Scene
 from strapdown.report.chart_svg import still
-from strapdown.report.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -23,7 +26,6 @@ class Paragraph:
 
     Attributes
     ----------
-    text : str
     kind : {'plain', 'lead', 'note', 'warning', 'mono'}
         ``lead`` is the one paragraph of page one; ``mono`` a command or digest.
     """
@@ -62,10 +64,8 @@ class TableBlock:
     ----------
     columns : tuple of str
         With units.
-    rows : tuple of tuple of str
     text : tuple of int
         Left-aligned text columns; the others are right-aligned numbers.
-    caption, title : str
     strong : tuple of int
         Emphasized rows, such as a sum.
     passed : frozenset of (int, int)
@@ -82,13 +82,6 @@ class TableBlock:
 
 
 @dataclass(frozen=True)
-class ChartBlock:
-    """A chart: interactive in the page, a still in the PDF and among the figures."""
-
-    chart: Chart
-
-
-@dataclass(frozen=True)
 class Picture:
     """A custom SVG picture, the same in page and PDF.
 
@@ -98,7 +91,6 @@ class Picture:
         File name among the figures.
     svg : str
         A whole SVG; all external text in it is escaped.
-    title, caption : str
     alt : str
         Text alternative for readers who cannot see it.
     width_mm : float
@@ -146,9 +138,8 @@ class KeyFigures:
     pictures: tuple[Picture, ...] = ()
 
 
-Block = (
-    Paragraph | Items | Links | Facts | TableBlock | ChartBlock | Picture | Animation | KeyFigures
-)
+#: A chart is interactive in the page, a still in the PDF and among the figures.
+Block = Paragraph | Items | Links | Facts | TableBlock | Chart | Picture | Animation | KeyFigures
 
 
 @dataclass(frozen=True)
@@ -160,18 +151,26 @@ class Section:
     blocks: tuple[Block, ...]
 
 
+def blocks(*found: Block | None) -> tuple[Block, ...]:
+    """Return the blocks that there are."""
+    return tuple(block for block in found if block is not None)
+
+
+def section(slug: str, title: str, *found: Block | None) -> Section:
+    """Make a section of the blocks that there are."""
+    return Section(slug, title, blocks(*found))
+
+
 @dataclass(frozen=True)
 class Document:
     """A whole report.
 
     Attributes
     ----------
-    title, subtitle : str
     facts : tuple of (str, str)
         Under the title: case, vehicle, software.
     front : tuple of Block
         Page one.
-    sections : tuple of Section
     footer : str
         On every page of the PDF, beside the page number.
     links : tuple of (str, str)
@@ -185,6 +184,31 @@ class Document:
     sections: tuple[Section, ...]
     footer: str = ""
     links: tuple[tuple[str, str], ...] = ()
+
+
+def paragraph(text: str | None, kind: str = "plain") -> Paragraph | None:
+    """Make a paragraph if there is a text."""
+    return Paragraph(text, kind) if text else None
+
+
+def taken_for_given(*texts: str) -> tuple[Block, ...]:
+    """Return the assumptions of a report."""
+    return Paragraph("Taken for given:"), Items(tuple(("", text) for text in texts))
+
+
+def run_again(name: str) -> tuple[Block, ...]:
+    """Return the command that verifies a folder; nothing without its name."""
+    if not name:
+        return ()
+    return (
+        Paragraph("To run it again and compare every byte:"),
+        Paragraph(f"strapdown verify {name}", "mono"),
+    )
+
+
+def capital(text: str) -> str:
+    """Return a text with a capital first letter."""
+    return f"{text[:1].upper()}{text[1:]}"
 
 
 def findings_list(findings: Iterable[Finding]) -> Items | Paragraph:
@@ -201,6 +225,88 @@ def finding_json(finding: Finding, words: Words = "file") -> dict[str, Any]:
     """Return a finding for programs, with its sentence and remedy for people."""
     said = {"sentence": finding.sentence(words), "remedy": finding.advice(words)}
     return {**finding.plain(), **said}
+
+
+# Whether an answer can be trusted, and why.
+
+
+MOST_SAID = 2  # reasons against an answer in one sentence
+WORDS = {
+    "trusted": "It can be trusted",
+    "reserve": "Use with caution",
+    "distrusted": "It should not be trusted",
+}
+
+
+@dataclass(frozen=True)
+class Trust:
+    """Verdict on an answer, with its reasons.
+
+    Attributes
+    ----------
+    verdict : {'trusted', 'reserve', 'distrusted'}
+    reasons : tuple of Finding
+        A note supports the answer, a warning contradicts it.
+    short : tuple of Finding
+        Supporting reasons in short form.
+    """
+
+    verdict: str
+    reasons: tuple[Finding, ...]
+    short: tuple[Finding, ...] = ()
+
+    @property
+    def supporting(self) -> tuple[Finding, ...]:
+        """Reasons that support the answer."""
+        return tuple(one for one in self.reasons if one.severity == "note")
+
+    @property
+    def against(self) -> tuple[Finding, ...]:
+        """Reasons against the answer."""
+        return tuple(one for one in self.reasons if one.severity != "note")
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in words, with the reasons against the answer."""
+        against = [one.sentence() for one in self.against]
+        said = WORDS[self.verdict]
+        if against:
+            more = len(against) - MOST_SAID
+            rest = f"; and {more} more, under 'The answer'" if more > 0 else ""
+            return f"{said}: {'; '.join(against[:MOST_SAID])}{rest}."
+        short = [one.sentence() for one in self.short]
+        if len(short) > 1:
+            short = [f"{', '.join(short[:-1])}, and {short[-1]}"]
+        return f"{said}: {short[0]}." if short else f"{said}."
+
+    @property
+    def paragraph(self) -> Paragraph:
+        """The verdict for page one."""
+        return Paragraph(self.sentence, "lead" if self.verdict == "trusted" else "warning")
+
+    @property
+    def blocks(self) -> tuple[Block, ...]:
+        """Every reason, for and against."""
+        said = tuple(
+            ("For it" if one.severity == "note" else "Against it", f"{one.sentence()}.")
+            for one in self.reasons
+        )
+        if not said:
+            return ()
+        return Paragraph("What speaks for the answer, and what against it:"), Items(said)
+
+    def json(self) -> dict[str, Any]:
+        """Return the verdict for programs."""
+        return {
+            "verdict": self.verdict,
+            "for": [finding_json(f) for f in self.supporting],
+            "against": [finding_json(f) for f in self.against],
+        }
+
+
+def reason(good: bool, code: str, **data: Any) -> Finding:
+    """Return a reason for an answer or against it."""
+    return Finding(code, severity="note" if good else "warning", data=data)
 
 
 # Conversion of every text in a document to plain text.
@@ -348,11 +454,7 @@ def draw_stills(document: Document) -> tuple[str, ...]:
 
 
 def _charts(document: Document) -> list[Chart]:
-    blocks = [
-        *document.front,
-        *(block for section in document.sections for block in section.blocks),
-    ]
-    return [block.chart for block in blocks if isinstance(block, ChartBlock)]
+    return [block for block in drawings(document) if isinstance(block, Chart)]
 
 
 def document_data(
@@ -427,8 +529,8 @@ class _Writer:
             return {"kind": "facts", "rows": _pairs(block.rows)}
         if isinstance(block, TableBlock):
             return self._table(block)
-        if isinstance(block, ChartBlock):
-            return self._chart(block.chart)
+        if isinstance(block, Chart):
+            return self._chart(block)
         if isinstance(block, Picture):
             return self._picture(block) | {"kind": "picture", "number": next(self._figures)}
         if isinstance(block, Animation):
@@ -523,11 +625,11 @@ class _Writer:
 # Drawings of a document as files beside the page.
 
 
-def drawings(document: Document) -> list[ChartBlock | Picture | Animation]:
+def drawings(document: Document) -> list[Chart | Picture | Animation]:
     """Return every chart, picture and animation, in report order."""
-    found: list[ChartBlock | Picture | Animation] = []
+    found: list[Chart | Picture | Animation] = []
     for block in (*document.front, *(b for s in document.sections for b in s.blocks)):
-        if isinstance(block, ChartBlock | Picture | Animation):
+        if isinstance(block, Chart | Picture | Animation):
             found.append(block)
         elif isinstance(block, KeyFigures):
             found += block.pictures
@@ -539,17 +641,15 @@ def write_drawings(document: Document, stills: Sequence[str], folder: Path) -> N
 
     Parameters
     ----------
-    document : Document
     stills : sequence of str
-        Drawn charts from `document_data.draw_stills`, one per chart.
-    folder : Path
+        Drawn charts from `draw_stills`, one per chart.
     """
     folder.mkdir()
     drawn = iter(stills)
     for block in drawings(document):
         match block:
-            case ChartBlock(chart=chart):
-                write_text(folder / f"{chart.slug}.svg", next(drawn))
+            case Chart(slug=slug):
+                write_text(folder / f"{slug}.svg", next(drawn))
             case Picture() as picture:
                 write_text(folder / f"{picture.slug}.svg", picture.svg)
             case Animation(stills=Picture() as picture):
@@ -559,3 +659,81 @@ def write_drawings(document: Document, stills: Sequence[str], folder: Path) -> N
 def write_text(path: Path, text: str) -> None:
     """Write a text file, the same bytes on every system."""
     path.write_text(text, encoding="utf-8", newline="\n")
+
+
+# A document as one page that needs no network, and works without scripts.
+
+
+_TITLE_ELEMENT = re.compile("<title>.*?</title>", re.DOTALL)
+
+
+def document_page(document: Document, *, stills: Sequence[str] | None = None) -> str:
+    """Lay out a document as an HTML page.
+
+    Parameters
+    ----------
+    document : Document
+        Texts are made plain by `plain_document`, then escaped.
+    stills : sequence of str, optional
+        Drawn charts from `draw_stills`, if already made.
+
+    Returns
+    -------
+    str
+        HTML, the same for the same document, whole without scripts but for scenes that move.
+        Charts are SVG of `chart_svg`, with every text escaped; pictures are embedded as images,
+        which cannot run scripts or fetch resources. A content policy in the page allows its own
+        script and no other.
+    """
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+    from markupsafe import Markup
+
+    drawn = draw_stills(document) if stills is None else stills
+    data = document_data(document, drawn, _image, alive=True)
+    sections = (block for section in data["sections"] for block in section["blocks"])
+    alive = False
+    for block in (*data["front"], *sections):
+        if "svg" in block:
+            # The browser would show a title wherever the pointer rests on the chart.
+            drawn_svg = _TITLE_ELEMENT.sub("", block["svg"], count=1)
+            block["svg"] = Markup(drawn_svg.replace(' xmlns="http://www.w3.org/2000/svg"', "", 1))
+        elif "scene" in block:
+            block["json"] = _embedded(block["scene"].data())
+        else:
+            continue
+        alive = True
+    script = files("strapdown.report").joinpath("templates", "document.js").read_text("utf-8")
+    environment = Environment(
+        loader=PackageLoader("strapdown.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template("document.html").render(
+        document=data,
+        script=Markup(script) if alive else "",
+        policy=_digest(script) if alive else "'none'",
+    )
+
+
+def _image(svg: str) -> str:
+    # A lone surrogate has no UTF-8.
+    whole = base64.b64encode(svg.encode("utf-8", "replace")).decode("ascii")
+    return f"data:image/svg+xml;base64,{whole}"
+
+
+def _digest(script: str) -> str:
+    """Digest of a script for the page's content policy; an unlisted script does not run."""
+    whole = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
+    return f"'sha256-{whole}'"
+
+
+def _embedded(figure: Mapping[str, Any]) -> Any:
+    """Encode JSON for a script element; no text in it can end the element or begin another."""
+    from markupsafe import Markup
+
+    text = json.dumps(figure, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+    for char in "<>&":
+        text = text.replace(char, f"\\u{ord(char):04x}")
+    return Markup(text)

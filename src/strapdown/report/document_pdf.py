@@ -23,10 +23,9 @@ def write_pdf(document: Document, path: Path, *, stills: Sequence[str] | None = 
     Parameters
     ----------
     document : Document
-        Texts are made plain by `document.plain_document`, and reach typst as values only.
-    path : Path
+        Texts are made plain by `plain_document`, and reach typst as values only.
     stills : sequence of str, optional
-        Drawn charts from `document_data.draw_stills`, if already made.
+        Drawn charts from `draw_stills`, if already made.
 
     Raises
     ------

@@ -11,10 +11,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown.alignment.alignment import Alignment
-from strapdown.bundle.seal import Seal, to_json
+from strapdown.bundle.seal import to_json
 from strapdown.config.navigation import STAGES, NavigationSpec
 from strapdown.errors import ConfigError
 from strapdown.evaluation.plane_bound import plane_bound
@@ -25,114 +24,78 @@ from strapdown.navigation.consistency import Inconsistency
 from strapdown.navigation.heading_integrity import COLOURS, REASONS
 from strapdown.navigation.integrity import Repeated
 from strapdown.navigation.record import NavigationRecord
-from strapdown.progress import Progress, silent
+from strapdown.progress import Progress
 from strapdown.report import navigation_charts as charts
-from strapdown.report.chart import Chart
-from strapdown.report.chart_figure import ChartFigure
-from strapdown.report.document import draw_stills, finding_json, write_drawings, write_text
-from strapdown.report.document_html import document_page
+from strapdown.report.chart import Array, Chart
+from strapdown.report.chart_svg import ChartFigure
+from strapdown.report.document import document_page, finding_json, write_text
 from strapdown.report.navigation_charts import innovation_chart
-from strapdown.report.navigation_document import CONVENTIONS, navigation_document
-from strapdown.report.navigation_found import (
+from strapdown.report.navigation_document import (
+    CONVENTIONS,
+    cautions,
+    headline,
+    navigation_document,
+)
+from strapdown.report.navigation_evaluation import (
     Agreement,
-    NavigationFound,
-    NavigationTold,
+    NavigationEvaluation,
     Score,
     agreements,
-    examine,
-    told_of,
+    distance_over_ground,
+    evaluation_of,
+    trust,
+    worst_within,
 )
 from strapdown.report.navigation_plan import plan_chart
-from strapdown.report.navigation_trust import trust
-from strapdown.report.navigation_words import cautions, headline
-from strapdown.report.report_bundle import report_bundle
-from strapdown.report.values import distance_over_ground, worst_within
-from strapdown.report.verdict_document import light_section, verdict_document
-from strapdown.report.verdict_words import (
+from strapdown.report.report_bundle import (
+    ReportBundle,
+    file_of,
+    json_number,
+    with_file,
+    write_report,
+)
+from strapdown.report.verdict import (
     answer,
     first_words,
+    light_section,
     promise,
     repeated_words,
+    verdict_document,
     witness_words,
 )
 from strapdown.systems.navigation_run import NavigationRun, run_navigation
-from strapdown.systems.one_thread import one_thread
 from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
 
 
-def rerun_navigation(configuration: dict[str, Any], out: Path, *, report: bool = True) -> Seal:
-    """Re-run a sealed navigation run from its configuration, with or without its page."""
+def _configuration(result: NavigationRun) -> dict[str, Any]:
+    return with_file({"navigation": result.spec.plain()}, result)
+
+
+def _run(configuration: dict[str, Any]) -> NavigationRun:
     spec = NavigationSpec.checked(configuration["navigation"])
-    path = configuration.get("file_path")
-    name = str(configuration["name"])
-    return write_navigation(
-        run_navigation(spec, None if path is None else Path(path)), out, name=name, report=report
-    )
+    return run_navigation(spec, file_of(configuration))
 
 
-@one_thread()
-def write_navigation(
-    result: NavigationRun,
-    out: str | Path,
-    *,
-    name: str | None = None,
-    report: bool = True,
-    force: bool = False,
-    progress: Progress = silent,
-) -> Seal:
-    """Write a navigation run as a sealed bundle.
+def _write_all(
+    result: NavigationRun, folder: Path, name: str, report: bool, progress: Progress
+) -> None:
+    found = evaluation_of(result)
+    write_text(folder / "navigation.json", to_json(navigation_json(result, found)))
+    write_navigation_files(result, folder)
+    if report:
+        write_verdict(result, name, folder)
+        document = navigation_document(found, name, light_section(result))
+        write_report(document, folder, progress, figures=result.spec.output.figures)
 
-    Parameters
-    ----------
-    result : NavigationRun
-    out : str or Path
-        Folder to create.
-    name : str, optional
-        Folder name shown in the report; by default that of `out`.
-    report : bool
-        Whether to write the pages and the figures.
-    force : bool
-        Overwrite an existing bundle.
-    progress : callable, optional
 
-    Raises
-    ------
-    ConfigError
-        `out` exists and may not be replaced.
-    """
-    name = Path(out).absolute().name if name is None else name
-    seals: list[Seal] = []
-    with report_bundle(
-        result,
-        out,
-        "navigate",
-        key="navigation",
-        name=name,
-        force=force,
-        seals=seals,
-        report=report,
-    ) as folder:
-        progress("writing the tables", 0.82)
-        found = examine(told_of(result))
-        write_text(folder / "navigation.json", to_json(navigation_json(result, found)))
-        write_navigation_files(result, folder)
-        if report:
-            write_verdict(result, name, folder)
-            progress("drawing the figures", 0.86)
-            document = navigation_document(found.told, name, found, light_section(result))
-            stills = draw_stills(document)
-            if result.spec.output.figures:
-                write_drawings(document, stills, folder / "figures")
-            progress("writing the page", 0.95)
-            write_text(folder / "report.html", document_page(document, stills=stills))
-        progress("sealing", 0.97)
-    return seals[0]
+#: Pages, JSON, tables and paths for maps of a navigation run.
+NAVIGATION = ReportBundle("navigate", _configuration, _run, _write_all)
 
 
 # Charts of a navigation run as figures for a notebook.
 
 
-KINDS: dict[str, Callable[[NavigationTold], Chart | None]] = {
+KINDS: dict[str, Callable[[NavigationEvaluation], Chart | None]] = {
     "plan": plan_chart,
     "bound": charts.bound_chart,
     "height": charts.height_chart,
@@ -146,7 +109,6 @@ def plot(result: NavigationRun, kind: str) -> ChartFigure:
 
     Parameters
     ----------
-    result : NavigationRun
     kind : str
         One of `KINDS`, or the name of an observation.
 
@@ -163,7 +125,7 @@ def plot(result: NavigationRun, kind: str) -> ChartFigure:
         raise ConfigError(
             "report.unknown-chart", quantity="kind", word=kind, known=[*KINDS, *observed]
         )
-    chart = KINDS[kind](told_of(result))
+    chart = KINDS[kind](evaluation_of(result))
     if chart is None:
         raise ConfigError("report.no-path-to-draw", quantity=f"kind '{kind}'")
     return ChartFigure(chart)
@@ -174,17 +136,16 @@ def plot(result: NavigationRun, kind: str) -> ChartFigure:
 
 MODULES = (*STAGES, "aiding")
 
-Array = NDArray[np.float64]
 
-
-def navigation_json(result: NavigationRun, found: NavigationFound | None = None) -> dict[str, Any]:
+def navigation_json(
+    result: NavigationRun, found: NavigationEvaluation | None = None
+) -> dict[str, Any]:
     """Return a navigation run as plain data for programs.
 
     Parameters
     ----------
-    result : NavigationRun
-    found : NavigationFound, optional
-        From `examine`, if already computed.
+    found : NavigationEvaluation, optional
+        From `evaluation_of`, if already computed.
 
     Returns
     -------
@@ -193,16 +154,11 @@ def navigation_json(result: NavigationRun, found: NavigationFound | None = None)
     """
     record, source = result.record, result.source
     time = record.trajectory.index
-    found = examine(told_of(result)) if found is None else found
-    verdict = trust(found)
+    found = evaluation_of(result) if found is None else found
     return {
         "conventions": {key.lower().replace(" ", "_"): text for key, text in CONVENTIONS},
         "answer": _plain(headline(found)),
-        "trust": {
-            "verdict": verdict.verdict,
-            "for": [finding_json(f) for f in verdict.supporting],
-            "against": [finding_json(f) for f in verdict.against],
-        },
+        "trust": trust(found).json(),
         "cautions": [_plain(f"{head}: {text}") for head, text in cautions(found)],
         "record": {
             "name": source.name,
@@ -228,8 +184,8 @@ def navigation_json(result: NavigationRun, found: NavigationFound | None = None)
         "sensors": {
             str(name): {
                 "unit": record.units.get(str(name), ""),
-                "estimate": _number(record.sensors[name].iloc[-1]),
-                "sd": _number(record.sensors_sd[name].iloc[-1]),
+                "estimate": json_number(record.sensors[name].iloc[-1]),
+                "sd": json_number(record.sensors_sd[name].iloc[-1]),
             }
             for name in record.sensors.columns
         },
@@ -241,14 +197,14 @@ def navigation_json(result: NavigationRun, found: NavigationFound | None = None)
                 "aid": w.aid,
                 "from_s": w.begin,
                 "to_s": w.end,
-                "largest_horizontal_error_m": _number(w.error_m),
-                "bound_95_m": _number(w.bound_m),
+                "largest_horizontal_error_m": json_number(w.error_m),
+                "bound_95_m": json_number(w.bound_m),
                 "inside": w.inside,
                 "largest_horizontal_error_forward_m": (
-                    None if w.forward_m is None else _number(w.forward_m)
+                    None if w.forward_m is None else json_number(w.forward_m)
                 ),
             }
-            for w in found.told.withheld
+            for w in found.withheld
         ],
         "modes": [{"mode": s.name, "from_s": s.begin, "to_s": s.end} for s in record.modes],
         "events": [
@@ -261,7 +217,7 @@ def navigation_json(result: NavigationRun, found: NavigationFound | None = None)
     }
 
 
-def _smoothing(found: NavigationFound) -> dict[str, Any] | None:
+def _smoothing(found: NavigationEvaluation) -> dict[str, Any] | None:
     """Agreement of filter and smoother; None for a run without smoothing."""
     one = found.smoother
     if one is None:
@@ -269,8 +225,8 @@ def _smoothing(found: NavigationFound) -> dict[str, Any] | None:
     return {
         name: {
             "instants": int(one.instants[k]),
-            "share_within_3_sd": _number(one.share[k]),
-            "rms_in_sd": _number(one.rms[k]),
+            "share_within_3_sd": json_number(one.share[k]),
+            "rms_in_sd": json_number(one.rms[k]),
         }
         for k, name in enumerate(one.columns)
     }
@@ -289,25 +245,25 @@ def _method(result: NavigationRun) -> dict[str, Any]:
     return chosen
 
 
-def _against(found: NavigationFound) -> dict[str, Any] | None:
+def _against(found: NavigationEvaluation) -> dict[str, Any] | None:
     """Errors against the truth, at the samples after the covariance marks."""
     errors = found.errors
     if errors is None:
         return None
     return {
-        "name": found.told.truth_name,
+        "name": found.truth_name,
         "instants": len(errors.time),
         "from_s": float(errors.time[0]),
         "to_s": float(errors.time[-1]),
-        "mean_nees": _number(errors.nees.mean()) if errors.freedom else None,
+        "mean_nees": json_number(errors.nees.mean()) if errors.freedom else None,
         "nees_of": errors.freedom,
         "errors": {score.quantity: _score(score) for score in errors.scores},
     }
 
 
-def _points(found: NavigationFound) -> dict[str, Any] | None:
+def _points(found: NavigationEvaluation) -> dict[str, Any] | None:
     """Errors at the control points, after the best fit of origin and heading."""
-    score = found.told.points
+    score = found.points
     if score is None:
         return None
     return {
@@ -328,7 +284,7 @@ def _outages(record: NavigationRecord) -> list[dict[str, Any]]:
     for aid, spans in record.outages.items():
         for span in spans:
             worst = worst_within(record, span)
-            bound = None if worst is None else _number(worst[0])
+            bound = None if worst is None else json_number(worst[0])
             out.append(
                 {
                     "aid": aid,
@@ -343,15 +299,15 @@ def _outages(record: NavigationRecord) -> list[dict[str, Any]]:
 def _score(score: Score) -> dict[str, Any]:
     unit = {"m": "m", "m/s": "m_per_s", "deg": "deg"}[score.unit]
     return {
-        f"rms_{unit}": _number(score.rms),
-        f"largest_{unit}": _number(score.largest),
+        f"rms_{unit}": json_number(score.rms),
+        f"largest_{unit}": json_number(score.largest),
         "largest_at_s": score.largest_at,
-        f"bound_95_rms_{unit}": _number(score.bound),
+        f"bound_95_rms_{unit}": json_number(score.bound),
         "share_within_bound": score.share,
     }
 
 
-def _state(found: NavigationFound, row: int) -> dict[str, Any]:
+def _state(found: NavigationEvaluation, row: int) -> dict[str, Any]:
     """Position, velocity and attitude with the standard deviations of the nearest mark."""
     record = found.record
     at, how = record.trajectory.iloc[row], record.sd.iloc[row]
@@ -360,10 +316,10 @@ def _state(found: NavigationFound, row: int) -> dict[str, Any]:
     names = [*GEODETIC, *VELOCITY, *EULER]
     return {
         "time_s": float(record.trajectory.index[row]),
-        **{f"{n}_{units[n]}": _number(at[n]) for n in names},
+        **{f"{n}_{units[n]}": json_number(at[n]) for n in names},
         "sd_at_s": float(record.sd.index[row]),
-        **{f"{n}_sd_{units[n]}": _number(how[n]) for n in [*NED, *VELOCITY, *EULER]},
-        "horizontal_bound_95_m": _number(plane_bound(record.covariance)[row]),
+        **{f"{n}_sd_{units[n]}": json_number(how[n]) for n in [*NED, *VELOCITY, *EULER]},
+        "horizontal_bound_95_m": json_number(plane_bound(record.covariance)[row]),
     }
 
 
@@ -386,16 +342,18 @@ def _innovations(one: Agreement) -> dict[str, Any]:
         "epochs": one.epochs,
         "rejected": one.rejected,
         "weakened": one.weakened,
-        "rms_in_sd": _number(one.ratio),
-        "mean_nis": _number(one.mean_nis),
-        "mean_nis_expected_95": [_number(x) for x in one.band],
-        "correlation_next_epoch": _number(one.correlation),
-        "correlation_by_chance_95": _number(one.correlation_bound),
+        "rms_in_sd": json_number(one.ratio),
+        "mean_nis": json_number(one.mean_nis),
+        "mean_nis_expected_95": [json_number(x) for x in one.band],
+        "correlation_next_epoch": json_number(one.correlation),
+        "correlation_by_chance_95": json_number(one.correlation_bound),
         "verdicts": [
             {"kind": v.kind, "component": v.component, "since_s": v.since, "what": v.finding.what}
             for v in one.consistency.verdicts
         ],
-        "rms": {label: _number(_rms(one.nu[one.used, k])) for k, label in enumerate(one.labels)},
+        "rms": {
+            label: json_number(_rms(one.nu[one.used, k])) for k, label in enumerate(one.labels)
+        },
     }
 
 
@@ -405,11 +363,6 @@ def _rms(values: Array) -> float:
 
 def _plain(text: str) -> str:
     return text.replace("\u00a0", " ")
-
-
-def _number(value: Any) -> float | None:
-    number = float(value)
-    return number if math.isfinite(number) else None
 
 
 # Files of a navigation run beside its report: tables over time, and paths for maps.
@@ -428,7 +381,6 @@ def write_navigation_files(result: NavigationRun, folder: Path) -> None:
 
     Parameters
     ----------
-    result : NavigationRun
     folder : Path
         ``trajectory.*`` in the requested formats, ``sd.csv``, ``sensor_errors.csv``,
         ``innovations/NAME.csv``, ``events.csv``, and ``errors.csv`` if the truth is known; for a
@@ -519,10 +471,8 @@ def write_verdict(result: NavigationRun, name: str, folder: Path) -> None:
 
     Parameters
     ----------
-    result : NavigationRun
     name : str
         Folder name shown on the page.
-    folder : Path
     """
     write_text(folder / "verdict.html", document_page(verdict_document(result, name)))
     write_text(folder / "verdict.json", to_json(verdict_json(result)))
@@ -558,8 +508,8 @@ def verdict_json(result: NavigationRun) -> dict[str, Any]:
     return {
         "answer": _plain(answer(result)),
         "place": {
-            "bound_95_at_end_m": _number(bounds[-1]),
-            "largest_bound_95_m": _number(bounds.max()),
+            "bound_95_at_end_m": json_number(bounds[-1]),
+            "largest_bound_95_m": json_number(bounds.max()),
             "borne_out": bool(trust.consistency) and trust.against_bounds is None,
         },
         "heading": {
@@ -585,14 +535,14 @@ def verdict_json(result: NavigationRun) -> dict[str, Any]:
                 {
                     "time_s": a.time,
                     "light": a.span.colour,
-                    "sd_deg": _number(a.sd),
+                    "sd_deg": json_number(a.sd),
                     "manoeuvres": [
                         {
                             "what": m.what,
                             "forward_m_per_s2": m.forward,
                             "aside_m_per_s2": m.aside,
                             "duration_s": m.duration,
-                            "sd_after_deg": _number(sd),
+                            "sd_after_deg": json_number(sd),
                         }
                         for m, sd in a.options
                     ],
@@ -620,9 +570,9 @@ def _repeated(repeated: Repeated, result: NavigationRun) -> dict[str, Any]:
         turn = np.abs(table["heading"].to_numpy(dtype=np.float64))
         for name, unit, values in (("place", "m", place), ("heading", "deg", turn)):
             out[f"{name}_apart"] = {
-                f"median_{unit}": _number(np.median(values)),
-                f"largest_{unit}": _number(values.max()),
-                f"at_end_{unit}": _number(values[-1]),
+                f"median_{unit}": json_number(np.median(values)),
+                f"largest_{unit}": json_number(values.max()),
+                f"at_end_{unit}": json_number(values[-1]),
             }
     return out
 

@@ -19,6 +19,7 @@ from strapdown.report.chart import (
     PURPLE,
     SKY,
     VERMILLION,
+    Array,
     Band,
     Chart,
     Fill,
@@ -32,16 +33,17 @@ from strapdown.report.chart import (
     thin_fill,
 )
 from strapdown.report.chart import BUCKETS_OVER_TIME as BUCKETS
-from strapdown.report.navigation_found import (
+from strapdown.report.navigation_evaluation import (
     Agreement,
-    NavigationErrors,
-    NavigationTold,
+    NavigationEvaluation,
+    ShownStates,
+    at_marks,
+    blocks_of,
     chi_square_far,
+    heading_shown,
+    unwrapped,
 )
-from strapdown.report.values import ShownStates, at_marks, blocks_of, heading_shown, unwrapped
 from strapdown.tables import EULER, NED, VELOCITY
-
-Array = NDArray[np.float64]
 
 TIME = "time, s"
 BOUND = "95 % bound"
@@ -67,9 +69,9 @@ def over_time(
     )
 
 
-def bound_chart(told: NavigationTold) -> Chart:
+def bound_chart(found: NavigationEvaluation) -> Chart:
     """95 % bounds of position, velocity and attitude over the run."""
-    record = told.record
+    record = found.record
     time = record.sd.index.to_numpy(dtype=np.float64)
     groups = (
         (
@@ -114,43 +116,43 @@ def _bound(record: NavigationRecord, column: str, name: str) -> tuple[str, Array
     return name, TWO_SIDED_95 * record.sd[column].to_numpy(dtype=np.float64), colours[column]
 
 
-def height_chart(told: NavigationTold) -> Chart:
+def height_chart(found: NavigationEvaluation) -> Chart:
     """Height above the ellipsoid with its bound."""
-    panel = _state_panel(told, "alt", "down", "height, m")
+    panel = _state_panel(found, "alt", "down", "height, m")
     return over_time(
         "height",
         "Height",
-        f"Over the ellipsoid ({told.ellipsoid.name}).",
+        f"Over the ellipsoid ({found.ellipsoid.name}).",
         (panel,),
-        told.record,
+        found.record,
     )
 
 
-def velocity_chart(told: NavigationTold) -> Chart:
+def velocity_chart(found: NavigationEvaluation) -> Chart:
     """Velocity over ground with its bounds."""
     panels = tuple(
-        _state_panel(told, name, name, f"{words}, m/s")
+        _state_panel(found, name, name, f"{words}, m/s")
         for name, words in zip(VELOCITY, NED, strict=True)
     )
-    return over_time("velocity", "Velocity", "Relative to the Earth.", panels, told.record)
+    return over_time("velocity", "Velocity", "Relative to the Earth.", panels, found.record)
 
 
-def attitude_chart(told: NavigationTold) -> Chart:
+def attitude_chart(found: NavigationEvaluation) -> Chart:
     """Roll, pitch and heading with their bounds."""
-    heading, marks, said = heading_shown(told.record)
-    panels = [_state_panel(told, name, name, f"{name}, deg") for name in EULER[:2]]
-    panels.append(_state_panel(told, "heading", "heading", "heading, deg", (heading, marks)))
+    heading, marks, said = heading_shown(found.record)
+    panels = [_state_panel(found, name, name, f"{name}, deg") for name in EULER[:2]]
+    panels.append(_state_panel(found, "heading", "heading", "heading, deg", (heading, marks)))
     return over_time(
         "attitude",
         "Attitude",
         said,
         tuple(panels),
-        told.record,
+        found.record,
     )
 
 
 def _state_panel(
-    told: NavigationTold,
+    found: NavigationEvaluation,
     column: str,
     error: str,
     label: str,
@@ -160,24 +162,24 @@ def _state_panel(
 
     `shown` holds the values over the trajectory and at the marks, if not those of the column.
     """
-    record = told.record
+    record = found.record
     time = record.trajectory.index.to_numpy(dtype=np.float64)
     if shown is None:
         shown = record.trajectory[column].to_numpy(dtype=np.float64), at_marks(record, column)
     values, here = shown
     lines = [curve("navigated", time, values, BLUE, width=1.3, buckets=BUCKETS)]
-    if told.truth is not None:
-        lines.append(_true(told, column, values))
+    if found.truth is not None:
+        lines.append(_true(found, column, values))
     at = record.sd.index.to_numpy(dtype=np.float64)
     half = TWO_SIDED_95 * record.sd[error].to_numpy(dtype=np.float64)
     fill = thin_fill(BOUND, at, here - half, here + half, BLUE, opacity=0.25)
     return Panel(label, tuple(lines), fills=(fill,), height=0.8)
 
 
-def _true(told: NavigationTold, column: str, navigated: Array) -> Line:
-    truth = told.truth
+def _true(found: NavigationEvaluation, column: str, navigated: Array) -> Line:
+    truth = found.truth
     assert truth is not None
-    time = told.record.trajectory.index
+    time = found.record.trajectory.index
     within = truth[(truth.index >= time[0]) & (truth.index <= time[-1])]
     values = within[column].to_numpy(dtype=np.float64)
     if column == "heading" and np.isnan(navigated).any():
@@ -212,7 +214,7 @@ def _block_chart(record: NavigationRecord, block: ShownStates) -> Chart:
         f"state-{block.slug}",
         f"{block.name[0].upper()}{block.name[1:]}",
         "Reading less truth, or what was assumed less the truth; a band that does not narrow is "
-        "of what this motion does not tell.",
+        "not observable in this motion.",
         tuple(panels),
         record,
     )
@@ -262,7 +264,7 @@ def strip(record: NavigationRecord) -> Panel | None:
     if record.modes:
         rows.append("mode")
         fills += _modes(record.modes)
-        lines += _names(record.modes, whole)
+        lines += span_names(record.modes, whole)
     for aid in _aids(record)[: _MOST_ROWS - len(rows)]:
         at = float(len(rows))
         rows.append(aid)
@@ -272,9 +274,9 @@ def strip(record: NavigationRecord) -> Panel | None:
             if aid in record.outages
             else _stretches(_epochs(record, aid), going)
         )
-        fills.append(_bar("used", used, at, 0.3, GREEN))
+        fills.append(bar("used", used, at, 0.3, GREEN))
         if out:
-            fills.append(_bar("outage", out, at, 0.13, VERMILLION))
+            fills.append(bar("outage", out, at, 0.13, VERMILLION))
         lost = _rejected(record, aid, whole)
         if lost.size:
             y = np.full(lost.size, at)
@@ -351,9 +353,10 @@ def _between(out: tuple[Span, ...], whole: Span) -> tuple[Span, ...]:
     return tuple(found)
 
 
-def _bar(
+def bar(
     name: str, spans: tuple[Span, ...], at: float, thick: float, colour: str, opacity: float = 0.75
 ) -> Fill:
+    """Bars of a row of a strip over spans: its number from the top, and their half height."""
     x = [v for s in spans for v in (s.begin, s.end, np.nan)][:-1]
     y = [v for _ in spans for v in (at, at, np.nan)][:-1]
     rows = np.array(y)
@@ -363,7 +366,7 @@ def _bar(
 def _modes(modes: tuple[Span, ...]) -> list[Fill]:
     names = tuple(dict.fromkeys(m.name for m in modes))
     return [
-        _bar(
+        bar(
             name,
             tuple(m for m in modes if m.name == name),
             0.0,
@@ -375,8 +378,8 @@ def _modes(modes: tuple[Span, ...]) -> list[Fill]:
     ]
 
 
-def _names(modes: tuple[Span, ...], whole: Span) -> list[Line]:
-    """Names of modes in their bars, where they fit."""
+def span_names(modes: tuple[Span, ...], whole: Span) -> list[Line]:
+    """Names of spans in their bars, where they fit."""
     length = max(whole.end - whole.begin, 1e-9)
     fit = [m for m in modes if (m.end - m.begin) / length > _LETTER * (len(m.name) + 2)]
     if not fit:
@@ -406,8 +409,11 @@ _LEAST = 1e-2
 _NAMES = dict(zip(VELOCITY, NED, strict=True))
 
 
-def error_charts(told: NavigationTold, found: NavigationErrors) -> tuple[Chart, ...]:
-    """Errors of position, velocity and attitude within their bounds."""
+def error_charts(found: NavigationEvaluation) -> tuple[Chart, ...]:
+    """Errors of position, velocity and attitude within their bounds; none without a truth."""
+    errors = found.errors
+    if errors is None:
+        return ()
     out = []
     for slug, title, columns, unit in (
         ("errors-place", "Errors of place", NED, "m"),
@@ -416,40 +422,41 @@ def error_charts(told: NavigationTold, found: NavigationErrors) -> tuple[Chart, 
     ):
         panels = []
         for k, column in enumerate(columns):
-            half, error = found.bound(column), found.error(column)
+            half, error = errors.bound(column), errors.error(column)
             panels.append(
                 Panel(
                     f"{_NAMES.get(column, column)}, {unit}",
-                    (curve("error", found.time, error, AXIS_COLOURS[k], buckets=BUCKETS),),
-                    fills=(thin_fill(BOUND, found.time, -half, half, AXIS_COLOURS[k]),),
+                    (curve("error", errors.time, error, AXIS_COLOURS[k], buckets=BUCKETS),),
+                    fills=(thin_fill(BOUND, errors.time, -half, half, AXIS_COLOURS[k]),),
                     height=0.8,
                 )
             )
-        caption = f"Navigated less {told.truth_name}, within what the run itself claims."
-        out.append(over_time(slug, title, caption, tuple(panels), told.record))
+        caption = f"Navigated less {found.truth_name}, within what the run itself claims."
+        out.append(over_time(slug, title, caption, tuple(panels), found.record))
     return tuple(out)
 
 
-def nees_chart(told: NavigationTold, found: NavigationErrors) -> Chart | None:
-    """NEES of position, velocity and attitude; None without bounds."""
-    if not found.freedom:
+def nees_chart(found: NavigationEvaluation) -> Chart | None:
+    """NEES of position, velocity and attitude; None without a truth or without bounds."""
+    errors = found.errors
+    if errors is None or not errors.freedom:
         return None
-    low, high = bounds(found.freedom)
-    nees = np.maximum(found.nees, _LEAST)
+    low, high = bounds(errors.freedom)
+    nees = np.maximum(errors.nees, _LEAST)
     panel = Panel(
         "error squared",
-        (curve("place, velocity and attitude", found.time, nees, BLUE, buckets=BUCKETS),),
+        (curve("place, velocity and attitude", errors.time, nees, BLUE, buckets=BUCKETS),),
         log=True,
         levels=(Level(low, "2.5 %"), Level(high, "97.5 %")),
     )
     return over_time(
         "nees",
         "Normalised errors squared",
-        f"By the covariance of these errors; {found.freedom} is expected, and 95 of 100 runs "
+        f"By the covariance of these errors; {errors.freedom} is expected, and 95 of 100 runs "
         "belong between the levels at an instant. The errors of one run are alike from instant to "
         "instant: one that stays outside for a while says less than many runs would.",
         (panel,),
-        told.record,
+        found.record,
     )
 
 
@@ -458,8 +465,8 @@ def nees_chart(told: NavigationTold, found: NavigationErrors) -> Chart | None:
 
 # Innovations beyond this multiple of the usual bound are drawn at the edge.
 _REACH, _USUAL = 2.5, 0.97
-# Epochs of a mean, and the smallest sum of squares drawn.
-_WINDOW, _NAVIGATION_INNOVATION_CHARTS_LEAST = 20, 1e-2
+# Epochs of a mean.
+_WINDOW = 20
 # Points per panel; innovations within this many standard deviations are thinned to it.
 _POINTS, _FAR = 500, 3.0
 
@@ -538,7 +545,7 @@ def nis_chart(record: NavigationRecord, found: tuple[Agreement, ...]) -> Chart |
         if not one.used.any():
             continue
         low, high = bounds(one.freedom)
-        nis = np.maximum(one.nis, _NAVIGATION_INNOVATION_CHARTS_LEAST)
+        nis = np.maximum(one.nis, _LEAST)
         colour = AXIS_COLOURS[(2 + k) % 3]
         step = max(1, one.epochs // _POINTS)
         drawn = (np.arange(one.epochs) % step == 0) | (one.nis > chi_square_far(one.freedom))

@@ -1,200 +1,763 @@
-"""Report of a navigation run: the answer first, then its basis."""
+"""Results of a navigation run in sentences, shared by terminal and page."""
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
+
 from strapdown import __version__
-from strapdown.errors import Finding
+from strapdown.constants import TWO_SIDED_95
+from strapdown.evaluation.plane_bound import plane_bound
+from strapdown.navigation.record import NavigationRecord, Span
+from strapdown.navigation.truth_comparison import SmootherConsistency
 from strapdown.report import navigation_charts as charts
-from strapdown.report import navigation_tables as tables
+from strapdown.report.chart import BLUE, GREY, Array, Chart, Panel, curve
+from strapdown.report.chart import BUCKETS_OVER_TIME as BUCKETS
 from strapdown.report.document import (
     Block,
-    ChartBlock,
     Document,
     Facts,
     Items,
+    KeyFigure,
     KeyFigures,
     Paragraph,
     Section,
     TableBlock,
+    blocks,
+    capital,
     findings_list,
+    paragraph,
+    run_again,
+    section,
+    taken_for_given,
 )
-from strapdown.report.navigation_charts import error_charts, innovation_chart, nees_chart, nis_chart
-from strapdown.report.navigation_found import NavigationFound, NavigationTold, examine
+from strapdown.report.navigation_charts import (
+    error_charts,
+    innovation_chart,
+    nees_chart,
+    nis_chart,
+    over_time,
+)
+from strapdown.report.navigation_evaluation import (
+    NavigationEvaluation,
+    blocks_of,
+    distance_over_ground,
+    trust,
+    worst_within,
+)
 from strapdown.report.navigation_plan import plan_chart
-from strapdown.report.navigation_trust import trust
-from strapdown.report.navigation_words import (
-    cautions,
-    headline,
-    key_figures,
-    place_words,
-    smoothing_chart,
-    smoothing_table,
-    smoothing_words,
+from strapdown.report.values import (
+    GAP,
+    about,
+    duration_words,
+    half,
+    length_words,
+    plain,
+    share_words,
 )
+from strapdown.report.values import stamp as instant
+from strapdown.rotation import within_half_turn
+from strapdown.tables import EULER, NED, VELOCITY
+
+# 95 % bound in deg from which a heading is unknown.
+_NO_HEADING = 180.0
+# A smaller relative reduction of a bound means that the motion made the state not observable.
+_FELL = 0.1
+
+
+def headline(found: NavigationEvaluation) -> str:
+    """Return the end position, the distance traveled, and the bounds."""
+    record = found.record
+    return (
+        f"Ended at {place_words(found)} after {duration_words(_duration(found))} and "
+        f"{length_words(distance_over_ground(record.trajectory))}; the place is known to "
+        f"{length_words(float(plane_bound(record.covariance)[-1]))}, the heading {_heading(found)} "
+        "(bounds of 95 %)."
+    )
+
+
+def place_words(found: NavigationEvaluation, row: int = -1) -> str:
+    """Latitude, longitude and height of a row: ``40.096627°, −105.147448°, 1601.5 m``."""
+    last = found.record.trajectory.iloc[row]
+    lon = float(within_half_turn(last["lon"]))
+    return (
+        f"{plain(float(last['lat']), 6)}°, {plain(lon, 6)}°, {plain(float(last['alt']), 1)}{GAP}m"
+    )
+
+
+def key_figures(found: NavigationEvaluation) -> tuple[KeyFigure, ...]:
+    """Return the key figures at the top of the page."""
+    record = found.record
+    sd = record.sd.iloc[-1]
+    last = record.trajectory.iloc[-1]
+    plane = float(plane_bound(record.covariance)[-1])
+    heading = half(sd["heading"])
+    out = [
+        KeyFigure(
+            "Way and time",
+            length_words(distance_over_ground(record.trajectory)),
+            f"in {duration_words(_duration(found))}",
+            f"from {instant(float(record.trajectory.index[0]))} to "
+            f"{instant(float(record.trajectory.index[-1]))}",
+        ),
+        KeyFigure(
+            "Place at the end",
+            f"±{GAP}{length_words(plane)}",
+            f"horizontal, 95{GAP}%; height {about(float(last['alt']), half(sd['down']), 'm')}",
+            place_words(found),
+        ),
+        KeyFigure(
+            "Heading at the end",
+            "not known"
+            if heading >= _NO_HEADING
+            else about(float(last["heading"]) % 360.0, heading, "°"),
+            f"95{GAP}% bound",
+            f"roll {about(float(last['roll']), half(sd['roll']), '°')}, pitch "
+            f"{about(float(last['pitch']), half(sd['pitch']), '°')}",
+        ),
+    ]
+    out.append(_known(found))
+    return tuple(out)
+
+
+def _known(found: NavigationEvaluation) -> KeyFigure:
+    """The main figure besides the end: the error, the worst outage, or the worst bound."""
+    if found.errors is not None:
+        score = found.errors.score("horizontal")
+        up = found.errors.score("down")
+        return KeyFigure(
+            f"Error against {found.truth_name}",
+            length_words(score.rms),
+            f"horizontal, root mean square; at most {length_words(score.largest)}",
+            f"height {length_words(up.rms)}, at most {length_words(up.largest)}",
+        )
+    outages = longest_outages(found)
+    if outages:
+        aid, span, bound = max(outages, key=lambda o: o[2])
+        return KeyFigure(
+            "Largest bound in an outage",
+            f"±{GAP}{length_words(bound)}",
+            f"horizontal, 95{GAP}%, after {duration_words(span.end - span.begin)} without {aid}",
+            f"{len(outages)} {'outage' if len(outages) == 1 else 'outages'} in all",
+        )
+    bounds = plane_bound(found.record.covariance)
+    worst = int(np.argmax(bounds))
+    return KeyFigure(
+        "Largest bound",
+        f"±{GAP}{length_words(float(bounds[worst]))}",
+        f"horizontal, 95{GAP}%, at {instant(float(found.record.sd.index[worst]))}",
+        "no outage",
+    )
+
+
+def longest_outages(found: NavigationEvaluation) -> list[tuple[str, Span, float]]:
+    """Source, span and largest horizontal bound in m of each outage, in time order."""
+    out = []
+    for aid, spans in found.record.outages.items():
+        for span in spans:
+            worst = worst_within(found.record, span)
+            if worst is not None:
+                out.append((aid, span, worst[0]))
+    return sorted(out, key=lambda o: (o[1].begin, o[0]))
+
+
+def cautions(found: NavigationEvaluation, *, brief: bool = False) -> tuple[tuple[str, str], ...]:
+    """Return the cautions, each with its number; brief, without those that the tables show."""
+    shown = () if brief else (*_memory(found), *_refused(found), *_not_told(found))
+    return (
+        *_outages(found),
+        *_ended_without(found),
+        *_heading_caution(found),
+        *shown,
+        *agreement_words(found),
+    )
+
+
+def _outages(found: NavigationEvaluation) -> list[tuple[str, str]]:
+    outages = longest_outages(found)
+    if not outages:
+        return []
+    total = sum(s.end - s.begin for _, s, _ in outages)
+    aid, span, bound = max(outages, key=lambda o: o[2])
+    count = "one outage" if len(outages) == 1 else f"{len(outages)} outages"
+    return [
+        (
+            "In outages the position is less accurate",
+            f"{count}, {duration_words(total)} in all; the largest bound of 95{GAP}% is "
+            f"{length_words(bound)}, at the end of {duration_words(span.end - span.begin)} without "
+            f"{aid} from {instant(span.begin)}.",
+        )
+    ]
+
+
+def _ended_without(found: NavigationEvaluation) -> list[tuple[str, str]]:
+    end = float(found.record.trajectory.index[-1])
+    late = [(a, s) for a, s, _ in longest_outages(found) if s.end >= end - 1e-6]
+    return [
+        (
+            f"It ended without {aid}",
+            f"the last {duration_words(span.end - span.begin)}; the end is by the inertial "
+            "sensors alone; a fix would correct it.",
+        )
+        for aid, span in late
+    ]
+
+
+def _heading_caution(found: NavigationEvaluation) -> list[tuple[str, str]]:
+    bound = half(found.record.sd["heading"].iloc[-1])
+    if bound < 2.0:
+        return []
+    how = "is not known" if bound >= _NO_HEADING else f"is known to {plain(bound, 1)}° alone"
+    return [
+        (
+            f"The heading {how}",
+            "without fixes the cross-track error grows by "
+            f"{plain(min(100.0, 100.0 * math.radians(min(bound, 90.0))), 1)}{GAP}% of the "
+            "distance. Acceleration and turns with fixes determine it, or two antennas.",
+        )
+    ]
+
+
+def _memory(found: NavigationEvaluation) -> list[tuple[str, str]]:
+    out = []
+    for one in found.agreements:
+        if one.remembers:
+            out.append(
+                (
+                    f"Innovations of {one.name} are correlated",
+                    f"lag 1: {plain(one.correlation, 2)}; 95 % limit "
+                    f"{plain(one.correlation_bound, 2)}. Its errors are time-correlated, and the "
+                    "bounds are too small. Look for a time offset, a lever arm, "
+                    "or noise of the sensors that is stated too small.",
+                )
+            )
+    return out
+
+
+def _refused(found: NavigationEvaluation) -> list[tuple[str, str]]:
+    rows = [
+        f"{one.rejected} of {one.epochs} epochs of {one.name}"
+        for one in found.agreements
+        if one.rejected
+    ]
+    if not rows:
+        return []
+    return [("Some observations were rejected", f"{', '.join(rows)}; shown as crosses.")]
+
+
+def _not_told(found: NavigationEvaluation) -> list[tuple[str, str]]:
+    """States whose bounds hardly decreased."""
+    sd = found.filtered.sensors_sd
+    if len(sd) < 2:
+        return []
+    names = []
+    for block in blocks_of(found.filtered):
+        first = sd[list(block.columns)].iloc[0].to_numpy()
+        last = sd[list(block.columns)].iloc[-1].to_numpy()
+        some = [
+            label
+            for label, a, b in zip(block.labels, first, last, strict=True)
+            if a > 0.0 and b > (1.0 - _FELL) * a
+        ]
+        if some:
+            names.append(f"{block.name} {', '.join(some)}" if len(block.labels) > 1 else block.name)
+    if not names:
+        return []
+    return [
+        (
+            "Not observable in this run",
+            f"bound reduced by less than {plain(100.0 * _FELL, 0)}{GAP}%: {'; '.join(names)}.",
+        )
+    ]
+
+
+def _heading(found: NavigationEvaluation) -> str:
+    bound = half(found.record.sd["heading"].iloc[-1])
+    return (
+        "not at all"
+        if bound >= _NO_HEADING
+        else f"to {about(0.0, bound, '°').split('±')[1].strip()}"
+    )
+
+
+def _duration(found: NavigationEvaluation) -> float:
+    time = found.record.trajectory.index
+    return float(time[-1] - time[0])
+
+
+# Effect of the smoother: bounds and errors beside those of the filter alone.
+
+
+#: A smaller share of the differences within three standard deviations is not due to chance.
+SHARE = 0.95
+UNITS = dict.fromkeys(NED, "m") | dict.fromkeys(VELOCITY, "m/s") | dict.fromkeys(EULER, "°")
+
+
+def smoothing_chart(found: NavigationEvaluation) -> Chart | None:
+    """Bounds of position, height and heading over time, filter and smoother."""
+    forward, record = found.forward, found.record
+    if forward is None:
+        return None
+    panels = []
+    for label, of in (
+        ("horizontal, m", _plane),
+        ("height, m", lambda one: _bound(one, "down")),
+        ("heading, deg", lambda one: _bound(one, "heading")),
+    ):
+        lines = tuple(
+            curve(name, one.sd.index.to_numpy(), of(one), colour, "solid", width, buckets=BUCKETS)
+            for name, one, colour, width in (
+                ("filter", forward, GREY, 1.2),
+                ("smoothed", record, BLUE, 1.6),
+            )
+        )
+        panels.append(Panel(label, lines, log=True))
+    return over_time(
+        "smoothing",
+        "Filter and smoother",
+        "Bounds of 95 %: of the filter, by what came before; smoothed, by what came after, too.",
+        tuple(panels),
+        record,
+    )
+
+
+def smoothing_table(found: NavigationEvaluation) -> TableBlock | None:
+    """Median bounds and errors against the truth, filter and smoother."""
+    forward, agreement = found.forward, found.smoother
+    if forward is None or agreement is None:
+        return None
+    rows = []
+    for k, column in enumerate(agreement.columns):
+        before, after = (float(np.median(_bound(one, column))) for one in (forward, found.record))
+        rows.append(
+            (
+                f"{column}, {UNITS[column]}",
+                _figure(before),
+                _figure(after),
+                plain(before / after, 1) if after > 0.0 else "–",
+                *_errors(found, column),
+                share_words(float(agreement.share[k])) if agreement.instants[k] else "–",
+            )
+        )
+    return TableBlock(
+        (
+            *("", "filter", "smoothed", "times less"),
+            *(() if found.errors is None else ("error of filter", "smoothed")),
+            "agree",
+        ),
+        tuple(rows),
+        text=(0,),
+        caption="Bounds of 95 %, medians over the run"
+        + ("" if found.errors is None else "; errors against the truth, root mean square")
+        + "; and how often the two are within three of "
+        "the standard deviations that their covariances leave for the difference (99.7 % where "
+        "the model is right).",
+        strong=tuple(k for k in range(len(rows)) if _apart(agreement, k)),
+    )
+
+
+def _errors(found: NavigationEvaluation, column: str) -> tuple[str, ...]:
+    """RMS errors of filter and smoother, if the truth is known."""
+    if found.errors is None or found.forward_errors is None:
+        return ()
+    return tuple(_figure(one.score(column).rms) for one in (found.forward_errors, found.errors))
+
+
+def smoothing_words(found: NavigationEvaluation) -> str | None:
+    """Effect of the smoother in a sentence."""
+    forward = found.forward
+    if forward is None:
+        return None
+    before, after = (float(np.median(_plane(one))) for one in (forward, found.record))
+    heading = [float(np.median(_bound(one, "heading"))) for one in (forward, found.record)]
+    return (
+        "Smoothed: every state is by all observations, later ones too. In the median the bound of "
+        f"the place is {_figure(after)} m where the filter had {_figure(before)} m, that of the "
+        f"heading {_figure(heading[1])}° where it had {_figure(heading[0])}°."
+    )
+
+
+def agreement_words(found: NavigationEvaluation) -> tuple[tuple[str, str], ...]:
+    """Cautions where filter and smoother are inconsistent."""
+    agreement = found.smoother
+    if agreement is None:
+        return ()
+    apart = [k for k in range(len(agreement.columns)) if _apart(agreement, k)]
+    if not apart:
+        return ()
+    worst = min(apart, key=lambda k: agreement.share[k])
+    named = ", ".join(agreement.columns[k] for k in apart)
+    return (
+        (
+            "Filter and smoother do not agree",
+            f"in {named}: of {agreement.columns[worst]} {share_words(agreement.share[worst])} of "
+            "the differences are within three of the standard deviations that are expected of "
+            "them. Later observations speak against the model: look for errors of the sensors "
+            "that last or change and are not stated ([sensors], [states.NAME]).",
+        ),
+    )
+
+
+def _apart(agreement: SmootherConsistency, k: int) -> bool:
+    return bool(agreement.instants[k] > 0 and agreement.share[k] < SHARE)
+
+
+def _bound(record: NavigationRecord, column: str) -> Array:
+    """95 % bound of a component at the covariance marks."""
+    return TWO_SIDED_95 * record.sd[column].to_numpy(dtype=np.float64)
+
+
+def _plane(record: NavigationRecord) -> Array:
+    """95 % bound of the horizontal position at the covariance marks."""
+    return plane_bound(record.covariance)
+
+
+def _figure(value: float) -> str:
+    return f"{value:.3g}" if value < 1000.0 else f"{value:.0f}"
+
+
+# Tables of a navigation run: start and end, states, observations, outages, errors.
+
+
+_MOST_EVENTS = 40
+
+
+def end_table(found: NavigationEvaluation) -> TableBlock:
+    """Position, velocity and attitude at the start and at the end, with bounds."""
+    record = found.record
+    rows = [
+        ("time", *(instant(float(record.trajectory.index[k])) for k in (0, -1))),
+        ("place", place_words(found, 0), place_words(found, -1)),
+    ]
+    plane = plane_bound(record.covariance)
+    rows.append(("horizontal ±", *(length_words(float(plane[k])) for k in (0, -1))))
+    for name, column, sd, unit in (
+        ("height", "alt", "down", "m"),
+        *(
+            (f"velocity {w}", v, v, "m/s")
+            for v, w in zip(VELOCITY, ("north", "east", "down"), strict=True)
+        ),
+        *((a, a, a, "°") for a in reversed(EULER)),
+    ):
+        cells = []
+        for k in (0, -1):
+            value = float(record.trajectory[column].iloc[k])
+            value = value % 360.0 if column == "heading" else value
+            cells.append(about(value, half(record.sd[sd].iloc[k]), unit))
+        rows.append((name, *cells))
+    return TableBlock(
+        ("", "start", "end"), tuple(rows), text=(0,), caption="Start and end, with bounds of 95 %."
+    )
+
+
+def state_table(found: NavigationEvaluation) -> TableBlock | None:
+    """Sensor and measurement errors: uncertainty before and after the run."""
+    record = found.filtered
+    if record.sensors.empty or not len(record.sensors.columns):
+        return None
+    rows = []
+    for block in blocks_of(record):
+        for column, label in zip(block.columns, block.labels, strict=True):
+            value = block.factor * float(record.sensors[column].iloc[-1])
+            first, last = (block.factor * half(record.sensors_sd[column].iloc[k]) for k in (0, -1))
+            name = f"{block.name} {label}" if len(block.columns) > 1 else block.name
+            before = about(0.0, first, block.unit)
+            rows.append(
+                (
+                    name,
+                    about(value, last, block.unit),
+                    before[before.index("±") :],
+                    share_words(1.0 - last / first) if first > 0.0 and last <= first else "–",
+                )
+            )
+    return TableBlock(
+        ("error of", "estimate at the end", "bound at the start", "bound fell by"),
+        tuple(rows),
+        text=(0,),
+        caption="Bounds of 95 %.",
+    )
+
+
+def observation_table(found: NavigationEvaluation) -> TableBlock | None:
+    """Observations with their innovation statistics and rejected epochs."""
+    rows = []
+    for one in found.agreements:
+        band = "–"
+        if one.used.any():
+            band = f"{plain(one.band[0], 2)} to {plain(one.band[1], 2)}"
+        memory = "–"
+        if math.isfinite(one.correlation):
+            memory = f"{plain(one.correlation, 2)} (±{GAP}{plain(one.correlation_bound, 2)})"
+        rows.append(
+            (
+                one.name,
+                str(one.epochs),
+                str(one.rejected),
+                str(one.weakened),
+                plain(one.ratio, 2),
+                plain(one.mean_nis, 2),
+                band,
+                memory,
+            )
+        )
+    if not rows:
+        return None
+    return TableBlock(
+        (
+            "observation",
+            "epochs",
+            "rejected",
+            "weakened",
+            "rms, sd",
+            "mean NIS",
+            "expected, 95 %",
+            "memory",
+        ),
+        tuple(rows),
+        text=(0,),
+        caption="Innovations that were used: root mean square in the standard deviations that were "
+        "expected, mean of the normalised innovation squared (NIS) and where it belongs, and the "
+        "largest correlation of a component with itself an epoch later, beside what chance makes.",
+    )
+
+
+def outage_table(found: NavigationEvaluation) -> TableBlock | None:
+    """Outages, each with its largest bound."""
+    rows = [
+        (
+            aid,
+            instant(span.begin),
+            duration_words(span.end - span.begin),
+            length_words(bound),
+        )
+        for aid, span, bound in longest_outages(found)
+    ]
+    if not rows:
+        return None
+    return TableBlock(
+        ("aid", "from", "for", "largest bound"),
+        tuple(rows),
+        text=(0,),
+        caption="Outages, and the largest horizontal bound of 95 % in each: at its last mark.",
+    )
+
+
+def withheld_table(found: NavigationEvaluation) -> TableBlock | None:
+    """GNSS outage tests with the resulting errors."""
+    rows = [
+        (
+            w.aid,
+            instant(w.begin),
+            duration_words(w.end - w.begin),
+            length_words(w.error_m),
+            length_words(w.bound_m),
+            "yes" if w.inside else "no",
+            *(() if w.forward_m is None else (length_words(w.forward_m),)),
+        )
+        for w in found.withheld
+    ]
+    if not rows:
+        return None
+    smoothed = found.forward is not None
+    return TableBlock(
+        (
+            *("withheld", "from", "for", "largest error", "bound then", "inside"),
+            *(("filter alone",) if smoothed else ()),
+        ),
+        tuple(rows),
+        text=(0, 5),
+        caption="Aids withheld on purpose: the largest horizontal error, and the run's own bound "
+        "of 95 % at that instant" + ("; smoothed, and of the filter alone." if smoothed else "."),
+        strong=tuple(k for k, w in enumerate(found.withheld) if not w.inside),
+    )
+
+
+def point_table(found: NavigationEvaluation) -> TableBlock | None:
+    """Errors at the control points."""
+    score = found.points
+    if score is None:
+        return None
+    row = (
+        f"{len(score.time)} of {score.given}",
+        length_words(score.way),
+        length_words(score.rms),
+        length_words(score.median),
+        length_words(score.largest),
+        instant(score.largest_at),
+        f"{plain(100.0 * score.rms / score.way, 2)} %",
+    )
+    return TableBlock(
+        ("control points", "way", "rms", "median", "largest", "at", "rms of the way"),
+        (row,),
+        caption="Horizontal distance from the control points, after the one origin and heading "
+        "that fit best (no scale): the run's heading less theirs is "
+        f"{plain(score.turn_deg, 2)} deg.",
+    )
+
+
+def error_table(found: NavigationEvaluation) -> TableBlock | None:
+    """Errors against the truth with their bounds."""
+    if found.errors is None:
+        return None
+    names = {"horizontal": "horizontal", "down": "down (height)"}
+    names |= {v: f"velocity {w}" for v, w in zip(VELOCITY, ("north", "east", "down"), strict=True)}
+    rows = []
+    for score in found.errors.scores:
+        places = _places(score.rms)
+        rows.append(
+            (
+                f"{names.get(score.quantity, score.quantity)}, {score.unit}",
+                plain(score.rms, places),
+                plain(score.largest, places),
+                instant(score.largest_at),
+                plain(score.bound, places),
+                share_words(score.share),
+            )
+        )
+    return TableBlock(
+        ("error", "rms", "largest", "at", "95 % bound, rms", "inside"),
+        tuple(rows),
+        text=(0,),
+        caption=f"Errors against {found.truth_name}, at {len(found.errors.time)} instants.",
+        strong=(0,),
+    )
+
+
+def _places(value: float) -> int:
+    if not (math.isfinite(value) and value > 0.0):
+        return 3
+    return min(6, max(0, 2 - math.floor(math.log10(value))))
+
+
+def event_table(found: NavigationEvaluation) -> TableBlock | None:
+    """Events; only the first ones if there are many."""
+    events = found.record.events
+    if not events:
+        return None
+    shown = events[:_MOST_EVENTS]
+    rest = len(events) - len(shown)
+    more = f"; {rest} more stand in navigation.json" if rest else ""
+    return TableBlock(
+        ("at", "event", "what"),
+        tuple((instant(e.time), e.kind, e.finding.what) for e in shown),
+        text=(0, 1, 2),
+        caption=f"What happened, in the order of time{more}.",
+    )
+
+
+# Report of a navigation run: the answer first, then its basis.
 
 
 def navigation_document(
-    told: NavigationTold,
-    name: str,
-    found: NavigationFound | None = None,
-    light: Section | None = None,
+    found: NavigationEvaluation, name: str, light: Section | None = None
 ) -> Document:
     """Return the report of a navigation run.
 
     Parameters
     ----------
-    told : NavigationTold
     name : str
         Folder name, for the verification command; no command if empty.
-    found : NavigationFound, optional
-        From `examine`, if already computed.
     light : Section, optional
         Integrity section, for a run whose verdict is on a separate page.
     """
-    found = examine(told) if found is None else found
     verdict = trust(found)
-    plan = plan_chart(told)
-    front: tuple[Block | None, ...] = (
-        KeyFigures(key_figures(found)),
-        Paragraph(verdict.sentence, "lead" if verdict.verdict == "trusted" else "warning"),
-        Items(cautions(found)) if cautions(found) else None,
-        Paragraph(f"It did not move from {place_words(found, 0)}.") if plan is None else None,
-        None if plan is None else ChartBlock(plan),
-        ChartBlock(charts.bound_chart(told)),
+    plan = plan_chart(found)
+    said = cautions(found)
+    aids = dict.fromkeys(
+        [*found.record.outages, *(a.name.partition(".")[0] for a in found.agreements)]
     )
     sections = (
-        _section("answer", "The answer", *_answer(found, verdict.reasons)),
+        section("answer", "The answer", end_table(found), *verdict.blocks),
         *(() if light is None else (light,)),
-        _section(
+        section(
             "state",
             "Height, velocity, attitude",
-            ChartBlock(charts.height_chart(told)),
-            ChartBlock(charts.velocity_chart(told)),
-            ChartBlock(charts.attitude_chart(told)),
+            charts.height_chart(found),
+            charts.velocity_chart(found),
+            charts.attitude_chart(found),
         ),
-        _section("truth", f"Against {told.truth_name}", *_errors(found)),
-        _section("points", "At the control points", tables.point_table(found)),
-        _section("smoothing", "Smoothed", *_smoothing(found)),
-        _section("sensors", "Errors of the sensors and the aids", *_states(found)),
-        _section("observations", "What was observed", *_observations(found)),
-        _section("outages", "Outages", *_outages(found)),
-        _section("events", "Events", tables.event_table(found)),
-        _section("findings", "Findings", findings_list(found.findings)),
-        _section("method", "Method and assumptions", *_method(found, name)),
-        _section("conventions", "Conventions", Facts(CONVENTIONS)),
+        section(
+            "truth",
+            f"Against {found.truth_name}",
+            error_table(found),
+            *error_charts(found),
+            nees_chart(found),
+        ),
+        section("points", "At the control points", point_table(found)),
+        section(
+            "smoothing",
+            "Smoothed",
+            paragraph(smoothing_words(found)),
+            smoothing_table(found),
+            smoothing_chart(found),
+        ),
+        section(
+            "sensors",
+            "Errors of the sensors and the aids",
+            state_table(found),
+            *charts.state_charts(found.filtered),
+        ),
+        section("observations", "What was observed", *_observations(found)),
+        section("outages", "Outages", withheld_table(found), outage_table(found)),
+        section("events", "Events", event_table(found)),
+        section("findings", "Findings", findings_list(found.all_findings)),
+        section(
+            "method",
+            "Method and assumptions",
+            Facts(found.chain) if found.chain else None,
+            *taken_for_given(
+                "The errors of the sensors and of the aids are as stated, without bias that is not "
+                "among the states, and those of the aids without memory: every bound rests on "
+                "them.",
+                "Normal gravity of the ellipsoid: a deflection of the vertical is not in the "
+                "bounds.",
+            ),
+            *run_again(name),
+        ),
+        section("conventions", "Conventions", Facts(CONVENTIONS)),
     )
-    title = told.title or f"Navigation of {told.name}"
+    title = found.title or f"Navigation of {found.name}"
     return Document(
         title,
         headline(found),
-        _facts(found),
-        tuple(block for block in front if block is not None),
+        (
+            ("Record", ", ".join(t for t in (found.name, found.what) if t)),
+            ("Start", place_words(found, 0)),
+            ("Aids", ", ".join(aids) or "none"),
+            ("Made with", f"strapdown {__version__}"),
+        ),
+        blocks(
+            KeyFigures(key_figures(found)),
+            verdict.paragraph,
+            Items(said) if said else None,
+            Paragraph(f"It did not move from {place_words(found, 0)}.") if plan is None else None,
+            plan,
+            charts.bound_chart(found),
+        ),
         tuple(s for s in sections if s.blocks),
         title,
         links=() if light is None else (("verdict.html", "Can it be trusted? The verdict"),),
     )
 
 
-def _section(slug: str, title: str, *blocks: Block | None) -> Section:
-    return Section(slug, title, tuple(b for b in blocks if b is not None))
-
-
-def _facts(found: NavigationFound) -> tuple[tuple[str, str], ...]:
-    told = found.told
-    aids = dict.fromkeys(
-        [*told.record.outages, *(a.name.partition(".")[0] for a in found.agreements)]
-    )
-    return (
-        ("Record", ", ".join(t for t in (told.name, told.what) if t)),
-        ("Start", place_words(found, 0)),
-        ("Aids", ", ".join(aids) or "none"),
-        ("Made with", f"strapdown {__version__}"),
-    )
-
-
-def _answer(found: NavigationFound, reasons: tuple[Finding, ...]) -> tuple[Block, ...]:
-    said = tuple(
-        ("For it" if one.severity == "note" else "Against it", f"{one.sentence()}.")
-        for one in reasons
-    )
-    blocks: list[Block] = [tables.end_table(found)]
-    if said:
-        blocks += [Paragraph("What speaks for the answer, and what against it:"), Items(said)]
-    return tuple(blocks)
-
-
-def _errors(found: NavigationFound) -> tuple[Block | None, ...]:
-    if found.errors is None:
-        return ()
-    drawn = [ChartBlock(c) for c in error_charts(found.told, found.errors)]
-    nees = nees_chart(found.told, found.errors)
-    return (tables.error_table(found), *drawn, None if nees is None else ChartBlock(nees))
-
-
-def _smoothing(found: NavigationFound) -> tuple[Block | None, ...]:
-    said, chart = smoothing_words(found), smoothing_chart(found)
-    if said is None or chart is None:
-        return ()
-    return (Paragraph(said), smoothing_table(found), ChartBlock(chart))
-
-
-def _states(found: NavigationFound) -> tuple[Block | None, ...]:
-    table: TableBlock | None = tables.state_table(found)
-    return (table, *(ChartBlock(c) for c in charts.state_charts(found.filtered)))
-
-
-def _observations(found: NavigationFound) -> tuple[Block | None, ...]:
+def _observations(found: NavigationEvaluation) -> tuple[Block | None, ...]:
     if not found.agreements:
         return (Paragraph("Nothing was observed: the inertial sensors were alone."),)
-    nis = nis_chart(found.record, found.agreements)
-    return (
-        tables.observation_table(found),
-        *_verdicts(found),
-        None if nis is None else ChartBlock(nis),
-        *(ChartBlock(innovation_chart(found.record, one)) for one in found.agreements),
-    )
-
-
-def _verdicts(found: NavigationFound) -> tuple[Block, ...]:
-    """Conclusions from the innovations on the stated errors, beyond chance."""
     rows: list[tuple[str, str]] = []
     for one in found.agreements:
-        kinds = dict.fromkeys(v.kind for v in one.consistency.verdicts)
-        for kind in kinds:
+        for kind in dict.fromkeys(v.kind for v in one.consistency.verdicts):
             alike = [v for v in one.consistency.verdicts if v.kind == kind]
             said = "; ".join(v.finding.what for v in alike)
-            rows.append((one.name, f"{said}. {_capital(alike[0].finding.remedy or '')}."))
-    if not rows:
-        return (Paragraph("Nothing in them speaks against what was stated of sensors and aids."),)
+            rows.append((one.name, f"{said}. {capital(alike[0].finding.remedy or '')}."))
+    against = "What in them is not by chance, and what it may mean:"
+    agree = "Nothing in them speaks against what was stated of sensors and aids."
     return (
-        Paragraph("What in them is not by chance, and what it may mean:"),
-        Items(tuple(rows)),
-    )
-
-
-def _capital(text: str) -> str:
-    return f"{text[:1].upper()}{text[1:]}"
-
-
-def _outages(found: NavigationFound) -> tuple[Block | None, ...]:
-    return (tables.withheld_table(found), tables.outage_table(found))
-
-
-def _method(found: NavigationFound, name: str) -> tuple[Block | None, ...]:
-    taken = (
-        (
-            "",
-            "The errors of the sensors and of the aids are as stated, without bias that is not "
-            "among the states, and those of the aids without memory: every bound rests on them.",
-        ),
-        ("", "Normal gravity of the ellipsoid: a deflection of the vertical is not in the bounds."),
-    )
-    return (
-        Facts(found.told.chain) if found.told.chain else None,
-        Paragraph("Taken for given:"),
-        Items(taken),
-        Paragraph("To run it again and compare every byte:") if name else None,
-        Paragraph(f"strapdown verify {name}", "mono") if name else None,
+        observation_table(found),
+        Paragraph(against if rows else agree),
+        Items(tuple(rows)) if rows else None,
+        nis_chart(found.record, found.agreements),
+        *(innovation_chart(found.record, one) for one in found.agreements),
     )
 
 

@@ -15,15 +15,12 @@ from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.formats.trajectory_maps import thin
 from strapdown.frames import ned_from_geodetic
 from strapdown.navigation.record import NavigationRecord, Span
-from strapdown.report.chart import BLACK, BLUE, GREY, PURPLE, VERMILLION, Chart, Line, Panel
+from strapdown.report.chart import BLACK, BLUE, GREY, PURPLE, VERMILLION, Array, Chart, Line, Panel
 from strapdown.report.navigation_charts import mode_colour
-from strapdown.report.navigation_found import NavigationTold
-from strapdown.report.path_marks import View, path_marks, place_labels
-from strapdown.report.plan_view import ellipse, nice_step
+from strapdown.report.navigation_evaluation import NavigationEvaluation
+from strapdown.report.plan import View, ellipse, nice_step, path_marks, place_labels
 from strapdown.report.values import GAP, duration_words, length_words, plain
 from strapdown.tables import places_of
-
-Array = NDArray[np.float64]
 
 MOST_POINTS, MOST_FIXES, MOST_SAMPLES = 1500, 600, 100_000
 # Plans of at least this size, m, are in kilometers.
@@ -36,7 +33,7 @@ _TALL = 0.9
 NO_PATH = 0.05
 
 
-def plan_chart(told: NavigationTold) -> Chart | None:
+def plan_chart(found: NavigationEvaluation) -> Chart | None:
     """Draw the path to one scale, with its fixes and 95 % ellipses.
 
     Returns
@@ -44,16 +41,16 @@ def plan_chart(told: NavigationTold) -> Chart | None:
     Chart or None
         None for a run without motion.
     """
-    record = told.record
+    record = found.record
     table = record.trajectory
-    rows = _rows(told)
+    rows = _rows(found)
     kept = table.iloc[rows]
     origin = places_of(table.iloc[:1])[0]
-    ned = ned_from_geodetic(places_of(kept), origin, ellipsoid=told.ellipsoid)
+    ned = ned_from_geodetic(places_of(kept), origin, ellipsoid=found.ellipsoid)
     reach = float(np.ptp(ned[:, :2], axis=0).max())
     if reach < NO_PATH:
         return None
-    plane = Plane(origin, told, *(("km", 1e-3) if reach >= _FAR else ("m", 1.0)))
+    plane = Plane(origin, found, *(("km", 1e-3) if reach >= _FAR else ("m", 1.0)))
     path = (plane.scale * ned[:, 1], plane.scale * ned[:, 0])
     time = kept.index.to_numpy(dtype=np.float64)
     view = _with_margin(View.of([path, *_around(plane)], most=_TALL))
@@ -88,20 +85,20 @@ def plan_chart(told: NavigationTold) -> Chart | None:
     )
 
 
-def _rows(told: NavigationTold) -> NDArray[np.intp]:
+def _rows(found: NavigationEvaluation) -> NDArray[np.intp]:
     """Rows that preserve the course, and those at the ends of modes and outages."""
-    table = told.record.trajectory
-    rows = _course(table, told)
-    spans = [*told.record.modes, *(s for v in told.record.outages.values() for s in v)]
+    table = found.record.trajectory
+    rows = _course(table, found)
+    spans = [*found.record.modes, *(s for v in found.record.outages.values() for s in v)]
     edges = np.searchsorted(table.index.to_numpy(), [t for s in spans for t in (s.begin, s.end)])
     return np.unique(np.concatenate([rows, np.clip(edges, 0, len(table) - 1)]))
 
 
-def _course(table: pd.DataFrame, told: NavigationTold) -> NDArray[np.intp]:
+def _course(table: pd.DataFrame, found: NavigationEvaluation) -> NDArray[np.intp]:
     """Rows that preserve the course, including the last one."""
     # At this sampling no vehicle leaves its course between samples.
     step = max(1, len(table) // MOST_SAMPLES)
-    rows = step * thin(table.iloc[::step], MOST_POINTS, told.ellipsoid).rows
+    rows = step * thin(table.iloc[::step], MOST_POINTS, found.ellipsoid).rows
     return np.append(rows, len(table) - 1) if rows[-1] < len(table) - 1 else rows
 
 
@@ -112,11 +109,11 @@ def _with_margin(view: View) -> View:
 
 def _around(plane: Plane) -> list[tuple[Array, Array]]:
     """Corners about the ellipses, which may be larger than the path."""
-    along, ends = ellipse_rows(plane.told.record)
+    along, ends = ellipse_rows(plane.found.record)
     rows = [*along, *(k for k, _ in ends)]
     if not rows:
         return []
-    bounds = plane_bound(plane.told.record.covariance)[rows] * plane.scale
+    bounds = plane_bound(plane.found.record.covariance)[rows] * plane.scale
     east, north = centres(plane, rows).T
     return [(east + side * bounds, north + side * bounds) for side in (-1.0, 1.0)]
 
@@ -163,7 +160,7 @@ def _fixes(plane: Plane, view: View) -> tuple[list[Line], str]:
     """Fixes as faint points; text on those outside of the view."""
     out: list[Line] = []
     beyond = 0
-    for aid, table in plane.told.fixes.items():
+    for aid, table in plane.found.fixes.items():
         if table.empty:
             continue
         time = table.index.to_numpy(dtype=np.float64)
@@ -171,7 +168,7 @@ def _fixes(plane: Plane, view: View) -> tuple[list[Line], str]:
         inside = (east >= view.low[0]) & (east <= view.high[0])
         inside &= (north >= view.low[1]) & (north <= view.high[1])
         beyond += int((~inside).sum())
-        lost = np.isin(np.round(time, 6), np.round(_rejected(plane.told.record, aid), 6))
+        lost = np.isin(np.round(time, 6), np.round(_rejected(plane.found.record, aid), 6))
         some = np.flatnonzero(inside & ~lost)
         some = some[:: max(1, -(-some.size // MOST_FIXES))]
         out.append(
@@ -212,20 +209,20 @@ def _rejected(record: NavigationRecord, aid: str) -> Array:
 
 
 def _truth(plane: Plane) -> list[Line]:
-    truth = plane.told.truth
+    truth = plane.found.truth
     if truth is None:
         return []
-    time = plane.told.record.trajectory.index
+    time = plane.found.record.trajectory.index
     within = truth[(truth.index >= time[0]) & (truth.index <= time[-1])]
     if within.empty:
         return []
-    rows = _course(within, plane.told)
+    rows = _course(within, plane.found)
     return [Line("truth", *plane.of(within.iloc[rows]), BLACK, "dot", 1.2)]
 
 
 def _points(plane: Plane) -> list[Line]:
     """Control points, rotated and shifted to the path, and the distance of the path from each."""
-    score = plane.told.points
+    score = plane.found.points
     if score is None:
         return []
     placed, there = plane.scale * score.points, plane.scale * (score.points + score.error)
@@ -331,13 +328,12 @@ def ellipses(plane: Plane, view: View) -> tuple[list[Line], str, list[tuple[int,
 
     Returns
     -------
-    lines : list of Line
     said : str
         Caption text; empty without ellipses.
     at_outages : list of (int, Span)
         As in `ellipse_rows`.
     """
-    record = plane.told.record
+    record = plane.found.record
     along, ends = ellipse_rows(record)
     rows = [*along, *(k for k, _ in ends)]
     bounds = plane_bound(record.covariance)[rows] * plane.scale
@@ -370,7 +366,7 @@ def ellipses(plane: Plane, view: View) -> tuple[list[Line], str, list[tuple[int,
 
 def centres(plane: Plane, rows: list[int]) -> Array:
     """Return east and north of marks, (k, 2), in the unit of the plan."""
-    record = plane.told.record
+    record = plane.found.record
     time = record.trajectory.index.to_numpy(dtype=np.float64)
     at = np.searchsorted(time, record.sd.index.to_numpy(dtype=np.float64)[rows] - 1e-9)
     near = record.trajectory.iloc[np.clip(at, 0, len(time) - 1)]
@@ -394,8 +390,6 @@ def bound_labels(
 
     Parameters
     ----------
-    plane : Plane
-    view : View
     path : tuple of ndarray, (n,)
         East and north, which labels avoid.
     marks : list of Line
@@ -405,7 +399,7 @@ def bound_labels(
     """
     if not ends:
         return []
-    record = plane.told.record
+    record = plane.found.record
     bounds = plane_bound(record.covariance)
     points = centres(plane, [k for k, _ in ends])
     words = tuple(
@@ -453,7 +447,6 @@ class Plane:
     ----------
     origin : ndarray, (3,)
         The start: latitude and longitude in deg, height in m.
-    told : NavigationTold
     unit : str
         ``m`` or ``km``.
     scale : float
@@ -461,13 +454,13 @@ class Plane:
     """
 
     origin: Array
-    told: NavigationTold
+    found: NavigationEvaluation
     unit: str
     scale: float
 
     def of(self, table: pd.DataFrame) -> tuple[Array, Array]:
         """East and north of the rows of a table of positions, each (n,)."""
-        ned = ned_from_geodetic(places_of(table), self.origin, ellipsoid=self.told.ellipsoid)
+        ned = ned_from_geodetic(places_of(table), self.origin, ellipsoid=self.found.ellipsoid)
         return self.scale * ned[:, 1], self.scale * ned[:, 0]
 
 

@@ -1,108 +1,149 @@
-"""The sealed folder of a report, with the inputs needed to re-run it."""
+"""The sealed folder of a run with its report: written, and run again from its configuration."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Generic, Protocol, TypeVar
 
 import pandas as pd
 
 from strapdown.bundle.seal import InputFiles, Seal
 from strapdown.bundle.writing import write_bundle
-from strapdown.config.spec import Spec
 from strapdown.formats import csv
+from strapdown.progress import Progress, silent
+from strapdown.report.document import (
+    Document,
+    document_page,
+    draw_stills,
+    write_drawings,
+    write_text,
+)
+from strapdown.systems.one_thread import one_thread
 
 
 class Ran(Protocol):
-    """A completed run with its specification and input files."""
-
-    @property
-    def spec(self) -> Spec:
-        """The specification as read."""
+    """A completed run."""
 
     @property
     def inputs(self) -> Sequence[InputFiles]:
         """Input files with their roles."""
 
 
-@contextmanager
-def report_bundle(
-    result: Ran,
-    out: str | Path,
-    command: str,
-    *,
-    key: str,
-    name: str,
-    force: bool,
-    seals: list[Seal],
-    role: str = "configuration",
-    path_key: str = "file_path",
-    beside: Mapping[str, Spec] | None = None,
-    report: bool = True,
-) -> Iterator[Path]:
-    """Write the bundle of a report, whole or not at all; as `write_bundle`.
+R = TypeVar("R", bound=Ran)
 
-    Parameters
+
+@dataclass(frozen=True)
+class ReportBundle(Generic[R]):
+    """How the runs of one command are sealed.
+
+    Attributes
     ----------
-    result : Ran
-    out : str or Path
-        Folder to create.
-    command : str
-        Command that can re-run it.
-    key, path_key : str
-        Keys of the specification, and of the path of its file, in the sealed configuration.
-    name : str
-        Folder name shown in the report.
-    force : bool
-        Overwrite an existing bundle.
-    seals : list of Seal
-        The seal is appended when the bundle is complete.
-    role : str
-        Role of the specification's file among the inputs.
-    beside : mapping of str to Spec, optional
-        Further specifications of the run, by their keys in the sealed configuration.
-    report : bool
-        Whether it has its pages and figures; recorded in the seal if not.
-
-    Yields
-    ------
-    Path
-        An empty folder.
-
-    Raises
-    ------
-    ConfigError
-        `out` exists and may not be replaced.
+    configuration : callable
+        From a run to its sealed configuration.
+    run : callable
+        From a sealed configuration to the run.
+    write_files : callable
+        Writes the files of a run into a folder. Takes the run, the folder, the name shown in the
+        report, whether to write pages and figures, and progress.
     """
+
+    command: str
+    configuration: Callable[[R], dict[str, Any]]
+    run: Callable[[dict[str, Any]], R]
+    write_files: Callable[[R, Path, str, bool, Progress], None]
+
+    @one_thread()
+    def write(
+        self,
+        result: R,
+        out: str | Path,
+        *,
+        name: str | None = None,
+        report: bool = True,
+        force: bool = False,
+        progress: Progress = silent,
+    ) -> Seal:
+        """Write a run as a sealed bundle, whole or not at all.
+
+        Parameters
+        ----------
+        result : object
+        out : str or Path
+            Folder to create.
+        name : str, optional
+            Folder name shown in the report; by default that of `out`.
+        report : bool
+            Whether to write pages and figures; recorded in the seal if not.
+        force : bool
+            Overwrite an existing bundle.
+        progress : callable, optional
+
+        Raises
+        ------
+        ConfigError
+            `out` exists and may not be replaced.
+        """
+        name = Path(out).absolute().name if name is None else name
+        seals: list[Seal] = []
+        with write_bundle(
+            Path(out),
+            command=self.command,
+            configuration={
+                "name": name,
+                **self.configuration(result),
+                **({} if report else {"report": False}),
+            },
+            inputs=result.inputs,
+            force=force,
+            seals=seals,
+        ) as folder:
+            progress("writing the tables", 0.8)
+            self.write_files(result, folder, name, report, progress)
+            progress("sealing", 0.97)
+        return seals[0]
+
+    def rerun(self, configuration: dict[str, Any], out: Path, *, report: bool = True) -> Seal:
+        """Re-run a sealed bundle from its configuration, with or without its report."""
+        name = str(configuration["name"])
+        return self.write(self.run(configuration), out, name=name, report=report)
+
+
+def file_of(configuration: dict[str, Any], key: str = "file_path") -> Path | None:
+    """Return the configuration file of a sealed run, if it had one."""
+    path = configuration.get(key)
+    return None if path is None else Path(path)
+
+
+def with_file(
+    configuration: dict[str, Any], result: Ran, role: str = "configuration", key: str = "file_path"
+) -> dict[str, Any]:
+    """Return a configuration with the path of its own file among the inputs, if it had one."""
     file = next((str(i.path) for i in result.inputs if i.role == role), None)
-    configuration = {
-        "name": name,
-        key: result.spec.plain(),
-        **{name: spec.plain() for name, spec in (beside or {}).items()},
-        **({} if file is None else {path_key: file}),
-        **({} if report else {"report": False}),
-    }
-    with write_bundle(
-        Path(out),
-        command=command,
-        configuration=configuration,
-        inputs=result.inputs,
-        force=force,
-        seals=seals,
-    ) as folder:
-        yield folder
+    return configuration if file is None else {**configuration, key: file}
+
+
+def write_report(
+    document: Document, folder: Path, progress: Progress = silent, *, figures: bool = True
+) -> tuple[str, ...]:
+    """Write ``report.html`` and, in ``figures``, its drawings; return the drawn charts."""
+    progress("drawing the figures", 0.86)
+    stills = draw_stills(document)
+    if figures:
+        write_drawings(document, stills, folder / "figures")
+    progress("writing the page", 0.93)
+    write_text(folder / "report.html", document_page(document, stills=stills))
+    return stills
 
 
 def write_table(table: pd.DataFrame, path: Path, comments: dict[str, str]) -> None:
-    """Write a table as CSV with shortest round-trip numbers.
-
-    Parameters
-    ----------
-    table : DataFrame
-    path : Path
-    comments : dict of str to str
-        Written at the top.
-    """
+    """Write the columns of a table as CSV, with shortest round-trip numbers and comments on top."""
     csv.write(path, {str(c): table[c].to_numpy() for c in table.columns}, comments)
+
+
+def json_number(value: Any) -> float | None:
+    """Return a number for JSON, which has no NaN and no infinity: these are null."""
+    number = float(value)
+    return number if math.isfinite(number) else None

@@ -21,9 +21,9 @@ from strapdown.formats.trajectory_maps import thin
 from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS, TrajectoryFileOptions
 from strapdown.frames import ned_from_geodetic
 from strapdown.report.chart import BLUE, ORANGE, Array, Chart, Line, Panel, break_jumps, curve
-from strapdown.report.chart_figure import ChartFigure
+from strapdown.report.chart_svg import ChartFigure
 from strapdown.report.crash_simulation import stated_errors
-from strapdown.report.path_marks import View, path_marks
+from strapdown.report.plan import View, path_marks
 from strapdown.simulation import Motion, PulseMotion, TriadErrors, find_scenario
 from strapdown.systems.trajectory_source import SimulatedTrajectory, simulate_trajectory
 from strapdown.tables import EULER, places_of
@@ -40,7 +40,6 @@ def write_simulation(
 
     Parameters
     ----------
-    spec : SimulateSpec
     out : Path
         Folder to create.
     force : bool
@@ -155,7 +154,6 @@ def write_trajectory_simulation(
 
     Parameters
     ----------
-    spec : TrajectorySpec
     out : Path
         Folder to create.
     force : bool
@@ -238,7 +236,6 @@ def simulation_chart(spec: TrajectorySpec, trajectory: pd.DataFrame) -> Chart:
 
     Parameters
     ----------
-    spec : TrajectorySpec
     trajectory : DataFrame
         A Trajectory table.
     """
@@ -300,10 +297,8 @@ def trajectory_chart(
         A Trajectory table. The plan is about its first position.
     other : DataFrame, optional
         A second one on the same clock, a reference or an estimate, drawn over the first.
-    title : str
     names : (str, str)
         Of the two, for the legend; a single trajectory has no legend.
-    ellipsoid : Ellipsoid
     slug : str
         File name.
 

@@ -8,9 +8,10 @@ from contextlib import contextmanager
 from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from strapdown.report.chart import Array
+
 Box = tuple[float, float, float, float]
 
 
@@ -235,10 +236,7 @@ class Drawing:
         at : (float, float)
         text : str
             Escaped here.
-        size : float
-        colour : str
         anchor : {'start', 'middle', 'end'}
-        bold : bool
         turn : float, deg
             Clockwise.
         halo : bool

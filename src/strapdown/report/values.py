@@ -3,18 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-import pandas as pd
-from numpy.typing import NDArray
-
-from strapdown.alignment.alignment import Alignment
 from strapdown.constants import DEG_PER_HOUR, MICRO_G, STANDARD_GRAVITY, TWO_SIDED_95
-from strapdown.evaluation.plane_bound import plane_bound
-from strapdown.navigation.record import NavigationRecord, Span
-from strapdown.report.chart import break_jumps
 
 if TYPE_CHECKING:
     from strapdown.crash.case import CaseResult
@@ -63,7 +54,6 @@ def about(value: float, half: float, unit: str) -> str:
     ----------
     value, half : float
         In the given unit.
-    unit : str
 
     Returns
     -------
@@ -143,64 +133,7 @@ def spaced(text: str) -> str:
 # Numbers of a navigation run: distances and bounds in convenient units.
 
 
-Array = NDArray[np.float64]
-
 _MG = 1e-3 * MICRO_G
-#: A heading that turns by more is drawn within 0 to 360 deg.
-MOST_TURN = 900.0
-
-
-@dataclass(frozen=True)
-class ShownStates:
-    """States of one kind, with their display unit.
-
-    Attributes
-    ----------
-    name : str
-        In words: ``gyro bias``, ``rtk: lever arm``.
-    slug : str
-    columns : tuple of str
-        Columns of the record.
-    labels : tuple of str
-        ``x``, ``y``, ``z``.
-    unit : str
-    factor : float
-        Conversion from SI.
-    """
-
-    name: str
-    slug: str
-    columns: tuple[str, ...]
-    labels: tuple[str, ...]
-    unit: str
-    factor: float
-
-
-def blocks_of(record: NavigationRecord) -> tuple[ShownStates, ...]:
-    """Return the blocks of sensor and measurement error states, in their order."""
-    groups: dict[str, list[str]] = {}
-    for column in record.sensors.columns:
-        groups.setdefault(str(column).rpartition("_")[0] or str(column), []).append(str(column))
-    out = []
-    for name, columns in groups.items():
-        labels = [c.removeprefix(name).lstrip("_") for c in columns]
-        # The unit must suit both the estimates and their standard deviations.
-        sizes = [record.sensors[columns].to_numpy(), record.sensors_sd[columns].to_numpy()]
-        size = max((float(np.nanmax(np.abs(v))) for v in sizes if v.size), default=0.0)
-        factor, unit = shown_unit(record.units.get(columns[0], ""), size)
-        aid, dot, own = name.rpartition(".")
-        words = own.replace("_", " ")
-        out.append(
-            ShownStates(
-                f"{aid}: {words}" if dot else words.replace("accel ", "accelerometer "),
-                name.replace("_", "-").replace(".", "-"),
-                tuple(columns),
-                tuple(labels),
-                unit,
-                factor,
-            )
-        )
-    return tuple(out)
 
 
 def shown_unit(unit: str, size: float) -> tuple[float, str]:
@@ -218,57 +151,6 @@ def shown_unit(unit: str, size: float) -> tuple[float, str]:
     if unit == "(rad/s)/(m/s²)":
         return DEG_PER_HOUR * STANDARD_GRAVITY, "deg/h/g"
     return 1.0, unit
-
-
-def unwrapped(heading: Array) -> Array:
-    """Headings in deg without jumps, starting within 0 to 360."""
-    if not heading.size:
-        return heading
-    whole = np.unwrap(heading, period=360.0)
-    return np.asarray(whole - 360.0 * np.floor(whole[0] / 360.0))
-
-
-def heading_shown(record: NavigationRecord) -> tuple[Array, Array, str]:
-    """Heading over the trajectory and at the marks, deg, for display, with its caption.
-
-    It continues through north, unless it turns too often to be readable; then NaN breaks it at
-    north.
-    """
-    time = record.trajectory.index.to_numpy(dtype=np.float64)
-    values = unwrapped(record.trajectory["heading"].to_numpy(dtype=np.float64))
-    marks = np.interp(record.sd.index.to_numpy(dtype=np.float64), time, values)
-    if np.ptp(values) <= MOST_TURN:
-        return values, marks, "The heading goes on over north, so that no turn breaks it."
-    return (
-        break_jumps(values % 360.0),
-        break_jumps(marks % 360.0),
-        f"The heading turns by {plain(float(np.ptp(values)) / 360.0, 1)} full turns in all.",
-    )
-
-
-def at_marks(record: NavigationRecord, column: str) -> Array:
-    """A trajectory column, other than heading, at the covariance marks."""
-    time = record.trajectory.index.to_numpy(dtype=np.float64)
-    values = record.trajectory[column].to_numpy(dtype=np.float64)
-    return np.asarray(np.interp(record.sd.index.to_numpy(dtype=np.float64), time, values))
-
-
-def worst_within(record: NavigationRecord, span: Span) -> tuple[float, float] | None:
-    """The largest horizontal bound in m of a span, and its time; None without a mark in it."""
-    time = record.sd.index.to_numpy(dtype=np.float64)
-    rows = np.flatnonzero((time >= span.begin) & (time <= span.end))
-    if not rows.size:
-        return None
-    bounds = plane_bound(record.covariance)[rows]
-    k = int(np.argmax(bounds))
-    return float(bounds[k]), float(time[rows[k]])
-
-
-def distance_over_ground(trajectory: pd.DataFrame) -> float:
-    """Distance over ground, m: the horizontal speed integrated by the trapezoidal rule."""
-    time = trajectory.index.to_numpy(dtype=np.float64)
-    speed = np.hypot(*(trajectory[c].to_numpy(dtype=np.float64) for c in ("VN", "VE")))
-    return float(np.trapezoid(speed, time))
 
 
 def length_words(metres: float) -> str:
@@ -315,23 +197,7 @@ def share_words(share: float) -> str:
 # Numbers of an alignment.
 
 
-#: Half widths of roll, pitch and heading, in deg, that exclude no angle.
-ANY = (180.0, 90.0, 180.0)
-NOT_KNOWN = "not known"
-
-
-def angle_bound(alignment: Alignment, which: int) -> str:
-    """Format an angle with its bound: ``90.60° ± 0.12°``; in words if it is undetermined."""
-    value = float(alignment.roll_pitch_heading[which])
-    half = TWO_SIDED_95 * float(alignment.sd_deg[which])
-    if not half < ANY[which]:
-        return NOT_KNOWN
-    if which == 2:
-        value %= 360.0
-    return about(value, half, "°")
-
-
-def alignment_values_instant(time: float) -> str:
+def stamp(time: float) -> str:
     """Format a time stamp to a hundredth of a second: ``243298.01 s``."""
     return f"{plain(time, 2).rstrip('0').rstrip('.')}{GAP}s"
 

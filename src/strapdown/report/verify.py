@@ -8,6 +8,7 @@ import re
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,12 +27,13 @@ from strapdown.config.crash_case import CaseSpec
 from strapdown.config.reading import changed_options
 from strapdown.errors import DataError, StrapdownError
 from strapdown.formats import read_raw
-from strapdown.report.alignment import rerun_alignment
+from strapdown.report.alignment import ALIGNMENT
 from strapdown.report.attitude import write_attitude
-from strapdown.report.coast import rerun_coast
-from strapdown.report.crash_case import rerun_crash
+from strapdown.report.coast import COAST
+from strapdown.report.crash_case import CRASH
 from strapdown.report.crash_simulation import write_crash_simulation
-from strapdown.report.navigation import rerun_navigation
+from strapdown.report.navigation import NAVIGATION
+from strapdown.report.report_bundle import ReportBundle
 from strapdown.report.simulation import write_simulation, write_trajectory_simulation
 
 # Another processor or library may round the last digits differently, and a long integration
@@ -85,29 +87,17 @@ def _rerun_simulation(configuration: dict[str, Any], out: Path, sealed: set[str]
     return write_simulation(SimulateSpec.model_validate(configuration), out)
 
 
-def _rerun_crash(configuration: dict[str, Any], out: Path, sealed: set[str]) -> Seal:
-    return rerun_crash(configuration, out, report=_with_page(configuration))
+def _rerun_report(
+    bundle: ReportBundle[Any], configuration: dict[str, Any], out: Path, sealed: set[str]
+) -> Seal:
+    return bundle.rerun(configuration, out, report=_with_page(configuration))
 
 
-def _rerun_alignment(configuration: dict[str, Any], out: Path, sealed: set[str]) -> Seal:
-    return rerun_alignment(configuration, out, report=_with_page(configuration))
-
-
-def _rerun_navigation(configuration: dict[str, Any], out: Path, sealed: set[str]) -> Seal:
-    return rerun_navigation(configuration, out, report=_with_page(configuration))
-
-
-def _rerun_coast(configuration: dict[str, Any], out: Path, sealed: set[str]) -> Seal:
-    return rerun_coast(configuration, out, report=_with_page(configuration))
-
-
+BUNDLES: tuple[ReportBundle[Any], ...] = (ALIGNMENT, COAST, CRASH, NAVIGATION)
 RERUNS: dict[str, Callable[[dict[str, Any], Path, set[str]], Seal]] = {
-    "align": _rerun_alignment,
     "attitude": _rerun_attitude,
-    "coast": _rerun_coast,
-    "crash": _rerun_crash,
-    "navigate": _rerun_navigation,
     "simulate": _rerun_simulation,
+    **{b.command: partial(_rerun_report, b) for b in BUNDLES},
 }
 
 
@@ -310,7 +300,7 @@ def changed_case(root: Path, manifest: dict[str, Any]) -> list[str]:
     try:
         told = CaseSpec.read(path, files=False).model_dump(mode="json", exclude_none=True)
     except StrapdownError as error:
-        return [f"{name}: it is no case any more: {error.finding.what}"]
+        return [f"{name}: it is not a valid case: {error.finding.what}"]
     told.pop("name", None)
     sealed = {k: v for k, v in configuration.get("case", {}).items() if k != "name"}
     return [f"{name}: {what}" for what in changed_options(_told(sealed), _told(told))]

@@ -41,7 +41,7 @@ from strapdown.tables import ACCEL, EULER, GYRO
 from strapdown.tables.checks import index_of, source_of, values_of
 
 if TYPE_CHECKING:
-    from strapdown.report.chart_figure import ChartFigure
+    from strapdown.report.chart_svg import ChartFigure
 
 __all__ = [
     "AlignmentReadiness",
@@ -117,8 +117,8 @@ class AlignmentRun(SavedRun):
         ConfigError
             The chart does not exist.
         """
-        from strapdown.report.alignment_charts import attitude_chart
-        from strapdown.report.chart_figure import ChartFigure
+        from strapdown.report.alignment_document import attitude_chart
+        from strapdown.report.chart_svg import ChartFigure
 
         if kind not in ("attitude", *EULER):
             raise ConfigError("api.unknown-chart", quantity="kind", kind=kind)
@@ -129,9 +129,9 @@ class AlignmentRun(SavedRun):
 
     @staticmethod
     def _writer() -> Callable[..., Seal]:
-        from strapdown.report.alignment import write_alignment
+        from strapdown.report.alignment import ALIGNMENT
 
-        return write_alignment
+        return ALIGNMENT.write
 
     def __repr__(self) -> str:
         last = self.attitude.iloc[-1]

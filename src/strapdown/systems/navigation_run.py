@@ -65,7 +65,7 @@ from strapdown.tables import EULER, GEODETIC, VELOCITY
 if TYPE_CHECKING:
     from strapdown.evaluation.control_points import ControlPointScore
     from strapdown.navigation.outage_test import Withheld
-    from strapdown.report.chart_figure import ChartFigure
+    from strapdown.report.chart_svg import ChartFigure
 
 __all__ = ["Drive", "NavigationRun", "make_chain", "run_navigation", "withheld_aid"]
 
@@ -363,9 +363,9 @@ class NavigationRun(SavedRun):
 
     @staticmethod
     def _writer() -> Callable[..., Seal]:
-        from strapdown.report.navigation import write_navigation
+        from strapdown.report.navigation import NAVIGATION
 
-        return write_navigation
+        return NAVIGATION.write
 
     def __repr__(self) -> str:
         time, smoothed = self.trajectory.index, "" if self.forward is None else ", smoothed"

@@ -67,7 +67,7 @@ from strapdown.tables.aiding import odometer_table
 from strapdown.tables.checks import index_of, values_of
 
 if TYPE_CHECKING:
-    from strapdown.report.chart_figure import ChartFigure
+    from strapdown.report.chart_svg import ChartFigure
 
 __all__ = [
     "Drift",
@@ -132,16 +132,16 @@ class OutageRun(SavedRun):
         ChartFigure
             Displays itself in a notebook; `save` writes it as SVG, PNG or PDF.
         """
-        from strapdown.report.chart_figure import ChartFigure
+        from strapdown.report.chart_svg import ChartFigure
         from strapdown.report.coast_document import cone_chart
 
         return ChartFigure(cone_chart(self))
 
     @staticmethod
     def _writer() -> Callable[..., Seal]:
-        from strapdown.report.coast import write_coast
+        from strapdown.report.coast import COAST
 
-        return write_coast
+        return COAST.write
 
     def __repr__(self) -> str:
         time, bound = self.forecast.time[-1], self.forecast.bound[-1]

@@ -12,7 +12,7 @@ from strapdown.config.alignment import sensors_of
 from strapdown.config.navigation import NavigationSpec, make_filter
 from strapdown.navigation.heading_integrity import SURE
 from strapdown.navigation.heading_witness import hear_witnesses, witnesses_of
-from strapdown.report.navigation import write_navigation
+from strapdown.report.navigation import NAVIGATION
 from strapdown.systems.navigation_run import make_chain, run_navigation
 
 LIMIT = 3.0
@@ -173,7 +173,7 @@ def test_without_fixes_nothing_bears_a_heading_out():
 
 
 def test_the_files_say_what_was_judged(sound, tmp_path):
-    write_navigation(sound, tmp_path / "out")
+    NAVIGATION.write(sound, tmp_path / "out")
     told = json.loads((tmp_path / "out" / "verdict.json").read_text(encoding="utf-8"))
     light = sound.trust.light
     assert told["heading"]["share"]["green"] == light.share("green")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -21,7 +22,9 @@ from strapdown.crash.entry import Entry
 from strapdown.crash.path import compare_with_reference, sample_paths
 from strapdown.crash.reconstruction import CrashOptions, reconstruct_crash
 from strapdown.crash.severity import find_severity_model, injury_risk
-from strapdown.report.crash_figures import crash_figures
+from strapdown.report.chart import Chart
+from strapdown.report.crash_document import crash_document
+from strapdown.report.document import Picture, drawings
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.simulation.crash_motion import find_crash
 from strapdown.simulation.crash_recording import paper_units, record_crash
@@ -114,7 +117,39 @@ def _path_reference(crash, impact, main):
     )
 
 
+def figures_in(document):
+    """Charts, pictures and the animation of a report, by what they show."""
+    drawn = drawings(document)
+    by = {one.slug: one for one in drawn}
+    charts = [one for one in drawn if isinstance(one, Chart)]
+    pictures = [one for one in drawn if isinstance(one, Picture)]
+
+    def all_of(kind):
+        return [one for one in charts if one.slug.startswith(kind)]
+
+    return SimpleNamespace(
+        charts=charts,
+        pictures=[*pictures, by["motion"].stills],
+        path=by["path"],
+        motion=by["motion"],
+        delta_v=all_of("delta-v"),
+        references=all_of("reference-"),
+        signals=by.get("signals-1"),
+        rates=by.get("rates-1"),
+        overview=by.get("overview-1"),
+        pdof_by_window=by.get("pdof-by-window"),
+        pdof_by_time_zero=by.get("pdof-by-time-zero"),
+        place=by["place"],
+        attitude=by["attitude"],
+        units=by.get("units"),
+        accelerations=by.get("accelerations"),
+        delta_v_budget=by.get("budget-delta-v"),
+        place_budget=by["budget-place"],
+        severity=by.get("severity"),
+    )
+
+
 @cache
 def figures_of(name="pole", units=("IMU1", "IMU2"), window=None, end=None):
     """All figures of such a case."""
-    return crash_figures(crash_case(name, units, window, end))
+    return figures_in(crash_document(crash_case(name, units, window, end), ""))

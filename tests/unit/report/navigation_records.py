@@ -9,7 +9,7 @@ import pandas as pd
 
 from strapdown.frames import geodetic_from_ned
 from strapdown.navigation.record import Event, NavigationRecord, Span
-from strapdown.report.navigation_found import NavigationTold
+from strapdown.report.navigation_evaluation import NavigationEvaluation
 from strapdown.rotation import euler_sd
 from strapdown.tables import gnss_table, trajectory_error_table, trajectory_table
 
@@ -127,7 +127,7 @@ def told(made, **more):
         (np.inf,) * 3,
     )
     given = {"name": "made.csv", "what": "made up", "fixes": {"rtk": fixes}} | more
-    return NavigationTold(made, **given)
+    return NavigationEvaluation(made, **given)
 
 
 def shifted(trajectory, north=0.0, east=0.0, down=0.0, heading=0.0):

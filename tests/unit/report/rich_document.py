@@ -17,10 +17,13 @@ from strapdown.report.chart import (
     Line,
     Mark,
     Panel,
+    Scene,
+    SceneBody,
+    SceneLine,
+    SceneWord,
 )
 from strapdown.report.document import (
     Animation,
-    ChartBlock,
     Document,
     Facts,
     Items,
@@ -31,7 +34,6 @@ from strapdown.report.document import (
     Section,
     TableBlock,
 )
-from strapdown.report.scene import Scene, SceneBody, SceneLine, SceneWord
 
 EVIL = (
     "<script>alert(1)</script>",
@@ -166,9 +168,9 @@ def rich_document(evil=(), charts=8):
                 Paragraph(f"strapdown verify FOLDER\nsha256 {DIGEST}", "mono"),
             ),
         ),
-        Section("velocity", "Change of velocity", (ChartBlock(speed_chart("dv")), table(6))),
-        Section("budget", "Where the bound comes from", (ChartBlock(budget_chart()),)),
-        Section("path", "Path", (ChartBlock(plan_chart()), picture(), animation())),
+        Section("velocity", "Change of velocity", (speed_chart("dv"), table(6))),
+        Section("budget", "Where the bound comes from", (budget_chart(),)),
+        Section("path", "Path", (plan_chart(), picture(), animation())),
         Section("long", "A long table", (table(90, strong=(89,)), Paragraph(WORDS))),
         Section("wide", "A wide table", (table(8, columns=12, caption="Everything"),)),
         Section(
@@ -180,7 +182,7 @@ def rich_document(evil=(), charts=8):
             ),
         ),
         *(
-            Section(f"unit-{k}", f"Unit {k}", (Paragraph(WORDS), ChartBlock(speed_chart(f"u{k}"))))
+            Section(f"unit-{k}", f"Unit {k}", (Paragraph(WORDS), speed_chart(f"u{k}")))
             for k in range(max(0, charts - 3))
         ),
         Section(
@@ -191,7 +193,7 @@ def rich_document(evil=(), charts=8):
                 Items(tuple((text, text) for text in evil)),
                 Facts(tuple((text, text) for text in evil)),
                 TableBlock(("a", one(1), one(3), "d"), evil_rows, (0, 1), one(2)),
-                ChartBlock(speed_chart(f"evil {one(0)}", one(3))),
+                speed_chart(f"evil {one(0)}", one(3)),
                 picture(f"../{one(1)}", one(1)),
                 animation(f"x{one(2)}", one(1) + '<a href="http://example.org">a</a>'),
             ),

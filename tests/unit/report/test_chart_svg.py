@@ -24,8 +24,7 @@ from strapdown.report.chart import (
     Panel,
     runs,
 )
-from strapdown.report.chart_figure import ChartFigure
-from strapdown.report.chart_svg import Scale, fitted, still, ticks
+from strapdown.report.chart_svg import ChartFigure, Scale, fitted, still, ticks
 from strapdown.report.svg_drawing import overlap, text_width
 
 SVG = "{http://www.w3.org/2000/svg}"

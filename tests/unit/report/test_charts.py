@@ -8,20 +8,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from strapdown.report.attitude_charts import (
-    LEAST_ERROR,
-    answer_charts,
-    charts,
-    judgement_charts,
-    share_basis,
-)
+from strapdown.report.attitude_charts import LEAST_ERROR, charts
+from strapdown.report.attitude_tables import share_basis
 from strapdown.report.chart import DASHES, SERIES_COLOURS, Level, look
 from strapdown.report.chart_svg import entries, still
-from strapdown.report.path_marks import PLACES, place_labels
+from strapdown.report.plan import PLACES, place_labels
 
 
 def by_slug(bench):
-    return {c.slug: c for c in [*answer_charts(bench), *judgement_charts(bench)]}
+    return {c.slug: c for c in charts(bench)}
 
 
 def points(chart, name):

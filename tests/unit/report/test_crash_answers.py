@@ -23,7 +23,7 @@ from strapdown.report.crash_case import (
     trajectory_table,
     write_table,
 )
-from strapdown.report.crash_limits import limitations
+from strapdown.report.crash_words import limitations
 from strapdown.report.values import spaced
 from strapdown.report.verify import changed_case
 

@@ -98,9 +98,9 @@ def test_several_events_have_a_chart_each_and_none_has_none():
 def test_signals_are_as_recorded_and_marked_where_a_range_ends():
     result = crash_case(units=ALONE)
     recorded, unit = result.units[0], result.reconstruction.units[0]
-    signals = figures_of(units=ALONE).signals[0]
+    figures = figures_of(units=ALONE)
     low = recorded.accelerometers[0]
-    panel = signals.crash.panels[0]
+    panel = figures.signals.panels[0]
     raw = line(panel, f"{low.name}, as recorded")
     offset = result.reconstruction.synchronised.units[0].offset
     stamps = low.table.index.to_numpy() - offset
@@ -114,14 +114,14 @@ def test_signals_are_as_recorded_and_marked_where_a_range_ends():
     clipped = result.reconstruction.synchronised.units[0].accelerometers[0].clipped[:, 0]
     assert len(held.x) == int(clipped.sum())
     assert any(level.y == pytest.approx(-2.0, abs=0.01) for level in panel.levels)
-    down = line(signals.crash.panels[2], "merged, biases taken off")
+    down = line(figures.signals.panels[2], "merged, biases taken off")
     assert down.y[0] == pytest.approx(-1.0, abs=0.05)
     zero, end = unit.events.events[0].time_zero, unit.events.events[0].end
     assert merged.x[0] >= 1e3 * (zero - 0.05) - 1e-6
     assert merged.x[-1] <= 1e3 * (end + 0.10) + 1e-6
-    assert [(b.start, b.end) for b in signals.crash.bands] == [(1e3 * zero, 1e3 * end)]
-    assert signals.rates is not None
-    assert {b.label for b in signals.overview.bands} >= {"event"}
+    assert [(b.start, b.end) for b in figures.signals.bands] == [(1e3 * zero, 1e3 * end)]
+    assert figures.rates is not None
+    assert {b.label for b in figures.overview.bands} >= {"event"}
 
 
 def test_signals_are_turned_into_vehicle_axes_and_missing_axes_spoil_no_other():

@@ -12,13 +12,13 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from scipy.stats import chi2
-from tests.unit.report.crash_results import HOSTILE, crash_case, figures_of
+from tests.unit.report.crash_results import HOSTILE, crash_case, figures_in, figures_of
 
 from strapdown import rotation
 from strapdown.config.crash_case import PointSpec, VehicleSpec
 from strapdown.crash.pdof import AngleInterval
 from strapdown.report.crash_animation import MOST_FRAMES, path_animation, vehicle_body
-from strapdown.report.crash_figures import crash_figures, reference_in_path_axes
+from strapdown.report.crash_document import crash_document, reference_in_path_axes
 from strapdown.report.crash_outline import (
     angle_words,
     interval_words,
@@ -27,7 +27,7 @@ from strapdown.report.crash_outline import (
 )
 from strapdown.report.crash_pictures import Direction, MountingPoint, conventions_picture, pdof_dial
 from strapdown.report.crash_plan import path_plan
-from strapdown.report.plan_view import PlanView, ellipse, envelope, hull, nice_step, tick_words
+from strapdown.report.plan import PlanView, ellipse, envelope, hull, nice_step, tick_words
 from strapdown.report.svg_drawing import SMALL, Drawing, overlap, shortened, text_width
 from strapdown.report.values import plain
 from strapdown.tables import NED
@@ -345,7 +345,7 @@ def test_names_from_outside_are_text_and_nothing_else():
     answer = result.references[0]
     named = replace(answer, spec=answer.spec.model_copy(update={"name": HOSTILE}))
     units = [MountingPoint(HOSTILE, (0.0, 0.0, 0.0), 0)]
-    figures = crash_figures(replace(result, spec=spec, references=(named,)))
+    figures = figures_in(crash_document(replace(result, spec=spec, references=(named,)), ""))
     for picture in (*figures.pictures, conventions_picture(CAR, units)):
         assert "<script" not in picture.svg and "\x00" not in picture.svg
         ElementTree.fromstring(picture.svg)
@@ -366,6 +366,6 @@ def test_long_names_are_cut_and_numbers_are_short():
 
 
 def test_the_same_result_makes_the_same_bytes():
-    first, second = figures_of(), crash_figures(crash_case())
+    first, second = figures_of(), figures_in(crash_document(crash_case(), ""))
     assert [p.svg for p in first.pictures] == [p.svg for p in second.pictures]
     assert first.motion.scene.data() == second.motion.scene.data()

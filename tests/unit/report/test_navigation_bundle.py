@@ -15,9 +15,8 @@ from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.report.document import draw_stills, drawings, write_drawings
 from strapdown.report.navigation import navigation_json
 from strapdown.report.navigation_document import navigation_document
-from strapdown.report.navigation_found import examine, told_of, withheld_of
-from strapdown.report.navigation_trust import trust
-from strapdown.report.verdict_words import answer, heading_words
+from strapdown.report.navigation_evaluation import evaluation_of, trust, withheld_of
+from strapdown.report.verdict import answer, heading_words
 from strapdown.systems.navigation_run import run_navigation
 
 FILE = """
@@ -59,7 +58,7 @@ def result(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def found(result):
-    return examine(told_of(result))
+    return evaluation_of(result)
 
 
 def leaves(value, path=""):
@@ -123,7 +122,7 @@ def test_the_json_states_its_conventions_and_no_clock(result, found):
 
 
 def test_each_drawing_is_a_file(result, found, tmp_path):
-    document = navigation_document(found.told, "out", found)
+    document = navigation_document(found, "out")
     write_drawings(document, draw_stills(document), tmp_path / "figures")
     names = sorted(p.stem for p in (tmp_path / "figures").iterdir())
     assert names == sorted(block.chart.slug for block in drawings(document))
@@ -135,7 +134,7 @@ def test_the_terminal_says_what_the_page_says(result, capsys):
 
     print_navigation(result)
     said = " ".join(capsys.readouterr().out.split())
-    found = examine(told_of(result))
+    found = evaluation_of(result)
     assert trust(found).sentence.replace("\u00a0", " ") in said
     assert heading_words(result.trust).replace("\u00a0", " ") in said
     assert "rtk.position" in said

@@ -29,9 +29,12 @@ from strapdown.report.navigation_charts import (
     nis_chart,
     strip,
 )
-from strapdown.report.navigation_found import agreements, navigation_errors
+from strapdown.report.navigation_evaluation import (
+    agreements,
+    heading_shown,
+    unwrapped,
+)
 from strapdown.report.navigation_plan import ellipse_rows, plan_chart
-from strapdown.report.values import heading_shown, unwrapped
 
 
 def named(panel, start):
@@ -284,7 +287,7 @@ def test_errors_are_beside_their_bounds():
     # 3 m along the longer axis: one standard deviation.
     truth = shifted(made.trajectory, 3.0 * np.cos(TURN), 3.0 * np.sin(TURN), 1.0, 0.25)
     given = told(made, truth=truth)
-    found = navigation_errors(given)
+    found = given.errors
     score = found.score("horizontal")
     assert score.rms == pytest.approx(3.0, rel=1e-6)
     assert score.bound == pytest.approx(PLANE_95 * 3.0, rel=1e-6)
@@ -292,9 +295,9 @@ def test_errors_are_beside_their_bounds():
     # One of the plane, 1 m by 2 m down, 0.25 deg by 0.5 deg of heading.
     assert found.nees == pytest.approx(1.0 + 0.25 + 0.25, rel=1e-4)
     assert found.freedom == 9
-    place = error_charts(given, found)[0]
+    place = error_charts(given)[0]
     assert place.panels[1].lines[0].y == pytest.approx(3.0 * np.cos(TURN), rel=1e-6)
-    assert nees_chart(given, found).panels[1].levels[1].y == pytest.approx(19.0228, abs=1e-4)
+    assert nees_chart(given).panels[1].levels[1].y == pytest.approx(19.0228, abs=1e-4)
 
 
 @pytest.mark.parametrize(

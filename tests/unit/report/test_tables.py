@@ -17,8 +17,8 @@ from strapdown.formats import read_raw
 from strapdown.report import attitude_tables as tables
 from strapdown.report.attitude import attitude_json, write_attitude
 from strapdown.report.attitude_document import KINDS, attitude_document
-from strapdown.report.attitude_words import headline
-from strapdown.report.document_html import document_page
+from strapdown.report.attitude_tables import headline
+from strapdown.report.document import document_page
 from strapdown.report.verify import _difference
 
 EVIL = "</script><script>alert(1)</script><img src=x onerror=alert(2)>"

@@ -11,8 +11,8 @@ import pytest
 from strapdown.ellipsoids import ELLIPSOIDS, WGS84
 from strapdown.frames import geodetic_from_ned
 from strapdown.report.chart import steady_range
-from strapdown.report.chart_figure import ChartFigure
-from strapdown.report.path_marks import View
+from strapdown.report.chart_svg import ChartFigure
+from strapdown.report.plan import View
 from strapdown.report.simulation import MOST_POINTS, trajectory_chart
 from strapdown.tables import trajectory_table
 

@@ -7,9 +7,14 @@ import pytest
 
 from strapdown.cli.align import spec_of_flags
 from strapdown.errors import ConfigError, DataError
-from strapdown.report.alignment_charts import attitude_chart
-from strapdown.report.alignment_document import headline, key_figures, limits
-from strapdown.report.alignment_trust import bounds_hold, trust
+from strapdown.report.alignment_document import (
+    attitude_chart,
+    bounds_hold,
+    headline,
+    key_figures,
+    limits,
+    trust,
+)
 from strapdown.report.values import rate_words
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty

@@ -11,7 +11,7 @@ from strapdown.alignment.coarse_alignments import COARSE_ALIGNMENTS
 from strapdown.alignment.readiness import carried_attitude, carry
 from strapdown.config.alignment import AlignmentSpec
 from strapdown.errors import ConfigError
-from strapdown.report.alignment_trust import answer_error, trust
+from strapdown.report.alignment_document import answer_error, trust
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.simulation import Origin, StationaryMotion, simulate_imu

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -25,7 +25,7 @@ from strapdown.navigation.consistency import (
 )
 from strapdown.navigation.measurements.measurement import lasting
 from strapdown.navigation.outage_test import Withheld as WithheldScores
-from strapdown.navigation.record import NavigationRecord
+from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.navigation.truth_comparison import (
     SmootherConsistency,
     TruthComparison,
@@ -33,68 +33,96 @@ from strapdown.navigation.truth_comparison import (
     compare_with_truth,
     smoother_consistency,
 )
+from strapdown.report.chart import Array, break_jumps
+from strapdown.report.document import Trust, reason
+from strapdown.report.values import plain, shown_unit
 from strapdown.systems.navigation_run import NavigationRun, withheld_aid
 from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
 
 
 @dataclass(frozen=True, eq=False)
-class NavigationFound:
-    """A navigation run with its evaluation.
+class NavigationEvaluation:
+    """A navigation run with the references known beside it, evaluated for its report.
 
     Attributes
     ----------
-    told : NavigationTold
-    agreements : tuple of Agreement
-        One per observation name.
-    errors : NavigationErrors or None
-        Against the truth.
-    smoother : SmootherConsistency or None
-    forward_errors : NavigationErrors or None
-        For a smoothed run: agreement of filter and smoother, and the filter's errors.
+    forward : NavigationRecord, optional
+        For a smoothed run, the record of the filter alone.
+    name, what : str
+        Of the log: its file, and its kind (``recorded log``).
+    title : str
+        Of the report; made from `name` if empty.
+    chain : tuple of (str, str)
+        Slots and their modules, in words.
+    fixes : mapping of str to DataFrame
+        Gnss tables by name of the measurement source, drawn as points.
+    truth : DataFrame, optional
+        Trajectory table on the clock of the run.
+    truth_name : str
+        Words that follow "error against".
+    lasting : tuple of str
+        Names of the measurement sources with stated time-correlated errors.
     """
 
-    told: NavigationTold
-    agreements: tuple[Agreement, ...]
-    errors: NavigationErrors | None
-    smoother: SmootherConsistency | None = None
-    forward_errors: NavigationErrors | None = None
-
-    @property
-    def record(self) -> NavigationRecord:
-        """Record of the run."""
-        return self.told.record
+    record: NavigationRecord
+    forward: NavigationRecord | None = None
+    name: str = "log"
+    what: str = ""
+    title: str = ""
+    chain: tuple[tuple[str, str], ...] = ()
+    fixes: Mapping[str, pd.DataFrame] = field(default_factory=dict)
+    truth: pd.DataFrame | None = None
+    truth_name: str = "the truth"
+    points: ControlPointScore | None = None
+    withheld: tuple[Withheld, ...] = ()
+    findings: tuple[Finding, ...] = ()
+    ellipsoid: Ellipsoid = WGS84
+    lasting: tuple[str, ...] = ()
 
     @property
     def filtered(self) -> NavigationRecord:
         """Record of the filter alone, which shows the convergence of the estimated errors."""
-        return self.told.forward or self.told.record
+        return self.forward or self.record
+
+    @cached_property
+    def agreements(self) -> tuple[Agreement, ...]:
+        """Consistency of each observation that has innovations."""
+        return agreements(self.record, self.lasting)
+
+    @cached_property
+    def errors(self) -> NavigationErrors | None:
+        """Errors against the truth, which has an instant in common with the run, else DataError."""
+        return self._errors(self.record)
+
+    @cached_property
+    def forward_errors(self) -> NavigationErrors | None:
+        """Errors of the filter alone, for a smoothed run."""
+        return None if self.forward is None else self._errors(self.forward)
+
+    @cached_property
+    def smoother(self) -> SmootherConsistency | None:
+        """Agreement of filter and smoother, for a smoothed run."""
+        if self.forward is None:
+            return None
+        return smoother_consistency(self.forward, self.record, self.ellipsoid)
 
     @property
-    def findings(self) -> tuple[Finding, ...]:
+    def all_findings(self) -> tuple[Finding, ...]:
         """Findings of the run and of its comparison with the truth."""
-        return (*self.told.findings, *(() if self.errors is None else self.errors.findings))
+        return (*self.findings, *(() if self.errors is None else self.errors.findings))
 
-
-def examine(told: NavigationTold) -> NavigationFound:
-    """Evaluate a run for its report.
-
-    Raises
-    ------
-    DataError
-        The truth has no instant in common with the run.
-    """
-    smoother = before = None
-    if told.forward is not None:
-        smoother = smoother_consistency(told.forward, told.record, told.ellipsoid)
-        before = navigation_errors(replace(told, record=told.forward))
-    agreed = agreements(told.record, told.lasting)
-    return NavigationFound(told, agreed, navigation_errors(told), smoother, before)
+    def _errors(self, record: NavigationRecord) -> NavigationErrors | None:
+        if self.truth is None:
+            return None
+        return NavigationErrors(
+            compare_with_truth(
+                record.trajectory, record.sd.index, record.covariance, self.truth, self.ellipsoid
+            )
+        )
 
 
 # Consistency of innovations: size and whiteness, against the filter's expectation.
 
-
-Array = NDArray[np.float64]
 
 #: An RMS of normalized innovations above this factor, or below its inverse, contradicts the
 #: stated errors.
@@ -115,7 +143,6 @@ class Agreement:
 
     Attributes
     ----------
-    name : str
     labels : tuple of str
         Of the components, with units.
     time : ndarray, (n,), s
@@ -260,7 +287,6 @@ def agreements(record: NavigationRecord, lasting: Collection[str] = ()) -> tuple
 
     Parameters
     ----------
-    record : NavigationRecord
     lasting : collection of str
         Names of the measurement sources with stated time-correlated errors.
     """
@@ -310,10 +336,8 @@ class Score:
 
     Attributes
     ----------
-    quantity, unit : str
     rms : float
         Weighted by time: instants are dense where measurements are frequent, sparse in an outage.
-    largest : float
     largest_at : float, s
     bound : float
         Root mean square of the 95 % bounds.
@@ -332,12 +356,7 @@ class Score:
 
 @dataclass(frozen=True, eq=False)
 class NavigationErrors:
-    """Errors against the truth, with the run's own bounds.
-
-    Attributes
-    ----------
-    comparison : TruthComparison
-    """
+    """Errors against the truth, with the run's own bounds."""
 
     comparison: TruthComparison
 
@@ -420,39 +439,12 @@ class NavigationErrors:
         )
 
 
-def navigation_errors(told: NavigationTold) -> NavigationErrors | None:
-    """Compare a run with its truth.
-
-    Returns
-    -------
-    NavigationErrors or None
-        None without a truth.
-
-    Raises
-    ------
-    DataError
-        As `truth_comparison.compare_with_truth`: no common instant.
-    """
-    if told.truth is None:
-        return None
-    record = told.record
-    return NavigationErrors(
-        compare_with_truth(
-            record.trajectory, record.sd.index, record.covariance, told.truth, told.ellipsoid
-        )
-    )
-
-
-# Input of the report of a navigation run.
-
-
 @dataclass(frozen=True)
 class Withheld:
     """A GNSS outage test: an interval of withheld measurements, and the resulting error.
 
     Attributes
     ----------
-    aid : str
     begin, end : float, s
     error_m : float
         Largest horizontal distance from the withheld fixes.
@@ -475,60 +467,11 @@ class Withheld:
         return self.error_m <= self.bound_m
 
 
-@dataclass(frozen=True, eq=False)
-class NavigationTold:
-    """A navigation run with the references known beside its own record.
-
-    Attributes
-    ----------
-    record : NavigationRecord
-    forward : NavigationRecord, optional
-        For a smoothed run, the record of the filter alone.
-    name, what : str
-        Of the log: its file, and its kind (``recorded log``).
-    title : str
-        Of the report; made from `name` if empty.
-    chain : tuple of (str, str)
-        Slots and their modules, in words.
-    fixes : mapping of str to DataFrame
-        Gnss tables by name of the measurement source, drawn as points.
-    truth : DataFrame, optional
-        Trajectory table on the clock of the run.
-    truth_name : str
-        Words that follow "error against".
-    points : ControlPointScore, optional
-        Comparison with control points.
-    withheld : tuple of Withheld
-    findings : tuple of Finding
-    ellipsoid : Ellipsoid
-    lasting : tuple of str
-        Names of the measurement sources with stated time-correlated errors.
-    """
-
-    record: NavigationRecord
-    forward: NavigationRecord | None = None
-    name: str = "log"
-    what: str = ""
-    title: str = ""
-    chain: tuple[tuple[str, str], ...] = ()
-    fixes: Mapping[str, pd.DataFrame] = field(default_factory=dict)
-    truth: pd.DataFrame | None = None
-    truth_name: str = "the truth"
-    points: ControlPointScore | None = None
-    withheld: tuple[Withheld, ...] = ()
-    findings: tuple[Finding, ...] = ()
-    ellipsoid: Ellipsoid = WGS84
-    lasting: tuple[str, ...] = ()
-
-
-# Report input from the result of ``strapdown navigate``.
-
-
 NO_RULE = "none: every observation counts in full, however far off it is"
 
 
-def told_of(result: NavigationRun) -> NavigationTold:
-    """Return the report input of a navigation result."""
+def evaluation_of(result: NavigationRun) -> NavigationEvaluation:
+    """Return a run as its report evaluates it."""
     spec, source = result.spec, result.source
     chain = [
         ("Record", f"{source.name}: {source.what}"),
@@ -543,7 +486,7 @@ def told_of(result: NavigationRun) -> NavigationTold:
         *((f"Aid {name}", _of_aid(aid)) for name, aid in spec.aiding.items()),
         ("States", ", ".join(dict.fromkeys(_block(c) for c in result.record.sensors.columns))),
     ]
-    return NavigationTold(
+    return NavigationEvaluation(
         record=result.record,
         forward=result.forward,
         name=source.name,
@@ -590,3 +533,267 @@ def withheld_of(aid: str, scores: Sequence[WithheldScores]) -> tuple[Withheld, .
 
 def _block(column: object) -> str:
     return str(column).rpartition("_")[0] or str(column)
+
+
+#: A heading that turns by more is drawn within 0 to 360 deg.
+MOST_TURN = 900.0
+
+
+@dataclass(frozen=True)
+class ShownStates:
+    """States of one kind, with their display unit.
+
+    Attributes
+    ----------
+    name : str
+        In words: ``gyro bias``, ``rtk: lever arm``.
+    columns : tuple of str
+        Columns of the record.
+    labels : tuple of str
+        ``x``, ``y``, ``z``.
+    factor : float
+        Conversion from SI.
+    """
+
+    name: str
+    slug: str
+    columns: tuple[str, ...]
+    labels: tuple[str, ...]
+    unit: str
+    factor: float
+
+
+def blocks_of(record: NavigationRecord) -> tuple[ShownStates, ...]:
+    """Return the blocks of sensor and measurement error states, in their order."""
+    groups: dict[str, list[str]] = {}
+    for column in record.sensors.columns:
+        groups.setdefault(str(column).rpartition("_")[0] or str(column), []).append(str(column))
+    out = []
+    for name, columns in groups.items():
+        labels = [c.removeprefix(name).lstrip("_") for c in columns]
+        # The unit must suit both the estimates and their standard deviations.
+        sizes = [record.sensors[columns].to_numpy(), record.sensors_sd[columns].to_numpy()]
+        size = max((float(np.nanmax(np.abs(v))) for v in sizes if v.size), default=0.0)
+        factor, unit = shown_unit(record.units.get(columns[0], ""), size)
+        aid, dot, own = name.rpartition(".")
+        words = own.replace("_", " ")
+        out.append(
+            ShownStates(
+                f"{aid}: {words}" if dot else words.replace("accel ", "accelerometer "),
+                name.replace("_", "-").replace(".", "-"),
+                tuple(columns),
+                tuple(labels),
+                unit,
+                factor,
+            )
+        )
+    return tuple(out)
+
+
+def unwrapped(heading: Array) -> Array:
+    """Headings in deg without jumps, starting within 0 to 360."""
+    if not heading.size:
+        return heading
+    whole = np.unwrap(heading, period=360.0)
+    return np.asarray(whole - 360.0 * np.floor(whole[0] / 360.0))
+
+
+def heading_shown(record: NavigationRecord) -> tuple[Array, Array, str]:
+    """Heading over the trajectory and at the marks, deg, for display, with its caption.
+
+    It continues through north, unless it turns too often to be readable; then NaN breaks it at
+    north.
+    """
+    time = record.trajectory.index.to_numpy(dtype=np.float64)
+    values = unwrapped(record.trajectory["heading"].to_numpy(dtype=np.float64))
+    marks = np.interp(record.sd.index.to_numpy(dtype=np.float64), time, values)
+    if np.ptp(values) <= MOST_TURN:
+        return values, marks, "The heading goes on over north, so that no turn breaks it."
+    return (
+        break_jumps(values % 360.0),
+        break_jumps(marks % 360.0),
+        f"The heading turns by {plain(float(np.ptp(values)) / 360.0, 1)} full turns in all.",
+    )
+
+
+def at_marks(record: NavigationRecord, column: str) -> Array:
+    """A trajectory column, other than heading, at the covariance marks."""
+    time = record.trajectory.index.to_numpy(dtype=np.float64)
+    values = record.trajectory[column].to_numpy(dtype=np.float64)
+    return np.asarray(np.interp(record.sd.index.to_numpy(dtype=np.float64), time, values))
+
+
+def worst_within(record: NavigationRecord, span: Span) -> tuple[float, float] | None:
+    """The largest horizontal bound in m of a span, and its time; None without a mark in it."""
+    time = record.sd.index.to_numpy(dtype=np.float64)
+    rows = np.flatnonzero((time >= span.begin) & (time <= span.end))
+    if not rows.size:
+        return None
+    bounds = plane_bound(record.covariance)[rows]
+    k = int(np.argmax(bounds))
+    return float(bounds[k]), float(time[rows[k]])
+
+
+def distance_over_ground(trajectory: pd.DataFrame) -> float:
+    """Distance over ground, m: the horizontal speed integrated by the trapezoidal rule."""
+    time = trajectory.index.to_numpy(dtype=np.float64)
+    speed = np.hypot(*(trajectory[c].to_numpy(dtype=np.float64) for c in ("VN", "VE")))
+    return float(np.trapezoid(speed, time))
+
+
+# Judge whether a navigation run can be trusted, from its consistency with its bounds.
+
+
+# Errors of one run are correlated in time, so less than 95 % may lie within a good bound.
+_ENOUGH = 0.8
+# Share of the epochs; more rejected epochs are not outliers.
+_MANY = 0.1
+
+
+def trust(found: NavigationEvaluation) -> Trust:
+    """Judge a run by its consistency."""
+    known = [*_errors(found), *_withheld(found)]
+    reasons = known + [_innovations(one) for one in found.agreements if one.used.any()]
+    reasons += [_memory(one) for one in found.agreements if one.remembers]
+    reasons += _rejected(found)
+    # Notes appear among the findings and do not count against the run.
+    reasons += [f for f in found.findings if f.severity == "warning"]
+    reasons += _silence(found)
+    wrong = any(one.severity == "warning" for one in known)
+    wrong |= any(one.refutes for one in found.agreements)
+    against = any(one.severity == "warning" for one in reasons)
+    verdict = "trusted" if not against else "distrusted" if wrong else "reserve"
+    return Trust(verdict, tuple(reasons), _short(found))
+
+
+def _silence(found: NavigationEvaluation) -> list[Finding]:
+    """Reason against a run without measurements, truth or outage test: it cannot be confirmed."""
+    if found.errors is not None or found.withheld:
+        return []
+    if any(one.used.any() for one in found.agreements):
+        return []
+    return [reason(False, "navigation.nothing-observed")]
+
+
+def _short(found: NavigationEvaluation) -> tuple[Finding, ...]:
+    parts = []
+    if found.errors is not None:
+        score = found.errors.score("horizontal")
+        parts.append(
+            reason(
+                True,
+                "navigation.position-within-bound",
+                reference=found.truth_name,
+                share=score.share,
+            )
+        )
+    if found.withheld:
+        count = len(found.withheld)
+        parts.append(
+            reason(True, "navigation.outage-test-passed")
+            if count == 1
+            else reason(True, "navigation.outage-tests-passed", count=count)
+        )
+    used = [one for one in found.agreements if one.used.any()]
+    if used:
+        worst = max(used, key=lambda a: abs(a.ratio - 1.0))
+        parts.append(
+            reason(
+                True,
+                "navigation.innovations-as-expected"
+                if len(used) == 1
+                else "navigation.innovations-as-expected-worst",
+                name=worst.name,
+                ratio=worst.ratio,
+            )
+        )
+    return tuple(parts)
+
+
+def _errors(found: NavigationEvaluation) -> list[Finding]:
+    if found.errors is None:
+        return []
+    out = []
+    for name, word in (
+        ("horizontal", "horizontal position"),
+        ("down", "height"),
+        *((a, a) for a in reversed(EULER)),
+    ):
+        score = found.errors.score(name)
+        out.append(
+            reason(
+                bool(score.share >= _ENOUGH),
+                "navigation.error-beside-bound",
+                component=word,
+                rms=score.rms,
+                bound=score.bound,
+                unit=score.unit,
+                share=score.share,
+            )
+        )
+    return out
+
+
+def _withheld(found: NavigationEvaluation) -> list[Finding]:
+    those = found.withheld
+    if not those:
+        return []
+    inside = sum(w.inside for w in those)
+    worst = max(those, key=lambda w: w.error_m / w.bound_m if w.bound_m > 0.0 else 0.0)
+    return [
+        reason(
+            bool(inside >= _ENOUGH * len(those)),
+            "navigation.outage-tests",
+            inside=inside,
+            count=len(those),
+            error_m=worst.error_m,
+            bound_m=worst.bound_m,
+            length_s=worst.end - worst.begin,
+        )
+    ]
+
+
+def _innovations(one: Agreement) -> Finding:
+    good = one.inside or one.acceptable
+    if one.inside:
+        code = "navigation.innovations-agree"
+    elif one.acceptable and one.ratio <= 1.0 / FAR_OFF:
+        code = "navigation.innovations-small-but-correlated"
+    elif one.acceptable:
+        code = (
+            "navigation.innovations-a-little-larger"
+            if one.ratio > 1.0
+            else "navigation.innovations-a-little-smaller"
+        )
+    else:
+        code = (
+            "navigation.innovations-larger" if one.ratio > 1.0 else "navigation.innovations-smaller"
+        )
+    return reason(good, code, name=one.name, ratio=one.ratio, independent=one.lasting)
+
+
+def _memory(one: Agreement) -> Finding:
+    return reason(
+        False,
+        "navigation.innovations-correlated",
+        name=one.name,
+        correlation=one.correlation,
+        by_chance=one.correlation_bound,
+    )
+
+
+def _rejected(found: NavigationEvaluation) -> list[Finding]:
+    out = []
+    for one in found.agreements:
+        if one.rejected > _MANY * one.epochs:
+            out.append(
+                reason(
+                    False,
+                    "navigation.many-rejected",
+                    name=one.name,
+                    rejected=one.rejected,
+                    epochs=one.epochs,
+                    share=one.rejected / one.epochs,
+                )
+            )
+    return out
