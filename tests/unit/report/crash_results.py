@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -22,6 +23,7 @@ from strapdown.crash.entry import Entry
 from strapdown.crash.path import compare_with_reference, sample_paths
 from strapdown.crash.reconstruction import CrashOptions, reconstruct_crash
 from strapdown.crash.severity import find_severity_model, injury_risk
+from strapdown.formats.crash_record import CrashRecord
 from strapdown.report.chart import Chart
 from strapdown.report.crash_document import crash_document
 from strapdown.report.document import Picture, drawings
@@ -87,14 +89,19 @@ def _run(name, units, window, end):
         point=PointSpec(name="centre of mass"),
         entry=EntrySpec(speed_m_per_s=speed, speed_sd_m_per_s=SPEED_SD),
         units=tuple(
-            UnitSpec(name=u.name, accelerometers=(TriadSpec(path="a.csv"),)) for u in recorded
+            UnitSpec(
+                name=u.name,
+                accelerometers=tuple(TriadSpec(path="a.csv") for _ in u.accelerometers),
+                gyro=None if u.gyro is None else TriadSpec(path="a.csv"),
+            )
+            for u in recorded
         ),
     )
     samples = sample_paths(path, runs=RUNS, seed=1)
     return CaseResult(
         spec,
         (),
-        {},
+        {"a.csv": CrashRecord(Path("a.csv"), "table", "", {}, (), ())},
         tuple(recorded),
         found,
         samples,

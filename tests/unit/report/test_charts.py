@@ -112,7 +112,7 @@ def test_aided_filters_never_share_axes_with_gyros_alone(full_bench):
 )
 def test_what_there_is_not_is_not_drawn(make_bench, options, slugs):
     bench = make_bench(**options)
-    assert list(by_slug(bench)) == slugs
+    assert [s for s in by_slug(bench) if s in {"cost", "sweep", "share"}] == slugs
     # The other charts are of the runs, which are the same however many there are.
     for chart in charts(bench) if len(bench.runs) == 1 else by_slug(bench).values():
         assert "data-line" in still(chart)
@@ -120,7 +120,7 @@ def test_what_there_is_not_is_not_drawn(make_bench, options, slugs):
 
 def test_a_sweep_without_columns_is_no_sweep(make_bench):
     bench = replace(make_bench(sweep=False), sweep=pd.DataFrame())
-    assert list(by_slug(bench)) == ["cost", "share"]
+    assert "sweep" not in by_slug(bench)
 
 
 def test_pictures_have_the_same_bytes_every_time(full_bench):

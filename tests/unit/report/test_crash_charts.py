@@ -243,7 +243,7 @@ def test_instants_that_are_one_are_named_together():
     assert [name for name, _ in named][1] in ("time zero, entry", "entry, time zero")
     marks = marks_apart([(0.0, "a"), (0.01, "b"), (0.5, "c"), (2.0, "d")], -0.1, 1.0)
     assert [(m.x, m.label) for m in marks] == [(0.0, ""), (10.0, "a, b"), (500.0, "c")]
-    assert event_marks([], 0.0, 1.0) == ()
+    assert event_marks([], 0.0, 1.0) == []
 
 
 @pytest.mark.parametrize(

@@ -114,7 +114,7 @@ def test_what_lasts_speaks_against_it():
     found = told(made)
     assert found.agreements[0].remembers
     assert trust(found).verdict == "reserve"
-    assert any("no noise" in head for head, _ in cautions(found))
+    assert any("correlated" in head for head, _ in cautions(found))
 
 
 def test_what_lasts_and_is_stated_wide_enough_for_it_does_not():
@@ -128,7 +128,7 @@ def test_what_lasts_and_is_stated_wide_enough_for_it_does_not():
     assert 0.5 < one.lasting < 1.0
     assert not one.remembers
     assert one.acceptable
-    assert not any("no noise" in head for head, _ in cautions(told(made)))
+    assert not any("correlated" in head for head, _ in cautions(told(made)))
 
 
 def test_most_epochs_far_off_refute_it_and_outliers_do_not():
