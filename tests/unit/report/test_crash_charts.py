@@ -89,7 +89,7 @@ def test_several_events_have_a_chart_each_and_none_has_none():
     main = crash_case("two-impacts", ALONE, (-0.1, 1.0)).reconstruction.main
     assert main_event(main) == int(np.argmax([b.event.resultant for b in main.body]))
     none = figures_of("hard-braking", ALONE)
-    assert none.delta_v == () and none.pdof_by_window is None and none.severity is None
+    assert not none.delta_v and none.pdof_by_window is None and none.severity is None
     assert none.units is None and none.accelerations is None and none.delta_v_budget is None
     nothing = crash_case("hard-braking", ALONE).reconstruction
     assert delta_v_chart(nothing.units, None) is None
@@ -243,7 +243,7 @@ def test_instants_that_are_one_are_named_together():
     assert [name for name, _ in named][1] in ("time zero, entry", "entry, time zero")
     marks = marks_apart([(0.0, "a"), (0.01, "b"), (0.5, "c"), (2.0, "d")], -0.1, 1.0)
     assert [(m.x, m.label) for m in marks] == [(0.0, ""), (10.0, "a, b"), (500.0, "c")]
-    assert event_marks([], 0.0, 1.0) == []
+    assert event_marks([], 0.0, 1.0) == ()
 
 
 @pytest.mark.parametrize(
