@@ -10,7 +10,7 @@ from strapdown.errors import StrapdownError
 
 
 def coded(code: str, **values: Any) -> Callable[[StrapdownError], bool]:
-    """Check for `pytest.raises`: the finding's code, and its file (by name), row, quantity or data."""
+    """Check for `pytest.raises`: code, file (by name), row, quantity and data of the finding."""
 
     def check(error: StrapdownError) -> bool:
         finding = error.finding
