@@ -619,7 +619,7 @@ def _heading_limit(result: AlignmentRun, east: float) -> tuple[str, str]:
         f"heading's standard deviation is {small(heading)}°"
     )
     if coarse.heading_given and heading < 0.7 * part:
-        return ("What was stated of the heading limits it", f"{told}: state it better.")
+        return ("The stated heading limits it", f"{told}: state it better.")
     if part > 0.7 * heading:
         why = "longer alignment at the same attitude does not help; better or calibrated gyros do"
         return ("The bias of the gyros limits the heading", f"{told}: {why}.")

@@ -384,7 +384,7 @@ def result_tables(bench: AttitudeComparison) -> list[TableBlock]:
     if len(columns) > _MOST_BESIDE:
         return [
             _table("Results", ["algorithm", *columns], names, compared, strong, ""),
-            _table("What the error is made of", ["algorithm", *parts], names, made, strong, note),
+            _table("Parts of the error", ["algorithm", *parts], names, made, strong, note),
         ]
     rows = [[*left, *right] for left, right in zip(compared, made, strict=True)]
     return [_table("Results", ["algorithm", *columns, *parts], names, rows, strong, note)]
@@ -489,7 +489,7 @@ def cost_table(bench: AttitudeComparison) -> TableBlock | None:
         "same weighed as a Cortex-M4F's floating-point unit takes them, for ranking; memory: "
         "numbers kept between samples.",
         strong=_named(bench),
-        title="What a sample costs",
+        title="Cost of a sample",
     )
 
 

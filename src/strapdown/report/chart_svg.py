@@ -1,6 +1,6 @@
 """A chart as an SVG, the same bytes every time: in the page, in the PDF and as a file.
 
-What the page's script needs to zoom, to show values and to hide a series is in ``data-``
+Everything that the page's script needs to zoom, show values and hide a series is in ``data-``
 attributes: of a panel its scales, of a group the name of its series, of a label its point.
 """
 

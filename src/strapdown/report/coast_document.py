@@ -288,7 +288,7 @@ def coast_document(result: OutageRun, name: str) -> Document:
     sections = (
         section("over-time", "Over the outage", time_table(result), parts_chart(result)),
         section("budget", "Error budget of the drift", budget_table(result), budget_chart(result)),
-        section("tried", "What came", drift_table(result)),
+        section("tried", "Actual drift", drift_table(result)),
         section("plane", "From above", plane_chart(result)),
         section(
             "method",
@@ -506,7 +506,7 @@ def cone_chart(result: OutageRun) -> Chart:
         "1 standard deviation, m",
         (Line("all together", found.time, found.sd("horizontal"), BLACK, "solid", 1.6),),
         fills=fills,
-        title="What it is made of",
+        title="Shares of the drift",
     )
     tried = "" if recorded is None else _tried(recorded.drifts)
     return Chart(

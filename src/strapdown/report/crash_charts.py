@@ -276,7 +276,7 @@ def delta_v_budget_chart(change: VelocityChange) -> Chart:
     table = delta_v_budget(change)[["forward", "right"]]
     return _chart(
         "budget-delta-v",
-        "What makes the uncertainty of the change of velocity",
+        "Sources of the uncertainty of delta-V",
         "Standard deviation that each contributor adds to the change of velocity of the main "
         "event, forward and right; their squares add up to that of the bar at the top, and 1.96 "
         "of it are the 95 % bound. Contributors below 1 % of the sum are joined.",
@@ -298,7 +298,7 @@ def place_budget_chart(path: CrashPath, names: tuple[str, str] = ("forward", "ri
     at = 1e3 * float(path.time[-1])
     return _chart(
         "budget-place",
-        "What makes the uncertainty of the end of the path",
+        "Sources of the uncertainty of the end of the path",
         f"Standard deviation that each contributor adds to the place of the reference point at "
         f"{at:.0f} ms, {names[0]} and {names[1]}; their squares add up to that of the bar at the "
         "top, and 1.96 of it are the 95 % bound. Contributors below 1 % of the sum are joined.",

@@ -698,7 +698,7 @@ def navigation_document(
             state_table(found),
             *charts.state_charts(found.filtered),
         ),
-        section("observations", "What was observed", *_observations(found)),
+        section("observations", "Observations", *_observations(found)),
         section("outages", "Outages", withheld_table(found), outage_table(found)),
         section("events", "Events", event_table(found)),
         section("findings", "Findings", findings_list(found.all_findings)),

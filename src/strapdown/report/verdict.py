@@ -326,7 +326,7 @@ def verdict_document(result: NavigationRun, name: str) -> Document:
         Section("heading", "Is the heading to be trusted?", _heading(result)),
         Section("innovations", "Does what was observed agree?", _innovations(result)),
         Section("first", "What is the first that does not, and does it matter?", _first(result)),
-        Section("meaning", "What the colours mean", (Items(promise(trust)), _limits())),
+        Section("meaning", "Meaning of the colors", (Items(promise(trust)), _limits())),
     )
     return Document(
         "Can it be trusted?",
@@ -394,7 +394,7 @@ def _keys(result: NavigationRun) -> tuple[KeyFigure, ...]:
             f"at its worst {length_words(float(bounds.max()))}",
         ),
         KeyFigure(
-            "What was observed",
+            "Observations",
             _agrees(result),
             _looked_at(len(trust.consistency))
             if first is None
@@ -520,7 +520,7 @@ def _innovations(result: NavigationRun) -> tuple[Block, ...]:
             ("observation", "verdict", "epochs", "scatter, sd", "gross errors"),
             tuple(rows),
             (0, 1),
-            "What was observed against what was expected of it; a scatter of 1 is as stated",
+            "Observed against expected innovations; a scatter of 1 is as stated",
         )
     ]
     small = [
