@@ -63,7 +63,6 @@ def second_unit():
     return record("pole", "IMU2")
 
 
-
 def changed(unit, which, change):
     """The unit with the table of one of its parts, or of all, changed by a function."""
     parts = [*unit.accelerometers, unit.gyro]
@@ -124,7 +123,9 @@ def laboratory_channel_saturated():
 
 
 def missing_axis():
-    return reconstruct_crash([changed(first_unit(), HIGH, lambda t: t.drop(columns="accel_y"))], ENTRY)
+    return reconstruct_crash(
+        [changed(first_unit(), HIGH, lambda t: t.drop(columns="accel_y"))], ENTRY
+    )
 
 
 def without(unit, *columns):
@@ -135,7 +136,9 @@ def without(unit, *columns):
 
 
 def assumed_and_not_levelled():
-    unit = replace(without(first_unit(), "accel_y"), assumed=Assumed(turn_sd_deg=5.0, delta_v_sd=1.0))
+    unit = replace(
+        without(first_unit(), "accel_y"), assumed=Assumed(turn_sd_deg=5.0, delta_v_sd=1.0)
+    )
     return reconstruct_crash([unit], ENTRY)
 
 
@@ -295,7 +298,9 @@ def window():
 
 
 def misspelt_option():
-    return reconstruct_crash([first_unit()], ENTRY, CrashOptions(preparation={"leveling": (0.0, 0.0, 1.0)}))
+    return reconstruct_crash(
+        [first_unit()], ENTRY, CrashOptions(preparation={"leveling": (0.0, 0.0, 1.0)})
+    )
 
 
 def stretch_in_the_crash():

@@ -13,6 +13,7 @@ import pytest
 
 import strapdown.report.crash_case as module
 from strapdown.bundle import read_manifest, unsealed_changes
+from strapdown.report import report_bundle
 
 
 def start(case, folder, *options):
@@ -78,8 +79,8 @@ def test_a_disk_that_is_full_is_said_and_nothing_is_left(
     def full(*given, **options):
         raise OSError(errno.ENOSPC, "No space left on device", str(tmp_path / "out"))
 
-    monkeypatch.setattr(module, "draw_stills", lambda document: ["<svg/>"] * 99)
-    monkeypatch.setattr(module, "document_page", lambda document, stills=(): "")
+    monkeypatch.setattr(report_bundle, "draw_stills", lambda document: ["<svg/>"] * 99)
+    monkeypatch.setattr(report_bundle, "document_page", lambda document, stills=(): "")
     monkeypatch.setattr(module, fails, full)
     done = run_cli("crash", sealed_crash.records / "case.toml", "--out", tmp_path / "deep" / "out")
     assert done.code == 4

@@ -288,7 +288,7 @@ def test_bad_input_leaves_nothing_and_says_why(case, run_cli, tmp_path, undrawn_
 DROPPED = """
 import os, signal, time, weakref
 from strapdown.cli import main
-from strapdown.report import navigation
+from strapdown.report import report_bundle
 
 # A shell that ignores interrupts hands that on to its jobs.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -311,7 +311,7 @@ def draw_stills(document):
         found = drawn(document)
     return found
 
-drawn, navigation.draw_stills = navigation.draw_stills, draw_stills
+drawn, report_bundle.draw_stills = report_bundle.draw_stills, draw_stills
 main.run()
 """
 

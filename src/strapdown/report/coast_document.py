@@ -9,8 +9,7 @@ import numpy as np
 
 from strapdown import __version__
 from strapdown.constants import DEG_PER_HOUR, MICRO_G, TWO_SIDED_95
-from strapdown.formats.crash_record import QUANTITIES
-from strapdown.navigation.outage import Share
+from strapdown.navigation.outage import QUANTITIES, Share
 from strapdown.report.chart import (
     BLACK,
     BLUE,

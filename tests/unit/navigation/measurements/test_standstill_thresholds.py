@@ -93,7 +93,7 @@ def test_otsu_goes_to_where_stances_and_swings_part(scale):
 def test_otsu_keeps_what_is_stated_while_there_is_one_class():
     rng = np.random.default_rng(2)
     quiet = np.exp(0.3 * rng.standard_normal(2000))
-    assert told(STANDSTILL_THRESHOLDS["otsu"], quiet) == (10.0).all()
+    assert (told(STANDSTILL_THRESHOLDS["otsu"], quiet) == 10.0).all()
 
 
 def test_patience_is_bayes_rule_with_an_exponential_cost():
