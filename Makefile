@@ -13,7 +13,7 @@ FRESH = cache=$$(mktemp -d); trap 'rm -rf "$$cache"' EXIT; NUMBA_CACHE_DIR="$$ca
 help:
 	@echo "make demo       install into $(VENV) and run strapdown on built-in data"
 	@echo "make test       install into $(VENV) and run the tests"
-	@echo "make test-slow  the tests that take more than 20 s each"
+	@echo "make test-slow  the tests that take more than 4 s each"
 	@echo "make examples   the longer examples of the manual: each prints what its page shows"
 	@echo "make record     version 0.1 and this tree on the same runs, compared to the last bit"
 	@echo "make papers     the tests of the reproduced papers, and the three of them into papers-reproduced"

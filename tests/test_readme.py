@@ -16,6 +16,7 @@ def test_there_are_runs_to_hold():
     assert len(RUNS) == 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("command", "shown"), RUNS, ids=["attitude", "crash", "navigate"])
 def test_the_output_shown_is_the_output(command, shown, run_cli, tmp_path, monkeypatch):
     words = shlex.split(command.replace("\\\n", " "))
@@ -32,6 +33,7 @@ def test_the_output_shown_is_the_output(command, shown, run_cli, tmp_path, monke
         assert line in printed or line in ("", "…")
 
 
+@pytest.mark.slow
 def test_the_python_shown_runs(tmp_path, monkeypatch):
     import doctest
 

@@ -73,6 +73,7 @@ def trials(plan, runs, outage=False):
     return squares, [np.array([one[k][0] for one in found]) for k in (0, 1)]
 
 
+@pytest.mark.slow
 def test_ten_drives_are_as_wrong_as_they_are_said_to_be_and_less_than_before():
     plan = Plan()
     found = [smoothed((plan, seed, True)) for seed in range(10)]

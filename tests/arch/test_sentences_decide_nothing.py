@@ -88,6 +88,7 @@ def aligned():
     return verdict, result, json.dumps(_numbers(alignment_json(result)), sort_keys=True)
 
 
+@pytest.mark.slow
 def test_an_alignment_is_judged_without_a_sentence(without_words):
     before, one, numbers = aligned()
     # What a bound accounts for makes the difference between the two verdicts.

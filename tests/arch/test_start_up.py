@@ -31,6 +31,7 @@ def test_dir_and_an_unknown_name_load_nothing_either():
     assert loaded_after(code) == set()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments",
     [

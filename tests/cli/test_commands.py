@@ -164,6 +164,7 @@ def test_a_simulation_takes_a_named_sensor_or_a_file(here, run_cli):
     assert "did you mean 'mpu-9250'" in wrong.err
 
 
+@pytest.mark.slow
 def test_python_m_strapdown_and_a_closed_pipe(tmp_path):
     assert shell("--version").stdout.startswith("strapdown 0.")
     done = shell("attitude", "no-such-log.csv", cwd=tmp_path)
@@ -183,6 +184,7 @@ def test_redirected_output_is_plain_text(tmp_path):
     assert "\x1b[" not in done.stdout
 
 
+@pytest.mark.slow
 def test_a_terminal_without_degree_signs_gets_question_marks(tmp_path):
     done = subprocess.run(
         [sys.executable, "-m", "strapdown", "attitude", "alexiev-fig4"],
@@ -204,6 +206,7 @@ def test_a_place_that_cannot_be_written_is_told_before_the_run(here, run_cli, ou
     assert "--out" in found.err
 
 
+@pytest.mark.slow
 def test_a_job_that_is_stopped_leaves_nothing_behind(tmp_path):
     job = subprocess.Popen(
         [sys.executable, "-m", "strapdown", "attitude", "alexiev-fig2c", "--rate", "2000"],

@@ -75,6 +75,7 @@ def commands(text):
     return {c for c in text if c != "\n" and unicodedata.category(c) in ("Cc", "Cf", "Zl", "Zp")}
 
 
+@pytest.mark.slow
 def test_the_page_has_no_tag_attribute_or_script_from_outside(page, sealed_crash):
     ours = Page()
     ours.feed((sealed_crash.folder / "report.html").read_text(encoding="utf-8"))

@@ -97,6 +97,7 @@ def test_a_disk_that_is_full_is_said_and_nothing_is_left(
     assert [p.name for p in tmp_path.iterdir()] == ["old"]
 
 
+@pytest.mark.slow
 def test_stopped_as_the_hidden_folder_appears(sealed_crash, tmp_path):
     job = start(sealed_crash.records / "case.toml", tmp_path)
     wait_until(job, lambda: any(tmp_path.glob(".*.partial")))

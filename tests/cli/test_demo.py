@@ -38,6 +38,7 @@ def shown(tmp_path_factory, run_cli):
     return root / "demo", found
 
 
+@pytest.mark.slow
 def test_three_systems_on_one_page_each_with_its_bound_and_the_truth(shown):
     folder, found = shown
     page = unescape((folder / "index.html").read_text(encoding="utf-8"))

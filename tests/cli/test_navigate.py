@@ -316,6 +316,7 @@ main.run()
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("sent", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
 def test_a_signal_that_python_drops_while_figures_are_drawn(tmp_path, sent, code):
     write_drive(tmp_path)
@@ -342,6 +343,7 @@ def test_a_signal_that_python_drops_while_figures_are_drawn(tmp_path, sent, code
     assert {p.name for p in tmp_path.iterdir()} == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGINT])
 @pytest.mark.parametrize("instant", ["*.partial", "*.partial/innovations"])
 def test_stopped_while_it_writes(tmp_path, sent, instant):

@@ -83,6 +83,7 @@ def trajectory(folder):
     return pd.read_csv(folder / "trajectory.csv", comment="#").to_numpy()
 
 
+@pytest.mark.slow
 def test_standard_input_to_its_end_is_the_batch_run(live, run_cli):
     job = start(live, "--live", "-", "--every", "0.5")
     out, err = job.communicate("\n".join(lines()) + "\n", timeout=120)
@@ -107,6 +108,7 @@ def test_standard_input_to_its_end_is_the_batch_run(live, run_cli):
     np.testing.assert_array_equal(trajectory(live / "out"), trajectory(other / "out"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_it_in_good_order(live, sent):
     job = start(live, "--live", "-", "--every", "0")
@@ -122,6 +124,7 @@ def test_a_signal_ends_it_in_good_order(live, sent):
     assert unsealed_changes(live / "out", read_manifest(live / "out")) == []
 
 
+@pytest.mark.slow
 def test_a_second_signal_ends_it_at_once(live):
     job = start(live, "--live", "-", "--every", "0")
     job.stdin.write("\n".join(lines(3.0)) + "\n")
@@ -149,6 +152,7 @@ def test_without_a_sample_there_is_no_bundle(live):
     assert [p.name for p in live.iterdir()] == ["run.toml"]
 
 
+@pytest.mark.slow
 def test_what_came_is_kept_where_navigation_never_began(live, run_cli):
     job = start(live, "--live", "-")
     _, err = job.communicate("\n".join(lines(0.0)) + "\n", timeout=120)

@@ -85,6 +85,7 @@ def test_a_picture_of_a_run_is_what_is_drawn_now(name, navigated, tmp_path):
     compare(navigated, name, tmp_path)
 
 
+@pytest.mark.slow
 def test_the_picture_of_a_smoothed_run_is_what_is_drawn_now(smoothed, tmp_path):
     compare(smoothed, "smoothing", tmp_path)
 
@@ -119,6 +120,7 @@ def test_the_crash_of_the_readme_is_what_is_drawn_now(sealed_crash):
     compare_picture(sealed_crash.folder / "figures" / "path.svg", "crash_path.svg")
 
 
+@pytest.mark.slow
 def test_the_drive_of_the_readme_is_what_is_drawn_now(driven, tmp_path):
     drawn = drawings(navigation_document(evaluation_of(driven), ""))
     (chart,) = [d for d in drawn if d.slug == "plan"]

@@ -57,6 +57,7 @@ def truth(folder):
     return pd.read_csv(folder / "trajectory.csv", comment="#")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_an_example_is_simulated_and_its_truth_agrees_with_itself(name):
     spec = TrajectorySpec.read(EXAMPLES / f"{name}.toml")

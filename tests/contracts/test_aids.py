@@ -187,6 +187,7 @@ def test_what_is_true_is_what_is_computed(kind, mechanization, situation):
             assert len(one.labels) == len(one.z) == len(one.R) == len(one.H)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mechanization", ["ned", "wander_azimuth"])
 @pytest.mark.parametrize(("kind", "situation"), TRUE)
 def test_every_column_is_how_an_error_changes_the_difference(kind, mechanization, situation):

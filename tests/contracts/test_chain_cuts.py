@@ -292,6 +292,7 @@ def two_modes(**fine):
     return coarse, FineMode(way=FineAlignment(), until=Until(**fine)), Navigation()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PREFILTERS)
 def test_prefilters_and_fine_alignment(name):
     prefilter = PREFILTERS[name]() if name == "none" else PREFILTERS[name](rate=25.0)

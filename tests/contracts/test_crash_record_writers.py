@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown.errors import DataError
 from strapdown.formats.crash_json import write_crash_json
@@ -113,7 +114,7 @@ def test_mme_says_no_date(record, tmp_path):
 def test_infinite_values_are_refused(write, tmp_path):
     time = np.arange(3.0)
     one = channel("a", "acceleration", "x", time, np.array([0.0, np.inf, 1.0]), unit="m/s2")
-    with pytest.raises(DataError, match="not a finite number") as error:
+    with pytest.raises(DataError, check=coded("io.not-finite-number")) as error:
         write(tmp_path / "out", CrashRecord(Path("a"), "csv", "", {}, (one,), ()))
     assert error.value.finding.row == 2
 

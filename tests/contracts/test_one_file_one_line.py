@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -108,5 +109,5 @@ def test_they_are_listed_with_their_options(added, run_cli):
 
 
 def test_without_the_line_there_is_no_such_module(tmp_path):
-    with pytest.raises(ConfigError, match="there is no 'half_steps'"):
+    with pytest.raises(ConfigError, check=coded("config.unknown-choice")):
         navigated(tmp_path, FILE + HALVES)

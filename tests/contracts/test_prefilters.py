@@ -52,6 +52,7 @@ def in_pieces(prefilter, imu, cut):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sampling", ["instantaneous", "mean"])
 @pytest.mark.parametrize("name", NAMES)
 def test_any_cut_gives_the_same_bits(name, sampling):
@@ -100,6 +101,7 @@ def test_a_constant_passes_as_it_is(name):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_noise_is_what_is_stated(name):
     """White noise: the spread of the outputs is the stated factor.

@@ -130,6 +130,7 @@ def test_anything(name, data):
     whole(name, data)
 
 
+@pytest.mark.slow
 @ENOUGH
 @given(st.text(max_size=60), st.text(max_size=30), st.text(max_size=200))
 def test_any_text_in_headers(name, unit, value):

@@ -61,6 +61,7 @@ def test_the_matrix_alone_loses_what_its_axis_turned_within_the_steps(recordings
     assert said == pytest.approx(matrix.sensor_deg[2], rel=5e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", ["x-pointing-forward", "y-pointing-left", "z-pointing-up"])
 def test_a_board_turned_by_hand(recordings, axis):
     """Put back by hand, tilted: what is far from the reference is neither algorithm nor rate."""

@@ -167,6 +167,7 @@ def test_the_fixes_show_that_velocities_are_late_and_clocks_apart(drive, clock):
     assert gnss_readiness(drive.gnss, drive.imu, good) == ()
 
 
+@pytest.mark.slow
 def test_the_filter_finds_what_is_known_of_the_recording(drive, clock):
     navigator, state, at, gnss = begun(drive, clock, NO_SLIP)
     state = navigator.tell(state, "rtk", gnss)
@@ -201,6 +202,7 @@ def test_the_filter_finds_what_is_known_of_the_recording(drive, clock):
         assert (nis < 1.5).all(), name
 
 
+@pytest.mark.slow
 def test_fifteen_places_say_more_than_five(drive, clock):
     navigator, state, at, gnss = begun(drive, clock, NO_SLIP)
     spans = spans_to_withhold(drive.time[0] + SETTLED, drive.time[-1] - 1.0, 30.0, 15)
@@ -219,6 +221,7 @@ def test_fifteen_places_say_more_than_five(drive, clock):
 # with slip and dive as states 0.4 (1.1), 7.7 (9.4), 11 (25): nearly all of it along the way, where
 # no constraint holds, by the pitch that the shaking gyro leaves unknown. What is asserted is a
 # fifth more than measured, or less than python-ins has, whichever is more.
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("length", "more", "median", "worst"),
     [

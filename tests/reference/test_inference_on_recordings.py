@@ -68,6 +68,7 @@ TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 AXES = {"as it is": np.eye(3), "turned": np.array([[0.0, 1, 0], [0, 0, -1], [-1, 0, 0]])}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("gyro", "accel", "time", "axes"),
     [

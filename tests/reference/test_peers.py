@@ -51,6 +51,7 @@ def errors(attitude, truth):
     return root_mean_square(whole), root_mean_square(inclination)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BROAD)
 @pytest.mark.parametrize("peer", ["vqf", "ahrs:closed"])
 def test_the_gyro_alone_is_our_quaternion_with_mean_rates(recordings, name, peer):

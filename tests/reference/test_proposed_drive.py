@@ -50,6 +50,7 @@ def slopes(fixes):
     return fixes.index.to_numpy()[good], np.degrees(np.arctan2(rise, 2.0 * WAY))[good]
 
 
+@pytest.mark.slow
 def test_the_pitch_is_that_of_the_road_within_its_bound(result):
     made, run = result
     offset = made.table["aiding"]["gnss"]["time_offset_s"]

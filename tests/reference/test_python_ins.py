@@ -81,6 +81,7 @@ def ours(name, sampling, interpolation):
     return errors(run_mechanization(NorthEastDown(), start_of(motion), increments), motion).abs()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "sampling"), CASES)
 def test_no_component_is_worse_than_that_of_python_ins(name, sampling):
     found = ours(name, sampling, "cubic").max()

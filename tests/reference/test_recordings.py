@@ -36,6 +36,7 @@ BIAS = {"forward": -4.54, "right": 0.11, "up": 1.07}
 KNOWN_TO = 0.1  # deg/s
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TURNS)
 @pytest.mark.parametrize("bias", ["none", "stated", "recorded"])
 def test_two_turns_by_hand(recordings, name, bias):
@@ -143,6 +144,7 @@ def broad(path):
     return compare_attitude(path, gyro_bias="rest")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("trial", BROAD)
 def test_broad_trials_against_their_optical_truth(recordings, trial):
     bench = broad(recordings(f"broad/{trial}.hdf5"))
@@ -176,6 +178,7 @@ def test_broad_starts_as_its_own_quaternion_says(recordings, trial):
     assert initial["roll_deg"] == pytest.approx(roll, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("trial", BROAD)
 def test_broad_by_another_library(recordings, trial):
     """The same integration by scipy's rotations in the file's own frames."""

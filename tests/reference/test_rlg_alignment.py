@@ -106,6 +106,7 @@ def test_two_vectors_fail_by_degrees_and_say_why(record, seconds):
     assert "use inertial_frame" in text
 
 
+@pytest.mark.slow
 def test_what_is_stated_is_right_over_many_pieces(record):
     """Sixty pieces of 15 to 60 s against the whole: errors over their standard deviations."""
     whole = InertialFrame("start").align(record, SITE, SENSORS)
@@ -132,6 +133,7 @@ def test_levelling_covers_the_rocking(record):
     assert (np.abs(found.roll_pitch_heading - true) < 3.0 * found.sd_deg).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seconds", [300, 900])
 def test_fine_alignment_confirms_the_inertial_frame(record, seconds):
     coarse = InertialFrame().align(first(record, 100), SITE, RING_LASERS)

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown.errors import ConfigError, DataError
 from strapdown.tables import (
@@ -92,7 +93,7 @@ def test_as_many_rows_of_each(make):
 
 def test_a_column_that_is_missing_is_named():
     table = odometer_table(TIME, *GOOD[odometer_table]).drop(columns="speed_sd")
-    with pytest.raises(DataError, match="speed_sd"):
+    with pytest.raises(DataError, check=coded("tables.missing-columns")):
         check_odometer(table)
 
 

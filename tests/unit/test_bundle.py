@@ -6,6 +6,7 @@ import json
 import shutil
 
 import pytest
+from tests.coded import coded
 
 from strapdown import simulate, verify
 from strapdown.api.attitude import compare_attitude
@@ -146,7 +147,7 @@ def test_a_run_that_fails_leaves_nothing(tmp_path):
 def test_a_bundle_is_replaced_only_when_asked(log, tmp_path):
     bench = compare_attitude(log)
     first = write_attitude(bench, tmp_path / "out")
-    with pytest.raises(ConfigError, match="force=True") as refused:
+    with pytest.raises(ConfigError, check=coded("bundle.folder-exists")) as refused:
         write_attitude(bench, tmp_path / "out")
     assert "--force" in refused.value.finding.text("cli")
     again = write_attitude(bench, tmp_path / "out", force=True)
@@ -176,16 +177,16 @@ def test_a_large_input_is_referred_to_and_still_watched(log, tmp_path, monkeypat
 
 
 def test_what_is_no_bundle_is_said_to_be_none(tmp_path):
-    with pytest.raises(DataError, match="no manifest"):
+    with pytest.raises(DataError, check=coded("bundle.no-manifest")):
         verify(tmp_path)
     (tmp_path / MANIFEST).write_text("{")
-    with pytest.raises(DataError, match="the file is not valid JSON"):
+    with pytest.raises(DataError, check=coded("bundle.not-json")):
         verify(tmp_path)
     (tmp_path / MANIFEST).write_text("[" * 100_000)
-    with pytest.raises(DataError, match="the file is not valid JSON"):
+    with pytest.raises(DataError, check=coded("bundle.not-json")):
         verify(tmp_path)
     (tmp_path / MANIFEST).write_text('{"schema": "other"}')
-    with pytest.raises(DataError, match="the manifest is not of the form"):
+    with pytest.raises(DataError, check=coded("bundle.unknown-form")):
         verify(tmp_path)
 
 
@@ -201,7 +202,7 @@ def test_a_manifest_that_names_files_outside_is_refused(copy, name):
     manifest = json.loads((copy / MANIFEST).read_text())
     manifest["outputs"][0]["name"] = name
     (copy / MANIFEST).write_text(json.dumps(manifest))
-    with pytest.raises(DataError, match="outside the folder"):
+    with pytest.raises(DataError, check=coded("bundle.malformed")):
         verify(copy)
 
 
@@ -263,7 +264,7 @@ def test_a_bundle_of_a_reproduced_paper_is_refused(copy):
     manifest = json.loads((copy / MANIFEST).read_text())
     manifest["command"] = "reproduce"
     (copy / MANIFEST).write_text(json.dumps(manifest))
-    with pytest.raises(DataError, match="reproduced paper") as refused:
+    with pytest.raises(DataError, check=coded("report.reproduced-paper")) as refused:
         verify(copy)
     assert "papers." in str(refused.value)
 
@@ -272,7 +273,7 @@ def test_a_configuration_that_reads_what_is_not_sealed_is_refused(copy):
     manifest = json.loads((copy / MANIFEST).read_text())
     manifest["configuration"]["source"]["path"] = "../log.csv"
     (copy / MANIFEST).write_text(json.dumps(manifest))
-    with pytest.raises(DataError, match="outside the seal"):
+    with pytest.raises(DataError, check=coded("bundle.malformed")):
         verify(copy)
 
 
@@ -310,10 +311,10 @@ def test_a_log_that_changed_since_it_was_read_is_not_sealed(tmp_path, log):
     mine.write_bytes(log.read_bytes())
     bench = compare_attitude(mine)
     mine.write_bytes(log.read_bytes() + b"\n")
-    with pytest.raises(DataError, match="since it was read"):
+    with pytest.raises(DataError, check=coded("bundle.input-changed")):
         write_attitude(bench, tmp_path / "out")
     mine.unlink()
-    with pytest.raises(DataError, match="since it was read"):
+    with pytest.raises(DataError, check=coded("bundle.input-changed")):
         write_attitude(bench, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown import tables
 from strapdown.errors import DataError
@@ -73,7 +74,7 @@ def test_time_and_columns_are_checked():
         check=lambda refused: refused.finding.code == "tables.time-does-not-advance-followed",
     ):
         made(back)
-    with pytest.raises(DataError, match="missing columns: VD_sd"):
+    with pytest.raises(DataError, check=coded("tables.missing-columns")):
         tables.check_gnss(FIXES.drop(columns="VD_sd"))
 
 
@@ -90,7 +91,7 @@ def test_velocities_in_another_unit_are_told(change, remedy):
 
 
 def test_exchanged_columns_are_told():
-    with pytest.raises(DataError, match="exchange VN and VE"):
+    with pytest.raises(DataError, check=coded("tables.velocity-north-east-exchanged")):
         made(FIXES.assign(VN=FIXES["VE"], VE=FIXES["VN"]))
     # Both are below 90 here, so that only the motion tells it.
     with pytest.raises(

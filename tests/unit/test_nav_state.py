@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown import rotation
 from strapdown.errors import DataError
@@ -83,7 +84,9 @@ def test_every_number_is_finite(name, value):
 
 
 def test_velocity_is_three_finite_numbers():
-    with pytest.raises(DataError, match="v_n east: not a finite number"):
+    with pytest.raises(
+        DataError, check=coded("mechanization.not-finite-number", quantity="v_n east")
+    ):
         state(v_n=[0.0, math.nan, 0.0])
     with pytest.raises(
         DataError, match="v_n", check=lambda refused: refused.finding.code == "mechanization.shape"
@@ -133,7 +136,9 @@ def test_degrees_that_are_none(lat, lon, quantity, remedy):
 
 
 def test_nan_in_degrees_is_named():
-    with pytest.raises(DataError, match="lat_deg: not a finite number"):
+    with pytest.raises(
+        DataError, check=coded("mechanization.not-finite-number-2", quantity="lat_deg")
+    ):
         NavState.from_degrees(math.nan, 0.0)
 
 

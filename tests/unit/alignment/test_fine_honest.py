@@ -55,6 +55,7 @@ def rocked(seed, amplitude, roll, pitch, heading=60.0, seconds=200.0):
     return Rest(with_errors(ideal, drawn, seed), q[0], off[:3], off[3:]), q
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("amplitude", [0.1, 1.0])
 @pytest.mark.parametrize(
     ("roll", "pitch"),
@@ -123,6 +124,7 @@ def test_a_burst_that_a_free_run_does_not_survive_is_named():
     assert "outliers" in str(raised.value)
 
 
+@pytest.mark.slow
 def test_a_heading_that_is_given_stays_as_good_as_it_was():
     """Gyros of hundreds of degrees an hour, over a time in which they turn over."""
     made = load_sensor("adis16495-1")

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.stats import chi2
+from tests.coded import coded
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -43,6 +44,7 @@ def fixes(seed=0, motion=DRIVE, noise=0.05, rate=5.0):
     return simulate_gnss(motion, receiver, seed=seed, source="gnss.csv")
 
 
+@pytest.mark.slow
 def test_without_errors():
     imu, truth = ideal(DRIVE, 100.0)
     exact = simulate_gnss(DRIVE, GnssReceiver(rate=10.0, velocity_noise=1e-5, position_noise=0.01))
@@ -57,6 +59,7 @@ def test_without_errors():
         assert error[2] < 5e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sensor", ["fog-1000", "icm-42688-p", "adis16495-1"])
 def test_units_in_a_drive(sensor):
     found = []
@@ -114,7 +117,9 @@ def test_reverse():
     imu, _ = ideal(DRIVE, 100.0)
     sensors = unit(DRIVE, 100.0, 0)[2]
     assert not GnssCourse().align(imu, SITE, sensors, fixes()).findings
-    with pytest.raises(DataError, match=r"log.csv, heading: the forward specific force fa"):
+    with pytest.raises(
+        DataError, check=coded("alignment.drives-other-way", quantity="heading", file="log.csv")
+    ):
         GnssCourse(reverse=True).align(imu, SITE, sensors, fixes())
 
 
@@ -130,6 +135,7 @@ def with_outliers(table, share, seed):
     return out, int(wrong.sum())
 
 
+@pytest.mark.slow
 def test_ten_percent_of_outliers():
     found, plain = [], []
     for seed in range(8):
@@ -162,6 +168,7 @@ def park_and_go(rest):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rest", [20.0, 2.0])
 def test_a_rest_before_tells_the_bias_of_the_gyros(rest):
     motion = park_and_go(rest)
@@ -189,6 +196,7 @@ def test_a_rest_before_tells_the_bias_of_the_gyros(rest):
     assert sum(squares) < chi2.isf(1e-4, 3 * len(squares))
 
 
+@pytest.mark.slow
 def test_without_a_rest_an_attitude_is_worth_what_the_bias_leaves():
     motion = PathMotion(6.0, ORIGIN, heading_deg=70.0, speed=Track((0.0, 6.0), (12.0, 15.0)))
     squares = []
@@ -210,7 +218,7 @@ def test_what_it_refuses():
     imu, _ = ideal(DRIVE, 100.0)
     sensors = unit(DRIVE, 100.0, 0)[2]
     with pytest.raises(
-        DataError, match=r"log\.csv, gnss: the course needs fixes, and there are none"
+        DataError, check=coded("alignment.no-fixes-for-course", quantity="gnss", file="log.csv")
     ):
         GnssCourse().align(imu, SITE, sensors)
     with pytest.raises(

@@ -6,6 +6,7 @@ import re
 from dataclasses import fields
 
 import pytest
+from tests.coded import coded
 
 from strapdown.alignment.fine import FineAlignment
 from strapdown.config.alignment import STAGES, AlignmentSpec
@@ -191,6 +192,6 @@ def test_what_does_not_fit_names_its_line(tmp_path, text, key, what, remedy):
 
 def test_a_log_that_is_not_there_is_told_with_its_line(tmp_path):
     text = '[log]\npath = "gone.csv"\n' + GOOD[GOOD.index("[site]") :]
-    with pytest.raises(ConfigError, match=r"there is no 'gone.csv'") as error:
+    with pytest.raises(ConfigError, check=coded("config.named-file-missing")) as error:
         read(tmp_path, text)
     assert error.value.finding.line == 2

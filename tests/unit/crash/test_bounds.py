@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from tests.coded import coded
 from tests.unit.crash.crash_case import RATE, prepared
 
 from strapdown import rotation
@@ -115,10 +116,10 @@ def test_a_path_is_consistent_with_itself_and_not_with_another(answer):
 def test_a_reference_that_cannot_serve_is_refused(answer):
     path = answer.path
     reference = path.table[NED]
-    with pytest.raises(DataError, match="reference path: missing column down"):
+    with pytest.raises(DataError, check=coded("crash.no-column", quantity="reference path")):
         compare_with_reference(path, reference[["north", "east"]])
     late = reference[reference.index > 0.5]
-    with pytest.raises(DataError, match="begins at or before the entry"):
+    with pytest.raises(DataError, check=coded("crash.path-entry")):
         compare_with_reference(path, late)
     holed = reference.copy()
     holed.iloc[3, 1] = np.nan

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown.crash.acceleration import Acceleration
 from strapdown.crash.crash_type import (
@@ -134,9 +135,11 @@ def test_each_event_has_its_own():
 
 
 def test_bad_rates_are_refused():
-    with pytest.raises(DataError, match="roll_rate"):
+    with pytest.raises(DataError, check=coded("tables.not-finite-number", quantity="roll_rate")):
         classify_crash((-5.0, 0.0, 0.0), roll=RollRecord([0.0, 0.1], [0.0, np.nan]))
     with pytest.raises(DataError, match="no roll rate from 3 s"):
         PASSENGER_CAR.roll_motion(RollRecord([0.0, 0.1], [0.0, 0.0]), since=3.0)
-    with pytest.raises(ConfigError, match="half_track"):
+    with pytest.raises(
+        ConfigError, check=coded("crash.no-dimension-vehicle", quantity="half_track")
+    ):
         TippingBody(half_track=-1.0)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown.crash.entry_estimate import FixCorrelation
 from strapdown.crash.gnss_entry import CONTRIBUTOR, GnssEntry, start_from_gnss
@@ -48,6 +49,7 @@ def cases():
     return [reconstructed(seed) for seed in range(SEEDS)]
 
 
+@pytest.mark.slow
 def test_speed_and_path_are_as_wrong_as_they_say(cases):
     speeds, places = [], []
     for _, _, entry, state, path in cases:
@@ -93,7 +95,9 @@ def test_a_mean_of_units_has_no_entry_of_its_own(cases):
     from dataclasses import replace
 
     at, fixes, *_ = cases[0]
-    with pytest.raises(DataError, match="let each unit find its entry"):
+    with pytest.raises(
+        DataError, check=coded("crash.mean-several-units-no-sensors", quantity="entry")
+    ):
         start_from_gnss(replace(at, prepared=None), GnssEntry(fixes), (0.0, 0.0, 0.0))
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown.crash.consistency import compare_units
 from strapdown.crash.measuring_point import at_point
@@ -108,7 +109,7 @@ def test_a_stated_attitude_gives_the_bias_of_the_lowest_range():
     made, force, _ = unit(
         noisy=False, low=poor, low_bias=(1.0, -2.0, 9.0), start=-0.1, driven=False
     )
-    with pytest.raises(DataError, match="give levelling"):
+    with pytest.raises(DataError, check=coded("crash.rest-not-level", quantity="levelling")):
         prepare_unit(made)
     out = prepare_unit(made, Preparation(levelling=(1.0, -2.0, 0.2), steady_acceleration=0.0))
     assert out.bias_from == (FROM_GRAVITY, 0)
@@ -160,7 +161,7 @@ def test_no_quiet_stretch():
     made, _, _ = unit(start=-3.0, driven=False)
     rng = np.random.default_rng(0)
     shaken = changed(made, "gyro", lambda t: t + 0.3 * rng.normal(size=t.shape))
-    with pytest.raises(DataError, match="no stationary interval"):
+    with pytest.raises(DataError, check=coded("crash.no-rest")):
         prepare_unit(shaken)
 
 
@@ -215,7 +216,7 @@ def test_a_low_range_that_is_never_clear():
 
 def test_gravity_in_g():
     made, _, _ = unit()
-    with pytest.raises(DataError, match="gravity in g, not in m/s²"):
+    with pytest.raises(DataError, check=coded("crash.specific-force-rest-long-gravity")):
         prepare_unit(changed(made, 0, lambda t: t / G))
 
 
@@ -265,9 +266,11 @@ def test_bad_input_names_the_part_the_row_and_the_quantity(edit, part, says):
 
 def test_parts_that_are_missing():
     made, _, _ = unit()
-    with pytest.raises(DataError, match="gyro_from"):
+    with pytest.raises(
+        DataError, check=coded("sensors.no-gyro-path-needs-turning", quantity="gyro")
+    ):
         prepare_unit(replace(made, gyro=None))
-    with pytest.raises(DataError, match="no accelerometer"):
+    with pytest.raises(DataError, check=coded("sensors.no-accelerometer")):
         prepare_unit(replace(made, accelerometers=()))
 
 

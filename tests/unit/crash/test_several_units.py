@@ -63,6 +63,7 @@ def four():
     return units, reconstruct_crash(units, ENTRY)
 
 
+@pytest.mark.slow
 def test_four_units_end_to_end(four):
     _, found = four
     assert [u.name for u in found.units] == ["LAB1", "LAB2", "IMU1", "IMU2"]

@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.coded import coded
 
 from strapdown import rotation
 from strapdown.config.crash_case import CaseSpec
@@ -142,6 +143,7 @@ def three(german, bare, cryptic, tmp_path_factory):
     return folder, draft, table
 
 
+@pytest.mark.slow
 def test_three_files_are_three_units(three):
     _, _, table = three
     units = {u["name"]: u for u in table["units"]}
@@ -374,7 +376,10 @@ def test_the_crash_test_of_nhtsa(recordings, tmp_path):
 
 
 def test_one_record_named_twice_is_refused(german):
-    with pytest.raises(ConfigError, match=r"Messung links\.csv, RECORD: the record is given twice"):
+    with pytest.raises(
+        ConfigError,
+        check=coded("crash.record-named-twice", quantity="RECORD", file="Messung links.csv"),
+    ):
         read_records([german, german.parent / "." / german.name])
 
 
@@ -430,6 +435,7 @@ names = st.lists(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(names, st.text(max_size=40), st.text(max_size=40))
 def test_hostile_text_of_a_record_stays_text(names, title, fact):

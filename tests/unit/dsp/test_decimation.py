@@ -14,6 +14,7 @@ def stamps_of(begin, end, rate=RATE):
     return np.arange(round(begin * rate), round(end * rate) + 1) / rate
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("attenuation", [40.0, 60.0, 80.0, 100.0, 120.0])
 @pytest.mark.parametrize("passband", [0.5, 0.8])
 def test_bands_keep_what_the_design_states(attenuation, passband):

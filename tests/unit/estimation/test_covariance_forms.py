@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.coded import coded
 
 from strapdown.errors import ConfigError, DataError
 from strapdown.estimation.covariance import COVARIANCES, Step
@@ -216,7 +217,7 @@ def test_what_is_no_covariance_is_refused(name, P, what):
 def test_bad_predictions_and_observations_are_named(name):
     form, one, x = COVARIANCES[name](), np.eye(2), np.zeros(2)
     state, h = form.begin(one), np.ones((1, 2))
-    with pytest.raises(DataError, match="Q has the shape"):
+    with pytest.raises(DataError, check=coded("estimation.shape-covariance", quantity="Q")):
         form.predict(state, one, np.eye(3))
     with pytest.raises(DataError, match="Phi is nan in row 2, column 1"):
         form.predict(state, np.array([[1.0, 0.0], [np.nan, 1.0]]), one)
@@ -244,7 +245,7 @@ def test_bad_predictions_and_observations_are_named(name):
 @pytest.mark.parametrize("name", ["ud", "wd"])
 def test_noise_that_is_not_semidefinite_is_found_by_the_factors(name):
     form = COVARIANCES[name]()
-    with pytest.raises(DataError, match="symmetric and has no negative eigenvalue"):
+    with pytest.raises(DataError, check=coded("estimation.predicted-variance-state-no-variance")):
         form.predict(form.begin(np.eye(2)), np.eye(2), np.array([[1.0, 2.0], [2.0, 1.0]]))
     with pytest.raises(DataError, match="state 2"):
         form.predict(form.begin(np.eye(2)), np.eye(2), np.array([[1.0, 0.5], [0.5, 0.0]]))

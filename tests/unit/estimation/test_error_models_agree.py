@@ -92,6 +92,7 @@ def largest(difference):
     return np.abs(difference * SIZE / SIZE[:, None]).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lat", [-40.0, 0.0, 52.0, 89.9999])
 def test_transitions_agree_and_better_with_the_cube_of_the_step(lat):
     segment = some_run(lat, 0.0, 25.6)

@@ -87,6 +87,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("height", ["held", "free"])
 @pytest.mark.parametrize("case", list(CASES))
 def test_transition_is_the_derivative_of_the_mechanization(case, height):
@@ -384,6 +385,7 @@ def test_what_it_is_no_model_of_is_refused(mechanization, said):
         model.transition(segment_of(mechanization, row[None], np.zeros((0, 10))), 0.1)
 
 
+@pytest.mark.slow
 def test_with_a_held_height_the_vertical_velocity_is_known():
     mechanization = WanderAzimuth(height="held")
     begin = mechanization.begin(start())

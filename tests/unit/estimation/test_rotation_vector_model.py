@@ -76,6 +76,7 @@ def _differences(mechanization, start, imu, columns):
     return out, segment
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mechanization", "lat"),
     [
@@ -130,6 +131,7 @@ def test_the_error_of_a_step_falls_with_its_square():
     assert 1.7 < order < 2.4
 
 
+@pytest.mark.slow
 def test_noise_adds_what_brownian_motion_of_a_body_at_rest_does():
     gyro, accel = 1e-5, 1e-4
     start = NavState.from_degrees(55.0, 37.0, 0.0)
@@ -147,6 +149,7 @@ def test_noise_adds_what_brownian_motion_of_a_body_at_rest_does():
     np.testing.assert_array_equal(q, q.T)
 
 
+@pytest.mark.slow
 def test_a_gauss_markov_state_fades_and_is_driven():
     block = gauss_markov(gyro_bias(1e-6), 20.0)
     start = NavState.from_degrees(55.0, 37.0, 0.0)

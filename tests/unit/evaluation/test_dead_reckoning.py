@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown import rotation
 from strapdown.attitude_algorithms.algorithm import AttitudeRun
@@ -248,5 +249,7 @@ def test_files_may_hold_places(tmp_path):
 
 def test_a_log_without_acceleration_is_refused():
     run, imu, rests = bench(*motion((0, 0, 0)))
-    with pytest.raises(DataError, match="needs acceleration"):
+    with pytest.raises(
+        DataError, check=coded("evaluation.position-needs-acceleration-log-none", quantity="accel")
+    ):
         dead_reckon(run, imu.drop(columns=ACCEL), *rests)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown import rotation
 from strapdown.api.attitude import compare_attitude
@@ -155,7 +156,7 @@ def test_a_file_of_points_with_a_hole_is_refused(tmp_path, text, message):
 
 def test_a_truth_that_is_none_is_refused(tmp_path):
     (tmp_path / "truth.csv").write_text("time_s,a\n0,1\n1,2\n")
-    with pytest.raises(DataError, match=r"truth\.csv: the file has no attitude"):
+    with pytest.raises(DataError, check=coded("io.file-without-attitude", file="truth.csv")):
         compare_attitude("alexiev-fig4", reference=[str(tmp_path / "truth.csv")])
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown import rotation
 from strapdown.attitude_algorithms.algorithm import AttitudeRun
@@ -136,7 +137,7 @@ def test_roll_and_pitch_may_be_said_without_a_heading(tmp_path):
 
 def test_a_rest_without_gravity_is_refused():
     zero = (0.0, 0.0, 0.0)
-    with pytest.raises(DataError, match="has no acceleration"):
+    with pytest.raises(DataError, check=coded("evaluation.rest-no-acceleration", quantity="accel")):
         tilt_sd_deg(RestStretch(0.0, 2.0, zero, zero, None))
     with pytest.raises(DataError, match=r"at rest it is 9.8"):
         tilt_sd_deg(RestStretch(0.0, 2.0, zero, zero, (0.0, 0.0, -1.0)))

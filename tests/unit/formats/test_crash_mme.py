@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown.errors import DataError
 from strapdown.formats.crash_records import read_crash_record
@@ -179,7 +180,9 @@ def test_stamps_that_are_not_there(test_of, explicit, words):
 
 def test_a_rate_where_the_header_has_none(test_of):
     record = test_of(channel(Sampling_interval="NOVALUE"))
-    with pytest.raises(DataError, match="sampling interval is not stated") as error:
+    with pytest.raises(
+        DataError, check=coded("io.sampling-interval-not-stated", quantity="sampling interval")
+    ) as error:
         record.channel(HEAD).load()
     assert "rate_hz" in error.value.finding.remedy
     triad = triad_of_channels(record, {"x": HEAD}, quantity="acceleration", rate_hz=1e4)
@@ -212,7 +215,7 @@ def test_damaged_channels_are_refused_with_their_row(test_of, text, words, row):
 
 
 def test_damaged_headers(test_of, tmp_path):
-    with pytest.raises(DataError, match="neither `key :value` nor a number") as error:
+    with pytest.raises(DataError, check=coded("io.mme-line-not-understood")) as error:
         test_of("Channel code :x\nno colon here\n1\n")
     assert error.value.finding.row == 2
     record = test_of(channel(), mme="Title :x\nMass test object 1 :heavy\n")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown import frames
 from strapdown.errors import DataError
@@ -99,7 +100,7 @@ def test_of_two_receivers_the_faster_is_taken_and_the_other_by_its_folder(tmp_pa
 def test_one_array_alone_names_the_folder(tmp_path):
     _, t, value = fixes()
     folder = written(tmp_path / "10", t, value, flat=True)
-    with pytest.raises(DataError, match="stamps and values") as told:
+    with pytest.raises(DataError, check=coded("io.fixes-comma-k-segment-two")) as told:
         read_gnss(folder / "GNSS__live_gnss_ublox__value.npy", OPTIONS)
     assert str(folder) in str(told.value)
 
@@ -120,7 +121,7 @@ def test_arrays_of_another_shape_are_refused(tmp_path, value, what):
 
 
 def test_a_folder_without_fixes_is_told(tmp_path):
-    with pytest.raises(DataError, match="one file"):
+    with pytest.raises(DataError, check=coded("io.folder-fixes-read-file")):
         read_gnss(tmp_path, OPTIONS)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
+from tests.coded import coded
 
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats.gnss_files import GnssOptions, read_gnss
@@ -108,7 +109,7 @@ def test_week_dates_and_unix(tmp_path):
 
 def test_heights_over_the_sea(tmp_path):
     head = "time,lat,lon,altitude_msl,sdn,sde,sdu"
-    with pytest.raises(DataError, match="the height is over the sea"):
+    with pytest.raises(DataError, check=coded("io.height-over-sea-column")):
         table_of(tmp_path, head, ["0,1,2,3,1,1,1"])
     table = table_of(tmp_path, f"{head},geoid_separation", ["0,1,2,3,1,1,1,45.5"])
     assert table["alt"].iloc[0] == 48.5
@@ -134,7 +135,7 @@ def test_speed_and_course_are_said_not_to_be_used(tmp_path):
 def test_arrays_of_python_ins(tmp_path):
     place = np.array([[55.0, 37.0, 150.0], [55.1, 37.1, 151.0]])
     np.savez(tmp_path / "drive.npz", fix_time=[1.0, 2.0], fix=place)
-    with pytest.raises(DataError, match="state position_sd"):
+    with pytest.raises(DataError, check=coded("io.position-sd-not-stated")):
         read_gnss(tmp_path / "drive.npz")
     table = read_gnss(tmp_path / "drive.npz", GnssOptions(position_sd=1.0))
     assert np.array_equal(table[GEODETIC].to_numpy(), place)
@@ -216,7 +217,7 @@ def test_no_file_of_fixes(tmp_path):
         DataError, check=lambda refused: refused.finding.code == "io.folder-fixes-read-file"
     ):
         read_gnss(tmp_path)
-    with pytest.raises(DataError, match="the file is empty"):
+    with pytest.raises(DataError, check=coded("io.file-empty")):
         read_gnss(written(tmp_path, ""))
     with pytest.raises(
         DataError, check=lambda refused: refused.finding.code == "io.ending-no-known-format-fixes"

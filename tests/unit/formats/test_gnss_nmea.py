@@ -7,6 +7,7 @@ from operator import xor
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown.errors import DataError
 from strapdown.formats.gnss_files import GnssOptions, read_gnss
@@ -62,7 +63,7 @@ def test_places_deviations_dates_over_midnight(tmp_path):
 
 def test_without_a_date_and_without_deviations(tmp_path):
     path = written(tmp_path, [gga("235959.50"), gga("000000.50")])
-    with pytest.raises(DataError, match="state position_sd"):
+    with pytest.raises(DataError, check=coded("io.position-sd-not-stated")):
         read_gnss(path)
     table = read_gnss(path, GnssOptions(position_sd=2.0))
     assert table.index.tolist() == [86399.5, 86400.5]

@@ -29,6 +29,7 @@ def said(signals):
     return {i.quantity: i for i in infer_signals(signals)}
 
 
+@pytest.mark.slow
 def test_no_wrong_answer_in_a_hundred_logs():
     asked, silent, wrong = Counter(), Counter(), []
     for seed in SEEDS:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import read_joined, read_log
@@ -166,7 +167,7 @@ def test_columns_are_named_by_their_log(tmp_path):
     imu = read_joined([tmp_path / "one.csv", tmp_path / "two.csv"], options).imu
     assert np.allclose(imu[GYRO], np.radians(line_of(t)), rtol=1e-15, atol=0)
     assert np.allclose(imu[ACCEL], 9.80665 * line_of(t), rtol=1e-15, atol=0)
-    with pytest.raises(ConfigError, match="no log has a column 'z'"):
+    with pytest.raises(ConfigError, check=coded("io.no-log-with-column")):
         read_joined(
             [tmp_path / "one.csv", tmp_path / "two.csv"], ReadOptions(columns={"gyro_x": "z"})
         )
@@ -186,7 +187,7 @@ def test_a_folder_of_one_table_a_sensor(tmp_path):
     table(folder / "gyro.csv", t, line_of(t), "time_s,x,y,z")
     table(folder / "accel.csv", own, line_of(own), "time_s,x [m/s^2],y [m/s^2],z [m/s^2]")
     (folder / "notes.txt").write_text("hello")
-    with pytest.raises(DataError, match="the unit is not stated"):
+    with pytest.raises(DataError, check=coded("io.unit-undecided")):
         read_log(folder)
     recording = read_log(folder, ReadOptions(gyro_unit="rad/s"))
     assert np.array_equal(recording.imu[GYRO], line_of(t))

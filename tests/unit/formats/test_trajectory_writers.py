@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from tests.coded import coded
 
 from strapdown import rotation
 from strapdown.ellipsoids import ELLIPSOIDS
@@ -89,14 +90,14 @@ def test_a_hostile_name_stays_a_name(tmp_path, form):
 @pytest.mark.parametrize("form", TRAJECTORY_WRITERS)
 def test_a_table_that_is_none_is_refused(tmp_path, form):
     track = made.random_trajectory(1, 5)
-    with pytest.raises(DataError, match="missing columns: VD"):
+    with pytest.raises(DataError, check=coded("tables.missing-columns")):
         write(form, tmp_path / "a", track.drop(columns="VD"))
     assert not (tmp_path / "a").exists()
 
 
 @pytest.mark.parametrize("form", ["tum", "kml", "geojson"])
 def test_a_trajectory_without_rows_is_no_file(tmp_path, form):
-    with pytest.raises(DataError, match="no rows"):
+    with pytest.raises(DataError, check=coded("io.trajectory-no-rows")):
         write(form, tmp_path / "a", made.random_trajectory(1, 5).iloc[:0])
 
 

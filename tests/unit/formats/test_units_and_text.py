@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown.constants import ACCEL_UNITS, GYRO_UNITS
 from strapdown.errors import ConfigError, DataError
@@ -117,7 +118,7 @@ def test_comments_among_the_rows_are_told(tmp_path):
 def test_a_comma_that_is_both_signs_is_told(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text(text_of(",", ","))
-    with pytest.raises(DataError, match="with semicolons or tabs"):
+    with pytest.raises(DataError, check=coded("io.csv-decimal-commas")):
         read_log(path)
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown import rotation
 from strapdown.errors import ConfigError, DataError
@@ -192,7 +193,7 @@ def test_the_first_step_of_increments_is_the_usual_one_or_as_said():
 
 @pytest.mark.parametrize("dt", [0.0, -0.01, np.nan])
 def test_a_first_step_that_is_none(dt):
-    with pytest.raises(DataError, match="first step") as error:
+    with pytest.raises(DataError, check=coded("mechanization.first-step-none")) as error:
         imu_from_increments([0.0, 0.01], np.zeros((2, 3)), dt=dt)
     assert error.value.finding.quantity == "dt"
 
@@ -203,15 +204,18 @@ def test_increments_whose_stamps_do_not_advance():
         check=lambda refused: refused.finding.code == "tables.time-does-not-advance-followed",
     ):
         imu_from_increments([0.0, 0.01, 0.01], np.zeros((3, 3)))
-    with pytest.raises(DataError, match="different lengths"):
+    with pytest.raises(DataError, check=coded("tables.arrays-different-lengths")):
         imu_from_increments([0.0, 0.01], np.zeros((2, 3)), np.zeros((3, 3)))
-    with pytest.raises(DataError, match="at least two"):
+    with pytest.raises(DataError, check=coded("tables.sample-attitude-integral-rate-needs")):
         imu_from_increments([0.0], np.zeros((1, 3)))
 
 
 def test_a_log_without_an_accelerometer():
     imu = imu_table([0.0, 0.01], np.zeros((2, 3)), source="log.csv")
-    with pytest.raises(DataError, match="no accelerometer") as error:
+    with pytest.raises(
+        DataError,
+        check=coded("mechanization.no-accelerometer-without-specific-force", quantity="accel"),
+    ) as error:
         motion_increments(imu)
     said = error.value.finding
     assert said.file == "log.csv" and said.quantity == "accel" and "--columns" in said.remedy

@@ -65,6 +65,7 @@ VIBRATIONS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", VIBRATIONS)
 @pytest.mark.parametrize("equal", [True, False], ids=["equal", "unequal"])
 @pytest.mark.parametrize(("sampling", "samples", "interpolation"), KINDS)

@@ -54,6 +54,7 @@ for name, home in STEPS.items():
 """
 
 
+@pytest.mark.slow
 def test_single_precision_is_single_in_every_operation(tmp_path):
     """In a process and a cache of its own: numba shows the code of what it has just compiled."""
     done = subprocess.run(

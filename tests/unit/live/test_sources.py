@@ -7,6 +7,7 @@ import socket
 from urllib.parse import urlsplit
 
 import pytest
+from tests.coded import coded
 
 from strapdown.errors import ConfigError
 from strapdown.live.replay import MachineClock
@@ -75,6 +76,6 @@ def test_what_nothing_comes_from(where):
 
 def test_a_port_that_is_taken():
     one = open_source("udp://127.0.0.1:0", MachineClock(), None)
-    with pytest.raises(ConfigError, match="port that is free"):
+    with pytest.raises(ConfigError, check=coded("live.cannot-listen")):
         open_source(one.name, MachineClock(), None)
     one.close()

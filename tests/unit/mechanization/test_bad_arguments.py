@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown.ellipsoids import WGS84
 from strapdown.errors import ConfigError, DataError, DivergenceError
@@ -51,9 +52,13 @@ def test_an_ellipsoid_in_place_of_its_name_is_told_its_name():
 @pytest.mark.parametrize("longest", [math.nan, 0.0, -1.0, "1", None])
 def test_a_longest_step_that_is_no_time_is_refused(longest):
     increments = motion_increments(log())
-    with pytest.raises(ConfigError, match="longest_step"):
+    with pytest.raises(
+        ConfigError, check=coded("mechanization.longest-step-none", quantity="longest_step")
+    ):
         run_mechanization(NorthEastDown(), HOME, increments, longest_step=longest)
-    with pytest.raises(ConfigError, match="longest_step"):
+    with pytest.raises(
+        ConfigError, check=coded("mechanization.longest-step-none", quantity="longest_step")
+    ):
         NavTracker(HOME, longest_step=longest)
 
 
@@ -89,7 +94,9 @@ def test_heights_that_are_no_numbers_are_refused(heights):
     ],
 )
 def test_a_start_outside_of_the_limits_is_not_blamed_on_a_sample(start):
-    with pytest.raises(DivergenceError, match="initial state") as caught:
+    with pytest.raises(
+        DivergenceError, check=coded("mechanization.state-begin-high-outside-or", quantity="state")
+    ) as caught:
         run_mechanization(NorthEastDown(), start, motion_increments(log()))
     assert "sample" not in str(caught.value)
 
@@ -157,10 +164,10 @@ def test_a_tracker_refuses_a_gap_unless_it_is_allowed():
     assert tracker.state.time == 0.0
     patient.update(5.0, np.zeros(3), LEVEL)
     assert patient.state.time == 5.0
-    with pytest.raises(DataError, match="does not increase"):
+    with pytest.raises(DataError, check=coded("mechanization.time-does-not-advance-followed")):
         patient.update(-50.0, np.zeros(3), LEVEL)
 
 
 def test_a_tracker_shows_a_ragged_sample():
-    with pytest.raises(DataError, match="three finite rates"):
+    with pytest.raises(DataError, check=coded("mechanization.time-three-finite-rates-three")):
         NavTracker(HOME).update(0.0, [[1.0], [1.0, 2.0], 3.0], LEVEL)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown.errors import DataError
 from strapdown.mechanization import (
@@ -145,6 +146,9 @@ def test_one_table_is_one_segment():
 def test_a_tracker_refuses_a_height_that_it_cannot_use(kind, height):
     tracker = NavTracker(NavState.from_degrees(55.0, 37.0), NorthEastDown(height=kind))
     force = [0.0, 0.0, -9.8]
-    with pytest.raises(DataError, match="reference height"):
+    with pytest.raises(
+        DataError,
+        check=coded("mechanization.reference-height-height-or-infinite", quantity="height"),
+    ):
         tracker.update(0.0, np.zeros(3), force, height)
     tracker.update(0.0, np.zeros(3), force)

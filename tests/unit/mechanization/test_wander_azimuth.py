@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
@@ -281,6 +282,6 @@ def test_a_sample_that_is_refused_leaves_every_bit_of_the_state():
     for k in range(5):
         tracker.update(0.1 * k, [0.1, 0.2, 0.3], [0.0, 0.1, -9.8])
     kept = tracker._record.copy()
-    with pytest.raises(DivergenceError, match="would diverge"):
+    with pytest.raises(DivergenceError, check=coded("mechanization.state-would-diverge")):
         tracker.update(0.5, [0.1, 0.2, 0.3], [4e6, 0.0, 0.0])
     assert np.array_equal(tracker._record, kept)

@@ -27,6 +27,7 @@ def verdicts(normalised):
     return consistency_of("gnss.position", innovation_table(normalised)).verdicts
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("epochs", "runs"), [(60, 150), (300, 200), (1800, 100)])
 def test_rate_of_false_alarms(epochs, runs):
     rng = np.random.default_rng(epochs)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown.errors import ConfigError, DataError
 from strapdown.estimation.covariance import COVARIANCES
@@ -116,5 +117,5 @@ def test_what_means_nothing_is_refused():
     for policy in ({"usual": 1.0}, {"coast": -1.0}, {"beyond": "hope"}):
         with pytest.raises(ConfigError):
             GapPolicy(**policy)
-    with pytest.raises(ConfigError, match="needs an alignment"):
+    with pytest.raises(ConfigError, check=coded("navigation.no-alignment-after-gap")):
         chain(beyond="align")

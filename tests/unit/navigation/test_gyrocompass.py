@@ -117,6 +117,7 @@ def test_a_wrong_latitude_takes_the_witness_away():
     assert codes[1:] == ["navigation.rest-not-consistent"]
 
 
+@pytest.mark.slow
 def test_a_wrong_stored_heading_is_not_green_while_it_is_wrong():
     light, error = errors(run_navigation(spec_of(heading=9.0)))
     wrong = np.abs(error) > LIMIT
@@ -126,6 +127,7 @@ def test_a_wrong_stored_heading_is_not_green_while_it_is_wrong():
     assert (light == 0).any()
 
 
+@pytest.mark.slow
 def test_gyros_that_are_far_worse_than_stated_bear_nothing_out():
     # Some 5 deg/h in the place of 0.01 deg/h: north is off by tens of degrees.
     result = run_navigation(spec_of(stated="stim300"))

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from tests import aided_drives
+from tests.coded import coded
 
 from strapdown.errors import ConfigError, DivergenceError
 from strapdown.estimation.covariance import COVARIANCES
@@ -110,6 +111,7 @@ OTHERS = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("aids", [LONE, BOTH, OTHERS], ids=["lone", "both", "others"])
 @pytest.mark.parametrize("form", list(COVARIANCES))
 @pytest.mark.parametrize("mechanization", list(MECHANIZATIONS))
@@ -141,6 +143,7 @@ def same(a, b):
         np.testing.assert_array_equal(one.innovations.s, other.innovations.s)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("aids", [LONE, BOTH, OTHERS], ids=["lone", "both", "others"])
 @pytest.mark.parametrize("form", list(COVARIANCES))
 @pytest.mark.parametrize("mechanization", list(MECHANIZATIONS))
@@ -259,7 +262,7 @@ def test_a_rule_that_takes_more_than_there_is_ends_with_a_message(log):
     navigator, state = started(form="joseph", aids=(aid,))
     wrong = fixes.copy()
     wrong[["VN", "VE", "VD"]] += 0.25
-    with pytest.raises(DivergenceError, match=r"(?s)variance of .* at .* s.*'robust'"):
+    with pytest.raises(DivergenceError, check=coded("navigation.variance-lost")):
         run((time, rows, wrong), navigator, state)
 
 
@@ -285,9 +288,9 @@ def test_scale_factors_and_held_height_go_the_same_way_in_both_engines(log, monk
 
 
 def test_names_are_of_one_aid_each():
-    with pytest.raises(ConfigError, match="two measurements"):
+    with pytest.raises(ConfigError, check=coded("navigation.aid-name-taken")):
         Navigator(started()[0].filter, (Gnss(name="a"), Gnss(name="a")))
-    with pytest.raises(ConfigError, match="no name"):
+    with pytest.raises(ConfigError, check=coded("navigation.aid-without-name")):
         Navigator(started()[0].filter, (Gnss(),))
     navigator, state = started(aids=LONE)
     with pytest.raises(ConfigError, match="rtk"):

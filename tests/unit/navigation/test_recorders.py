@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown.errors import ConfigError, DataError
 from strapdown.estimation.covariance import COVARIANCES, Innovations
@@ -136,8 +137,10 @@ def test_memory_grows_with_the_rate_of_the_recorder():
 
 
 def test_no_step_and_no_rate_are_refused():
-    with pytest.raises(DataError, match=r"run.csv.*no navigation step"):
+    with pytest.raises(DataError, check=coded("navigation.no-step", file="run.csv")):
         kept(FullRecorder(), [])
     for rate in (0.0, np.inf, "fast"):
-        with pytest.raises(ConfigError, match="rate_hz"):
+        with pytest.raises(
+            ConfigError, check=coded("navigation.recorder-rate-not-positive", quantity="rate_hz")
+        ):
             IntervalRecorder(rate)

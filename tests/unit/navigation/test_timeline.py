@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown.alignment.alignment import Site
 from strapdown.alignment.coarse_alignments import COARSE_ALIGNMENTS
@@ -95,11 +96,13 @@ def test_what_means_nothing_is_refused():
     for options in ({"duration": 0.0}, {"heading_sd_deg": -1.0}, {"pause": 2.0}, {"least": 0.0}):
         with pytest.raises(ConfigError):
             Until(**options)
-    with pytest.raises(ConfigError, match="unknown mode"):
+    with pytest.raises(ConfigError, check=coded("navigation.unknown-mode")):
         standing((LEVEL, Navigation()), commands=(Command(1.0, "fly"),))
-    with pytest.raises(ConfigError, match="needs the errors of its sensors"):
+    with pytest.raises(
+        ConfigError, check=coded("navigation.alignment-without-sensor-errors", quantity="sensors")
+    ):
         NavigationPipeline(navigator(), modes=(LEVEL, Navigation()))
-    with pytest.raises(ConfigError, match="fixes: no measurement 'rtk' has a table"):
+    with pytest.raises(ConfigError, check=coded("navigation.no-aid-table-2", quantity="fixes")):
         standing((LEVEL, Navigation()), fixes="rtk")
 
 
@@ -201,5 +204,7 @@ def test_errors_of_angles_turn_about_their_axes():
         expected += np.outer(psi, psi) * sd[k] ** 2
     found = KnownStart(state, (1.0,) * 3, (1.0,) * 3, tuple(sd)).covariance[6:, 6:]
     np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-12)
-    with pytest.raises(ConfigError, match="position_sd"):
+    with pytest.raises(
+        ConfigError, check=coded("navigation.no-three-standard-deviations", quantity="position_sd")
+    ):
         KnownStart(state, (1.0, -1.0, 1.0), (1.0,) * 3, (1.0,) * 3)

@@ -114,6 +114,7 @@ def test_a_wrong_start_is_never_green_while_it_is_wrong():
     assert not (wrong & (light == 0)).any()
 
 
+@pytest.mark.slow
 def test_what_was_wrong_with_a_run_does_not_pass_to_a_later_witness(tmp_path):
     """A compass off by 8° makes tilts and biases wrong that the second witness would begin with."""
     truth = run_navigation(drive(laps=3, trust={"repeat": False})).source.truth.iloc[::50]

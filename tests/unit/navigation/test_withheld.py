@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
@@ -38,7 +39,7 @@ def test_spans_are_spread_from_the_begin_to_the_end():
     assert [s.begin for s in spans] == [100.0, 120.0, 140.0, 160.0, 180.0]
     assert [s.end for s in spans] == [120.0, 140.0, 160.0, 180.0, 200.0]
     assert [s.begin for s in spans_to_withhold(0.0, 10.0, 4.0, 1)] == [3.0]
-    with pytest.raises(ConfigError, match="do not fit"):
+    with pytest.raises(ConfigError, check=coded("evaluation.spans-do-not-fit-within")):
         spans_to_withhold(0.0, 10.0, 12.0)
 
 

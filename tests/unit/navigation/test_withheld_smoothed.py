@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
@@ -139,7 +140,7 @@ def test_it_does_not_matter_which_aid_comes_first():
 
 def test_a_stretch_without_fixes_is_refused():
     navigator, state = begun(town.gnss())
-    with pytest.raises(ConfigError, match="no fixes"):
+    with pytest.raises(ConfigError, check=coded("evaluation.no-fixes-score")):
         score_withheld_smoothed(
             navigator, state, *town.increments(), "gnss", [Span("none", 60.1, 60.2)]
         )

@@ -79,6 +79,7 @@ def test_the_gyro_alone_turns_about_each_axis(peer, name, aiding, axis, sign):
     assert angles(found, truth).max() < np.degrees(2.0 * limit)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("axis", "xyz")
 @pytest.mark.parametrize(("peer", "name", "aiding"), cases("gyro+accel", "gyro+accel+mag"))
@@ -116,6 +117,7 @@ def test_a_wrong_tilt_is_corrected_and_the_heading_kept(peer, name, aiding):
     assert abs(last[2] - 130.0) < 3.1 + 0.2 + 0.3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("peer", "name", "aiding"), cases("gyro+accel+mag"))
 @pytest.mark.parametrize("euler", [(0.0, 0.0, 0.0), (20.0, -35.0, 130.0), (-60.0, 15.0, 285.0)])
 def test_the_heading_of_a_magnetometer_is_magnetic(peer, name, aiding, euler):

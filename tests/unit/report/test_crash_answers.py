@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown import simulate
 from strapdown.bundle.seal import to_json
@@ -347,7 +348,7 @@ def test_a_change_of_velocity_is_held_against_another(result, main):
     right = held(delta_v_m_per_s=0.0, delta_v_sd_m_per_s=0.1, axis="right", over_s=(0.0, 0.1))
     assert abs(right.delta_v) < 0.5
     assert right.span == (0.0, 0.1)
-    with pytest.raises(DataError, match="the reference 'EDR'"):
+    with pytest.raises(DataError, check=coded("crash.reference-span-outside-record")):
         held(delta_v_m_per_s=1.0, delta_v_sd_m_per_s=0.1, over_s=(0.5, 9.0))
 
 

@@ -103,6 +103,7 @@ def test_a_record_comes_back_as_it_was_written(name, folder, recording):
             assert np.allclose(back.gyro.table[GYRO], turned, rtol=4.5e-16, atol=0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(CASES))
 def test_the_case_states_what_the_recorders_tell(name, folder, recording):
     recorded = recording(name)

@@ -10,6 +10,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+from tests.coded import coded
 
 from strapdown.errors import DataError
 from strapdown.report.chart import Chart
@@ -164,7 +165,7 @@ def test_a_second_cleaning_does_nothing(document):
 def test_what_is_no_svg_is_named():
     broken = Picture("plan", "<svg><g></svg>", "The plan")
     with pytest.raises(
-        DataError, match="report, The plan: the picture 'plan' is not valid SVG: mismatched"
+        DataError, check=coded("report.picture-no-svg", quantity="The plan", file="report")
     ):
         document_page(Document("t", "", (), (broken,), ()))
 

@@ -12,6 +12,7 @@ import zlib
 from pathlib import Path
 
 import pytest
+from tests.coded import coded
 
 import strapdown
 from strapdown.errors import ConfigError, DataError
@@ -157,7 +158,7 @@ def test_the_bytes_depend_on_nothing_around(tmp_path):
 )
 def test_a_picture_reaches_nothing_outside(inside, tmp_path):
     evil = Picture("evil", f"{HEAD}{inside}</svg>", "title", alt="alt")
-    with pytest.raises(DataError, match=r"cannot be typeset: failed to load linked image"):
+    with pytest.raises(DataError, check=coded("report.document-cannot-laid-out")):
         write_pdf(short(evil), tmp_path / "a.pdf")
     assert not (tmp_path / "a.pdf").exists()
 
@@ -165,7 +166,7 @@ def test_a_picture_reaches_nothing_outside(inside, tmp_path):
 def test_without_typst_the_remedy_is_said_and_nothing_is_left(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "typst", None)
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    with pytest.raises(ConfigError, match="pip install typst"):
+    with pytest.raises(ConfigError, check=coded("report.pdf-laid-out-typst-not")):
         write_pdf(short(), tmp_path / "a.pdf")
     assert not list(tmp_path.iterdir())
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.coded import coded
 from tests.unit.report.navigation_records import one_epoch, record, shifted, told, without_aids
 
 from strapdown.errors import DataError, Finding
@@ -222,7 +223,9 @@ def test_a_truth_of_another_time_is_refused():
     made = record()
     truth = made.trajectory.set_index(made.trajectory.index + 1e4)
     truth.index.name = "time"
-    with pytest.raises(DataError, match="do not overlap in time"):
+    with pytest.raises(
+        DataError, check=coded("evaluation.run-truth-no-instant-common", quantity="time")
+    ):
         told(made, truth=truth).errors  # noqa: B018
 
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from tests.coded import coded
 
 from strapdown.cli.attitude import print_comparison
 from strapdown.errors import ConfigError
@@ -269,7 +270,7 @@ def test_a_bench_plots_itself_without_global_state(full_bench, kind):
 def test_what_cannot_be_plotted_is_said(make_bench):
     bench = make_bench(("dcm",), truth=False, sweep=False)
     with pytest.raises(
-        ConfigError, match="kind: unknown chart 'swep' of an attitude comparison"
+        ConfigError, check=coded("report.no-chart-bench", quantity="kind")
     ) as unknown:
         bench.plot("swep")
     assert "sweep" in str(unknown.value)

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.error_chain import apply, compensate, input_of, transfer
@@ -225,17 +226,17 @@ def test_what_makes_no_sensor_is_refused_by_name(values, quantity):
 
 def test_what_cannot_be_applied_is_refused():
     t, u = stamps(), truth()
-    with pytest.raises(ConfigError, match="sampling: unknown kind of sampling 'average'"):
+    with pytest.raises(ConfigError, check=coded("sensors.no-kind-sampling", quantity="sampling")):
         apply(TriadErrors(), t, u, sampling="average")
-    with pytest.raises(ConfigError, match="specific force"):
+    with pytest.raises(ConfigError, check=coded("sensors.triad-feels-specific-force-none")):
         apply(KNOWN, t, u)
     with pytest.raises(DataError, match="shape"):
         apply(KNOWN, t, u, specific_force=force(3))
-    with pytest.raises(DataError, match="does not increase"):
+    with pytest.raises(DataError, check=coded("sensors.times-do-not-advance")):
         apply(KNOWN, t[::-1], u, specific_force=force())
-    with pytest.raises(DataError, match="two stamps"):
+    with pytest.raises(DataError, check=coded("sensors.time-shape-values")):
         compensate(KNOWN, t, u[:3], specific_force=force())
-    with pytest.raises(ConfigError, match="tenth of the interval"):
+    with pytest.raises(ConfigError, check=coded("sensors.jitter-more-than-tenth-interval")):
         apply(TriadErrors(jitter=0.01), t, u)
 
 

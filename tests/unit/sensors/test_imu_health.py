@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from tests.coded import coded
 from tests.sensor_faults import (
     Burst,
     Dead,
@@ -54,6 +55,7 @@ def sample_sd(uncertainty, channel):
     return math.hypot(white, triad.axis("quantization")[axis] / math.sqrt(12.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BOTH)
 def test_sound_units_at_rest_have_no_faults(name):
     # 6 channels, 6 tests, 2 runs, 2 ways at 1e-6 each: 1.4e-4 for all of a sensor.
@@ -232,13 +234,13 @@ def test_the_limit_of_an_exponential_tail():
 
 def test_what_is_refused():
     imu, _ = at_rest("fog-1000")
-    with pytest.raises(DataError, match="too few"):
+    with pytest.raises(DataError, check=coded("sensors.samples-too-few-tell-channel")):
         check_imu_channels(imu.iloc[:30])
-    with pytest.raises(ConfigError, match="false alarm"):
+    with pytest.raises(ConfigError, check=coded("sensors.no-rate-false-alarms")):
         check_imu_channels(imu, false_alarm=2.0)
     with pytest.raises(ConfigError, match="gravity"):
         check_imu_channels(imu, gravity=-9.8)
-    with pytest.raises(DataError, match="missing columns"):
+    with pytest.raises(DataError, check=coded("tables.missing-columns")):
         check_imu_channels(imu.drop(columns="gyro_x"))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.signal import savgol_coeffs, savgol_filter
+from tests.coded import coded
 
 from strapdown.dsp.derivative import local_slope
 from strapdown.errors import ConfigError, DataError
@@ -132,15 +133,19 @@ def test_the_added_noise_is_what_many_draws_show(delay):
 
 def test_what_is_refused():
     table = imu_table(TIME, np.zeros((400, 3)), np.zeros((400, 3)))
-    with pytest.raises(ConfigError, match="lever arm"):
+    with pytest.raises(
+        ConfigError, check=coded("sensors.not-three-finite-numbers", quantity="lever arm")
+    ):
         move_imu(table, [1.0, np.nan, 0.0])
     with pytest.raises(ConfigError, match="window"):
         move_imu(table, R, window=-1.0)
     with pytest.raises(ConfigError, match="delay"):
         move_imu(table, R, gyro_delay=0.1)
-    with pytest.raises(ConfigError, match="gyro_noise"):
+    with pytest.raises(
+        ConfigError, check=coded("sensors.standard-deviations-shape-do-not", quantity="gyro_noise")
+    ):
         move_imu(table, R, gyro_noise=[1.0, 2.0])
-    with pytest.raises(DataError, match="missing columns"):
+    with pytest.raises(DataError, check=coded("tables.missing-columns")):
         move_imu(imu_table(TIME, np.zeros((400, 3))), R)
-    with pytest.raises(DataError, match="too few"):
+    with pytest.raises(DataError, check=coded("dsp.samples-too-few-derivative")):
         local_slope(np.array([0.0, 1.0]))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.coded import coded
 
 from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.range_merge import merge_ranges
@@ -150,9 +151,9 @@ def test_what_is_no_number_is_refused_with_its_row():
     values[1][7, 1] = np.nan
     with pytest.raises(DataError, match="row 8, range 1 y"):
         merge_ranges(time, values, limits, [truth, truth])
-    with pytest.raises(DataError, match="does not increase"):
+    with pytest.raises(DataError, check=coded("tables.time-does-not-advance-followed")):
         merge_ranges(time[::-1].copy(), [truth], limits[:1], [truth])
-    with pytest.raises(ConfigError, match="leave no range"):
+    with pytest.raises(ConfigError, check=coded("sensors.margin-hysteresis-leave-no-range")):
         merge_ranges(time, [truth], limits[:1], [truth], margin=0.6, hysteresis=0.5)
-    with pytest.raises(ConfigError, match="cross-fade"):
+    with pytest.raises(ConfigError, check=coded("sensors.no-length-cross-fade", quantity="fade")):
         merge_ranges(time, [truth], limits[:1], [truth], fade=-1.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.stats import chi2
+from tests.coded import coded
 
 from strapdown.errors import ConfigError
 from strapdown.sensors.catalogue import load_sensor
@@ -108,5 +109,5 @@ def test_the_stated_priors_are_those_of_the_rate():
     assert priors["accel"].bias == (0.2,) * 3
     assert priors["accel"].scale == (0.02,) * 3
     assert priors["gyro"].bias[0] == pytest.approx(np.radians(0.3))
-    with pytest.raises(ConfigError, match="is not positive"):
+    with pytest.raises(ConfigError, check=coded("sensors.rate-not-positive")):
         crash_priors(0.0)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
+from strapdown.errors import DataError
 from strapdown.sensors.rest import (
     find_rests,
     find_rests_of_every_grade,
@@ -80,5 +82,5 @@ def test_a_stretch_is_taken_on_the_users_word():
     imu = log([], [(0.0, 40.0)])
     rest = rest_between(imu, 3.0, 4.0)
     assert (rest.start, rest.end, rest.grade) == (3.0, 4.0, "stated")
-    with pytest.raises(Exception, match="too few for a mean"):
+    with pytest.raises(DataError, check=coded("sensors.samples-between-too-few-mean")):
         rest_between(imu, 3.0, 3.02)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from tests.coded import coded
 
 from strapdown import rotation
 from strapdown.errors import ConfigError, DataError
@@ -442,7 +443,9 @@ def test_options_that_are_not_understood(keys, word):
 
 
 def test_correlation_needs_one_trigger_and_something_in_common():
-    with pytest.raises(DataError, match="no unit has a trigger"):
+    with pytest.raises(
+        DataError, check=coded("sensors.no-unit-trigger-time-counted", quantity="trigger")
+    ):
         synchronise([imu(trigger=None)], method="correlation")
     noise = np.random.default_rng(6).normal(size=(401, 3))
     other = with_table(

@@ -120,6 +120,7 @@ def test_cameras_see_the_whole_path_within_what_they_state(name):
     assert np.abs(apart).max() < 5.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [n for n, c in CRASHES.items() if c.kind])
 def test_the_entry_is_the_motions_own(name):
     recorded = record_case(CASES[name], seed=4)

@@ -11,6 +11,7 @@ import mpmath
 import numpy as np
 import pytest
 from mpmath import mpf
+from tests.coded import coded
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -216,5 +217,5 @@ def test_a_change_is_three_numbers(change):
 
 def test_a_motion_that_does_not_know_its_angular_acceleration_says_so():
     motion = SineVelocityMotion(10.0, Origin(45.0, 20.0), (5.0, 1.0, 0.0), (1.0, 0.0, 0.0), 5.0)
-    with pytest.raises(ConfigError, match="SineVelocityMotion has no"):
+    with pytest.raises(ConfigError, check=coded("simulation.does-not-know-angular-acceleration")):
         motion.angular_acceleration([1.0])

@@ -185,6 +185,7 @@ def test_increments_of_the_angle_are_integrals_of_the_rate(name):
     assert np.array_equal(motion.angle([0.0]), np.zeros((1, 3)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MOTIONS)
 def test_another_integrator_ends_at_the_same_attitude(name):
     motion = MOTIONS[name]

@@ -12,6 +12,7 @@ import mpmath
 import numpy as np
 import pytest
 from mpmath import mpf
+from tests.coded import coded
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -201,7 +202,12 @@ def test_points_of_a_rigid_vehicle_keep_their_distance():
 
 def test_a_unit_on_a_motion_without_angular_acceleration_is_refused():
     sine = SineVelocityMotion(10.0, Origin(45.0, 20.0), (5.0, 1.0, 0.0), (1.0, 0.0, 0.0), 5.0)
-    with pytest.raises(ConfigError, match="angular acceleration"):
+    with pytest.raises(
+        ConfigError,
+        check=coded(
+            "simulation.does-not-know-angular-acceleration", quantity="angular acceleration"
+        ),
+    ):
         MountedMotion(sine, MOUNTING).specific_force([1.0])
 
 

@@ -11,6 +11,7 @@ import mpmath
 import numpy as np
 import pytest
 from mpmath import mpf
+from tests.coded import coded
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -167,6 +168,7 @@ def instants(motion):
     return inner[:: max(1, len(inner) // 8)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", VEHICLES)
 def test_a_path_is_felt_as_in_inertial_axes(name):
     # A few last places of 10 m/s² (2e-15), and of rates under 1 rad/s (1e-16).
@@ -299,7 +301,7 @@ def test_what_a_vehicle_cannot_do_is_said(speed, manoeuvres, words):
 def test_waves_and_pitches_are_checked():
     with pytest.raises(ConfigError, match="period: 0 is not above zero"):
         Wave(1.0, 0.0)
-    with pytest.raises(ConfigError, match="not finite"):
+    with pytest.raises(ConfigError, check=coded("simulation.not-finite")):
         Wave(math.inf, 1.0)
     with pytest.raises(ConfigError, match="pitch reaches 85 deg"):
         PathMotion(1.0, PLACE, attack_deg=-80.0, pitch_waves=(Wave(5.0, 3.0),))

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown.api.attitude import compare_attitude
 from strapdown.attitude_algorithms import make_algorithm
@@ -173,7 +174,7 @@ def test_rates_are_taken_as_what_one_sample_in_so_many_gives():
     assert "30 Hz was requested; 33.33 Hz is what one sample in 3 gives" in findings[0].what
     assert "200 Hz was requested; 100 Hz is the log's own rate" in findings[1].what
     # The remedy of the error is a rate that is not refused.
-    with pytest.raises(ConfigError, match="at least") as refused:
+    with pytest.raises(ConfigError, check=coded("attitude.hz-leaves-fewer-than-two")) as refused:
         choose_factors(imu, (0.1,), findings)
     least = float(str(refused.value).split("use at least ")[1].split(" Hz")[0])
     assert len(choose_factors(imu, (least * 1.01,), findings)) == 2

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy import stats
+from tests.coded import coded
 
 from strapdown import simulate
 from strapdown.api.attitude import compare_attitude
@@ -195,7 +196,7 @@ def test_rates_without_a_partner_are_left_out():
     assert found["rate_hz"].tolist() == [110.0, 50.0]
     assert found["error_deg"].tolist() == [1.0, 2.5]
     assert found["reference_deg"].isna().all()
-    with pytest.raises(ConfigError, match="no common rate"):
+    with pytest.raises(ConfigError, check=coded("attitude.no-rate-common-all-trials")):
         worst_sweep([sweep(1.0), sweep(10.0)])
 
 
@@ -233,9 +234,7 @@ def test_what_are_no_trials_is_refused(asked):
 
 
 def test_a_log_is_not_drawn_again_or_named_twice(logs):
-    with pytest.raises(ConfigError, match="several logs"):
+    with pytest.raises(ConfigError, check=coded("attitude.recorded-log-not-drawn-again")):
         compare_attitude(logs[0], trials=3)
-    with pytest.raises(
-        ConfigError, match="a log is given twice, and one trial does not count as two"
-    ):
+    with pytest.raises(ConfigError, check=coded("attitude.named-twice-trial-does-not")):
         compare_attitude([logs[0], logs[0]])

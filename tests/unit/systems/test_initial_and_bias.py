@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown.api.attitude import compare_attitude
 from strapdown.errors import ConfigError, DataError
@@ -88,7 +89,7 @@ def test_one_text_stands_for_a_list_of_one(log):
 
 @pytest.mark.parametrize("option", [{"axes": "x,-y,-z"}, {"gyro_unit": "deg/s"}, {"repair": True}])
 def test_a_scenario_is_not_read_from_a_file(option):
-    with pytest.raises(ConfigError, match="alexiev-fig"):
+    with pytest.raises(ConfigError, check=coded("attitude.scenario-not-read-file")):
         compare_attitude("alexiev-fig4", **option)
 
 

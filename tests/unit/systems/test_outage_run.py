@@ -109,6 +109,7 @@ def test_a_bias_that_is_bound_to_a_tilt_cancels_it(aided):
     assert share.variance["horizontal"][-1] < 0.5 * share.alone["horizontal"][-1] ** 2
 
 
+@pytest.mark.slow
 def test_with_aids_the_budget_has_what_their_noise_adds(monkeypatch):
     asked = {
         "start": SMALL,
@@ -136,6 +137,7 @@ def test_with_aids_the_budget_has_what_their_noise_adds(monkeypatch):
     assert found.bound[-1] < foretold("mpu-6050", 12.0, start=SMALL).bound[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "motion", [{}, {"speed_m_per_s": 15.0}, {"speed_m_per_s": 15.0, "turn_rate_deg_per_s": 6.0}]
 )

@@ -7,6 +7,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
@@ -72,6 +73,7 @@ def offset_at_the_end(walk, rate):
     return -last.sensors[k] - rate * span, last.sensors_sd[k]
 
 
+@pytest.mark.slow
 def test_what_is_proposed_follows_quartz_and_spoils_little_without_it():
     for rate in (RATE, -RATE, 0.0):
         error, sd = offset_at_the_end(APART, rate)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 from tests.aided_drives import CarriedMotion, drive, estimate, gnss_of, navigator_of, run
+from tests.coded import coded
 
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
@@ -70,6 +71,7 @@ def driven(aid, seed):
     return navigator, state
 
 
+@pytest.mark.slow
 def test_slip_and_dive_are_found_within_what_is_said():
     """Squares of the errors over their covariances: one in a hundred is outside of this."""
     total = 0.0
@@ -86,5 +88,7 @@ def test_one_of_them_alone_and_none():
     alone = replace(NOISE, compliance_sd_deg_per_g=(0.0, 2.0))
     assert alone.states()[-1].block.labels == ("dive",)
     assert [one.block.name for one in NOISE.states()] == ["wheels.mounting"]
-    with pytest.raises(ConfigError, match="compliance_sd_deg_per_g"):
+    with pytest.raises(
+        ConfigError, check=coded("navigation.no-numbers-from", quantity="compliance_sd_deg_per_g")
+    ):
         replace(NOISE, compliance_sd_deg_per_g=(-1.0, 0.0))

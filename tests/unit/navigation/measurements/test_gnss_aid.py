@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown import earth, rotation
 from strapdown._kernels.sums import steady_motion
@@ -196,7 +197,7 @@ def test_stated_deviations_have_factors_and_floors_and_qualities_are_chosen():
 
 def test_a_fix_that_claims_to_be_exact_is_refused_with_the_option_that_helps():
     table = table_of([40.0, 10.0, 0.0], [0.0, 0.0, 0.0], sd=0.0)
-    with pytest.raises(DataError, match="least_position_sd_m"):
+    with pytest.raises(DataError, check=coded("navigation.sd-zero-in-rows")):
         Gnss(name="rtk").epochs(table)
     least = Gnss(name="rtk", least_position_sd=0.1, least_velocity_sd=0.1)
     assert least.epochs(table).time.size == 2

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 sys.path.insert(0, str(Path(__file__).parents[3]))
 
@@ -81,6 +82,7 @@ def test_the_delay_of_a_mean_velocity_is_half_of_its_interval():
     assert not find_velocity_delay(table, 0.125)
 
 
+@pytest.mark.slow
 def test_the_stated_deviation_of_a_delay_is_that_of_its_errors():
     off = []
     for seed in range(8):
@@ -201,7 +203,7 @@ def test_units_of_places_are_told_by_their_speed():
     place = table[GEODETIC].to_numpy().copy()
     minutes = np.floor(place[:, :2]) + (place[:, :2] % 1.0) * 0.6
     place[:, :2] = minutes
-    with pytest.raises(DataError, match="degrees and minutes"):
+    with pytest.raises(DataError, check=coded("tables.places-in-degrees-and-minutes")):
         gnss_readiness(remade(table, place=place))
 
 
@@ -210,14 +212,14 @@ def test_places_that_move_faster_than_anything_are_refused():
     place = table[GEODETIC].to_numpy().copy()
     place[:, 1] *= 100.0 * (np.arange(len(place)) % 2)
     place[:, 1] %= 180.0
-    with pytest.raises(DataError, match="m/s between fixes"):
+    with pytest.raises(DataError, check=coded("navigation.places-move-fix-fix-steps")):
         gnss_readiness(remade(table, place=place, velocity_sd=(np.inf,) * 3))
 
 
 def test_no_fix_at_all_is_refused():
     table = town.fixes()
     table = remade(table, position_sd=(np.inf,) * 3, velocity_sd=(np.inf,) * 3)
-    with pytest.raises(DataError, match="none of"):
+    with pytest.raises(DataError, check=coded("navigation.none-rows-fix-quality-or")):
         gnss_readiness(table)
 
 

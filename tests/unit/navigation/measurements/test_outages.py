@@ -96,6 +96,7 @@ def medians(aids, told, until, measure, lost=LOST):
     return float(np.median(out))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", list(CASES))
 def test_it_helps_while_gnss_is_lost(kind):
     aid, told, until, measure, part = CASES[kind]
