@@ -132,6 +132,14 @@ def test_one_outage_at_a_stamp(drive, run_cli):
     assert [one["begin_s"] for one in told["drifts"]] == [50.0]
 
 
+def test_an_outage_between_two_covariances_is_refused(drive, run_cli):
+    flags = ("--outage", "0.3", "--at", "50.2")
+    done = run_cli("coast", drive / DRIVE, *flags, "--out", drive / "short")
+    assert done.code == 4
+    assert "Traceback" not in done.err and "--outage" in done.err
+    assert not (drive / "short").exists()
+
+
 @pytest.mark.parametrize("end", [("--to", "65"), ("--duration", "20")])
 def test_outages_lie_within_the_part_that_flags_name(drive, run_cli, tmp_path, end):
     flags = ("--outage", "10", "--places", "3", "--from", "45", *end)

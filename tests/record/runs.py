@@ -123,7 +123,7 @@ add(
     Command(
         "attitude",
         (TURNS,),
-        {"gyro-bias": "rest", "reference": ("end 2 turns about z since start", "rests")}
+        {"gyro-bias": "none", "reference": "end 2 turns about z since start"}
         | {"algorithms": "euler dcm rk4", **Q},
         "att",
     ),
@@ -349,7 +349,14 @@ add(
         "align",
         ("{data}/" + CAR_IMU,),
         {"method": "gnss_course", "gnss": "{data}/" + CAR_GNSS, "coarse-only": True}
-        | {"sensor": "icm-42688-p", "from": 243260, "duration": 60, **Q},
+        | {
+            "sensor": "icm-42688-p",
+            "from": 243260,
+            "duration": 60,
+            "lat": 40.1,
+            "lon": -105.15,
+            **Q,
+        },
         "align",
     ),
     recordings=(CAR_IMU, CAR_GNSS),
@@ -604,6 +611,7 @@ add(
         {"sensor": "xsens-mti-1", "lat": 41, "lon": 29, "heading": 0, "duration": 15}
         | {"control-points": "{data}/" + FOOT, **Q},
         "nav",
+        exit=3,  # The recording has no rest at gravity for this start: both versions refuse it.
     ),
     recordings=(FOOT,),
 )
@@ -665,7 +673,7 @@ add(
     ),
     Command("outage", ("hg1700",), {"aided": 0, "with": "zupt", "json": True}, "b", stdout="json"),
     Command("navigate", ("run.toml",), Q, "nav", keep=False),
-    Command("outage", ("nav",), {"outage": 4, "places": 3, **Q}, "drive"),
+    Command("outage", ("nav",), {"outage": 4, "places": 3, **Q}, "drive", exit=4),
     Command("verify", ("nav",), {"json": True}, stdout="json", label="verified"),
     Tamper("nav", "trajectory"),
     Command("verify", ("nav",), {"json": True}, stdout="json", label="tampered", exit=6),

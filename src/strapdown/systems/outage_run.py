@@ -411,6 +411,14 @@ def _drift(
         raise _aligns_anew(span.begin, span.end)
     record = record_of(navigator, run.pieces)
     marks = record.sd.index.to_numpy(dtype=np.float64)
+    if not len(marks):
+        # The record has the covariance at intervals; a shorter outage may lie between two of them.
+        raise ConfigError(
+            "outage.outage-between-covariances",
+            quantity="--outage",
+            outage_s=span.end - span.begin,
+            begin=span.begin,
+        )
     course = courses(record.trajectory, marks)
     on_grid = grid + span.begin
     variance = {
