@@ -222,7 +222,7 @@ def test_a_folder_of_logs_names_them(tmp_path, run_cli):
 def test_modules_as_json_hold_what_the_tables_hold(run_cli):
     lists = json.loads(run_cli("modules", "--json").out)
     text = run_cli("modules").out
-    for key in ("attitude_algorithms", "aiding", "sensors", "log_formats", "fix_formats"):
+    for key in ("attitude_algorithms", "aiding", "sensors", "formats"):
         for row in lists[key]:
             assert row["name"] in text
     assert {"name", "source", "options", "summary"} == set(lists["attitude_algorithms"][0])

@@ -20,8 +20,8 @@ from numpy.typing import ArrayLike
 
 from strapdown.config.spec import specify
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
-from strapdown.formats.gnss_files import GNSS_READERS, GnssOptions
 from strapdown.formats.gnss_files import read_gnss as read_gnss_table
+from strapdown.formats.gnss_fixes import GnssOptions
 from strapdown.tables import ACCEL, GYRO, QUATERNION, imu_table
 
 if TYPE_CHECKING:
@@ -330,35 +330,37 @@ def read(path: str | Path) -> Streams:
     Returns
     -------
     Streams
-        ``imu``; ``reference``, an Attitude table, if the recording has a truth; ``gnss``, if it
-        has fixes.
+        ``imu``; ``gnss``, if it has fixes; ``reference``, an Attitude table of a log with a truth,
+        or a Trajectory.
 
     Raises
     ------
     DataError, ConfigError
         The recording has neither a log of an inertial sensor nor fixes.
     """
+    from strapdown.formats.trajectory_readers import read_trajectory
     from strapdown.tables import attitude_table
 
     tables: dict[str, pd.DataFrame] = {}
     refused: StrapdownError | None = None
-    try:
-        imu = read_imu(path)
-        tables["imu"] = imu
-        if "reference" in imu.attrs:
-            q_nb, stamps = imu.attrs["reference"]
-            tables["reference"] = attitude_table(stamps, q_nb)
-    except StrapdownError as error:
-        refused = error
-    if Path(path).exists() and any(reader.detect(Path(path)) for reader in GNSS_READERS.values()):
+    for stream, table_of in (
+        ("imu", read_imu),
+        ("gnss", read_gnss),
+        ("reference", read_trajectory),
+    ):
+        if stream == "reference" and "reference" in tables:
+            continue
         try:
-            tables["gnss"] = read_gnss(path)
+            tables[stream] = table_of(path)
         except StrapdownError as error:
-            # A log of inertial sensors may have no fixes; if it is neither, report why it is not a
-            # log.
+            # A recording need not have every stream; if it has none, report why it is not a log.
             refused = refused or error
+            continue
+        if "reference" in tables[stream].attrs:
+            q_nb, stamps = tables[stream].attrs["reference"]
+            tables["reference"] = attitude_table(stamps, q_nb)
     if not tables:
-        assert refused is not None  # one of the two failed
+        assert refused is not None  # each of them failed
         raise refused
     return Streams(tables, Path(path).name)
 

@@ -13,7 +13,6 @@ from strapdown.ellipsoids import ELLIPSOIDS
 from strapdown.errors import Finding
 from strapdown.formats import READERS, Reader
 from strapdown.formats.crash_records import CRASH_READERS
-from strapdown.formats.gnss_files import GNSS_READERS
 from strapdown.formats.log_writers import LOG_WRITERS
 from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS
 from strapdown.mechanization import MECHANIZATIONS, Mechanization
@@ -74,7 +73,7 @@ def cell_text(value: Any) -> str:
 _PLUGINS: dict[str, tuple[str, type]] = {
     "attitude_algorithms": ("attitude", AttitudeAlgorithm),
     "aiding": ("measurement", Measurement),
-    "log_formats": ("reader", Reader),
+    "formats": ("reader", Reader),
 }
 
 
@@ -94,7 +93,7 @@ def listed_modules() -> tuple[tuple[Listed, ...], tuple[Finding, ...]]:
         added = {
             "attitude_algorithms": _algorithm_rows,
             "aiding": _module_rows,
-            "log_formats": _titles,
+            "formats": _formats,
         }[one.key](found)
         lists.append(replace(one, rows=(*one.rows, *added)))
     return tuple(lists), tuple(findings)
@@ -142,8 +141,7 @@ def _literal() -> tuple[Listed, ...]:
                 for s in map(load_sensor, SENSORS)
             ),
         ),
-        Listed("log_formats", "Formats of logs that are read", _titles(READERS)),
-        Listed("fix_formats", "Formats of fixes that are read", _titles(GNSS_READERS)),
+        Listed("formats", "Formats that are read", _formats(READERS)),
         Listed("crash_formats", "Formats of crash records that are read", _titles(CRASH_READERS)),
         Listed(
             "log_writers",
@@ -265,6 +263,13 @@ def _summaries(entries: Mapping[str, Any]) -> tuple[Mapping[str, Any], ...]:
     return tuple(
         {"name": name, "source": one.source, "summary": one.summary}
         for name, one in entries.items()
+    )
+
+
+def _formats(readers: Mapping[str, Reader]) -> tuple[Mapping[str, Any], ...]:
+    return tuple(
+        {"name": name, "streams": list(one.streams), "summary": one.title}
+        for name, one in readers.items()
     )
 
 

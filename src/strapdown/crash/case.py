@@ -38,10 +38,11 @@ from strapdown.crash.severity import (
     injury_risk,
 )
 from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.formats import files_of
 from strapdown.formats.crash_record import CrashRecord
 from strapdown.formats.crash_records import read_crash_record
 from strapdown.formats.crash_triad import triad_of_channels
-from strapdown.formats.gnss_files import files_of_fixes, read_gnss
+from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.named_columns import read_reference_path
 from strapdown.progress import Progress, silent
 from strapdown.sensors.catalogue import SENSORS, load_sensor
@@ -208,7 +209,7 @@ def _inputs(
     given += [("sensor", s, (Path(s),)) for s in dict.fromkeys(sensors) if s.lower() not in SENSORS]
     others = [("reference", r.path) for r in spec.references if r.path is not None]
     others += [("fixes", spec.entry.path)] if spec.entry.path is not None else []
-    given += [(role, path, files_of_fixes(path)) for role, path in dict.fromkeys(others)]
+    given += [(role, path, files_of(path)) for role, path in dict.fromkeys(others)]
     return tuple(
         InputFiles(role, Path(path), files, tuple(sha256(file) for file in files))
         for role, path, files in given

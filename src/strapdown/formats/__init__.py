@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+import pandas as pd
 
 from strapdown.errors import ConfigError, DataError, StrapdownError
 from strapdown.formats import (
@@ -16,6 +18,8 @@ from strapdown.formats import (
     csv,
     foot_mounted,
     gnss_logger,
+    gnss_nmea,
+    gnss_pos,
     hdf5,
     join,
     kf_gins,
@@ -35,98 +39,193 @@ from strapdown.formats import (
 )
 from strapdown.formats.assemble import assemble
 from strapdown.formats.columns import read_name
-from strapdown.formats.recording import RawLog, ReadOptions, Recording
+from strapdown.formats.gnss_fixes import Fixes
+from strapdown.formats.recording import NoStreamError, RawLog, ReadOptions, Recording
 from strapdown.plugins import plugin, plugins
 
 _log = logging.getLogger("strapdown")
 
-__all__ = ["READERS", "ReadOptions", "Reader", "Recording", "read_joined", "read_log", "read_raw"]
+__all__ = [
+    "READERS",
+    "STREAMS",
+    "NoStreamError",
+    "ReadOptions",
+    "Reader",
+    "Recording",
+    "files_of",
+    "open_stream",
+    "read_joined",
+    "read_log",
+    "read_raw",
+    "readers_of",
+]
+
+
+#: Raw content of a stream: columns, fixes in the units of a Gnss table, or a Trajectory table.
+Raw = RawLog | Fixes | pd.DataFrame
+#: Names of streams, in the order in which they are shown.
+STREAMS = ("imu", "gnss", "reference", "magnetometer", "barometer", "wheel")
+#: In `Reader.streams`: one table of named columns, which hold any of `STREAMS`.
+TABLE = "table"
 
 
 @dataclass(frozen=True)
 class Reader:
-    """How one format is recognized and read."""
+    """How one format is recognized and read.
+
+    Attributes
+    ----------
+    title : str
+    detect : callable
+        Whether a file or folder is of this format: by its content, then by its name.
+    streams : mapping of str to callable
+        Reader of each stream that the format may hold, by a name of `STREAMS`, or of `TABLE`. It
+        raises `NoStreamError` if this file lacks the stream.
+    files : callable, optional
+        Every file that is read for a path; the path itself by default.
+    """
 
     title: str
     detect: Callable[[Path], bool]
-    read: Callable[[Path], RawLog]
+    streams: Mapping[str, Callable[[Path], Raw]]
+    files: Callable[[Path], tuple[Path, ...]] | None = None
 
 
 #: In the order of detection: formats of known recordings first, general formats last.
 READERS: dict[str, Reader] = {
-    "mpu6050": Reader("folder of an MPU-6050 in MATLAB files", mpu6050.detect, mpu6050.read),
-    "broad": Reader("BROAD trial, HDF5 with optical truth", broad.detect, broad.read),
+    "mpu6050": Reader(
+        "folder of an MPU-6050 in MATLAB files", mpu6050.detect, {"imu": mpu6050.read}
+    ),
+    "broad": Reader("BROAD trial, HDF5 with optical truth", broad.detect, {"imu": broad.read}),
     "comma2k19": Reader(
-        "comma2k19 segment, with its pose as truth", comma2k19.detect, comma2k19.read
+        "comma2k19 segment, with its pose as truth",
+        comma2k19.detect,
+        {"imu": comma2k19.read, "gnss": comma2k19.read_fixes},
+        comma2k19.files_of,
     ),
-    "kitti": Reader("KITTI raw, folder oxts", kitti.detect, kitti.read),
-    "ronin": Reader("RoNIN, HDF5 of a phone", ronin.detect, ronin.read),
-    "asl": Reader("EuRoC, TUM VI: data.csv of imu0, or folder mav0", asl.detect, asl.read),
-    "xsens": Reader("Xsens MT Manager export (.txt .csv)", xsens.detect, xsens.read),
-    "sensorstream": Reader("Sensorstream IMU+GPS", sensorstream.detect, sensorstream.read),
+    "kitti": Reader(
+        "KITTI raw, folder oxts",
+        kitti.detect,
+        {"imu": kitti.read, "gnss": kitti.read_fixes, "reference": kitti.read_trajectory},
+        kitti.files_of,
+    ),
+    "ronin": Reader("RoNIN, HDF5 of a phone", ronin.detect, {"imu": ronin.read}),
+    "asl": Reader("EuRoC, TUM VI: data.csv of imu0, or folder mav0", asl.detect, {"imu": asl.read}),
+    "xsens": Reader(
+        "Xsens MT Manager export (.txt .csv)", xsens.detect, {"imu": xsens.read, TABLE: csv.read}
+    ),
+    "sensorstream": Reader("Sensorstream IMU+GPS", sensorstream.detect, {"imu": sensorstream.read}),
     "sensor-logger": Reader(
-        "Sensor Logger: zip, folder, CSV, JSON", sensor_logger.detect, sensor_logger.read
+        "Sensor Logger: zip, folder, CSV, JSON", sensor_logger.detect, {"imu": sensor_logger.read}
     ),
-    "sensorlog": Reader("SensorLog of iOS, wide CSV", sensorlog.detect, sensorlog.read),
+    "sensorlog": Reader(
+        "SensorLog of iOS, wide CSV", sensorlog.detect, {"imu": sensorlog.read, TABLE: csv.read}
+    ),
     "gnss-logger": Reader(
-        "GnssLogger of Android, device_imu.csv", gnss_logger.detect, gnss_logger.read
+        "GnssLogger of Android, device_imu.csv",
+        gnss_logger.detect,
+        {"imu": gnss_logger.read, "gnss": gnss_logger.read_fixes},
     ),
-    "phyphox": Reader("phyphox: CSV, zip, folder", phyphox.detect, phyphox.read),
+    "phyphox": Reader("phyphox: CSV, zip, folder", phyphox.detect, {"imu": phyphox.read}),
     "sensor-folder": Reader(
-        "folder or zip of one text table a sensor", sensor_folder.detect, sensor_folder.read
+        "folder or zip of one text table a sensor",
+        sensor_folder.detect,
+        {"imu": sensor_folder.read},
+    ),
+    "rtklib": Reader("solution of RTKLIB (.pos)", gnss_pos.detect, {"gnss": gnss_pos.read}),
+    "nmea": Reader(
+        "NMEA 0183: GGA, RMC, VTG, ZDA, GST", gnss_nmea.detect, {"gnss": gnss_nmea.read}
     ),
     "kf-gins": Reader(
-        "KF-GINS increments, seven columns without a header", kf_gins.detect, kf_gins.read
+        "KF-GINS increments, seven columns without a header", kf_gins.detect, {"imu": kf_gins.read}
     ),
-    "psins": Reader("PSINS increments (.imu)", psins.detect, psins.read),
+    "kf-gins-fixes": Reader(
+        "KF-GINS fixes, 7 or 13 columns without a header",
+        kf_gins.detect_fixes,
+        {"gnss": kf_gins.read_fixes, TABLE: csv.read},
+    ),
+    "kf-gins-nav": Reader(
+        "KF-GINS trajectory, eleven columns (.nav)",
+        kf_gins.detect_trajectory,
+        {"reference": kf_gins.read_trajectory},
+    ),
+    "psins": Reader("PSINS increments (.imu)", psins.detect, {"imu": psins.read}),
     "npy-folder": Reader(
-        "folder of NumPy arrays (.npy)", numpy_files.detect_folder, numpy_files.read_folder
+        "folder of NumPy arrays (.npy)", numpy_files.detect_folder, {TABLE: numpy_files.read_folder}
     ),
-    "csv": Reader("text table (.csv .txt .tsv .dat)", csv.detect, csv.read),
-    "python-ins": Reader("python-ins arrays: time, imu (.npz)", pyins.detect, pyins.read),
-    "npz": Reader("NumPy archive (.npz)", numpy_files.detect, numpy_files.read),
-    "parquet": Reader("Parquet (.parquet .pq)", parquet.detect, parquet.read),
-    "hdf5": Reader("HDF5 (.h5 .hdf5) and MATLAB v7.3 (.mat)", hdf5.detect, hdf5.read),
+    "csv": Reader("text table (.csv .txt .tsv .dat)", csv.detect, {TABLE: csv.read}),
+    "python-ins": Reader(
+        "python-ins arrays: imu, fix, truth (.npz)",
+        pyins.detect,
+        {"imu": pyins.read, "gnss": pyins.read_fixes, "reference": pyins.read_truth},
+    ),
+    "npz": Reader("NumPy archive (.npz)", numpy_files.detect, {TABLE: numpy_files.read}),
+    "parquet": Reader("Parquet (.parquet .pq)", parquet.detect, {TABLE: parquet.read}),
+    "hdf5": Reader("HDF5 (.h5 .hdf5) and MATLAB v7.3 (.mat)", hdf5.detect, {TABLE: hdf5.read}),
     "foot-mounted": Reader(
-        "unit on a shoe: timestamps, imu_data (.mat)", foot_mounted.detect, foot_mounted.read
+        "unit on a shoe: timestamps, imu_data (.mat)",
+        foot_mounted.detect,
+        {"imu": foot_mounted.read},
     ),
-    "matlab": Reader("MATLAB up to v7 (.mat)", hdf5.detect_matlab, hdf5.read_matlab),
+    "matlab": Reader("MATLAB up to v7 (.mat)", hdf5.detect_matlab, {TABLE: hdf5.read_matlab}),
 }
 
 
-def read_raw(path: Path, form: str | None = None) -> RawLog:
-    """Read the raw columns of a log.
+def readers_of(path: Path) -> Iterator[tuple[str, Reader]]:
+    """Yield the readers that recognize a file or folder, those of plug-ins last."""
+    yield from ((name, reader) for name, reader in READERS.items() if reader.detect(path))
+    others, broken = plugins("reader", Reader)
+    yield from ((name, reader) for name, reader in others.items() if reader.detect(path))
+    for one in broken:
+        _log.warning("%s", one)
 
-    `path`: a file, or the folder of a known recording. `form`: a key of `READERS`; detected from
-    the file if not given. ConfigError: the file does not exist, or the format is unknown.
-    DataError: the format is not recognized, or the file is damaged.
+
+def open_stream(path: str | Path, stream: str, form: str | None = None) -> Raw:
+    """Read one stream of a recording as it is in the file.
+
+    `path`: a file, or the folder of a known recording. `stream`: of `STREAMS`. `form`: a key of
+    `READERS`; detected if not given. Returns the stream, or the columns of a table, whose names
+    decide. ConfigError: the file does not exist, or the format is unknown. NoStreamError: the
+    format is known and holds other streams. DataError: the format is not recognized, or the file
+    is damaged.
     """
+    path = Path(path)
     if not path.exists():
-        raise ConfigError("io.no-such-log", file=str(path))
+        code = "io.no-such-log" if stream == "imu" else "io.no-such-file"
+        raise ConfigError(code, file=str(path))
     if path.is_file() and path.stat().st_size == 0:
         raise DataError("io.file-empty", file=path.name)
-    if form is not None:
-        named: Reader | None = READERS.get(form) or plugin("reader", form, Reader)
-        if named is None:
+    if form is None:
+        form, reader = next(readers_of(path), ("", None))
+    else:
+        reader = READERS.get(form) or plugin("reader", form, Reader)
+        if reader is None:
             raise ConfigError(
                 "io.unknown-format-of-log", quantity="format", form=form, word=form, known=READERS
             )
-        return named.read(path)
-    for name, reader in READERS.items():
-        if reader.detect(path):
-            _log.info("%s: read as %s (%s)", path.name, name, reader.title)
-            return reader.read(path)
-    others, broken = plugins("reader", Reader)
-    for other in others.values():
-        if other.detect(path):
-            raw: RawLog = other.read(path)
-            return raw
-    for one in broken:
-        _log.warning("%s", one)
-    kinds = "; ".join(r.title for r in READERS.values())
-    if path.is_dir():
-        raise _no_recording(path)
-    raise DataError("io.ending-no-known-format", file=path.name, suffix=path.suffix, kinds=kinds)
+    if reader is None:
+        raise _not_recognized(path)
+    for key in (stream, TABLE):
+        if key in reader.streams:
+            _log.info("%s: read as %s (%s)", path.name, form, reader.title)
+            return reader.streams[key](path)
+    raise NoStreamError(path.name, stream, reader.title, list(reader.streams))
+
+
+def files_of(path: str | Path) -> tuple[Path, ...]:
+    """List the files that are read for a path: itself, or several of a folder."""
+    given = Path(path)
+    for _, reader in readers_of(given):
+        if reader.files is not None and (files := reader.files(given)):
+            return files
+    return (given,)
+
+
+def read_raw(path: str | Path, form: str | None = None) -> RawLog:
+    """Read the raw columns of inertial sensors, or of a table; see `open_stream`."""
+    raw = open_stream(path, "imu", form)
+    assert isinstance(raw, RawLog)  # of inertial sensors and tables
+    return raw
 
 
 #: Most names of a folder that are searched, and that a message lists.
@@ -135,8 +234,13 @@ MOST_NAMES, MOST_SHOWN = 1000, 6
 MOST_BYTES = 64 * 1024 * 1024
 
 
-def _no_recording(path: Path) -> DataError:
-    """Make the error for a folder without a recording; it names the logs in the folder."""
+def _not_recognized(path: Path) -> DataError:
+    """Make the error for a file or folder of no known format; it names the logs in a folder."""
+    if path.is_file():
+        kinds = "; ".join(r.title for r in READERS.values())
+        return DataError(
+            "io.ending-no-known-format", file=path.name, suffix=path.suffix, kinds=kinds
+        )
     inside = sorted(path.iterdir())[:MOST_NAMES]
     may_be = [p for p in inside if any(r.detect(p) for r in READERS.values())]
     logs = [p.name for p in may_be if _has_sensors(p)]

@@ -21,11 +21,11 @@ from strapdown import frames, rotation
 from strapdown.errors import DataError, Finding
 from strapdown.formats import numpy_files
 from strapdown.formats.clocks import RELATIVE, Clock
-from strapdown.formats.gnss_fixes import Fixes, GnssOptions
+from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.join import join
-from strapdown.formats.recording import RawLog, TruthInSensorAxes
+from strapdown.formats.recording import NoStreamError, RawLog, TruthInSensorAxes
 
-__all__ = ["belongs", "detect_fixes", "files_of", "read_fixes"]
+__all__ = ["belongs", "detect", "files_of", "read", "read_fixes"]
 
 
 Array = NDArray[np.float64]
@@ -42,8 +42,8 @@ LONGEST_STEP = 0.5  # s
 
 
 def detect(path: Path) -> bool:
-    """Whether a folder has the arrays of the gyro."""
-    return path.is_dir() and _find(path, "IMU", "gyro", "t") is not None
+    """Whether a folder has the arrays of the gyro or of a receiver."""
+    return path.is_dir() and (_find(path, "IMU", "gyro", "t") is not None or bool(files_of(path)))
 
 
 def read(path: Path) -> RawLog:
@@ -220,11 +220,6 @@ COLUMNS = 6
 IN_MS = 1e11
 
 
-def detect_fixes(path: Path) -> bool:
-    """Whether a folder has the arrays of a receiver."""
-    return bool(files_of(path))
-
-
 def belongs(path: Path) -> bool:
     """Whether a file is one of the arrays of a receiver."""
     parts = (path.resolve().parent.name, *path.stem.split("__"))
@@ -255,13 +250,16 @@ def files_of(path: Path) -> tuple[Path, ...]:
     return ()
 
 
-def read_fixes(path: Path, options: GnssOptions) -> Fixes:
+def read_fixes(path: Path) -> Fixes:
     """Read the fixes of a segment.
 
     Returns without standard deviations. Speed and bearing are converted to velocity north and east;
     down is not measured. DataError: an array is damaged or has the wrong shape.
     """
-    t_file, value_file = files_of(path)
+    files = files_of(path)
+    if not files:
+        raise NoStreamError(path.resolve().name, "gnss", "comma2k19 segment", ["imu"])
+    t_file, value_file = files
     name = path.resolve().name
     t, value = (numpy_files.load(file, f"{name}/{file.name}") for file in (t_file, value_file))
     if (

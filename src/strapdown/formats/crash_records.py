@@ -47,11 +47,11 @@ def read(path: Path) -> CrashRecord:
     DataError
         The file is damaged, or of none of these formats.
     """
-    from strapdown.formats import READERS
+    from strapdown.formats import READERS, read_raw
 
     for key in LOGS:
         if READERS[key].detect(path):
-            return record_of(READERS[key].read(path), path, "log")
+            return record_of(read_raw(path, key), path, "log")
     raise DataError(
         "io.crash-log-format-unknown",
         file=path.name,

@@ -1,10 +1,9 @@
-"""GNSS fixes from files: the registry of readers, and tables with column names."""
+"""GNSS fixes from files, and from tables with column names."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,18 +11,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.constants import TIME_UNITS
-from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.formats import (
-    comma2k19,
-    csv,
-    gnss_logger,
-    gnss_nmea,
-    gnss_pos,
-    kf_gins,
-    kitti,
-    parquet,
-    pyins,
-)
+from strapdown.errors import DataError, Finding
+from strapdown.formats import comma2k19, open_stream
 from strapdown.formats.arrays import numbers, ticks_of
 from strapdown.formats.clocks import GPS, RELATIVE, UNIX, WEEK, Clock, clock_of_name
 from strapdown.formats.columns import CLOCKS, TIMES
@@ -42,13 +31,9 @@ from strapdown.formats.recording import RawLog
 from strapdown.tables.checks import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
 
 __all__ = [
-    "GNSS_READERS",
     "QUANTITIES",
     "GnssOptions",
-    "GnssReader",
-    "detect",
-    "files_of_fixes",
-    "read",
+    "fixes_of_columns",
     "read_gnss",
 ]
 
@@ -107,32 +92,14 @@ QUANTITIES: dict[str, Quantity] = {
 _NEEDED = ("time", *GEODETIC)
 
 
-def detect(path: Path) -> bool:
-    """Detect by the suffix."""
-    return csv.detect(path) or parquet.detect(path)
-
-
-def read(path: Path, options: GnssOptions) -> Fixes:
-    """Read the fixes of a table by its column names.
-
-    Returns
-    -------
-    Fixes
-        Names may carry a unit, as ``lat_deg``, ``vN [km/h]``, ``sdU_m``; the default units are
-        those of a Gnss table. A column ``Q`` has the codes of RTKLIB, ``quality`` those of NMEA.
-
-    Raises
-    ------
-    DataError
-        Time or the position is missing, two columns fit one quantity, a unit is unknown, or the
-        only height is above the geoid.
-    """
-    raw = parquet.read(path) if parquet.detect(path) else csv.read(path)
-    return fixes_of_columns(raw, options)
-
-
 def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
-    """Convert named columns to fixes; see `read`."""
+    """Convert named columns to fixes.
+
+    Names may carry a unit, as ``lat_deg``, ``vN [km/h]``, ``sdU_m``; the default units are those of
+    a Gnss table. A column ``Q`` has the codes of RTKLIB, ``quality`` those of NMEA. DataError: time
+    or the position is missing, two columns fit one quantity, a unit is unknown, or the only height
+    is above the geoid.
+    """
     found = find_quantities(raw.columns, QUANTITIES, options.columns, raw.name, raw.units)
     over_sea = "alt" not in found and "alt_msl" in found
     missing = [q for q in _NEEDED if q not in found and not (q == "alt" and over_sea)]
@@ -264,48 +231,6 @@ def _quality(raw: RawLog, found: dict[str, Found], values: Callable[[str], Array
     return np.array([QUALITY[int(q)] for q in codes], dtype=np.float64)
 
 
-@dataclass(frozen=True)
-class GnssReader:
-    """How one format of fixes is recognized and read."""
-
-    title: str
-    detect: Callable[[Path], bool]
-    read: Callable[[Path, GnssOptions], Fixes]
-
-
-#: In the order of detection.
-GNSS_READERS: dict[str, GnssReader] = {
-    "comma2k19": GnssReader(
-        "receiver of a comma2k19 segment, its folder", comma2k19.detect_fixes, comma2k19.read_fixes
-    ),
-    "rtklib": GnssReader("solution of RTKLIB (.pos)", gnss_pos.detect, gnss_pos.read),
-    "nmea": GnssReader("NMEA 0183: GGA, RMC, VTG, ZDA, GST", gnss_nmea.detect, gnss_nmea.read),
-    "gnss-logger": GnssReader(
-        "GnssLogger of Android: lines Fix", gnss_logger.detect_fixes, gnss_logger.read_fixes
-    ),
-    "kitti": GnssReader("KITTI raw, folder oxts", kitti.detect, kitti.read_fixes),
-    "kf-gins": GnssReader(
-        "KF-GINS fixes, 7 or 13 columns without a header", kf_gins.detect_fixes, kf_gins.read_fixes
-    ),
-    "python-ins": GnssReader(
-        "python-ins arrays: fix_time, fix (.npz)", pyins.detect_fixes, pyins.read_fixes
-    ),
-    "columns": GnssReader(
-        "table with named columns (.csv .txt .tsv .dat .parquet)",
-        detect,
-        read,
-    ),
-}
-
-
-def files_of_fixes(path: str | Path) -> tuple[Path, ...]:
-    """List the files that fixes are read from: one, or several of a folder."""
-    given = Path(path)
-    if kitti.detect(given):
-        return kitti.files_of(given)
-    return comma2k19.files_of(given) or (given,)
-
-
 def read_gnss(path: str | Path, options: GnssOptions | None = None) -> pd.DataFrame:
     """Read the fixes of a GNSS receiver.
 
@@ -328,27 +253,7 @@ def read_gnss(path: str | Path, options: GnssOptions | None = None) -> pd.DataFr
         The file cannot be used; the message names file, row, quantity and remedy.
     """
     path, asked = Path(path), options or GnssOptions()
-    if not path.exists():
-        raise ConfigError("io.no-such-file", file=str(path))
     if path.is_file() and comma2k19.belongs(path):
         raise DataError("io.fixes-comma-k-segment-two", file=path.name, parent=path.parent)
-    if path.is_file() and path.stat().st_size == 0:
-        raise DataError("io.file-empty", file=path.name)
-    if asked.format is not None and asked.format not in GNSS_READERS:
-        raise ConfigError(
-            "io.unknown-format-of-fixes",
-            quantity="format",
-            format=asked.format,
-            word=asked.format,
-            known=GNSS_READERS,
-        )
-    readers = [GNSS_READERS[asked.format]] if asked.format else GNSS_READERS.values()
-    for reader in readers:
-        if asked.format or reader.detect(path):
-            return table_of_fixes(reader.read(path, asked), asked)
-    if path.is_dir():
-        raise DataError("io.folder-fixes-read-file", file=path.resolve().name)
-    kinds = "; ".join(r.title for r in GNSS_READERS.values())
-    raise DataError(
-        "io.ending-no-known-format-fixes", file=path.name, suffix=path.suffix, kinds=kinds
-    )
+    raw = open_stream(path, "gnss", asked.format)
+    return table_of_fixes(raw if isinstance(raw, Fixes) else fixes_of_columns(raw, asked), asked)

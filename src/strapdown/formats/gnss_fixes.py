@@ -32,7 +32,7 @@ class GnssOptions:
     Attributes
     ----------
     format : str, optional
-        A key of `gnss_files.GNSS_READERS`.
+        A key of `formats.READERS`.
     columns : dict of str to str
         Quantity (``time``, ``lat`` …, as in a Gnss table) to the name of its column, or its
         number, from 1.

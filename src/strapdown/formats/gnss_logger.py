@@ -25,7 +25,7 @@ from strapdown.formats.arrays import numbers
 from strapdown.formats.clocks import UNIX, Clock
 from strapdown.formats.csv import parsed
 from strapdown.formats.find_columns import Column
-from strapdown.formats.gnss_fixes import Fixes, GnssOptions
+from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.join import join
 from strapdown.formats.phones import sensor_log
 from strapdown.formats.recording import RawLog
@@ -67,23 +67,17 @@ HEAD = 1 << 16  # bytes
 
 
 def detect(path: Path) -> bool:
-    """Detect by the header of the table, or by the comments that define the fields."""
-    return _has(path, lambda line: line.startswith(HEADER)) or _has(
-        path, lambda line: _is_description(line, ("UncalGyro", "Gyro"))
-    )
-
-
-def detect_fixes(path: Path) -> bool:
-    """Detect by the comment that defines the fields of a fix, or by a header with those names."""
-    return _has(path, lambda line: _is_description(line, (FIX,)) or _is_fix_header(line))
-
-
-def _has(path: Path, wanted: Any) -> bool:
+    """Detect by the header of a table, or by the comments that define the fields."""
     if not csv.detect(path):
         return False
     with path.open("rb") as stream:
         head = stream.read(HEAD).decode("utf-8-sig", "replace")
-    return any(wanted(line) for line in head.splitlines())
+    return any(
+        line.startswith(HEADER)
+        or _is_description(line, ("UncalGyro", "Gyro", FIX))
+        or _is_fix_header(line)
+        for line in head.splitlines()
+    )
 
 
 def _is_description(line: str, kinds: tuple[str, ...]) -> bool:
@@ -145,10 +139,10 @@ def read(path: Path) -> RawLog:
     return dataclasses.replace(raw, findings=[*findings, *raw.findings], clock=UNIX)
 
 
-def read_fixes(path: Path, options: GnssOptions) -> Fixes:
+def read_fixes(path: Path) -> Fixes:
     """Read the fixes of the receiver.
 
-    `options`: not used. Returns stamps in s since 1970, on the clock of the sensors if the log has
+    Returns stamps in s since 1970, on the clock of the sensors if the log has
     it. DataError: the log has no fix, or a line is damaged.
     """
     findings: list[Finding] = []

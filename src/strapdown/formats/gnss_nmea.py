@@ -20,7 +20,7 @@ import numpy as np
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.clocks import RELATIVE, UNIX, Clock
-from strapdown.formats.gnss_fixes import Fixes, GnssOptions
+from strapdown.formats.gnss_fixes import Fixes
 
 __all__ = ["detect", "read"]
 
@@ -52,7 +52,7 @@ class _Epoch:
     day: float | None = None
 
 
-def read(path: Path, options: GnssOptions) -> Fixes:
+def read(path: Path) -> Fixes:
     """Read the fixes of NMEA sentences.
 
     Returns

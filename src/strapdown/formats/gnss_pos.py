@@ -21,7 +21,7 @@ from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.clocks import GPS, WEEK, Clock, leap_seconds
 from strapdown.formats.csv import columns_at_once
-from strapdown.formats.gnss_fixes import Fixes, GnssOptions
+from strapdown.formats.gnss_fixes import Fixes
 from strapdown.frames import geodetic_from_ecef, q_ne
 
 __all__ = ["QUALITY", "detect", "read"]
@@ -65,7 +65,7 @@ class _Layout:
     row: int
 
 
-def read(path: Path, options: GnssOptions) -> Fixes:
+def read(path: Path) -> Fixes:
     """Read the fixes of an RTKLIB solution.
 
     Returns

@@ -17,7 +17,7 @@ from strapdown.formats import csv
 from strapdown.formats.arrays import numbers, told_by_file_rows
 from strapdown.formats.clocks import GPS, WEEK, Clock, clock_of, unrolled, with_clock
 from strapdown.formats.find_columns import Column
-from strapdown.formats.gnss_fixes import Fixes, GnssOptions
+from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.recording import RawLog
 from strapdown.formats.trajectory_csv import write_decimals
 from strapdown.formats.trajectory_options import TrajectoryFileOptions
@@ -167,13 +167,11 @@ def detect_fixes(path: Path) -> bool:
     return all(csv.is_data(f.decode("latin-1")) for f in lines[0])
 
 
-def read_fixes(path: Path, options: GnssOptions) -> Fixes:
+def read_fixes(path: Path) -> Fixes:
     """Read fixes without a header.
 
-    DataError: the number of columns differs, a value is not a number, or the data are inertial.
+    DataError: the number of columns differs, or a value is not a number.
     """
-    if detect(path):
-        raise DataError("io.these-increments-inertial-sensors-not", file=path.name)
     raw = csv.read(path)
     names = WITH_VELOCITY if len(raw.columns) == len(WITH_VELOCITY) else NAMES
     if len(raw.columns) != len(names):

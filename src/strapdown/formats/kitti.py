@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.errors import DataError, Finding
 from strapdown.formats.clocks import UNIX, Clock, with_clock
-from strapdown.formats.gnss_fixes import Fixes, GnssOptions
+from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.recording import RawLog, TruthInSensorAxes
 from strapdown.tables import trajectory_table
 
@@ -86,10 +86,10 @@ def read(path: Path) -> RawLog:
     )
 
 
-def read_fixes(path: Path, options: GnssOptions) -> Fixes:
+def read_fixes(path: Path) -> Fixes:
     """Read positions and velocities of the unit's own solution as fixes.
 
-    `path`: as `read`. `options`: not used. Returns each with the accuracy that the unit states;
+    `path`: as `read`. Returns each with the accuracy that the unit states;
     down as north and east.
     """
     time, values, _ = _values(path)

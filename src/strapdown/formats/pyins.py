@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError
 from strapdown.formats import numpy_files
 from strapdown.formats.clocks import RELATIVE, Clock, with_clock
-from strapdown.formats.gnss_fixes import Fixes, GnssOptions
-from strapdown.formats.recording import RawLog
+from strapdown.formats.gnss_fixes import Fixes
+from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.tables import trajectory_table
 
-__all__ = ["detect", "detect_fixes", "detect_truth", "read", "read_fixes", "read_truth"]
+__all__ = ["detect", "read", "read_fixes", "read_truth"]
 
 Array = NDArray[np.float64]
 COLUMNS = [*(f"gyro_{a}" for a in "xyz"), *(f"accel_{a}" for a in "xyz")]
@@ -37,22 +37,19 @@ def _holds(path: Path, *names: str) -> bool:
         return False
 
 
+STREAMS = {"imu": ("time", "imu"), "gnss": ("fix_time", "fix"), "reference": ("time", "truth")}
+
+
 def detect(path: Path) -> bool:
     """Detect by the names of the arrays."""
-    return _holds(path, "time", "imu")
+    return any(_holds(path, *names) for names in STREAMS.values())
 
 
-def detect_fixes(path: Path) -> bool:
-    """Detect by the names of the arrays."""
-    return _holds(path, "fix_time", "fix")
-
-
-def detect_truth(path: Path) -> bool:
-    """Detect by the names of the arrays."""
-    return _holds(path, "time", "truth")
-
-
-def _arrays(path: Path, time: str, values: str, width: int) -> tuple[Array, Array]:
+def _arrays(path: Path, stream: str, width: int) -> tuple[Array, Array]:
+    time, values = STREAMS[stream]
+    if not _holds(path, time, values):
+        there = [name for name, names in STREAMS.items() if _holds(path, *names)]
+        raise NoStreamError(path.name, stream, "python-ins arrays", there)
     arrays = numpy_files.arrays_of(path)
     stamps, block = arrays[time], arrays[values]
     numeric = stamps.dtype.kind in "iuf" and block.dtype.kind in "iuf"
@@ -76,7 +73,7 @@ def read(path: Path) -> RawLog:
     DataError
         The archive is damaged, or its arrays have the wrong shapes.
     """
-    time, imu = _arrays(path, "time", "imu", len(COLUMNS))
+    time, imu = _arrays(path, "imu", len(COLUMNS))
     stated = {"time": ("time", "s")}
     stated |= {n: (n, "rad/s" if n.startswith("gyro") else "m/s2") for n in COLUMNS}
     return RawLog(
@@ -89,9 +86,9 @@ def read(path: Path) -> RawLog:
     )
 
 
-def read_fixes(path: Path, options: GnssOptions) -> Fixes:
+def read_fixes(path: Path) -> Fixes:
     """Read the fixes; the archive does not state standard deviations."""
-    time, place = _arrays(path, "fix_time", "fix", 3)
+    time, place = _arrays(path, "gnss", 3)
     return Fixes(path.name, time, place, np.arange(1, time.size + 1))
 
 
@@ -103,7 +100,7 @@ def read_truth(path: Path) -> pd.DataFrame:
     DataFrame
         A Trajectory table.
     """
-    time, truth = _arrays(path, "time", "truth", 9)
+    time, truth = _arrays(path, "reference", 9)
     table = trajectory_table(time, truth[:, :3], truth[:, 3:6], truth[:, 6:], source=path.name)
     table.attrs["findings"] = ()
     return with_clock(table, Clock(RELATIVE))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,11 +11,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import Finding
+from strapdown.errors import DataError, Finding
 
 Array = NDArray[np.float64]
 
 __all__ = [
+    "NoStreamError",
     "Origin",
     "RawLog",
     "ReadOptions",
@@ -24,6 +25,16 @@ __all__ = [
     "StatedStart",
     "TruthInSensorAxes",
 ]
+
+
+class NoStreamError(DataError):
+    """A file is of a known format that does not hold the stream.
+
+    `stream`: what was wanted. `title`: of the format. `streams`: what it may hold.
+    """
+
+    def __init__(self, file: str, stream: str, title: str, streams: Sequence[str]) -> None:
+        super().__init__("io.no-stream", file=file, stream=stream, title=title, streams=streams)
 
 
 @dataclass(frozen=True)

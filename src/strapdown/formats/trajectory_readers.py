@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +12,8 @@ from numpy.typing import NDArray
 
 from strapdown.constants import TIME_UNITS
 from strapdown.dsp.running_integral import running_integral
-from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.formats import csv, kf_gins, kitti, parquet, pyins
+from strapdown.errors import DataError, Finding
+from strapdown.formats import open_stream
 from strapdown.formats.arrays import numbers, ticks_of, told_by_file_rows
 from strapdown.formats.clocks import Clock, clock_of_name, with_clock
 from strapdown.formats.columns import CLOCKS, EULERS, TIMES
@@ -32,9 +31,6 @@ from strapdown.tables import EULER, VELOCITY, trajectory_table
 
 __all__ = [
     "QUANTITIES",
-    "TRAJECTORY_READERS",
-    "TrajectoryReader",
-    "files_of_trajectory",
     "find_trajectory_columns",
     "judge_trajectory",
     "read_trajectory",
@@ -44,33 +40,7 @@ __all__ = [
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class TrajectoryReader:
-    """How a format without column names is recognized and read."""
-
-    title: str
-    detect: Callable[[Path], bool]
-    read: Callable[[Path], pd.DataFrame]
-
-
-#: Tried before a table is read by its column names.
-TRAJECTORY_READERS: dict[str, TrajectoryReader] = {
-    "kf-gins": TrajectoryReader(
-        "KF-GINS, eleven columns (.nav)", kf_gins.detect_trajectory, kf_gins.read_trajectory
-    ),
-    "python-ins": TrajectoryReader(
-        "python-ins arrays: time, truth (.npz)", pyins.detect_truth, pyins.read_truth
-    ),
-    "kitti": TrajectoryReader("KITTI raw, folder oxts", kitti.detect, kitti.read_trajectory),
-}
-
 _ELLIPSOID = re.compile(r"[#%]\s*ellipsoid\s*:\s*(\S+)\s*$", re.M)
-
-
-def files_of_trajectory(path: str | Path) -> tuple[Path, ...]:
-    """List the files that a trajectory is read from: one, or several of a folder."""
-    given = Path(path)
-    return kitti.files_of(given) if kitti.detect(given) else (given,)
 
 
 def read_trajectory(path: str | Path, columns: Mapping[str, str] | None = None) -> pd.DataFrame:
@@ -79,8 +49,7 @@ def read_trajectory(path: str | Path, columns: Mapping[str, str] | None = None) 
     Parameters
     ----------
     path : str or Path
-        ``.csv``, ``.txt``, ``.tsv``, ``.dat`` or ``.parquet`` with column names, or one of
-        `TRAJECTORY_READERS`.
+        A table with column names, or another format with a ``reference`` (`formats.READERS`).
     columns : mapping of str to str, optional
         Quantity (``time``, ``lat``, ``lon``, ``alt``, ``VN``, ``VE``, ``VD``, ``roll``, ``pitch``,
         ``heading``) to the name of its column, or its number, from 1, if not evident.
@@ -105,14 +74,10 @@ def read_trajectory(path: str | Path, columns: Mapping[str, str] | None = None) 
         attitude is in radians.
     """
     path = Path(path)
-    if not path.exists():
-        raise ConfigError("io.no-such-file", file=str(path))
-    if columns is None or not columns:
-        for reader in TRAJECTORY_READERS.values():
-            if reader.detect(path):
-                return reader.read(path)
-    _refuse_others(path)
-    raw = parquet.read(path) if parquet.detect(path) else csv.read(path)
+    raw = open_stream(path, "reference")
+    if isinstance(raw, pd.DataFrame):
+        return raw
+    assert isinstance(raw, RawLog)  # the columns of a table
     found = find_trajectory_columns(raw.columns, columns or {}, raw.name)
     values = {q: _values(raw, q, found[q]) for q in QUANTITIES}
     with told_by_file_rows(raw.name, raw.row):
@@ -136,18 +101,6 @@ def read_trajectory(path: str | Path, columns: Mapping[str, str] | None = None) 
     table.attrs["ellipsoid"] = stated.group(1) if stated else None
     table.attrs["findings"] = (*raw.findings, *judged)
     return table
-
-
-def _refuse_others(path: Path) -> None:
-    known = (*csv.SUFFIXES, *parquet.SUFFIXES, ".nav", ".npz")
-    if path.is_dir() or path.suffix.lower() not in known:
-        raise DataError(
-            "io.trajectory-read-text-table-alone"
-            if not path.is_dir()
-            else "io.folder-trajectory-read-file",
-            file=path.name,
-            known=known,
-        )
 
 
 def _values(raw: RawLog, quantity: str, column: Found) -> Array:

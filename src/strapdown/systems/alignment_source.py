@@ -14,9 +14,9 @@ from strapdown.bundle.seal import InputFiles, input_files, sensor_file
 from strapdown.config.alignment import AlignmentSpec, AxesTable, LogTable
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import Finding
-from strapdown.formats import read_log
+from strapdown.formats import files_of, read_log
 from strapdown.formats.clocks import on_clock_of
-from strapdown.formats.gnss_files import files_of_fixes, read_gnss
+from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.recording import Reading, ReadOptions, Recording, StatedStart
 from strapdown.rotation import euler_from_dcm
 from strapdown.sensors.triad_errors import (
@@ -83,7 +83,7 @@ def read_alignment_source(spec: AlignmentSpec) -> AlignmentSource:
             *(
                 ()
                 if spec.gnss is None
-                else (input_files("gnss", spec.gnss.path, files_of_fixes(spec.gnss.path)),)
+                else (input_files("gnss", spec.gnss.path, files_of(spec.gnss.path)),)
             ),
             *_sensor_file(spec),
         ),

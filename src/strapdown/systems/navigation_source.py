@@ -18,12 +18,13 @@ from strapdown.config.choice import SLOTS
 from strapdown.config.navigation import AidSpec, NavigationSpec, ReceiverTable
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import ConfigError, DataError, DivergenceError, Finding
+from strapdown.formats import files_of
 from strapdown.formats.aid_table import read_aid_table, read_control_points
 from strapdown.formats.clocks import on_clock_of
-from strapdown.formats.gnss_files import files_of_fixes, read_gnss
+from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.gnss_fixes import GnssOptions
 from strapdown.formats.recording import Reading, StatedStart
-from strapdown.formats.trajectory_readers import files_of_trajectory, read_trajectory
+from strapdown.formats.trajectory_readers import read_trajectory
 from strapdown.navigation.measurements.measurement import TabulatedMeasurement
 from strapdown.sensors.error_chain import child, normal
 from strapdown.systems.alignment_source import body_record
@@ -96,12 +97,12 @@ def read_navigation_source(spec: NavigationSpec) -> NavigationSource:
         if aid.path is not None:
             tables[name] = read_aid(aid)
             findings += tables[name].attrs.get("findings", ())
-            inputs.append(input_files(f"aid-{name}", aid.path, files_of_fixes(aid.path)))
+            inputs.append(input_files(f"aid-{name}", aid.path, files_of(aid.path)))
     truth = None
     if spec.truth is not None:
         truth = read_trajectory(spec.truth.path)
         findings += truth.attrs["findings"]
-        inputs.append(input_files("truth", spec.truth.path, files_of_trajectory(spec.truth.path)))
+        inputs.append(input_files("truth", spec.truth.path, files_of(spec.truth.path)))
     points = None
     if spec.control_points is not None:
         given = spec.control_points

@@ -12,8 +12,9 @@ from tests.coded import coded
 
 from strapdown import frames
 from strapdown.errors import DataError
+from strapdown.formats import files_of
 from strapdown.formats.comma2k19 import RECEIVERS
-from strapdown.formats.gnss_files import GnssOptions, files_of_fixes, read_gnss
+from strapdown.formats.gnss_files import GnssOptions, read_gnss
 
 BOOT, UTC = 46_408.0, 1_533_226_488.0
 SPEED, BEARING = 20.0, 30.0
@@ -66,7 +67,7 @@ def test_fixes_are_dated_by_utc_on_the_clock_of_the_device(tmp_path, flat):
     assert (table["VD_sd"] == np.inf).all()
     assert (table[["VN_sd", "VE_sd"]] == 0.3).all(axis=None)
     assert "dated by its UTC" in str(table.attrs["findings"][0])
-    assert [f.name.split("__")[-1].removesuffix(".npy") for f in files_of_fixes(folder)] == [
+    assert [f.name.split("__")[-1].removesuffix(".npy") for f in files_of(folder)] == [
         "t",
         "value",
     ]
@@ -121,7 +122,7 @@ def test_arrays_of_another_shape_are_refused(tmp_path, value, what):
 
 
 def test_a_folder_without_fixes_is_told(tmp_path):
-    with pytest.raises(DataError, check=coded("io.folder-fixes-read-file")):
+    with pytest.raises(DataError, check=coded("io.folder-no-known-recording-holds")):
         read_gnss(tmp_path, OPTIONS)
 
 

@@ -213,14 +213,12 @@ def test_no_file_of_fixes(tmp_path):
         ConfigError, check=lambda refused: refused.finding.code == "io.no-such-file"
     ):
         read_gnss(tmp_path / "none.csv")
-    with pytest.raises(
-        DataError, check=lambda refused: refused.finding.code == "io.folder-fixes-read-file"
-    ):
+    with pytest.raises(DataError, check=coded("io.folder-no-known-recording-holds")):
         read_gnss(tmp_path)
     with pytest.raises(DataError, check=coded("io.file-empty")):
         read_gnss(written(tmp_path, ""))
     with pytest.raises(
-        DataError, check=lambda refused: refused.finding.code == "io.ending-no-known-format-fixes"
+        DataError, check=lambda refused: refused.finding.code == "io.ending-no-known-format"
     ):
         read_gnss(written(tmp_path, "x", "a.docx"))
     with pytest.raises(
@@ -228,7 +226,7 @@ def test_no_file_of_fixes(tmp_path):
     ):
         read_gnss(written(tmp_path, "\0\1\2" * 100, "a.pos"))
     with pytest.raises(
-        ConfigError, check=lambda refused: refused.finding.code == "io.unknown-format-of-fixes"
+        ConfigError, check=lambda refused: refused.finding.code == "io.unknown-format-of-log"
     ):
         read_gnss(written(tmp_path, "x"), GnssOptions(format="rtk"))
     with pytest.raises(

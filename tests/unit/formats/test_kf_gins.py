@@ -159,7 +159,7 @@ def test_another_width_is_refused(tmp_path):
 
 
 def test_increments_are_no_fixes(tmp_path):
-    with pytest.raises(DataError, check=coded("io.these-increments-inertial-sensors-not")):
+    with pytest.raises(DataError, check=coded("io.no-stream")):
         read_gnss(written(tmp_path / "imu.txt", increments()))
 
 

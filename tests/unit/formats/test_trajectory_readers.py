@@ -174,7 +174,7 @@ def test_files_that_are_none(tmp_path):
     (tmp_path / "a.kml").write_text("<kml/>")
     with pytest.raises(
         DataError,
-        check=lambda refused: refused.finding.code == "io.trajectory-read-text-table-alone",
+        check=lambda refused: refused.finding.code == "io.ending-no-known-format",
     ):
         read_trajectory(tmp_path / "a.kml")
 
