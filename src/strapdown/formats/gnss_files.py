@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -17,15 +16,22 @@ from strapdown.formats.arrays import numbers, ticks_of
 from strapdown.formats.clocks import GPS, RELATIVE, UNIX, WEEK, Clock, clock_of_name
 from strapdown.formats.columns import CLOCKS, TIMES
 from strapdown.formats.find_columns import Column
-from strapdown.formats.gnss_fixes import Fixes, GnssOptions, table_of_fixes
+from strapdown.formats.gnss_fixes import (
+    RADIUS,
+    UNSTATED_VERTICAL,
+    Fixes,
+    GnssOptions,
+    table_of_fixes,
+)
 from strapdown.formats.gnss_pos import QUALITY
 from strapdown.formats.quantity_columns import (
+    ANGLES,
     GEODETIC_QUANTITIES,
     LENGTHS,
     SPEEDS,
     Found,
     Quantity,
-    find_quantities,
+    quantities_of,
 )
 from strapdown.formats.recording import RawLog
 from strapdown.tables.checks import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
@@ -86,6 +92,44 @@ QUANTITIES: dict[str, Quantity] = {
     "VD_sd": Quantity(
         _sds("vd", "veld", "velocityd", "vu", "velu", "velocityu", "veldown", "velup"), SPEEDS
     ),
+    "horizontal_accuracy": Quantity(
+        (
+            "accuracy",
+            "horizontalaccuracy",
+            "locationhorizontalaccuracy",
+            "accuracyhorizontal",
+            "hacc",
+            "haccuracy",
+            "eph",
+        ),
+        LENGTHS,
+    ),
+    "vertical_accuracy": Quantity(
+        (
+            "verticalaccuracy",
+            "locationverticalaccuracy",
+            "altitudeaccuracy",
+            "accuracyvertical",
+            "vacc",
+            "vaccuracy",
+            "epv",
+        ),
+        LENGTHS,
+    ),
+    "speed": Quantity(("speed", "sog", "groundspeed", "locationspeed", "speedoverground"), SPEEDS),
+    "speed_sd": Quantity(("speedaccuracy", "speedsd", "sacc", "locationspeedaccuracy"), SPEEDS),
+    "course": Quantity(
+        (
+            "course",
+            "cog",
+            "bearing",
+            "courseoverground",
+            "locationcourse",
+            "track",
+            "directionofmotion",
+        ),
+        ANGLES,
+    ),
     "quality": Quantity(("quality", "fixquality", "gpsquality", "gnssquality"), {}),
     "Q": Quantity(("q",), {}),
 }
@@ -100,7 +144,7 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
     or the position is missing, two columns fit one quantity, a unit is unknown, or the only height
     is above the geoid.
     """
-    found = find_quantities(raw.columns, QUANTITIES, options.columns, raw.name, raw.units)
+    found = quantities_of(raw, QUANTITIES, options.columns)
     over_sea = "alt" not in found and "alt_msl" in found
     missing = [q for q in _NEEDED if q not in found and not (q == "alt" and over_sea)]
     if missing:
@@ -145,15 +189,19 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
         week = values("week")
         time = time + WEEK * (week - week[0])
         clock = Clock(GPS, 0.0, int(week[0]))
+    velocity, velocity_sd = block(VELOCITY), block(VELOCITY_SD)
+    position_sd = block(POSITION_SD)
+    if velocity is None and {"speed", "course"} <= found.keys():
+        velocity, velocity_sd = _over_ground(raw, found, values)
     return Fixes(
         name=raw.name,
         time=time,
         place=place,
         rows=np.arange(1, time.size + 1) if raw.rows is None else raw.rows,
         clock=clock,
-        velocity=_velocity(raw, block(VELOCITY)),
-        position_sd=block(POSITION_SD),
-        velocity_sd=block(VELOCITY_SD),
+        velocity=velocity,
+        position_sd=_accuracy(raw, found, values) if position_sd is None else position_sd,
+        velocity_sd=velocity_sd,
         quality=_quality(raw, found, values),
         findings=raw.findings,
     )
@@ -175,26 +223,70 @@ def _height(found: dict[str, Found], values: Callable[[str], Array], raw: RawLog
     return np.asarray(values("alt_msl") + values("geoid"))
 
 
-def _velocity(raw: RawLog, velocity: Array | None) -> Array | None:
-    """Return the velocity; note that speed with course is not used: the vertical part is open."""
-    words = [w for name in raw.columns for w in re.split(r"[^a-z]+", name.lower())]
-    if velocity is None and {"speed", "sog"} & set(words) and {"course", "cog"} & set(words):
-        raw.findings.append(
-            Finding(
-                "io.speed-course-not-used-nothing",
-                severity="note",
-                file=raw.name,
-                quantity=", ".join(VELOCITY),
-            )
+def _over_ground(
+    raw: RawLog, found: dict[str, Found], values: Callable[[str], Array]
+) -> tuple[Array, Array | None]:
+    """Return velocity by speed and course, and its standard deviation; down is unknown.
+
+    Phones write -1 for a speed or a course that they do not know.
+    """
+    speed, course = values("speed"), values("course")
+    known = (speed >= 0.0) & (course >= 0.0)
+    speed = np.where(known, speed, np.nan)
+    angle, none = np.radians(course), np.full(speed.size, np.nan)
+    raw.findings.append(
+        Finding(
+            "io.velocity-by-speed-and-course",
+            severity="note",
+            file=raw.name,
+            quantity=", ".join(VELOCITY),
+            source=found["speed"].source,
+            source_2=found["course"].source,
         )
-    return velocity
+    )
+    sd = None
+    if "speed_sd" in found:
+        stated = values("speed_sd")
+        sd = np.where(known & (stated > 0.0), stated, np.nan)
+        sd = np.column_stack([sd, sd, none])
+    return np.column_stack([speed * np.cos(angle), speed * np.sin(angle), none]), sd
+
+
+def _accuracy(raw: RawLog, found: dict[str, Found], values: Callable[[str], Array]) -> Array | None:
+    """Return standard deviations by the accuracies that a phone states, or None.
+
+    Horizontal: the radius that holds 68 % (Android, Location.getAccuracy). A negative accuracy
+    means that the position is not valid.
+    """
+    if "horizontal_accuracy" not in found:
+        return None
+    radius = values("horizontal_accuracy")
+    horizontal = np.where(radius > 0.0, radius, np.nan) / RADIUS
+    if "vertical_accuracy" in found:
+        down = values("vertical_accuracy")
+        vertical = np.where(down > 0.0, down, np.nan)
+    else:
+        vertical = UNSTATED_VERTICAL * horizontal
+    raw.findings.append(
+        Finding(
+            "io.sd-by-accuracy",
+            severity="note",
+            file=raw.name,
+            quantity=", ".join(POSITION_SD),
+            source=found["horizontal_accuracy"].source,
+            unstated_vertical=None if "vertical_accuracy" in found else UNSTATED_VERTICAL,
+        )
+    )
+    return np.column_stack([horizontal, horizontal, vertical])
 
 
 def _time(raw: RawLog, found: Found) -> tuple[Array, Clock]:
     ticks, dated = ticks_of(raw, Column(found.source, None, ""))
     time = np.asarray(ticks * (1e-9 if dated else found.factor), dtype=np.float64)
     first = float(time[np.isfinite(time)][0]) if np.isfinite(time).any() else 0.0
-    name = clock_of_name(found.source, first, dated=dated)
+    name = raw.clock or clock_of_name(found.source, first, dated=dated)
+    if raw.clock:
+        return time, Clock(name)
     if name == UNIX and not dated and not found.stated and first > 1e11:
         raise DataError(
             "io.stamp-no-date-clock-tells",

@@ -20,6 +20,11 @@ __all__ = ["Fixes", "GnssOptions", "table_of_fixes"]
 Array = NDArray[np.float64]
 Sd = float | tuple[float, float, float]
 
+#: Radius of 68 % of a circular normal distribution, in standard deviations (Android,
+#: Location.getAccuracy): 1 - exp(-r²/2) = 0.68.
+RADIUS = float(np.sqrt(-2.0 * np.log(0.32)))
+#: Standard deviation of an unstated vertical accuracy, relative to the horizontal one.
+UNSTATED_VERTICAL = 2.0
 #: Typical accuracies of receivers, m and m/s.
 POSITION_SDS = "0.02 suits RTK, 1 a code receiver with corrections, 5 one without"
 VELOCITY_SDS = "0.05 suits RTK, 0.3 a code receiver by Doppler, 1 one that differences places"

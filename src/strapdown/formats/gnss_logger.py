@@ -25,7 +25,7 @@ from strapdown.formats.arrays import numbers
 from strapdown.formats.clocks import UNIX, Clock
 from strapdown.formats.csv import parsed
 from strapdown.formats.find_columns import Column
-from strapdown.formats.gnss_fixes import Fixes
+from strapdown.formats.gnss_fixes import RADIUS, UNSTATED_VERTICAL, Fixes
 from strapdown.formats.join import join
 from strapdown.formats.phones import sensor_log
 from strapdown.formats.recording import RawLog
@@ -56,11 +56,6 @@ FIX_FIELDS = {
 }
 # Providers of positions, in order of preference: the receiver before sensor fusion.
 PROVIDERS = ("gps", "gt", "flp", "fused")
-# Radius of 68 % of a circular normal distribution, in standard deviations (Android,
-# Location.getAccuracy): 1 - exp(-r²/2) = 0.68.
-RADIUS = float(np.sqrt(-2.0 * np.log(0.32)))
-# Standard deviation of an unstated vertical accuracy, relative to the horizontal one.
-UNSTATED_VERTICAL = 2.0
 # Largest drift of the phone's two clocks, or setting of its wall clock, within a log.
 MOST_DRIFT = 0.05  # s
 HEAD = 1 << 16  # bytes

@@ -12,6 +12,7 @@ from strapdown.constants import TIME_UNITS
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats.columns import CLOCKS, unit_of
 from strapdown.formats.columns import UNIT_OF as UNITS_OF_LOGS
+from strapdown.formats.recording import RawLog
 
 __all__ = [
     "ANGLES",
@@ -23,6 +24,7 @@ __all__ = [
     "Found",
     "Quantity",
     "find_quantities",
+    "quantities_of",
 ]
 
 
@@ -88,6 +90,23 @@ class Found:
     source: str
     factor: float
     stated: bool
+
+
+def quantities_of(
+    raw: RawLog, known: Mapping[str, Quantity], asked: Mapping[str, str], of: str = "this table"
+) -> dict[str, Found]:
+    """Find the column of each quantity: as asked, else as the file states, else by its name.
+
+    See `find_quantities`. A file that states its columns is not searched by names.
+    """
+    if not raw.stated:
+        return find_quantities(raw.columns, known, asked, raw.name, raw.units, of)
+    found = {
+        quantity: Found(column, 1.0 if unit is None else known[quantity].units[unit], True)
+        for column, (quantity, unit) in raw.stated.items()
+        if quantity in known and quantity not in asked
+    }
+    return found | (find_quantities(raw.columns, known, asked, raw.name) if asked else {})
 
 
 def find_quantities(

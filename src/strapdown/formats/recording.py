@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -179,6 +180,24 @@ class RawLog:
     start: StatedStart | None = None
     clock: str | None = None
 
+    @classmethod
+    def of(
+        cls, path: Path, quantities: Mapping[str, tuple[NDArray[Any], str | None]], **stated: Any
+    ) -> RawLog:
+        """Make a log of a file whose format states every quantity.
+
+        `quantities`: by quantity (``time``, ``gyro_x``, ``lat``, ``VN``, ``north_sd`` …): values
+        ((n,)) and their unit in the spelling of `constants`. `stated`: further attributes, such as
+        ``clock``, ``axes``, ``sampling`` and ``findings``.
+        """
+        return cls(
+            path.resolve().name,
+            (path,),
+            {quantity: np.asarray(values) for quantity, (values, _) in quantities.items()},
+            stated={quantity: (quantity, unit) for quantity, (_, unit) in quantities.items()},
+            **stated,
+        )
+
     def row(self, sample: int) -> int:
         """Row of a sample in the file, counted from 1."""
         return sample + 1 if self.rows is None else int(self.rows[sample])
@@ -231,3 +250,17 @@ class Recording:
     readings: tuple[Reading, ...]
     findings: tuple[Finding, ...]
     start: StatedStart | None = None
+
+
+def library(module: str, path: Path, extra: str = "logs") -> Any:
+    """Import the library that reads a format.
+
+    `module`: its name. `path`: the file that needs it. `extra`: of this package, which installs it.
+    DataError: it is not installed.
+    """
+    try:
+        return importlib.import_module(module)
+    except ImportError:
+        raise DataError(
+            "io.library-missing", file=path.name, library=module.partition(".")[0], extra=extra
+        ) from None
