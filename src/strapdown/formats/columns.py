@@ -27,6 +27,7 @@ __all__ = [
     "parse_unit",
     "read_name",
     "says_increment",
+    "says_linear",
     "unit_of",
 ]
 
@@ -35,13 +36,20 @@ _AXES = "xyz"
 TRIADS = {
     "gyro": [
         "gyro",
+        "gyros",
         "gyr",
         "gyroscope",
         "gyroscopes",
         "imugyr",
         "imugyro",
         "angularvelocity",
+        "angularvel",
+        "angvel",
         "angularrate",
+        "angularrates",
+        "angrate",
+        "turnrate",
+        "rot",
         "rotationrate",
         "omega",
         "rate",
@@ -54,7 +62,12 @@ TRIADS = {
         "acc",
         "accelerometer",
         "accelerometers",
+        "accelerations",
         "acceleration",
+        "linearacceleration",
+        "linacc",
+        "linaccel",
+        "accl",
         "imuacc",
         "imuaccel",
         "specificforce",
@@ -96,6 +109,18 @@ TIMES = [
     "unixtime",
     "epoch",
     "stamp",
+    "elapsedtime",
+    "timeelapsed",
+    "timesincestart",
+    "sampletime",
+    "sensortime",
+    "systemtime",
+    "unixtimestamp",
+    "datetime",
+    "localtime",
+    "utc",
+    "utctime",
+    "timeutc",
 ]
 # Names of clocks that state their unit.
 CLOCKS = {
@@ -129,6 +154,8 @@ QUANTITIES = [
     *EULERS,
 ]
 
+# Rates about forward, right and down in the notation of flight mechanics.
+_BODY_RATES = {"p": "gyro_x", "q": "gyro_y", "r": "gyro_z"}
 # G is also gravity.
 _MAGNETIC = {"g": "gauss", "mg": "mG"}
 #: A column of an array: its name and its number.
@@ -144,6 +171,14 @@ _DIRECTIONS = {
     "up": (2, -1.0),
 }
 _AXES_BY_INDEX = {"0": "x", "1": "y", "2": "z"}
+# Words of a name: split at signs, and where capitals begin or end.
+_HUMPS = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-zµμ°]+|\d+|[²]")
+# Words that do not tell quantities apart.
+_NOISE = {
+    *("raw", "field", "imu", "sensor", "sensors", "data", "body", "device", "phone", "watch"),
+    *("cal", "calib", "calibrated", "corrected", "meas", "measured", "value", "values", "axis"),
+    *("ins", "the", "of", "in", "reading", "readings"),
+}
 _BRACKETS = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$")
 
 
@@ -157,10 +192,13 @@ class ColumnName:
         One of `QUANTITIES`, or a triad's name where the column holds three numbers.
     unit : str or None
         In the spelling of this package.
+    loose : bool
+        The quantity follows only without the words and the order of the name.
     """
 
     quantity: str | None
     unit: str | None
+    loose: bool = False
 
 
 def read_name(name: str) -> ColumnName:
@@ -178,6 +216,8 @@ def read_name(name: str) -> ColumnName:
     if bracket:
         text = text[: bracket.start()]
     said = ColumnName(None, unit)
+    if text.startswith("field."):
+        return _ros_field(text)
     # In group/sub/name the last part decides, unless the whole is a known name.
     parts = re.split(r"[/.]", text)
     for start in range(len(parts)):
@@ -186,22 +226,47 @@ def read_name(name: str) -> ColumnName:
             break
     quantity = said.quantity
     if str(quantity).startswith("mag") and said.unit in _MAGNETIC:
-        said = ColumnName(quantity, _MAGNETIC[said.unit])
+        said = ColumnName(quantity, _MAGNETIC[said.unit], said.loose)
     if quantity in TRIADS and index in _AXES_BY_INDEX:
         quantity = f"{quantity}_{_AXES_BY_INDEX[index]}"
     if quantity == "time" and (
         (bracket and unit is None) or (said.unit is not None and said.unit not in TIME_UNITS)
     ):
         return ColumnName(None, said.unit)
-    return ColumnName(quantity, said.unit)
+    return ColumnName(quantity, said.unit, said.loose)
+
+
+def _ros_field(text: str) -> ColumnName:
+    """Read a name of ``rostopic echo -p``: fields of a message, which define their units.
+
+    ROS REP 103: SI units; stamps in ns.
+    """
+    if text == "field.header.stamp":
+        return ColumnName("time", "ns")
+    kind, _, axis = text.removeprefix("field.").partition(".")
+    triad = {"angular_velocity": "gyro", "linear_acceleration": "accel", "magnetic_field": "mag"}
+    units = {"gyro": "rad/s", "accel": "m/s2", "mag": "T"}
+    if kind in triad and axis in ("x", "y", "z"):
+        return ColumnName(f"{triad[kind]}_{axis}", units[triad[kind]])
+    return ColumnName(None, None)
 
 
 def _read_words(text: str, unit: str | None) -> ColumnName:
     words = [w for w in re.split(r"[\s_\-/:]+", text.lower()) if w]
-    if unit is None:
-        words, unit = _split_unit(words)
-    word = "".join(words)
-    return ColumnName(_quantity(word), unit or CLOCKS.get(word))
+    bare, its = (words, unit) if unit else _split_unit(words)
+    word = "".join(bare)
+    if quantity := _quantity(word):
+        return ColumnName(quantity, its or CLOCKS.get(word))
+    # Names in capitals without separators (latDeg), in another order (x_gyro), with words that say
+    # nothing of the quantity (raw_acceleration_x).
+    words = [w.lower() for w in _HUMPS.findall(text)]
+    bare, its = (words, unit) if unit else _split_unit(words)
+    bare = [w for w in bare if w not in _NOISE]
+    axes = [w for w in bare if w in _AXES]
+    if len(axes) == 1:
+        bare = [w for w in bare if w != axes[0]] + axes
+    word = "".join(bare)
+    return ColumnName(_quantity(word), its or CLOCKS.get(word), loose=True)
 
 
 def _split_unit(words: list[str]) -> tuple[list[str], str | None]:
@@ -215,6 +280,8 @@ def _split_unit(words: list[str]) -> tuple[list[str], str | None]:
 
 
 def _quantity(word: str) -> str | None:
+    if word in _BODY_RATES:
+        return _BODY_RATES[word]
     if word in TIMES or word in CLOCKS:
         return "time"
     for table in (QUATERNIONS, EULERS):
@@ -230,6 +297,11 @@ def _quantity(word: str) -> str | None:
         if word in names or (word[-1:] in _AXES and word[:-1] in names):
             return triad if word in names else f"{triad}_{word[-1]}"
     return None
+
+
+def says_linear(name: str) -> bool:
+    """Whether a name is of linear acceleration: without gravity on phones, with it in ROS."""
+    return not name.startswith("field.") and "linear" in name.lower()
 
 
 def says_increment(name: str) -> bool:
@@ -305,12 +377,13 @@ def _directions(text: str) -> tuple[list[int], list[float]] | None:
 
 # Each spelling to its canonical word.
 _SPELLINGS = {
-    "rad/s": "rad/s rad_s rads rad_per_s rad/sec radps rad·s-1 rad*s^-1 rad.s-1",
+    "rad/s": "rad/s rad_s rads rad_per_s rad_per_sec rad/sec radps rad·s-1 rad*s^-1 rad.s-1",
     "mrad/s": "mrad/s mrad_s",
-    "deg/s": "deg/s deg_s degs dps °/s °_s º/s deg_per_s deg/sec degps",
+    "deg/s": "deg/s deg_s degs dps °/s °_s º/s deg_per_s deg_per_sec deg/sec degps",
     "mdeg/s": "mdeg/s mdps mdeg_s",
     "deg/h": "deg/h deg/hr deg_h deg_per_h °/h",
-    "m/s2": "m/s2 m/s^2 m/s² m_s2 ms2 ms-2 mps2 m_per_s2 m/s/s m·s-2 m*s^-2",
+    "m/s2": "m/s2 m/s^2 m/s² m_s2 ms2 ms^2 ms-2 mps2 m_per_s2 m_per_s_2 m/s/s m/sec2 m/sec^2 "
+    "m·s-2 m*s^-2",
     "g": "g g0 gs",
     "m/s": "m/s m_s mps m_per_s m/sec m·s-1 m*s^-1",
     "g*s": "g*s g·s g_s",

@@ -33,6 +33,12 @@ __all__ = [
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat")
 COMMENTS = ("#", "%", "//")
 _META = re.compile(r"(?:[#%]|//)\s*(\w+)\s*:\s*(.+?)\s*$")
+# A preamble that states the rate: "Sample Rate:,128,Hz", "// Update Rate: 100.0Hz".
+_RATE = re.compile(
+    r"(?:sampl\w*|update|output|logging|data)[ _-]*(?:rate|freq\w*)"
+    r"\W*(\d+(?:\.\d*)?)(?!\d|\s*[a-gi-z])",
+    re.I,
+)
 _SEPARATOR = re.compile(r"sep=.?", re.I)
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?|[+-]?nan|[+-]?inf(inity)?", re.I)
 # Numbers with a decimal comma, separated by blanks.
@@ -100,7 +106,7 @@ def _at_once(data: bytes, name: str, files: tuple[Path, ...]) -> RawLog | None:
     columns = columns_at_once(data, len(top.names), top.separator, start)
     if columns is None:
         return None
-    return _log(name, files, top, columns, np.arange(first, first + columns[0].size), comments, [])
+    return _log(name, files, top, columns, np.arange(first, first + columns[0].size), [])
 
 
 def _line_by_line(data: bytes, name: str, files: tuple[Path, ...]) -> RawLog:
@@ -113,7 +119,7 @@ def _line_by_line(data: bytes, name: str, files: tuple[Path, ...]) -> RawLog:
         raise DataError("io.csv-without-rows", file=name, row=numbered[0][0])
     rows, lines = _whole_lines(top.data, len(top.names), top.separator, text, name, findings)
     columns = _parse(lines, len(top.names), top.separator, name)
-    return _log(name, files, top, columns, np.array(rows), comments, findings)
+    return _log(name, files, top, columns, np.array(rows), findings)
 
 
 @dataclass(frozen=True)
@@ -124,6 +130,7 @@ class _Top:
     units: dict[str, str]
     separator: str | None
     data: list[tuple[int, str]]
+    above: list[str]
 
 
 def _numbered(text: str) -> tuple[list[tuple[int, str]], list[str]]:
@@ -134,16 +141,84 @@ def _numbered(text: str) -> tuple[list[tuple[int, str]], list[str]]:
 
 
 def _top(numbered: list[tuple[int, str]], comments: list[str]) -> _Top:
+    """Find where the rows of numbers begin, and their names and units above them.
+
+    Lines above the names are a preamble. Two lines of names are a group and its members, as
+    ``Gyroscope,,`` over ``x,y,z``.
+    """
+    first, separator, width = _first_row(numbered)
+    preamble = [line for _, line in numbered[:first]]
+    above = [_named(line, separator, width) for line in preamble[-3:]][::-1]
+    names, units = None, {}
+    if above and above[0] is not None:
+        below = _units(preamble[-1], separator, width)
+        if below and len(above) > 1 and above[1] is not None:
+            names, above = above[1], above[1:]
+        else:
+            names, below = above[0], None
+        twice = len({n for n in names if n}) < len([n for n in names if n])
+        if twice and len(above) > 1 and above[1] is not None and _are_groups(above[1]):
+            names = [f"{g} {n}".strip() for g, n in zip(_filled(above[1]), names, strict=True)]
+        if below:
+            units = {n: u for n, u in zip(_unique(names), below, strict=False) if u}
+    if names is None:
+        names = _above(comments + preamble, width, separator)
+    return _Top(names, units, separator, numbered[first:], comments + preamble)
+
+
+#: Lines at the top of a text in which its rows of numbers are searched.
+SEARCHED = 400
+
+
+def _first_row(numbered: list[tuple[int, str]]) -> tuple[int, str | None, int]:
+    """Return the first of rows of numbers, their separator, and their number of fields.
+
+    Two of three rows in a line have the same form; a single row after one line of names counts.
+    """
+    forms = []
+    for _, line in numbered[:SEARCHED]:
+        separator = separator_of(line)
+        fields = fields_of(line, separator)
+        if len(fields) > 1 and not fields[-1]:
+            fields = fields[:-1]
+        full = [f for f in fields if f]
+        data = bool(full) and 2 * sum(is_data(f) for f in full) >= len(full)
+        forms.append((separator, len(fields)) if data else None)
+    for k, form in enumerate(forms):
+        after = forms[k + 1 : k + 3]
+        if form is not None and (not after or form in after or (k == 1 and len(numbered) < 4)):
+            if k != 1:
+                return k, form[0], form[1]
+            break
+    # A single line above is that of the names, and decides how many fields a row has.
     separator = separator_of(numbered[0][1])
-    fields = fields_of(numbered[0][1], separator)
-    names, units, under = _above(comments, fields, separator), {}, 0
-    if not all(is_data(f) for f in fields):
-        under = 1
-        names = fields[:-1] if len(fields) > 1 and not fields[-1] else fields
-        if len(numbered) > 1 and (below := _units(numbered[1][1], separator, len(names))):
-            under = 2
-            units = {n: u for n, u in zip(_unique(names), below, strict=True) if u}
-    return _Top(names, units, separator, numbered[under:])
+    names = fields_of(numbered[0][1], separator)
+    return 1, separator, len(names) - (len(names) > 1 and not names[-1])
+
+
+def _named(line: str, separator: str | None, width: int) -> list[str] | None:
+    """Return the fields of a line that may name columns, or None."""
+    fields = fields_of(line.strip().lstrip("#%/;").strip() if is_comment(line) else line, separator)
+    if len(fields) == width + 1 and not fields[-1]:
+        fields = fields[:-1]
+    full = [f for f in fields if f]
+    if len(fields) != width or not full or 2 * sum(is_data(f) for f in full) > len(full):
+        return None
+    return fields
+
+
+def _are_groups(fields: list[str]) -> bool:
+    """Whether a line names groups of columns: some fields are empty, each name is there once."""
+    full = [f for f in fields if f]
+    return len(fields) > len(full) > 0 and len(set(full)) == len(full)
+
+
+def _filled(fields: list[str]) -> list[str]:
+    """Repeat each name over the empty fields after it."""
+    out: list[str] = []
+    for field in fields:
+        out.append(field or (out[-1] if out else ""))
+    return out
 
 
 def _log(
@@ -152,10 +227,10 @@ def _log(
     top: _Top,
     columns: Columns,
     rows: NDArray[np.int64],
-    comments: list[str],
     findings: list[Finding],
 ) -> RawLog:
-    meta = {m[1]: m[2] for c in comments if (m := _META.match(c))}
+    meta = {m[1]: m[2] for c in top.above if (m := _META.match(c))}
+    rates = [float(m[1]) for line in top.above if (m := _RATE.search(line))]
     sampling, axes = meta.get("sampling"), meta.get("axes")
     return RawLog(
         name=name,
@@ -163,6 +238,7 @@ def _log(
         columns=dict(zip(_unique(top.names), columns, strict=True)),
         rows=rows,
         units=top.units,
+        rate=rates[0] if rates and rates[0] > 0.0 else None,
         sampling=sampling if sampling in SAMPLINGS else None,
         axes="x,y,z" if axes == "forward-right-down" else None,
         findings=findings,
@@ -205,19 +281,21 @@ def is_data(field: str) -> bool:
 
 
 def _units(line: str, separator: str | None, width: int) -> list[str] | None:
-    """Return the units of a second header line, if every field is one."""
+    """Return the units of a second header line, if most fields are units known here."""
     fields = [f.strip("[]() ") for f in fields_of(line, separator)][:width]
     known = [unit_of(f) is not None for f in fields if f]
-    return fields if len(fields) == width and known and all(known) else None
+    return fields if len(fields) == width and known and 2 * sum(known) > len(known) else None
 
 
-def _above(comments: list[str], fields: list[str], separator: str | None) -> list[str]:
+def _above(comments: list[str], width: int, separator: str | None) -> list[str]:
     """Name the columns without a header: by the last comment if it fits, else by numbers."""
-    text = comments[-1].strip().lstrip("#%/;").strip() if comments else ""
-    names = fields_of(text, separator)
-    if len(names) == len(fields) and not any(is_data(n) for n in names):
-        return names
-    return [f"column {k + 1}" for k in range(len(fields))]
+    names = _named(comments[-1], separator, width) if comments else None
+    if comments and names is None:
+        # Names may be separated otherwise than numbers: "% time, x, y" over blanks.
+        names = _named(comments[-1], separator_of(comments[-1].strip().lstrip("#%/;")), width)
+    if names is None or any(is_data(n) for n in names):
+        return [f"column {k + 1}" for k in range(width)]
+    return names
 
 
 def _unique(names: list[str]) -> list[str]:
@@ -269,7 +347,8 @@ def _whole_lines(
         if count == width + 1 and separator and line.rstrip().endswith(separator):
             line, count = line.rstrip()[:-1], width
         if count != width:
-            if is_comment(line):
+            fields = fields_of(line, separator)
+            if is_comment(line) or not any(is_data(f) for f in fields if f):
                 amid.append((row, line))
                 continue
             doubled = separator == "," and count >= 2 * width - 1 > 1

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NoReturn
 
+import numpy as np
+
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats.columns import (
     INDEXED,
@@ -114,8 +116,10 @@ def _by_name(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
         if quantity in asked:
             continue
         if len(names) > 1 and quantity == "time":
-            # A clock that states its unit is preferred.
-            names = [n for n in names if _unit_of(raw, n)] or names
+            names = _one_clock(raw, names)
+        # Letters alone are a last resort, and so are names read without their order.
+        names = [n for n in names if len(n.strip()) > 1] or names
+        names = [n for n in names if not read_name(n).loose] or names
         if len(names) > 1:
             # Rates are preferred to increments.
             names = [n for n in names if not says_increment(n)] or names
@@ -131,6 +135,25 @@ def _by_name(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
             )
         found[quantity] = Column(names[0], _unit_of(raw, names[0]), "by its name")
     return found
+
+
+def _one_clock(raw: RawLog, names: list[str]) -> list[str]:
+    """Return the clock to use of several: one of the samples, then one that states its unit.
+
+    A message that was recorded by another program has the stamp of its sender and that of its
+    arrival. Clocks that advance alike are one clock.
+    """
+    names = [n for n in names if n.lower().endswith("header.stamp")] or names
+    names = [n for n in names if _unit_of(raw, n)] or names
+    if len(names) > 1 and all(raw.columns[n].dtype.kind in "iuf" for n in names):
+        steps = [np.diff(raw.columns[n].astype(np.float64)) for n in names]
+        scaled = [s / s.mean() if s.size and s.mean() > 0.0 else None for s in steps]
+        first = scaled[0]
+        if first is not None and all(
+            s is not None and np.allclose(s, first, rtol=0.0, atol=1e-2) for s in scaled[1:]
+        ):
+            return names[:1]
+    return names
 
 
 def _unit_of(raw: RawLog, column: str) -> str | None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
 from strapdown.formats.arrays import numbers
-from strapdown.formats.columns import parse_axes, parse_unit, says_increment
+from strapdown.formats.columns import parse_axes, parse_unit, says_increment, says_linear
 from strapdown.formats.find_columns import AXES, Column
 from strapdown.formats.inference import Inference, Signals, infer_signals
 from strapdown.formats.judge import (
@@ -85,6 +85,9 @@ def units_of_triads(
     units: dict[str, tuple[str, str]] = {}
     asked: set[str] = set()
     for triad, block in values.items():
+        if triad == "accel" and _without_gravity(found, said):
+            findings.append(_not_used(raw, triad, "io.left-out-linear-acceleration"))
+            continue
         stated = _stated_unit(found, triad, options)
         if stated is None or _asked_unit(triad, options):
             asked.add(triad)
@@ -100,6 +103,14 @@ def units_of_triads(
     plain = {t: u for t, (u, _) in units.items()}
     report_contradictions(said, plain, asked, mirror, raw.name, findings)
     return units
+
+
+def _without_gravity(found: dict[str, Column], said: dict[str, Inference]) -> bool:
+    """Whether a column named linear acceleration has no gravity, as far as numbers decide."""
+    column, gravity = found["accel_x"], said.get("gravity")
+    if column.why != "by its name" or not says_linear(column.source):
+        return False
+    return gravity is None or not gravity.settled or gravity.value != "present"
 
 
 def _refuse_open(raw: RawLog, found: dict[str, Column], triad: str) -> None:

@@ -127,9 +127,25 @@ def test_what_is_missing_in_a_row(tmp_path):
     assert [f.data["count"] for f in out] == [1]
 
 
-def test_speed_and_course_are_said_not_to_be_used(tmp_path):
-    table = table_of(tmp_path, "time,lat,lon,alt,speed,course,sdn,sde,sdu", ["0,1,2,3,4,5,1,1,1"])
-    assert any("speed and course" in f.what for f in table.attrs["findings"])
+def test_speed_and_course_give_the_velocity_over_ground(tmp_path):
+    head = "time,lat,lon,alt,speed [km/h],course,sdn,sde,sdu,speed accuracy [m/s]"
+    rows = ["0,1,2,3,36,30,1,1,1,0.5", "1,1,2,3,-1,-1,1,1,1,0.5"]
+    table = table_of(tmp_path, head, rows)
+    assert "io.velocity-by-speed-and-course" in {f.code for f in table.attrs["findings"]}
+    velocity, sd = table[VELOCITY].to_numpy(), table[VELOCITY_SD].to_numpy()
+    assert velocity[0] == pytest.approx([10.0 * np.sqrt(0.75), 5.0, 0.0], abs=1e-12)
+    assert sd[0].tolist() == [0.5, 0.5, np.inf]
+    assert np.isinf(sd[1]).all()
+
+
+def test_accuracies_of_a_phone_give_standard_deviations(tmp_path):
+    head = "time,lat,lon,alt,Horizontal Accuracy (m),Vertical Accuracy (m)"
+    table = table_of(tmp_path, head, ["0,1,2,3,15.1,6", "1,1,2,3,-1,6"])
+    sd = table[POSITION_SD].to_numpy()
+    # The radius of 68 % of a circular normal distribution is 1.5096 standard deviations.
+    assert sd[0] == pytest.approx([15.1 / 1.5096, 15.1 / 1.5096, 6.0], rel=1e-4)
+    assert np.isinf(sd[1, :2]).all() and sd[1, 2] == 6.0
+    assert "io.sd-by-accuracy" in {f.code for f in table.attrs["findings"]}
 
 
 def test_arrays_of_python_ins(tmp_path):

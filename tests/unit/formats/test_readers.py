@@ -42,7 +42,7 @@ RATES = np.random.default_rng(2).normal(size=(30, 3))
         ("q_w", "q_w", None),
         ("yaw_deg", "heading", "deg"),
         ("Roll [rad]", "roll", "rad"),
-        ("linear_acceleration_x", None, None),  # gravity is gone from it: no specific force
+        ("linear_acceleration_x", "accel_x", None),  # used only where the numbers show gravity
         ("magnetometer_x", "mag_x", None),
         ("mag_y (µT)", "mag_y", "uT"),
         ("mz [mG]", "mag_z", "mG"),
