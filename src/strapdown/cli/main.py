@@ -8,6 +8,7 @@ import gc
 import inspect
 import io
 import os
+import shlex
 import signal
 import sys
 import threading
@@ -121,7 +122,11 @@ def run() -> None:
         with logged():
             app()
     except StrapdownError as error:
-        _fail(error.finding.text(WORDS.get()), error.exit_code)
+        text = error.finding.text(WORDS.get())
+        if flags := error.finding.data.get("flags"):
+            # What the file leaves open, answered as inferred, ready to paste.
+            text += f"\n  As inferred: strapdown {shlex.join(sys.argv[1:])} {flags}"
+        _fail(text, error.exit_code)
     except OSError as error:
         if error.errno == errno.EPIPE:
             _reader_gone()

@@ -18,7 +18,7 @@ from strapdown.formats.columns import EULERS, QUATERNIONS, factor_of, parse_axes
 from strapdown.formats.find_columns import AXES, Column, find_columns, require_gyro
 from strapdown.formats.inference import Inference
 from strapdown.formats.judge import SUMS, UNITS, intervals, sampling_of_sums
-from strapdown.formats.recording import Origin, RawLog, Reading, ReadOptions, Recording
+from strapdown.formats.recording import Origin, Questions, RawLog, Reading, ReadOptions, Recording
 from strapdown.formats.triad_units import (
     Axes,
     axes_matrix,
@@ -57,10 +57,20 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     ticks, dated = ticks_of(raw, found["time"]) if "time" in found else (None, False)
     said = told_by_numbers(raw, found, options, values, ticks, dated)
     axes = body_axes(raw, options, said, findings)
-    units = units_of_triads(raw, found, options, values, said, findings)
+    questions = Questions(raw.name)
+    units = units_of_triads(raw, found, options, values, said, findings, questions)
     values = {t: values[t] for t in units}
     finite = finite_rows(raw, found, ticks, values, options, findings)
-    stamps = stamps_of_log(raw, found, ticks, dated, options, finite, said, findings)
+    try:
+        stamps = stamps_of_log(raw, found, ticks, dated, options, finite, said, findings)
+    except DataError as error:
+        if error.finding.code not in ("io.time-unit-undecided", "io.time-column-missing"):
+            questions.refuse()
+            raise
+        choices = error.finding.data.get("choices")
+        likely = {"time_unit": str(choices[0].data["unit"])} if choices else {}
+        questions.ask(error.finding, **likely)
+    questions.refuse()
     kept = np.flatnonzero(finite)[stamps.keep]
     time = stamps.seconds[stamps.keep]
     if time.size < 2:

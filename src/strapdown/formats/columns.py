@@ -154,8 +154,9 @@ QUANTITIES = [
     *EULERS,
 ]
 
-# Rates about forward, right and down in the notation of flight mechanics.
-_BODY_RATES = {"p": "gyro_x", "q": "gyro_y", "r": "gyro_z"}
+#: Rates about forward, right and down in the notation of flight mechanics, if all three are there:
+#: a letter alone may be anything.
+BODY_RATES = {"rate_p": "gyro_x", "rate_q": "gyro_y", "rate_r": "gyro_z"}
 # G is also gravity.
 _MAGNETIC = {"g": "gauss", "mg": "mG"}
 #: A column of an array: its name and its number.
@@ -280,8 +281,8 @@ def _split_unit(words: list[str]) -> tuple[list[str], str | None]:
 
 
 def _quantity(word: str) -> str | None:
-    if word in _BODY_RATES:
-        return _BODY_RATES[word]
+    if f"rate_{word}" in BODY_RATES:
+        return f"rate_{word}"
     if word in TIMES or word in CLOCKS:
         return "time"
     for table in (QUATERNIONS, EULERS):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 import itertools
 import re
+from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -39,6 +40,7 @@ _RATE = re.compile(
     r"\W*(\d+(?:\.\d*)?)(?!\d|\s*[a-gi-z])",
     re.I,
 )
+_UNIT = re.compile(r"\s*[\[(].*")
 _SEPARATOR = re.compile(r"sep=.?", re.I)
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?|[+-]?nan|[+-]?inf(inity)?", re.I)
 # Numbers with a decimal comma, separated by blanks.
@@ -106,6 +108,10 @@ def _at_once(data: bytes, name: str, files: tuple[Path, ...]) -> RawLog | None:
     columns = columns_at_once(data, len(top.names), top.separator, start)
     if columns is None:
         return None
+    # A line of text between rows makes text of a column of numbers.
+    begins = [is_data(f) for f in fields_of(top.data[0][1], top.separator)]
+    if any(c.dtype.kind == "O" and data for c, data in zip(columns, begins, strict=False)):
+        return None
     return _log(name, files, top, columns, np.arange(first, first + columns[0].size), [])
 
 
@@ -156,8 +162,13 @@ def _top(numbered: list[tuple[int, str]], comments: list[str]) -> _Top:
             names, above = above[1], above[1:]
         else:
             names, below = above[0], None
-        twice = len({n for n in names if n}) < len([n for n in names if n])
-        if twice and len(above) > 1 and above[1] is not None and _are_groups(above[1]):
+        bare = [_UNIT.sub("", n) for n in names if n]
+        if (
+            len(set(bare)) < len(bare)
+            and len(above) > 1
+            and above[1] is not None
+            and _are_groups(above[1])
+        ):
             names = [f"{g} {n}".strip() for g, n in zip(_filled(above[1]), names, strict=True)]
         if below:
             units = {n: u for n, u in zip(_unique(names), below, strict=False) if u}
@@ -173,7 +184,7 @@ SEARCHED = 400
 def _first_row(numbered: list[tuple[int, str]]) -> tuple[int, str | None, int]:
     """Return the first of rows of numbers, their separator, and their number of fields.
 
-    Two of three rows in a line have the same form; a single row after one line of names counts.
+    They are the most frequent form, and two of the first three have it.
     """
     forms = []
     for _, line in numbered[:SEARCHED]:
@@ -184,9 +195,11 @@ def _first_row(numbered: list[tuple[int, str]]) -> tuple[int, str | None, int]:
         full = [f for f in fields if f]
         data = bool(full) and 2 * sum(is_data(f) for f in full) >= len(full)
         forms.append((separator, len(fields)) if data else None)
+    # Numbers in a preamble are fewer than the rows.
+    usual = Counter(f for f in forms if f is not None).most_common(1)
     for k, form in enumerate(forms):
         after = forms[k + 1 : k + 3]
-        if form is not None and (not after or form in after or (k == 1 and len(numbered) < 4)):
+        if usual and form == usual[0][0] and (not after or form in after or len(forms) < 4):
             if k != 1:
                 return k, form[0], form[1]
             break
@@ -290,8 +303,8 @@ def _units(line: str, separator: str | None, width: int) -> list[str] | None:
 def _above(comments: list[str], width: int, separator: str | None) -> list[str]:
     """Name the columns without a header: by the last comment if it fits, else by numbers."""
     names = _named(comments[-1], separator, width) if comments else None
-    if comments and names is None:
-        # Names may be separated otherwise than numbers: "% time, x, y" over blanks.
+    if comments and names is None and separator is None:
+        # Names over columns of blanks may be separated otherwise: "% time, x, y".
         names = _named(comments[-1], separator_of(comments[-1].strip().lstrip("#%/;")), width)
     if names is None or any(is_data(n) for n in names):
         return [f"column {k + 1}" for k in range(width)]
@@ -346,11 +359,13 @@ def _whole_lines(
         count = _count(line, separator)
         if count == width + 1 and separator and line.rstrip().endswith(separator):
             line, count = line.rstrip()[:-1], width
-        if count != width:
+        odd = count != width
+        if odd or line.lstrip()[:1].isalpha():
             fields = fields_of(line, separator)
-            if is_comment(line) or not any(is_data(f) for f in fields if f):
+            if (odd and is_comment(line)) or not any(is_data(f) for f in fields if f):
                 amid.append((row, line))
                 continue
+        if odd:
             doubled = separator == "," and count >= 2 * width - 1 > 1
             raise DataError(
                 "io.csv-decimal-commas" if doubled else "io.csv-field-count",

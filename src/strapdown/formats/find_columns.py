@@ -9,6 +9,7 @@ import numpy as np
 
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats.columns import (
+    BODY_RATES,
     INDEXED,
     QUANTITIES,
     TRIADS,
@@ -16,7 +17,7 @@ from strapdown.formats.columns import (
     says_increment,
     unit_of,
 )
-from strapdown.formats.recording import RawLog, ReadOptions
+from strapdown.formats.recording import RawLog, ReadOptions, as_stated
 
 AXES = "xyz"
 
@@ -110,31 +111,53 @@ def _by_name(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
         if (part := INDEXED.fullmatch(name)) and _width(raw, part.group(1)) != 3:
             continue
         candidates.setdefault(quantity, []).append(name)
+    if BODY_RATES.keys() <= candidates.keys() and "gyro_x" not in candidates:
+        candidates |= {gyro: candidates[rate] for rate, gyro in BODY_RATES.items()}
+    for rate in BODY_RATES:
+        candidates.pop(rate, None)
     asked = {q for key in options.columns for q in _members(key)}
     found = {}
+    several: dict[str, list[str]] = {}
     for quantity, names in candidates.items():
         if quantity in asked:
             continue
         if len(names) > 1 and quantity == "time":
             names = _one_clock(raw, names)
-        # Letters alone are a last resort, and so are names read without their order.
-        names = [n for n in names if len(n.strip()) > 1] or names
+        # Names read without their order are a last resort.
         names = [n for n in names if not read_name(n).loose] or names
         if len(names) > 1:
             # Rates are preferred to increments.
             names = [n for n in names if not says_increment(n)] or names
         if len(names) > 1:
-            raise ConfigError(
-                "io.columns-ambiguous",
-                file=raw.name,
-                quantity=quantity,
-                count=len(names),
-                names=names,
-                of_what=quantity,
-                names_2=names[0],
-            )
+            several[quantity] = names
         found[quantity] = Column(names[0], _unit_of(raw, names[0]), "by its name")
+    if several:
+        quantity, names = next(iter(several.items()))
+        raise ConfigError(
+            "io.columns-ambiguous",
+            file=raw.name,
+            quantity=quantity,
+            count=len(names),
+            names=names,
+            of_what=quantity,
+            names_2=names[0],
+            **as_stated(_first_of_several(raw, several)),
+        )
     return found
+
+
+def _first_of_several(raw: RawLog, several: dict[str, list[str]]) -> dict[str, str]:
+    """Answer which columns to use by the first of each; a triad by what its names begin with."""
+    answers: dict[str, str] = {}
+    for quantity, names in several.items():
+        triad = quantity.rpartition("_")[0]
+        if triad not in TRIADS:
+            answers[quantity] = names[0]
+        elif triad not in answers:
+            prefix = names[0].rstrip("xyzXYZ").rstrip("_-. /:[(")
+            whole = len(_three_of(raw, triad, prefix)) == 3
+            answers |= {triad: prefix} if whole else {quantity: names[0]}
+    return answers
 
 
 def _one_clock(raw: RawLog, names: list[str]) -> list[str]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from strapdown.constants import ACCEL_SUMS, ACCEL_UNITS, GYRO_SUMS, GYRO_UNITS, MAG_UNITS
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.inference import THRESHOLD, Inference
+from strapdown.formats.recording import Questions
 
 __all__ = ["OPEN", "SUMS", "intervals", "sampling_of_sums", "sum_of"]
 
@@ -107,11 +108,13 @@ def report_contradictions(
     mirrored: bool,
     file: str,
     findings: list[Finding],
+    questions: Questions,
 ) -> None:
     """Report where the numbers contradict a file or a name.
 
     `units`: triad to the unit that it is read in. `asked`: triads whose unit the user stated or the
     numbers gave; these are not checked. `mirrored`: the user stated left-handed sensor axes.
+    `questions`: a contradiction in a unit, which the user has to decide.
     """
     for triad, unit in units.items():
         other = said.get(f"{triad}_unit")
@@ -134,17 +137,19 @@ def report_contradictions(
             code = "io.mag-contradicts-unit" if triad == "mag" else "io.contradicts-unit"
         else:
             continue
-        findings.append(
-            Finding(
-                code,
-                file=file,
-                quantity=triad,
-                triad=triad,
-                unit=unit,
-                likely=likely,
-                reason=reason.finding(),
-            )
+        fault = Finding(
+            code,
+            file=file,
+            quantity=triad,
+            triad=triad,
+            unit=unit,
+            likely=likely,
+            reason=reason.finding(),
         )
+        if triad == "mag":
+            findings.append(fault)
+        else:
+            questions.ask(fault, **{f"{triad}_unit": likely})
     gravity = said.get("gravity")
     if "accel" in units and gravity is not None and gravity.settled and gravity.value == "removed":
         findings.append(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -250,6 +251,49 @@ class Recording:
     readings: tuple[Reading, ...]
     findings: tuple[Finding, ...]
     start: StatedStart | None = None
+
+
+class Questions:
+    """What a file leaves open, asked in one refusal with the answers as inferred.
+
+    Parameters
+    ----------
+    file : str
+    """
+
+    def __init__(self, file: str) -> None:
+        self._file = file
+        self._open: list[Finding] = []
+        self._answers: dict[str, str] = {}
+
+    def ask(self, fault: Finding, **answers: str) -> None:
+        """Add a question. `answers`: options of `ReadOptions`, with the likely values."""
+        self._open.append(fault)
+        self._answers |= answers
+
+    def refuse(self) -> None:
+        """Raise the questions, if there are any: DataError, or the fault itself if it is alone."""
+        if not self._open:
+            return
+        said = as_stated(self._answers)
+        if len(self._open) == 1:
+            raise DataError(self._open[0], **said)
+        raise DataError("io.questions", file=self._file, questions=self._open, **said)
+
+
+def as_stated(answers: Mapping[str, str]) -> dict[str, str]:
+    """Return answers as options of the command line, ``flags``, and as ``keys`` of a configuration.
+
+    `answers`: `ReadOptions` that end in ``_unit``, and quantities with their columns.
+    """
+    columns = {q: c for q, c in answers.items() if not q.endswith("_unit")}
+    units = {q: u for q, u in answers.items() if q.endswith("_unit")}
+    flags = [f"--{q.replace('_', '-')} {shlex.quote(u)}" for q, u in units.items()]
+    keys = [f'{q} = "{u}"' for q, u in units.items()]
+    if columns:
+        flags.append("--columns " + shlex.quote(",".join(f"{q}={c}" for q, c in columns.items())))
+        keys.append("columns = {" + ", ".join(f'{q} = "{c}"' for q, c in columns.items()) + "}")
+    return {"flags": " ".join(flags), "keys": "; ".join(keys)}
 
 
 def library(module: str, path: Path, extra: str = "logs") -> Any:

@@ -22,7 +22,7 @@ from strapdown.formats.judge import (
     report_contradictions,
     report_upside_down,
 )
-from strapdown.formats.recording import RawLog, ReadOptions
+from strapdown.formats.recording import Questions, RawLog, ReadOptions
 
 __all__ = [
     "Axes",
@@ -76,11 +76,12 @@ def units_of_triads(
     values: dict[str, Array],
     said: dict[str, Inference],
     findings: list[Finding],
+    questions: Questions,
 ) -> dict[str, tuple[str, str]]:
     """Return the unit of each usable triad, with the reason.
 
-    `values` ((n, 3)). `said`: from `told_by_numbers`. `findings`: dropped triads, inferences and
-    contradictions are appended. DataError: the unit of the gyro is not known.
+    `values` ((n, 3)). `said`: from `told_by_numbers`. `findings`: dropped triads and inferences are
+    appended. `questions`: an unknown unit of the gyro, and statements that the numbers contradict.
     """
     units: dict[str, tuple[str, str]] = {}
     asked: set[str] = set()
@@ -96,12 +97,18 @@ def units_of_triads(
                 _refuse_open(raw, found, triad)
             units[triad] = stated or inferred_unit(triad, said, block, raw.name, findings)
         except DataError as error:
-            if triad == "gyro":
-                raise
-            findings.append(left_out(raw, triad, error))
+            if triad != "gyro":
+                findings.append(left_out(raw, triad, error))
+                continue
+            likely = said.get("gyro_unit")
+            unit = str(likely.value) if likely is not None and likely.value else "rad/s"
+            if error.finding.code == "io.unit-not-stated-of-increments":
+                unit = str(error.finding.data["sum_of"]).split(" or ")[0]
+            questions.ask(error.finding, gyro_unit=unit)
+            units[triad] = unit, "asked"
     mirror = options.axes is not None and mirrored(*parse_axes(options.axes))
     plain = {t: u for t, (u, _) in units.items()}
-    report_contradictions(said, plain, asked, mirror, raw.name, findings)
+    report_contradictions(said, plain, asked, mirror, raw.name, findings, questions)
     return units
 
 

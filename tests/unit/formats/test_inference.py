@@ -232,18 +232,42 @@ def test_what_cannot_be_inferred_is_an_error_that_tells_why(tmp_path):
     read_log(path, ReadOptions(gyro_unit="rad/s"))
 
 
-def test_a_statement_goes_before_and_a_contradiction_is_told(tmp_path):
+def test_a_contradiction_stops_and_the_users_statement_goes_before(tmp_path):
     t, gyro, accel = turning()
     header = "time_s,gx_rad_s,gy_rad_s,gz_rad_s,ax_g,ay_g,az_g"
     path = write(tmp_path / "log.csv", t, np.degrees(gyro), accel, header)
-    log = read_log(path)
-    assert np.allclose(log.imu[GYRO], np.degrees(gyro), atol=1e-6)
-    told = [f.what for f in log.findings if f.code == "io.contradicts-unit"]
-    assert any("unit rad/s; inferred: deg/s" in w for w in told)
-    assert any("unit g; inferred: m/s2" in w for w in told)
-    # What the user states is not argued with.
-    log = read_log(path, ReadOptions(gyro_unit="rad/s", accel_unit="g"))
-    assert not any("contradict" in f.what for f in log.findings)
+    with pytest.raises(DataError) as refused:
+        read_log(path)
+    finding = refused.value.finding
+    assert finding.code == "io.questions"
+    assert [
+        (q.code, q.quantity, q.data["unit"], q.data["likely"]) for q in finding.data["questions"]
+    ] == [
+        ("io.contradicts-unit", "gyro", "rad/s", "deg/s"),
+        ("io.contradicts-unit", "accel", "g", "m/s2"),
+    ]
+    assert finding.data["flags"] == "--gyro-unit deg/s --accel-unit m/s2"
+    assert finding.data["keys"] == 'gyro_unit = "deg/s"; accel_unit = "m/s2"'
+    as_inferred = read_log(path, ReadOptions(gyro_unit="deg/s", accel_unit="m/s2"))
+    assert np.allclose(as_inferred.imu[GYRO], gyro, atol=1e-6)
+    # The user decides: the file may be right.
+    as_stated = read_log(path, ReadOptions(gyro_unit="rad/s", accel_unit="g"))
+    assert np.allclose(as_stated.imu[GYRO], np.degrees(gyro), atol=1e-6)
+
+
+def test_all_questions_are_asked_at_once(tmp_path):
+    t, gyro, accel = turning()
+    path = write(
+        tmp_path / "log.csv",
+        1e3 * t,
+        0 * gyro + 0.01,
+        accel[:1] + 0 * accel,
+        "t,gx,gy,gz,ax_g,ay_g,az_g",
+    )
+    with pytest.raises(DataError) as refused:
+        read_log(path)
+    questions = [q.code for q in refused.value.finding.data["questions"]]
+    assert questions[:2] == ["io.unit-undecided", "io.contradicts-unit"]
 
 
 def test_gravity_says_which_axis_points_up(tmp_path):

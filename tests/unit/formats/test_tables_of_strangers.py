@@ -1,0 +1,178 @@
+"""Text tables as people write them: preambles, two lines of names, text between rows, names."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from tests.coded import coded
+
+from strapdown.constants import STANDARD_GRAVITY
+from strapdown.errors import ConfigError, DataError
+from strapdown.formats import ReadOptions, read_log
+from strapdown.formats.columns import read_name
+from strapdown.tables import ACCEL, GYRO
+
+RATES = np.array([0.1, -0.2, 0.3])  # rad/s
+FORCE = np.array([0.5, -1.0, -9.7])  # m/s²
+
+
+def rows(count=40, *, separator=",", step=0.01, end=""):
+    values = [*np.degrees(RATES), *(FORCE / STANDARD_GRAVITY)]
+    return [
+        separator.join([f"{step * k:.3f}", *(f"{v + 1e-4 * (k % 3):.6f}" for v in values)]) + end
+        for k in range(count)
+    ]
+
+
+SENSORS = "x (deg/s),y (deg/s),z (deg/s),x (g),y (g),z (g)"
+HEADER = "Time (s),gx (deg/s),gy (deg/s),gz (deg/s),ax (g),ay (g),az (g)"
+
+
+def read(tmp_path, lines, name="log.csv", **options):
+    path = tmp_path / name
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return read_log(path, ReadOptions(**options))
+
+
+def check(log, count=40):
+    imu = log.imu
+    assert len(imu) == count
+    assert np.allclose(imu[GYRO].to_numpy()[0], RATES, atol=1e-5)
+    assert np.allclose(imu[ACCEL].to_numpy()[0], FORCE, atol=1e-4)
+    assert np.allclose(np.diff(imu.index), 0.01, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "top",
+    [
+        ["My board, v2", "Started:,2024-01-02", "", HEADER],
+        ["device: x", "rate 100", "range 2000", "firmware 1, build 2, debug", HEADER],
+        ["% a comment", "% another", "%" + HEADER],
+        ["# note", "", HEADER],
+        [",Gyroscope,,,Accelerometer,,", f"Time (s),{SENSORS}"],
+        ["Time,gx,gy,gz,ax,ay,az", "s,deg/s,deg/s,deg/s,g,g,g"],
+        ["Time,gx,gy,gz,ax,ay,az", "(s),(deg/s),(deg/s),(deg/s),(g),(g),(g)"],
+        ["Test,bench", "Time,gx,gy,gz,ax,ay,az", "s,deg/s,deg/s,deg/s,g,g,g"],
+        [HEADER + ","],
+    ],
+)
+def test_what_stands_above_the_rows(tmp_path, top):
+    check(read(tmp_path, [*top, *rows()]))
+
+
+def test_separators_at_the_end_of_each_line(tmp_path):
+    check(read(tmp_path, [HEADER, *rows(end=",")]))
+    check(read(tmp_path, [HEADER + ",", *rows(end=",")]))
+
+
+def test_lines_of_text_between_rows_are_left_out_and_said(tmp_path):
+    lines = rows()
+    text = "--- button pressed ---"
+    log = read(tmp_path, [HEADER, *lines[:10], text, *lines[10:30], HEADER, *lines[30:]])
+    check(log)
+    assert "io.comments-among-rows" in {f.code for f in log.findings}
+
+
+def test_a_damaged_row_is_no_text(tmp_path):
+    lines = rows()
+    with pytest.raises(DataError, check=coded("io.csv-field-count", row=12)):
+        read(tmp_path, [HEADER, *lines[:10], "0.1,2.0", *lines[10:]])
+
+
+def test_a_rate_above_the_names_serves_where_no_time_is(tmp_path):
+    body = [line.partition(",")[2] for line in rows()]
+    log = read(tmp_path, ["Sample Rate:,100,Hz", HEADER.partition(",")[2], *body])
+    check(log)
+
+
+@pytest.mark.parametrize(
+    ("name", "quantity", "unit"),
+    [
+        ("x_gyro", "gyro_x", None),
+        ("raw_acceleration_x_gs", "accel_x", "g"),
+        ("linear_acceleration.y", "accel_y", None),
+        ("field.angular_velocity.z", "gyro_z", "rad/s"),
+        ("field.linear_acceleration.z", "accel_z", "m/s2"),
+        ("field.header.stamp", "time", "ns"),
+        ("field.orientation.x", None, None),
+        ("time (sec)", "time", "s"),
+        ("%time", "time", None),
+        ("AngVelX", "gyro_x", None),
+        ("Static/Acceleration/X", "accel_x", None),
+        ("timestampMs", "time", "ms"),
+        ("accelX", "accel_x", None),
+        ("gyroscope_x_axis (rad/s)", "gyro_x", "rad/s"),
+        ("mag_heading", None, None),
+        ("temperature", None, None),
+        ("x", None, None),
+        ("max", None, None),
+        ("row", None, None),
+        ("lat", None, None),
+    ],
+)
+def test_names_in_any_order(name, quantity, unit):
+    said = read_name(name)
+    assert (said.quantity, said.unit) == (quantity, unit)
+
+
+def test_rates_p_q_r(tmp_path):
+    check(read(tmp_path, ["t_s,p_deg_s,q_deg_s,r_deg_s,ax_g,ay_g,az_g", *rows()]))
+
+
+def test_several_units_of_one_kind_are_asked_for_once(tmp_path):
+    names = [
+        f"{place}/{what}/{axis}"
+        for place in ("Left", "Right")
+        for what in ("Gyro", "Accel")
+        for axis in "XYZ"
+    ]
+    one = [line.partition(",") for line in rows()]
+    lines = [",".join(["Time (s)", *names])] + [f"{t},{v},{v}" for t, _, v in one]
+    with pytest.raises(ConfigError) as refused:
+        read(tmp_path, lines)
+    assert refused.value.finding.data["flags"] == "--columns gyro=Left/Gyro,accel=Left/Accel"
+    log = read(
+        tmp_path,
+        lines,
+        columns={"gyro": "Left/Gyro", "accel": "Left/Accel"},
+        gyro_unit="deg/s",
+        accel_unit="g",
+    )
+    check(log)
+
+
+def test_linear_acceleration_is_used_only_where_gravity_is_in_it(tmp_path):
+    header = (
+        HEADER.replace("ax (g)", "linear_acceleration_x (g)")
+        .replace("ay (g)", "linear_acceleration_y (g)")
+        .replace("az (g)", "linear_acceleration_z (g)")
+    )
+    still = [re.sub(r",[^,]+,[^,]+,[^,]+,", ",0.0,0.0,0.0,", line, count=1) for line in rows(400)]
+    force = read(tmp_path, [header, *still]).imu[ACCEL].to_numpy()
+    assert np.allclose(force, FORCE, atol=4e-3)
+    rng = np.random.default_rng(3)
+    still = [
+        ",".join([*line.split(",")[:4], *(f"{v:.5f}" for v in rng.normal(0.0, 0.02, 3))])
+        for line in rows(400)
+    ]
+    log = read(tmp_path, [header, *still])
+    assert "io.left-out-linear-acceleration" in {f.code for f in log.findings}
+    assert ACCEL[0] not in log.imu.columns
+
+
+def test_of_two_stamps_the_samples_own_is_used(tmp_path):
+    ns = [1_700_000_000_000_000_000 + 10_000_000 * k for k in range(40)]
+    late = [n + (k % 5) * 1_000_000 for k, n in enumerate(ns)]
+    axes = ",".join(
+        f"field.{v}.{a}" for v in ("angular_velocity", "linear_acceleration") for a in "xyz"
+    )
+    body = [
+        f"{b},{k},{a},imu,0.1,-0.2,0.3,0.5,-1.0,-9.7"
+        for k, (a, b) in enumerate(zip(ns, late, strict=True))
+    ]
+    log = read(
+        tmp_path, ["%time,field.header.seq,field.header.stamp,field.header.frame_id," + axes, *body]
+    )
+    check(log)
