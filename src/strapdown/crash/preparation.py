@@ -15,7 +15,7 @@ from strapdown.crash.acceleration import force_at_rest
 from strapdown.crash.entry import Entry
 from strapdown.crash.measuring_point import PointKinematics, at_point
 from strapdown.crash.path import reconstruct_path
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, check_choice
 from strapdown.rotation import level
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad, UnitArrays, check_unit
 from strapdown.sensors.pre_crash import (
@@ -92,14 +92,9 @@ class Preparation:
         """Options by name. `ConfigError`: a name is unknown."""
         known = [f.name for f in fields(cls)]
         for name in given:
-            if name not in known:
-                raise ConfigError(
-                    "crash.preparation-option-unknown",
-                    quantity="preparation",
-                    name=name,
-                    word=str(name),
-                    known=known,
-                )
+            check_choice(
+                "crash.preparation-option-unknown", known, quantity="preparation", name=name
+            )
         return cls(**given)
 
     def check(self, unit: str) -> None:

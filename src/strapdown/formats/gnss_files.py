@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.constants import TIME_UNITS
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, check_choice
 from strapdown.formats import (
     comma2k19,
     csv,
@@ -334,13 +334,9 @@ def read_gnss(path: str | Path, options: GnssOptions | None = None) -> pd.DataFr
         raise DataError("io.fixes-comma-k-segment-two", file=path.name, parent=path.parent)
     if path.is_file() and path.stat().st_size == 0:
         raise DataError("io.file-empty", file=path.name)
-    if asked.format is not None and asked.format not in GNSS_READERS:
-        raise ConfigError(
-            "io.unknown-format-of-fixes",
-            quantity="format",
-            format=asked.format,
-            word=asked.format,
-            known=GNSS_READERS,
+    if asked.format is not None:
+        check_choice(
+            "io.unknown-format-of-fixes", GNSS_READERS, quantity="format", format=asked.format
         )
     readers = [GNSS_READERS[asked.format]] if asked.format else GNSS_READERS.values()
     for reader in readers:
