@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -342,7 +342,8 @@ class Score:
     bound : float
         Root mean square of the 95 % bounds.
     share : float
-        Share of the time in which the error is within its bound.
+        Share of the time in which the error is within its bound; NaN for a quantity without a
+        variance of its own, as a height that is held.
     """
 
     quantity: str
@@ -397,6 +398,8 @@ class NavigationErrors:
             dict.fromkeys(NED, "m") | dict.fromkeys(VELOCITY, "m/s") | dict.fromkeys(EULER, "deg")
         )
         found = [self._score(n, u, self.error(n), self.bound(n)) for n, u in units.items()]
+        independent = self.comparison.table["inside"].notna()
+        found = [s if independent.get(s.quantity, True) else replace(s, share=np.nan) for s in found]
         size = np.hypot(*(self.error(n) for n in NED[:2]))
         return self._score("horizontal", "m", size, self._plane(size)), *found
 
@@ -720,6 +723,8 @@ def _errors(found: NavigationEvaluation) -> list[Finding]:
         *((a, a) for a in reversed(EULER)),
     ):
         score = found.errors.score(name)
+        if np.isnan(score.share):
+            continue
         out.append(
             reason(
                 bool(score.share >= _ENOUGH),
