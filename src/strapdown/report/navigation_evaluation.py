@@ -399,7 +399,9 @@ class NavigationErrors:
         )
         found = [self._score(n, u, self.error(n), self.bound(n)) for n, u in units.items()]
         independent = self.comparison.table["inside"].notna()
-        found = [s if independent.get(s.quantity, True) else replace(s, share=np.nan) for s in found]
+        found = [
+            s if independent.get(s.quantity, True) else replace(s, share=np.nan) for s in found
+        ]
         size = np.hypot(*(self.error(n) for n in NED[:2]))
         return self._score("horizontal", "m", size, self._plane(size)), *found
 
