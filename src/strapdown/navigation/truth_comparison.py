@@ -293,7 +293,8 @@ def _comparison(
     findings: tuple[Finding, ...],
 ) -> TruthComparison:
     variance = np.diagonal(P, axis1=1, axis2=2)
-    told = _independent(np.isfinite(errors).all(axis=0) & (variance > 0.0).all(axis=0), P)
+    known = np.asarray(np.isfinite(errors).all(axis=0) & (variance > 0.0).all(axis=0))
+    told = _independent(known, P)
     squares, freedom, inside = {}, {}, {}
     for part, members in PARTS.items():
         kept = [k for k in members if told[k]]

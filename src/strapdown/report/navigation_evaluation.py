@@ -398,10 +398,10 @@ class NavigationErrors:
             dict.fromkeys(NED, "m") | dict.fromkeys(VELOCITY, "m/s") | dict.fromkeys(EULER, "deg")
         )
         found = [self._score(n, u, self.error(n), self.bound(n)) for n, u in units.items()]
-        independent = self.comparison.table["inside"].notna()
-        found = [
-            s if independent.get(s.quantity, True) else replace(s, share=np.nan) for s in found
-        ]
+        inside = self.comparison.table["inside"]
+        for k, score in enumerate(found):
+            if np.isnan(inside.get(score.quantity, 0.0)):
+                found[k] = replace(score, share=np.nan)
         size = np.hypot(*(self.error(n) for n in NED[:2]))
         return self._score("horizontal", "m", size, self._plane(size)), *found
 
