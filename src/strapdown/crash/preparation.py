@@ -29,6 +29,7 @@ from strapdown.sensors.pre_crash import (
 )
 from strapdown.sensors.range_merge import (
     MergedRanges,
+    Range,
     agreement_findings,
     bias_from_lower_range,
     merge_ranges,
@@ -166,7 +167,10 @@ def prepare_unit(unit: CrashUnit, options: Preparation = Preparation()) -> Prepa
     gyro_noise = _noise(data.time, gyro)
     findings: list[Finding] = [*data.findings, *assumed_findings(unit)]
     findings += saturation_findings(unit, data, limits, gyro_limits)
-    limits = [_with_held(limit, t) for limit, t in zip(limits, triads, strict=True)]
+    ranges = [
+        Range(y, _with_held(limit, t), s, t.uncertainty.bandwidth)
+        for y, limit, s, t in zip(data.accelerometers, limits, noise, triads, strict=True)
+    ]
 
     own = _find_rest(unit, data, options, noise[0], gyro_noise)
     findings += rest_findings(unit, data.time, own, options)
@@ -175,16 +179,12 @@ def prepare_unit(unit: CrashUnit, options: Preparation = Preparation()) -> Prepa
         gyro_bias_from(own, gyro.axis("bias"), steady_rate=options.steady_rate), unit.gyro.absent
     )
 
-    bias, bias_from, bias_sd = _range_biases(unit, data, limits, own)
+    bias, bias_from, bias_sd = _range_biases(unit, data.time, ranges, own)
     findings += bias_findings(unit, bias, bias_from, own)
-    findings += agreement_findings(unit, data, limits, noise)
+    findings += agreement_findings(unit, ranges)
     merged = merge_ranges(
         data.time,
-        data.accelerometers,
-        limits,
-        noise,
-        bias=bias,
-        bandwidth=[t.uncertainty.bandwidth for t in triads],
+        [replace(one, bias=b) for one, b in zip(ranges, bias, strict=True)],
         margin=options.margin,
         hysteresis=options.hysteresis,
         fade=options.fade,
@@ -263,21 +263,22 @@ def _find_rest(
 
 
 def _range_biases(
-    unit: CrashUnit, data: UnitArrays, limits: Sequence[RangeLimits], rest: RestStretch | None
+    unit: CrashUnit, time: Array, ranges: Sequence[Range], rest: RestStretch | None
 ) -> tuple[list[Array], tuple[int | None, ...], tuple[Triad, ...]]:
     """Bias of every range relative to the lowest: each is tied to the next lower one."""
     bias: list[Array] = [np.zeros(3)]
     origin: list[int | None] = [None]
     sd: list[Triad] = [ZERO]
-    for j in range(1, len(data.accelerometers)):
+    for j in range(1, len(ranges)):
         found = None
         if rest is not None:
-            within = (data.time >= rest.start) & (data.time <= rest.end)
+            low, high = ranges[j - 1], ranges[j]
+            within = (time >= rest.start) & (time <= rest.end)
             found = bias_from_lower_range(
-                data.time,
-                data.accelerometers[j],
-                data.accelerometers[j - 1],
-                within[:, None] & ~limits[j - 1].clipped & ~limits[j].clipped,
+                time,
+                high.values,
+                low.values,
+                within[:, None] & ~low.limits.clipped & ~high.limits.clipped,
                 quantization=unit.accelerometers[j].uncertainty.axis("quantization"),
             )
         if found is None:
