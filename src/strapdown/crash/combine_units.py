@@ -69,10 +69,10 @@ def combine_units(units: Sequence[PointKinematics], method: str = "weighted") ->
         raise ConfigError(
             "crash.units-cannot-combined", quantity="units", count=len(units), method=method
         )
-    if method == "median" and any(u.unmeasured is not None for u in units):
+    if method == "median" and any(u.unmeasured.any() for u in units):
         raise ConfigError(
             "crash.median-takes-every-unit-value",
-            file=next(u.name for u in units if u.unmeasured is not None),
+            file=next(u.name for u in units if u.unmeasured.any()),
             quantity="units",
         )
     time = _common_stamps(units)
@@ -133,7 +133,7 @@ def combine_units(units: Sequence[PointKinematics], method: str = "weighted") ->
 
 def _turning_measured(units: Sequence[PointKinematics]) -> NDArray[np.bool_]:
     """Units that measure rotation about the most axes; assumed axes do not count."""
-    assumed = [0.0 if u.unmeasured_turns is None else np.trace(u.unmeasured_turns) for u in units]
+    assumed = [np.trace(u.unmeasured_turns) for u in units]
     return np.asarray(np.round(assumed) == np.round(min(assumed)))
 
 
@@ -323,13 +323,10 @@ def force_weights(units: Sequence[PointKinematics]) -> Array:
     """
     covariance = velocity_covariance(units)
     missing = [u.unmeasured for u in units]
-    aligned = all(
-        p is None or np.abs(p - np.diag(np.diagonal(p))).max() < ROUNDING for p in missing
-    )
-    if not aligned:
+    if any(np.abs(p - np.diag(np.diagonal(p))).max() >= ROUNDING for p in missing):
         return _turned_weights(covariance, missing)
     weights = np.zeros((len(units), 3, 3))
-    lacks = np.array([np.zeros(3) if p is None else np.diagonal(p) for p in missing]) > 0.5
+    lacks = np.array([np.diagonal(p) for p in missing]) > 0.5
     cut = np.array([clipped_axes(u, CRASH_WINDOW) for u in units])
     for axis in range(3):
         counts = ~lacks[:, axis]
@@ -384,26 +381,22 @@ def least_variance(covariance: Array) -> Array:
     return np.asarray(found / found.sum())
 
 
-def by_none(projections: Sequence[Array | None]) -> Array | None:
-    """Projection onto the directions that none of several units measures."""
-    given = [p for p in projections if p is not None]
-    if len(given) < len(projections):
-        return None
-    values, vectors = np.linalg.eigh(np.mean(given, axis=0))
+def by_none(projections: Sequence[Array]) -> Array:
+    """Projection onto the directions that none of several units measures, (3, 3)."""
+    values, vectors = np.linalg.eigh(np.mean(projections, axis=0))
     kept = vectors[:, values > 1.0 - ROUNDING]
-    return np.asarray(kept @ kept.T) if kept.size else None
+    return np.asarray(kept @ kept.T)
 
 
-def _turned_weights(covariance: Array, missing: Sequence[Array | None]) -> Array:
+def _turned_weights(covariance: Array, missing: Sequence[Array]) -> Array:
     """Weights where a missing axis is not a vehicle axis, so that axes do not separate."""
     information = []
-    for k, unmeasured in enumerate(missing):
+    for k, gone in enumerate(missing):
         own = floored(np.diag(covariance[:, k, k]))
-        gone = np.zeros((3, 3)) if unmeasured is None else unmeasured
         kept = np.eye(3) - gone
         information.append(kept @ np.linalg.inv(kept @ own @ kept + gone) @ kept)
     none = by_none(missing)
-    if none is not None:
+    if none.any():
         # Along directions that no unit measures all units are equally good.
         size = float(np.mean(np.trace(information, axis1=-2, axis2=-1)))
         information = [i + size * none for i in information]
