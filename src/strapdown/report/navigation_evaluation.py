@@ -6,6 +6,7 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -16,7 +17,6 @@ from strapdown.config.navigation import make_aids
 from strapdown.constants import TWO_SIDED_95
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import Finding
-from strapdown.evaluation.control_points import ControlPointScore
 from strapdown.evaluation.plane_bound import plane_bound, plane_reach
 from strapdown.navigation.consistency import (
     ComponentConsistency,
@@ -24,7 +24,6 @@ from strapdown.navigation.consistency import (
     consistency_of,
 )
 from strapdown.navigation.measurements.measurement import lasting
-from strapdown.navigation.outage_test import Withheld as WithheldScores
 from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.navigation.truth_comparison import (
     SmootherConsistency,
@@ -38,6 +37,10 @@ from strapdown.report.document import Trust, reason
 from strapdown.report.values import plain, shown_unit
 from strapdown.systems.navigation_run import NavigationRun, withheld_aid
 from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
+
+if TYPE_CHECKING:
+    from strapdown.evaluation.control_points import ControlPointScore
+    from strapdown.navigation.outage_test import Withheld as WithheldScores
 
 
 @dataclass(frozen=True, eq=False)
