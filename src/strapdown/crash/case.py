@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pandas as pd
 
@@ -16,7 +17,6 @@ from strapdown.crash.delta_v import delta_v
 from strapdown.crash.delta_v_bound import body_delta_v_bound
 from strapdown.crash.entry import Entry
 from strapdown.crash.events import EventRule
-from strapdown.crash.gnss_entry import GnssEntry
 from strapdown.crash.path import (
     CrashPath,
     PathComparison,
@@ -48,6 +48,9 @@ from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.crash_unit import Assumed, CrashUnit, Mounting, RecordedTriad
 from strapdown.sensors.uncertainty import stated_uncertainty
 from strapdown.systems.one_thread import one_thread
+
+if TYPE_CHECKING:
+    from strapdown.crash.gnss_entry import GnssEntry
 
 # Most numbers of a Monte Carlo in memory: half a gigabyte.
 MOST_NUMBERS = 64_000_000
@@ -215,6 +218,8 @@ def _entry(spec: CaseSpec) -> Entry | GnssEntry | None:
     if entry.kind == "standstill":
         return None
     if entry.kind == "gnss":
+        from strapdown.crash.gnss_entry import GnssEntry
+
         assert entry.path is not None
         return GnssEntry(
             read_gnss(entry.path),

@@ -75,14 +75,20 @@ def combine_units(units: Sequence[PointKinematics], method: str = "weighted") ->
             file=next(u.name for u in units if u.unmeasured.any()),
             quantity="units",
         )
-    time = _common_stamps(units)
+    first, last = max(float(u.time[0]) for u in units), min(float(u.time[-1]) for u in units)
+    time = units[0].time
+    time = time[(time >= first) & (time <= last)]
+    if time.size < 2:
+        raise DataError("crash.units-share-samples", quantity="units", size=time.size)
     at = [_at(u, time) for u in units]
     force = np.array([u.force for u in at])
     if method == "weighted":
         weights = np.repeat(force_weights(at)[:, None], time.size, axis=1)
     else:
         weights = _median_weights(force)
-    counted = _turning_measured(at)
+    # Rotation is that of the units that measure it about the most axes; assumed axes do not count.
+    assumed = np.round([np.trace(u.unmeasured_turns) for u in at])
+    counted = np.asarray(assumed == assumed.min())
     turning = _rate_weights(at, counted)
     kind = "weighted mean" if method == "weighted" else method
     name = f"{kind} of {', '.join(u.name for u in units)}"
@@ -110,7 +116,14 @@ def combine_units(units: Sequence[PointKinematics], method: str = "weighted") ->
             for w, r, s, q in zip(weights, at_rest, share, turning, strict=True)
         ],
     )
-    mean = _mean_levelling(units, share)
+    levels = [u.levelling for u in units]
+    mean = Levelling(
+        float(share @ [v.roll_deg for v in levels]),
+        float(share @ [v.pitch_deg for v in levels]),
+        # One unknown of the vehicle, as its name says.
+        float(share @ [v.sd_deg for v in levels]),
+        all(v.from_rest for v in levels),
+    )
     if levelled and rest is not None and rest.accel_mean is not None:
         roll, pitch = level(rest.accel_mean)
         mean = replace(mean, roll_deg=roll, pitch_deg=pitch)
@@ -129,22 +142,6 @@ def combine_units(units: Sequence[PointKinematics], method: str = "weighted") ->
             [u.unmeasured_turns for u, counts in zip(units, counted, strict=True) if counts]
         ),
     )
-
-
-def _turning_measured(units: Sequence[PointKinematics]) -> NDArray[np.bool_]:
-    """Units that measure rotation about the most axes; assumed axes do not count."""
-    assumed = [np.trace(u.unmeasured_turns) for u in units]
-    return np.asarray(np.round(assumed) == np.round(min(assumed)))
-
-
-def _common_stamps(units: Sequence[PointKinematics]) -> Array:
-    first = max(float(u.time[0]) for u in units)
-    last = min(float(u.time[-1]) for u in units)
-    time = units[0].time
-    time = time[(time >= first) & (time <= last)]
-    if time.size < 2:
-        raise DataError("crash.units-share-samples", quantity="units", size=time.size)
-    return time
 
 
 def _at(unit: PointKinematics, time: Array) -> PointKinematics:
@@ -187,17 +184,6 @@ def _common_rest(units: Sequence[PointKinematics], time: Array) -> tuple[float, 
     start, end = max(r.start for r in rests), min(r.end for r in rests)
     within = (time >= start) & (time <= end)
     return (start, end) if within.sum() >= LEAST_SAMPLES else None
-
-
-def _mean_levelling(units: Sequence[PointKinematics], share: Array) -> Levelling:
-    levels = [u.levelling for u in units]
-    return Levelling(
-        float(share @ [v.roll_deg for v in levels]),
-        float(share @ [v.pitch_deg for v in levels]),
-        # One unknown of the vehicle, as its name says.
-        float(share @ [v.sd_deg for v in levels]),
-        all(v.from_rest for v in levels),
-    )
 
 
 def _level(levelling: Levelling) -> Array:

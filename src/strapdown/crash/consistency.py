@@ -234,7 +234,12 @@ def noise_of_sums(at_point: PointKinematics, weights: Array) -> NoiseOfSums:
     """
     m = len(weights)
     prepared, moved, effects = at_point.prepared, at_point.moved, at_point.effects
-    within = _touched(at_point, weights)
+    # Samples with weight in a sum, and those used for their angular acceleration.
+    used = np.flatnonzero(weights.any(axis=0))
+    wide = 0 if moved is None else moved.slope.slope.shape[1]
+    within = slice(0)
+    if used.size:
+        within = slice(max(int(used[0]) - wide, 0), int(used[-1]) + wide + 1)
     few = weights[:, within]
     if prepared is None or moved is None:
         own = _diagonal(effects.force_noise[within])
@@ -250,15 +255,6 @@ def noise_of_sums(at_point: PointKinematics, weights: Array) -> NoiseOfSums:
         by_rate = moved.of_rates_in_sums(weights)[:, within]
         arm = np.einsum("anij,njk->aink", by_rate, turning).reshape(3 * m, -1)
     return NoiseOfSums(blocks.reshape(3 * m, 3 * m), arm, turned, at_point.gyro)
-
-
-def _touched(at_point: PointKinematics, weights: Array) -> slice:
-    """Samples with weight in a sum, and those used for their angular acceleration."""
-    used = np.flatnonzero(weights.any(axis=0))
-    if not used.size:
-        return slice(0, 0)
-    wide = 0 if at_point.moved is None else at_point.moved.slope.slope.shape[1]
-    return slice(max(int(used[0]) - wide, 0), int(used[-1]) + wide + 1)
 
 
 def _diagonal(sd: Array) -> Array:

@@ -37,7 +37,7 @@ from strapdown.sensors.range_merge import (
 from strapdown.sensors.rest import RestStretch, rest_between
 from strapdown.sensors.saturation import RangeLimits, find_limits
 from strapdown.sensors.synchronise import SynchronisedUnit, SynchronisedUnits
-from strapdown.sensors.triad_errors import ZERO, Triad, check_sd, finite, triad_of, triple
+from strapdown.sensors.triad_errors import ZERO, Triad, check_sd, finite, span, triad_of, triple
 from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.sensors.unmeasured import assumed_findings, with_filled_axes, with_gyro
 from strapdown.tables import ACCEL, imu_table
@@ -104,7 +104,7 @@ class Preparation:
             raise ConfigError(
                 "crash.gravity-nowhere-ground", file=unit, quantity="gravity", gravity=self.gravity
             )
-        if not (isinstance(self.rest, str) and self.rest == "auto") and not _is_stretch(self.rest):
+        if not (isinstance(self.rest, str) and self.rest == "auto") and span(self.rest) is None:
             raise ConfigError("crash.no-stretch", file=unit, quantity="rest", rest=self.rest)
         if self.levelling is not None:
             code = "crash.levelling-not-three-numbers"
@@ -124,14 +124,6 @@ class Preparation:
                 )
         check_sd(self.steady_acceleration, "steady_acceleration", "m/s²", unit)
         check_sd(self.steady_rate, "steady_rate", "rad/s", unit)
-
-
-def _is_stretch(given: Any) -> bool:
-    try:
-        start, end = given
-    except (TypeError, ValueError):
-        return False
-    return finite(start) and finite(end) and start < end
 
 
 def prepare_unit(unit: CrashUnit, options: Preparation = Preparation()) -> PreparedUnit:
@@ -175,8 +167,11 @@ def prepare_unit(unit: CrashUnit, options: Preparation = Preparation()) -> Prepa
     own = _find_rest(unit, data, options, noise[0], gyro_noise)
     findings += rest_findings(unit, data.time, own, options)
     unknown = steady_acceleration if own is not None and own.grade == "steady" else 0.0
-    turn = _where_there(
-        gyro_bias_from(own, gyro.axis("bias"), steady_rate=options.steady_rate), unit.gyro.absent
+    turn = gyro_bias_from(own, gyro.axis("bias"), steady_rate=options.steady_rate)
+    # Assumptions for missing axes are reported elsewhere.
+    keep = [k not in unit.gyro.absent for k in range(3)]
+    turn = BiasEstimate(
+        triad_of(np.where(keep, turn.bias, 0.0)), triad_of(np.where(keep, turn.sd, 0.0))
     )
 
     bias, bias_from, bias_sd = _range_biases(unit, data.time, ranges, own)
@@ -195,9 +190,8 @@ def prepare_unit(unit: CrashUnit, options: Preparation = Preparation()) -> Prepa
     standing = None if own is None else in_axes(own, C)
     force = merged.values @ C.T
     if levelling is not None:
-        level, shift = from_stated_attitude(
-            levelling, standing, _stated_sd(triads[0].uncertainty, C), unknown, gravity
-        )
+        stated = np.sqrt(C**2 @ np.asarray(triads[0].uncertainty.axis("bias")) ** 2)
+        level, shift = from_stated_attitude(levelling, standing, stated, unknown, gravity)
         if shift is not None:
             # All ranges are relative to the lowest and shift with it.
             force = force - shift
@@ -313,19 +307,6 @@ def _noise(time: Array, uncertainty: TriadUncertainty) -> Array:
     return np.hypot(white, np.asarray(uncertainty.quantization) / math.sqrt(12.0))
 
 
-def _where_there(found: BiasEstimate, absent: tuple[int, ...]) -> BiasEstimate:
-    """Omit missing axes: their assumptions are reported elsewhere."""
-    keep = [k not in absent for k in range(3)]
-    return BiasEstimate(
-        triad_of(np.where(keep, found.bias, 0.0)), triad_of(np.where(keep, found.sd, 0.0))
-    )
-
-
-def _stated_sd(uncertainty: TriadUncertainty, C: Array) -> Array:
-    """Stated standard deviation of the bias of the lowest range, in vehicle axes."""
-    return np.asarray(np.sqrt(C**2 @ np.asarray(uncertainty.axis("bias")) ** 2))
-
-
 # Joint preparation of units of one vehicle: units without a stationary interval are leveled
 # from units with one.
 
@@ -354,7 +335,16 @@ def prepare_together(
             lent = _attitude_at_start(unit, done[unit.lender])
             if lent is not None:
                 own["levelling"] = lent
-        hint = _gyro_to_borrow(unit, turning)
+        hint = None
+        if turning and unit.lender is None and not _turns(unit):
+            # It has no gyro and borrows none although other units have one.
+            hint = Finding(
+                "crash.gyro-not-borrowed" if len(turning) == 1 else "crash.gyros-not-borrowed",
+                file=unit.unit.name,
+                quantity="gyro",
+                turning=turning,
+                lender=turning[0],
+            )
         try:
             prepared = prepare_unit(unit.unit, Preparation.of(own))
         except DataError as error:
@@ -378,19 +368,6 @@ def _turns(unit: SynchronisedUnit) -> bool:
     """Whether the unit has a gyro that measures, not a substitute for an assumption."""
     gyro = unit.unit.gyro
     return gyro is not None and len(gyro.absent) < 3
-
-
-def _gyro_to_borrow(unit: SynchronisedUnit, turning: Sequence[str]) -> Finding | None:
-    """Report a unit without gyro that borrows none although other units have one."""
-    if unit.lender is not None or _turns(unit) or not turning:
-        return None
-    return Finding(
-        "crash.gyro-not-borrowed" if len(turning) == 1 else "crash.gyros-not-borrowed",
-        file=unit.unit.name,
-        quantity="gyro",
-        turning=turning,
-        lender=turning[0],
-    )
 
 
 def _attitude_at_start(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -28,7 +28,6 @@ from strapdown.crash.delta_v_bound import (
 )
 from strapdown.crash.entry import Entry
 from strapdown.crash.events import PART_563, CrashEvents, EventRule, detect_events
-from strapdown.crash.gnss_entry import GnssEntry, start_from_gnss
 from strapdown.crash.measuring_point import PointKinematics
 from strapdown.crash.path import VELOCITY, CrashPath, path_line, reconstruct_path
 from strapdown.crash.preparation import prepare_together
@@ -36,8 +35,11 @@ from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.mechanization import NorthEastDown
 from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.sensors.synchronise import SynchronisedUnits, synchronise
-from strapdown.sensors.triad_errors import FARTHEST, finite, triple
+from strapdown.sensors.triad_errors import FARTHEST, finite, span, triple
 from strapdown.tables import NED
+
+if TYPE_CHECKING:
+    from strapdown.crash.gnss_entry import GnssEntry
 
 Row = tuple[str, str, float, float, float]
 
@@ -219,8 +221,8 @@ class CrashOptions:
             raise ConfigError(
                 "crash.vehicle-origin", quantity="point", place=place, hypot=math.hypot(*place)
             )
-        if self.window is not None:
-            _check_window(self.window)
+        if self.window is not None and span(self.window) is None:
+            raise ConfigError("crash.window-not-a-pair", quantity="window", window=self.window)
         if not (finite(self.peak_window) and self.peak_window > 0.0):
             raise ConfigError(
                 "crash.no-length", quantity="peak_window", peak_window=self.peak_window
@@ -586,8 +588,14 @@ def reconstruct_crash(
         A path left the range of vehicle motion.
     """
     _check_units(units)
-    if not (entry is None or isinstance(entry, Entry | GnssEntry)):
-        raise _wrong_type("entry", entry)
+    of_fixes = None
+    if not (entry is None or isinstance(entry, Entry)):
+        # Estimation from fixes is loaded where it is needed.
+        from strapdown.crash.gnss_entry import GnssEntry, start_from_gnss
+
+        if not isinstance(entry, GnssEntry):
+            raise _wrong_type("entry", entry)
+        of_fixes = entry
     _check_preparation(options.preparation or {}, {unit.name for unit in units})
     point, combine = options.point, options.combine
     together = synchronise(
@@ -599,10 +607,10 @@ def reconstruct_crash(
         findings += () if of.prepared is None else of.prepared.findings
     # Before each unit estimates its own biases, which absorbs part of the differences.
     comparison = compare_units(there) if len(there) > 1 else None
-    tied: list[Entry | None] = [None if isinstance(entry, GnssEntry) else entry] * len(there)
-    if isinstance(entry, GnssEntry):
+    tied = [entry if isinstance(entry, Entry) else None] * len(there)
+    if of_fixes is not None:
         for k, of in enumerate(there):
-            there[k], tied[k], state = start_from_gnss(of, entry, point)
+            there[k], tied[k], state = start_from_gnss(of, of_fixes, point)
             findings += state.findings
 
     found = tuple(
@@ -653,15 +661,6 @@ def _check_units(units: object) -> None:
     for unit in units:
         if not isinstance(unit, CrashUnit):
             raise _wrong_type("units", unit)
-
-
-def _check_window(window: Any) -> None:
-    try:
-        begin, end = (float(x) for x in window)
-    except (TypeError, ValueError):
-        begin = end = math.nan
-    if not (math.isfinite(begin) and math.isfinite(end) and begin < end):
-        raise ConfigError("crash.window-not-a-pair", quantity="window", window=window)
 
 
 def _wrong_type(quantity: str, given: object) -> ConfigError:
