@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import io
 import sys
 from contextlib import redirect_stderr, redirect_stdout
@@ -10,6 +11,25 @@ from pathlib import Path
 
 import pytest
 from tests.recorded import DATA, without
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the crash tests in the middle: there a second worker begins.
+
+    The first worker compiles the filter's kernels, a third of all compilation; a second one that
+    began with navigation would compile them at the same time.
+    """
+    crash, others = [], []
+    for item in items:
+        (crash if "tests/unit/crash/" in item.path.as_posix() else others).append(item)
+    half = (len(items) + 1) // 2
+    items[:] = [*others[:half], *crash, *others[half:]]
+
+
+def pytest_collection_finish() -> None:
+    """Except what collecting made from garbage collection: it lives as long as the run."""
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import difflib
 import string
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from copy import copy
 from functools import cache
 from importlib import resources
@@ -37,6 +37,7 @@ __all__ = [
     "Severity",
     "StrapdownError",
     "Words",
+    "check_choice",
     "nearest",
 ]
 
@@ -236,6 +237,38 @@ class DivergenceError(StrapdownError):
     """A computation left the range in which its result means anything."""
 
     exit_code = 5
+
+
+def check_choice(
+    code: str,
+    known: Collection[str],
+    *,
+    quantity: str,
+    file: str | None = None,
+    **choice: Any,
+) -> None:
+    """Refuse a choice that is not known.
+
+    Parameters
+    ----------
+    code : str
+        Of the `ConfigError`.
+    known : collection of str
+        Choices, or the table whose keys they are.
+    quantity, file : str
+        As in `Finding`.
+    **choice
+        The choice, by its name in the data of the finding.
+    """
+    ((name, chosen),) = choice.items()
+    if chosen not in known:
+        raise ConfigError(
+            code,
+            file=file,
+            quantity=quantity,
+            data={name: chosen, "word": str(chosen)},
+            known=known,
+        )
 
 
 def nearest(word: str, known: Iterable[str], also: Iterable[str] = ()) -> str:

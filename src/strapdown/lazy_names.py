@@ -1,14 +1,14 @@
-"""Public names of a package that are loaded on first use."""
+"""Names and choices that are loaded on first use."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, MutableMapping
 from importlib import import_module
 from types import ModuleType
 from typing import Any
 
-__all__ = ["load_on_first_use"]
+__all__ = ["Choices", "load_on_first_use"]
 
 
 def load_on_first_use(package: str, homes: Mapping[str, str]) -> None:
@@ -40,3 +40,36 @@ class _Lazy(ModuleType):
 
     def __dir__(self) -> list[str]:
         return sorted({*self.__dict__, *self.__dict__["_homes"]})
+
+
+class Choices(MutableMapping[str, Any]):
+    """A literal table of choices, of which a run loads those that it takes.
+
+    `homes`: by name, ``module:attribute``.
+    """
+
+    def __init__(self, homes: Mapping[str, str]) -> None:
+        self._homes, self._loaded = dict(homes), dict[str, Any]()
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self._loaded:
+            home, _, attribute = self._homes[name].partition(":")
+            self._loaded[name] = getattr(import_module(home), attribute)
+        return self._loaded[name]
+
+    def __setitem__(self, name: str, entry: Any) -> None:
+        self._homes.setdefault(name, "")
+        self._loaded[name] = entry
+
+    def __delitem__(self, name: str) -> None:
+        del self._homes[name]
+        self._loaded.pop(name, None)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._homes
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._homes)
+
+    def __len__(self) -> int:
+        return len(self._homes)

@@ -64,6 +64,7 @@ def test_three_systems_on_one_page_each_with_its_bound_and_the_truth(shown):
     assert found.out.endswith(f"Open  {Path('demo') / 'index.html'}\n")
 
 
+@pytest.mark.slow
 def test_the_page_needs_nothing_else_and_its_links_lead_somewhere(shown):
     folder, _ = shown
     page = (folder / "index.html").read_text(encoding="utf-8")
@@ -75,6 +76,7 @@ def test_the_page_needs_nothing_else_and_its_links_lead_somewhere(shown):
         assert (folder / link).is_file(), link
 
 
+@pytest.mark.slow
 def test_it_says_in_one_line_what_is_missing(shown):
     folder, found = shown
     (line,) = [line for line in found.err.splitlines() if line.startswith("note: Further")]
@@ -83,6 +85,7 @@ def test_it_says_in_one_line_what_is_missing(shown):
     assert line.removeprefix("note: ") in unescape((folder / "index.html").read_text("utf-8"))
 
 
+@pytest.mark.slow
 def test_what_is_shown_is_what_the_commands_shown_make(shown, run_cli, monkeypatch):
     folder, _ = shown
     monkeypatch.chdir(folder.parent)
@@ -97,12 +100,14 @@ def test_what_is_shown_is_what_the_commands_shown_make(shown, run_cli, monkeypat
     assert ours == theirs
 
 
+@pytest.mark.slow
 def test_the_page_of_the_same_results_is_the_same(shown):
     folder, _ = shown
     runs = [r.shown for r in command.demo_runs(Path("demo"), Path("nowhere")) if not r.needs]
     assert demo_page(runs, folder) == demo_page(runs, folder)
 
 
+@pytest.mark.slow
 def test_results_that_are_there_are_kept_without_force(shown, run_cli, monkeypatch):
     folder, _ = shown
     monkeypatch.chdir(folder.parent)
@@ -159,6 +164,7 @@ def test_what_is_packaged_can_be_read(name):
     assert tomllib.loads(text)["title"]
 
 
+@pytest.mark.slow
 def test_the_real_drive_comes_first_and_is_scored_by_its_reference(shown):
     folder, found = shown
     assert found.out.startswith("A  A real drive")

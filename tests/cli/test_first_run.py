@@ -18,7 +18,7 @@ SOURCE = Path(__file__).parents[2] / "src" / "strapdown"
 
 
 def test_no_kernel_is_compiled_with_relaxed_arithmetic():
-    # A contracted product depends on what the compiler inlines: see _kernels/given_arrays.py.
+    # A contracted product depends on what the compiler inlines: see _kernels/compilation.py.
     relaxed = [
         path.name
         for path in SOURCE.rglob("*.py")

@@ -38,10 +38,13 @@ SLOW = {
     "health",
     "mechanization",
     "navigate",
+    "prefilter",
     "references",
     "results",
+    "scenarios",
     "smoothing",
     "start",
+    "trajectories",
     "trust",
     "walking",
 }

@@ -127,6 +127,7 @@ def test_the_drive_of_the_readme_is_what_is_drawn_now(driven, tmp_path):
     compare_chart(chart, "drive_plan.svg", tmp_path)
 
 
+@pytest.mark.slow
 def test_the_light_of_the_manual_is_what_is_drawn_now(driven, tmp_path):
     compare_chart(light_chart(driven), "trust_light.svg", tmp_path)
 

@@ -41,13 +41,14 @@ def largest(drive, clock, length):
 # known at both, the chord is taken off, and a t^2 / 8 is left in the middle. So a smoother leaves
 # no more than a quarter; 3 leaves room for the noise of the fixes, which is most of what is left
 # after 10 s. Measured: 6.7, 20 and 13 times less.
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("length", "median", "worst"),
     # A half more than measured: 0.11 (0.18), 0.43 (0.56), 0.96 (1.37) m.
     [
-        pytest.param(10.0, 0.17, 0.27, marks=pytest.mark.slow, id="10"),
+        pytest.param(10.0, 0.17, 0.27, id="10"),
         pytest.param(30.0, 0.64, 0.84, id="30"),
-        pytest.param(60.0, 1.44, 2.06, marks=pytest.mark.slow, id="60"),
+        pytest.param(60.0, 1.44, 2.06, id="60"),
     ],
 )
 def test_later_fixes_leave_a_third_of_an_outage_at_most(drive, clock, length, median, worst):

@@ -18,6 +18,8 @@ from strapdown.systems.navigation_proposal import propose
 from strapdown.systems.navigation_run import run_navigation
 from strapdown.tables import GEODETIC
 
+pytestmark = pytest.mark.slow
+
 MOUNTING = -6.8
 #: The way before and after that its slope is of, m: about the distance of the axles.
 WAY = 2.0
@@ -50,7 +52,6 @@ def slopes(fixes):
     return fixes.index.to_numpy()[good], np.degrees(np.arctan2(rise, 2.0 * WAY))[good]
 
 
-@pytest.mark.slow
 def test_the_pitch_is_that_of_the_road_within_its_bound(result):
     made, run = result
     offset = made.table["aiding"]["gnss"]["time_offset_s"]

@@ -92,6 +92,7 @@ def test_no_component_is_worse_than_that_of_python_ins(name, sampling):
     assert (found <= rounding(HOUR * MOTIONS[name][1], HOUR)).all(), found
 
 
+@pytest.mark.slow
 def test_the_trapezoid_costs_both_the_same():
     """Rates joined by a line: the line errs by dt²/12 of the curvature, whoever integrates it.
 
@@ -101,6 +102,7 @@ def test_the_trapezoid_costs_both_the_same():
     assert found.to_numpy() == pytest.approx(peer[found.index].to_numpy(), rel=0.07)
 
 
+@pytest.mark.slow
 def test_means_need_no_cubic_to_be_as_good():
     """The line through two means holds their integrals: what is left has the third order."""
     found, peer = ours("sine", "mean", "linear").max(), theirs("sine", "mean")

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from numba import njit
 
-from strapdown._kernels.given_arrays import GIVEN
+from strapdown._kernels.compilation import IN_PLACE
 from strapdown._kernels.rotation_vector import cross
 
 #: Iterations; each evaluates the errors at the inputs found by the previous one.
 ROUNDS = 5
 
 
-@njit(**GIVEN)
+@njit(**IN_PLACE)
 def errors_of_states(terms, states, out):
     """Fill (7, 3): the effect of coupling states, given by their terms, on a triad's readings."""
     for i in range(7):
@@ -62,7 +62,7 @@ def of_inputs(gyro, of_gyros, accel, of_accels, rate, force):
     return dx, dy, dz, ex, ey, ez
 
 
-@njit(**GIVEN)
+@njit(**IN_PLACE)
 def true_inputs(readings, gyro, accel, out):
     """Fill rate and force (6,) of readings without errors (7, 3) of gyros and accelerometers."""
     rate = (readings[0], readings[1], readings[2])
@@ -72,7 +72,7 @@ def true_inputs(readings, gyro, accel, out):
     out[3], out[4], out[5] = force[0] - ex, force[1] - ey, force[2] - ez
 
 
-@njit(**GIVEN)
+@njit(**IN_PLACE)
 def compensate(rows, gyro, accel, out):
     """Fill increments without the errors (7, 3) of gyros and accelerometers (`errors_of_states`).
 

@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numba import njit
 
-from strapdown._kernels.given_arrays import dot, fma
+from strapdown._kernels.compilation import dot, fma
 
 
 @njit(cache=True, error_model="numpy")

@@ -12,9 +12,9 @@ import numpy as np
 from numba import njit
 
 from strapdown._kernels.compensation import compensate, errors_of_states
+from strapdown._kernels.compilation import IN_PLACE
 from strapdown._kernels.covariance import dense_update, ud_update, udu_matrix, udu_predict, wd_epoch
 from strapdown._kernels.earth import E2, RATE, A, displacement
-from strapdown._kernels.given_arrays import GIVEN
 from strapdown._kernels.growth import grown_covariance, growth_of_step, unfold_growth
 from strapdown._kernels.level import (
     WANDER,
@@ -66,7 +66,7 @@ BEYOND = 1.000001
 # filled; otherwise `notes` is empty.
 
 
-@njit(**GIVEN)
+@njit(**IN_PLACE)
 def growth_of_group(kinds, model, states, group, count, room):
     """Fill transition and noise over the steps of a group."""
     which, _, held = kinds
@@ -99,7 +99,7 @@ def growth_of_group(kinds, model, states, group, count, room):
     growth_of_step(f, decay, dt, matrix, gyro_noise, accel_noise, drive, still, growth, work)
 
 
-@njit(**GIVEN)
+@njit(**IN_PLACE)
 def matrix_over_group(states, room):
     """Propagate a covariance matrix over a group; return -1, or the first invalid state."""
     return grown_covariance(states[2], room[1], room[2])
@@ -115,7 +115,7 @@ def factors_over_group(states, room):
     return bad
 
 
-@njit(**GIVEN)
+@njit(**IN_PLACE)
 def begin_group(states, group, count, room):
     """Begin a group where one of `count` steps ended."""
     state, at_covariance, _, sensors, times, _ = states

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from strapdown._kernels.given_arrays import GIVEN
+from strapdown._kernels.compilation import IN_PLACE
 
 CORE = 9
 SIXTH = 1.0 / 6.0
@@ -65,7 +65,7 @@ def growth_room(n: int) -> tuple[Any, ...]:
     )
 
 
-@njit(**GIVEN, forceinline=True)
+@njit(**IN_PLACE, forceinline=True)
 def driven(a, x0, x1, x2, x3, x4, x5, x6, x7, x8):
     """Change of the core by F, whose first panel is `a`: nine numbers of nine."""
     return (
@@ -84,13 +84,13 @@ def driven(a, x0, x1, x2, x3, x4, x5, x6, x7, x8):
     )
 
 
-@njit(**GIVEN, forceinline=True)
+@njit(**IN_PLACE, forceinline=True)
 def to_third_order(x, y, z):
     """``exp(F dt)`` and ``exp(F dt/2)``, each less one, of F dt, its square and its cube."""
     return x + 0.5 * y + SIXTH * z, 0.5 * x + 0.125 * y + 0.125 * SIXTH * z
 
 
-@njit(**GIVEN, forceinline=True)
+@njit(**IN_PLACE, forceinline=True)
 def series(a, one, fading, whole, half):
     """Fill a panel of ``exp(F dt)`` and of ``exp(F dt/2)``, less one, to third order.
 
@@ -121,7 +121,7 @@ def series(a, one, fading, whole, half):
         whole[128 + j], half[128 + j] = to_third_order(x8, y8, z8)
 
 
-@njit(**GIVEN)
+@njit(**IN_PLACE)
 def turn_columns(panel, at, matrix):
     """Multiply the three columns of a panel from `at` on by a matrix, (3, 3)."""
     for i in range(at, at + PANEL, LANES):
@@ -131,7 +131,7 @@ def turn_columns(panel, at, matrix):
         panel[i + 2] = x * matrix[0, 2] + y * matrix[1, 2] + z * matrix[2, 2]
 
 
-@njit(**GIVEN)
+@njit(**IN_PLACE)
 def growth_of_step(f, decay, dt, matrix, gyro_noise, accel_noise, drive, still, growth, room):
     """Fill transition and noise of a step of dynamics f, (9, `padded_width`).
 
@@ -179,7 +179,7 @@ def growth_of_step(f, decay, dt, matrix, gyro_noise, accel_noise, drive, still, 
                         lift[p, LANES * i + j] = 0.0
 
 
-@njit(**GIVEN, forceinline=True)
+@njit(**IN_PLACE, forceinline=True)
 def add_product(a, m, first, second, third, fourth, out):
     """Add to a panel the columns m to m + 3 of panel `a` times four rows of LANES."""
     a0, a1, a2, a3 = a[m], a[m + 1], a[m + 2], a[m + 3]
@@ -204,7 +204,7 @@ def add_product(a, m, first, second, third, fourth, out):
         out[128 + j] += i0 * w + i1 * x + i2 * y + i3 * z
 
 
-@njit(**GIVEN, forceinline=True)
+@njit(**IN_PLACE, forceinline=True)
 def times_covariance(phi, P, wide, out):
     """Fill the panels of ``Phi P``; `wide` takes P in panels, (panels, rows by fours, LANES)."""
     n = P.shape[0]
@@ -225,7 +225,7 @@ def times_covariance(phi, P, wide, out):
                 add_product(phi[q], m, part[i], part[i + 1], part[i + 2], part[i + 3], panel)
 
 
-@njit(**GIVEN, forceinline=True)
+@njit(**IN_PLACE, forceinline=True)
 def core_products(a, b, c, d, P):
     """Fill the upper half of the core of P: rows of panel a times rows of b, of c times d.
 
@@ -251,7 +251,7 @@ def core_products(a, b, c, d, P):
             )
 
 
-@njit(**GIVEN)
+@njit(**IN_PLACE)
 def add_column_products(a, b, scale, j, P):
     """Add to the upper half of the core of P a column of panel a times the same of b."""
     for i in range(CORE):
@@ -260,7 +260,7 @@ def add_column_products(a, b, scale, j, P):
             P[i, k] += factor * b[LANES * k + j]
 
 
-@njit(**GIVEN)
+@njit(**IN_PLACE)
 def grown_covariance(P, growth, room):
     """Replace P by ``Phi P Phi' + Q``, exactly symmetric; `growth` is of `growth_of_step`.
 
@@ -298,7 +298,7 @@ def grown_covariance(P, growth, room):
     return bad
 
 
-@njit(**GIVEN)
+@njit(**IN_PLACE)
 def unfold_growth(growth, Phi, Q):
     """Fill the transition and the covariance of noise of a step, (n, n) each."""
     phi, lift, weight, tail, own = growth
@@ -324,7 +324,7 @@ def unfold_growth(growth, Phi, Q):
             Q[i, j] = Q[j, i]
 
 
-@njit(**GIVEN)
+@njit(**IN_PLACE)
 def compose_growth(step, added, phi, q, work):
     """Append a step: ``phi <- step phi`` and ``q <- step q step' + added``; all are (n, n).
 

@@ -13,8 +13,8 @@ import math
 import numpy as np
 from numba import njit
 
+from strapdown._kernels.compilation import IN_PLACE
 from strapdown._kernels.earth import E2, A, radii, transport_rate
-from strapdown._kernels.given_arrays import GIVEN
 from strapdown._kernels.ned import ALT as NED_ALT
 from strapdown._kernels.ned import LAT, LON, Q, V, displace, level_turn, turn_back
 from strapdown._kernels.rotation import (
@@ -65,7 +65,7 @@ def curvatures(sine, alt, a, e2):
 # North-east-down.
 
 
-@njit(**GIVEN)
+@njit(**IN_PLACE)
 def ned_levels(history, earth, out):
     """Fill level rows from rows of a history."""
     for i in range(history.shape[0]):
@@ -83,7 +83,7 @@ def ned_levels(history, earth, out):
         )
 
 
-@njit(**GIVEN)
+@njit(**IN_PLACE)
 def ned_correct(row, error, earth):
     """Remove an error from position, velocity and attitude of a row of a history, in place.
 
@@ -111,7 +111,7 @@ def ned_correct(row, error, earth):
     row[Q], row[Q + 1], row[Q + 2], row[Q + 3] = bw, bx, by, bz
 
 
-@njit(**GIVEN)
+@njit(**IN_PLACE)
 def ned_correct_rows(rows, errors, earth):
     """Remove an error from each row, in place."""
     for i in range(rows.shape[0]):

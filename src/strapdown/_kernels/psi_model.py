@@ -14,8 +14,8 @@ import math
 
 from numba import njit
 
+from strapdown._kernels.compilation import IN_PLACE
 from strapdown._kernels.earth import E2, GAMMA, RATE, A, F, K, M, gravity_around
-from strapdown._kernels.given_arrays import GIVEN
 from strapdown._kernels.growth import CORE, compose_growth, growth_of_step, unfold_growth
 from strapdown._kernels.level import ALT, AXIS, OMEGA_EL, Q_LB, curvatures
 from strapdown._kernels.rotation import dcm_from_quat
@@ -36,7 +36,7 @@ def minus_cross(f, row, column, x, y, z):
     f[row + 2, column], f[row + 2, column + 1] = y, -x
 
 
-@njit(**GIVEN)
+@njit(**IN_PLACE)
 def gravity_gradient(f, row, column, level, up, earth):
     """Set the block at (row, column) to the change of gravity, as a vector, with position.
 
@@ -75,7 +75,7 @@ def gravity_gradient(f, row, column, level, up, earth):
     return g
 
 
-@njit(**GIVEN)
+@njit(**IN_PLACE)
 def couple(f, row, matrix, terms, rate, force):
     """Add to the sensors' columns of three rows ``matrix @ coupling(rate, force)``.
 
@@ -93,7 +93,7 @@ def couple(f, row, matrix, terms, rate, force):
             f[row + i, j] += weight * matrix[i, axis]
 
 
-@njit(**GIVEN)
+@njit(**IN_PLACE)
 def psi_dynamics(f, level, up, matrix, specific, rate, force, gyro, accel, held, earth):
     """Fill the first nine rows of F, (9, w).
 
@@ -125,7 +125,7 @@ def psi_dynamics(f, level, up, matrix, specific, rate, force, gyro, accel, held,
             f[2, j] = f[5, j] = 0.0
 
 
-@njit(**GIVEN)
+@njit(**IN_PLACE)
 def means_of_steps(states, q_at, rows, at, longest, matrix):
     """Fill `matrix` (6, 3) with means over the steps from `at` on, up to `longest` seconds.
 
@@ -175,7 +175,7 @@ def means_of_steps(states, q_at, rows, at, longest, matrix):
     return end, dt
 
 
-@njit(**GIVEN)
+@njit(**IN_PLACE)
 def psi_transitions(
     levels,
     rows,

@@ -14,8 +14,8 @@ import math
 import numpy as np
 from numba import njit
 
+from strapdown._kernels.compilation import IN_PLACE, dot
 from strapdown._kernels.covariance import udu_matrix
-from strapdown._kernels.given_arrays import GIVEN, dot
 from strapdown._kernels.growth import LANES as GROWTH_LANES
 from strapdown._kernels.level import level_place
 
@@ -80,7 +80,7 @@ def inverse(P, out):
             out[i, j] = out[j, i] = total
 
 
-@njit(**GIVEN)
+@njit(**IN_PLACE)
 def product(A, B, n, out):
     """Fill ``A B``, (n, n) within padded matrices."""
     for i in range(n):
@@ -94,7 +94,7 @@ def product(A, B, n, out):
                     out[i, p + j] += a * B[m, p + j]
 
 
-@njit(**GIVEN)
+@njit(**IN_PLACE)
 def sandwich(A, S, n, half, out):
     """Fill ``A S A'``, symmetric S, (n, n) within padded matrices; `half` is a work array."""
     product(A, S, n, half)
@@ -103,7 +103,7 @@ def sandwich(A, S, n, half, out):
             out[i, j] = out[j, i] = dot(half[i], A[j], half.shape[1])
 
 
-@njit(**GIVEN)
+@njit(**IN_PLACE)
 def unpack_growth(row, n, core, decay):
     """Fill the first rows of a transition, and the decay of the others, padded, from a row."""
     at = begin_of_move(n)
@@ -116,7 +116,7 @@ def unpack_growth(row, n, core, decay):
         at += 1
 
 
-@njit(**GIVEN)
+@njit(**IN_PLACE)
 def estimate_of(row, told, n, out):
     """Fill ``P l`` with the covariance P of a row."""
     at = COVARIANCE
@@ -132,7 +132,7 @@ def estimate_of(row, told, n, out):
         at += n - i
 
 
-@njit(**GIVEN)
+@njit(**IN_PLACE)
 def told_before_growth(core, decay, told, new):
     """Replace l by ``Phi' l``; vectors are padded."""
     for p in range(0, told.shape[0], LANES):
@@ -146,7 +146,7 @@ def told_before_growth(core, decay, told, new):
         told[j] = new[j]
 
 
-@njit(**GIVEN)
+@njit(**IN_PLACE)
 def less_before_growth(core, decay, less, n, half):
     """Replace L by ``Phi' L Phi``, exactly symmetric; padded matrices, `half` to work in."""
     for i in range(n):
@@ -282,7 +282,7 @@ def row_width(n):
     return max(begin_of_taken(n) + n, begin_of_move(n) + CORE * n + n - CORE)
 
 
-@njit(**GIVEN)
+@njit(**IN_PLACE)
 def unpack(row, at, out):
     """Fill a symmetric matrix from its upper half, row by row, from an index of a row on."""
     n = out.shape[0]
@@ -292,7 +292,7 @@ def unpack(row, at, out):
             at += 1
 
 
-@njit(**GIVEN)
+@njit(**IN_PLACE)
 def pack(matrix, row, at):
     """Write the upper half of a symmetric matrix, row by row, from an index of a row on."""
     n = matrix.shape[0]

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from strapdown.alignment.alignment import CoarseAlignment
-from strapdown.alignment.gnss_course import GnssCourse
-from strapdown.alignment.inertial_frame import InertialFrame
-from strapdown.alignment.levelling import KnownHeading, Levelling
-from strapdown.alignment.two_vector import TwoVector
+from strapdown.lazy_names import Choices
 
 #: A new method is a new file and a line here.
-COARSE_ALIGNMENTS: dict[str, type[CoarseAlignment]] = {
-    "levelling": Levelling,
-    "known_heading": KnownHeading,
-    "two_vector": TwoVector,
-    "inertial_frame": InertialFrame,
-    "gnss_course": GnssCourse,
-}
+COARSE_ALIGNMENTS: Mapping[str, type[CoarseAlignment]] = Choices(
+    {
+        "levelling": "strapdown.alignment.levelling:Levelling",
+        "known_heading": "strapdown.alignment.levelling:KnownHeading",
+        "two_vector": "strapdown.alignment.two_vector:TwoVector",
+        "inertial_frame": "strapdown.alignment.inertial_frame:InertialFrame",
+        "gnss_course": "strapdown.alignment.gnss_course:GnssCourse",
+    }
+)

@@ -27,7 +27,7 @@ from strapdown.alignment.record_checks import (
 from strapdown.constants import DEG_PER_HOUR
 from strapdown.dsp.chi_square import chi_square_exceeded
 from strapdown.earth import earth_rate
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import DataError, Finding, check_choice
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import GYRO
 from strapdown.tables.checks import source_of
@@ -62,14 +62,7 @@ class InertialFrame(CoarseAlignment):
     at: str = "end"
 
     def __post_init__(self) -> None:
-        if self.at not in EPOCHS:
-            raise ConfigError(
-                "alignment.unknown-epoch",
-                quantity="at",
-                at=self.at,
-                word=str(self.at),
-                known=EPOCHS,
-            )
+        check_choice("alignment.unknown-epoch", EPOCHS, quantity="at", at=self.at)
 
     def align(
         self,

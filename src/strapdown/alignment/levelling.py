@@ -171,22 +171,6 @@ def level_at_rest(
     return Alignment(method, float(imu.index[-1]), q_nb, covariance, findings=tuple(findings))
 
 
-def _disturbed(
-    length: float, loud: float, turning: float, swing: Array, source: str | None
-) -> Finding:
-    return Finding(
-        "alignment.specific-force-scatters",
-        file=source,
-        quantity="accel",
-        blocks=BLOCKS,
-        length=length / BLOCKS,
-        loud=loud,
-        turning=turning,
-        in_bound=True,
-        swing_deg=np.degrees(np.sqrt(np.trace(swing))),
-    )
-
-
 # Attitude errors for a force known in both frames and a stated heading.
 
 #: Beyond this pitch, deg, heading and roll axes coincide to within a minute of arc.

@@ -97,7 +97,7 @@ def align(
             sensor=sensor,
             coarse={"kind": method} if isinstance(method, str) else method,
             fine=fine,
-            gnss=None if fixes is None else keys_in(fixes, folder / "gnss.csv")["path"],
+            gnss=None if fixes is None else keys_in(fixes, folder / "gnss.csv"),
             prefilter={"kind": prefilter} if isinstance(prefilter, str) else prefilter,
         )
         run = run_alignment(spec, None, progress)
@@ -117,7 +117,7 @@ def specify_alignment(
     sensor: str | Path | None,
     coarse: Mapping[str, Any],
     fine: bool,
-    gnss: str | None = None,
+    gnss: Mapping[str, Any] | None = None,
     prefilter: Mapping[str, Any] | None = None,
     called: Callable[[str], str] = str,
 ) -> AlignmentSpec:
@@ -126,8 +126,10 @@ def specify_alignment(
     Parameters
     ----------
     log : ImuFile
-    site, sensor, fine, gnss
+    site, sensor, fine
         As `align`.
+    gnss : mapping, optional
+        The file of fixes, as the table ``gnss`` of a configuration.
     coarse, prefilter : mapping
         The module with its options, including ``kind``.
     called : callable
@@ -155,7 +157,7 @@ def specify_alignment(
             "site": _site(log.log.path, site or {}, called),
             "sensors": {"sensor": str(sensor)},
             "prefilter": dict(prefilter or {"kind": "none"}),
-            "gnss": None if gnss is None else {"path": gnss},
+            "gnss": gnss,
             "coarse": dict(coarse),
             "fine": {"kind": "none" if alone else "filter"},
         }

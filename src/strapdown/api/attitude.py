@@ -22,7 +22,7 @@ from strapdown.attitude_comparison.comparison import (
     run_comparison,
 )
 from strapdown.attitude_comparison.options import AttitudeOptions
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, check_choice
 from strapdown.increments import increments_from_imu
 from strapdown.progress import Progress, silent
 from strapdown.sensors.rest import find_rests
@@ -345,12 +345,9 @@ def compare_attitude(
     -----
     Alexiev (2021). Earth rotation is neglected, as in the paper: 15 deg/h.
     """
-    known = {f.name for f in fields(AttitudeOptions)}
+    known = [f.name for f in fields(AttitudeOptions)]
     for name in changes:
-        if name not in known:
-            raise ConfigError(
-                "api.unknown-option", quantity="options", name=name, word=name, known=known
-            )
+        check_choice("api.unknown-option", known, quantity="options", name=name)
     if algorithms is not None:
         changes["algorithms"] = algorithms
     if _is_named(source):

@@ -15,7 +15,7 @@ from strapdown.bundle.seal import Seal, check_destination
 from strapdown.config.crash_case import CaseSpec
 from strapdown.crash.case import CaseResult, run_case
 from strapdown.crash.reconstruction import UnitReconstruction
-from strapdown.errors import ConfigError
+from strapdown.errors import check_choice
 from strapdown.progress import Progress, silent
 from strapdown.report.crash_case import CRASH
 
@@ -99,10 +99,7 @@ class CrashRun(CaseResult):
 
         drawn = drawings(crash_document(self, ""))
         charts = {one.slug: one for one in drawn if isinstance(one, Chart)}
-        if kind not in charts:
-            raise ConfigError(
-                "api.unknown-case-chart", quantity="kind", kind=kind, word=kind, known=charts
-            )
+        check_choice("api.unknown-case-chart", charts, quantity="kind", kind=kind)
         return ChartFigure(charts[kind])
 
     def save(

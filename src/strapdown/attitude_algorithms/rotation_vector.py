@@ -9,7 +9,7 @@ import numpy as np
 
 from strapdown._kernels import rotation_vector as kernel
 from strapdown.attitude_algorithms.algorithm import Accuracy, Array, AttitudeAlgorithm
-from strapdown.errors import ConfigError
+from strapdown.errors import ConfigError, check_choice
 
 _COEFFICIENTS = {"auto": kernel.AUTO, "miller": kernel.MILLER, "fit": kernel.FIT}
 
@@ -53,14 +53,12 @@ class RotationVector(AttitudeAlgorithm):
             raise ConfigError(
                 "attitude.out-range-3", quantity="rotvec:samples", samples=self.samples
             )
-        if self.coefficients not in _COEFFICIENTS:
-            raise ConfigError(
-                "attitude.no-kind-coefficients",
-                quantity="rotvec:coefficients",
-                coefficients=self.coefficients,
-                word=str(self.coefficients),
-                known=_COEFFICIENTS,
-            )
+        check_choice(
+            "attitude.no-kind-coefficients",
+            _COEFFICIENTS,
+            quantity="rotvec:coefficients",
+            coefficients=self.coefficients,
+        )
 
     def begin(self, q_nb: Array) -> Array:
         """Return the quaternion now and at the block's start, and an empty block."""

@@ -166,7 +166,7 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
             sensor=given["sensor"],
             coarse=module_of_flag(given["method"] or "inertial_frame"),
             fine=not given["coarse_only"],
-            gnss=None if given["gnss"] is None else str(given["gnss"]),
+            gnss=None if given["gnss"] is None else {"path": str(given["gnss"])},
             prefilter=module_of_flag(given["prefilter"] or "none"),
             called=lambda argument: f"--{argument}",
         )

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
-from pydantic import Field, FiniteFloat
-
-from strapdown.config.spec import Spec, specify
 from strapdown.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
     from strapdown.config.crash_case import CaseSpec
     from strapdown.config.motions import TrajectorySpec
+    from strapdown.config.sources import (
+        CrashSimulationSpec,
+        LogSpec,
+        ScenarioSpec,
+        SimulateSpec,
+    )
+    from strapdown.config.spec import specify
 
 __all__ = [
     "CaseSpec",
@@ -28,49 +32,7 @@ load_on_first_use(
     {
         "crash_case": "CaseSpec",
         "motions": "TrajectorySpec",
+        "sources": "CrashSimulationSpec LogSpec ScenarioSpec SimulateSpec",
+        "spec": "specify",
     },
 )
-
-
-class ScenarioSpec(Spec):
-    """A simulated log; `sensor` replaces the scenario's own errors."""
-
-    kind: Literal["scenario"] = "scenario"
-    name: str
-    rate_hz: FiniteFloat = 100.0
-    sampling: str = "instantaneous"
-    seed: int = Field(default=0, ge=0)
-    sensor: str | None = None
-
-
-class LogSpec(Spec):
-    """A recorded log and how to read it; None means as stated in the log."""
-
-    kind: Literal["log"] = "log"
-    path: str
-    columns: dict[str, str] = Field(default_factory=dict)
-    gyro_unit: str | None = None
-    accel_unit: str | None = None
-    time_unit: str | None = None
-    axes: str | None = None
-    sampling: str | None = None
-    rate_hz: FiniteFloat | None = None
-    repair: bool = False
-
-
-class SimulateSpec(Spec):
-    """One run of the simulator."""
-
-    scenario: ScenarioSpec
-    formats: tuple[str, ...] = ("csv",)
-
-
-class CrashSimulationSpec(Spec):
-    """One crash and its recorders; without a rate each recorder uses its own."""
-
-    name: str
-    units: tuple[str, ...] = ()
-    rate_hz: FiniteFloat | None = Field(default=None, gt=0.0)
-    sampling: Literal["instantaneous", "mean"] = "instantaneous"
-    seed: int = Field(default=0, ge=0)
-    formats: tuple[str, ...] = ("csv",)

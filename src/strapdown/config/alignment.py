@@ -33,6 +33,7 @@ from strapdown.config.spec import (
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.formats.columns import parse_axes, parse_unit
+from strapdown.formats.gnss_fixes import GnssOptions
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.triad_errors import NAMED_AXES, check_axes_matrix
 from strapdown.sensors.uncertainty import ImuUncertainty, stated_imu
@@ -86,10 +87,26 @@ class LogTable(Spec):
         return self.duration_s
 
 
-class GnssTable(Spec):
-    """GNSS fixes for an alignment in motion."""
+class FixesTable(Spec):
+    """A file of fixes, and statements about it."""
 
     path: FileName
+    #: Column name by quantity, where it differs.
+    columns: dict[Word, Word] = Field(default_factory=dict)
+    #: Standard deviations, replacing those of the file.
+    position_sd_m: OneOrThree | None = None
+    velocity_sd_m_per_s: OneOrThree | None = None
+    #: Leave out unusable rows, and report them.
+    repair: StrictBool = False
+
+    def options(self) -> GnssOptions:
+        """The statements, as a reader of fixes takes them."""
+        return GnssOptions(
+            columns=self.columns,
+            position_sd=self.position_sd_m,
+            velocity_sd=self.velocity_sd_m_per_s,
+            repair=self.repair,
+        )
 
 
 class SimulationTable(Spec):
@@ -220,7 +237,7 @@ class AlignmentSpec(FileSpec):
     title: Words = ""
     log: LogTable | None = None
     simulation: SimulationTable | None = None
-    gnss: GnssTable | None = None
+    gnss: FixesTable | None = None
     axes: AxesTable = AxesTable()
     site: SiteTable = Field(description="where the body stands")
     sensors: SensorsTable = SensorsTable()

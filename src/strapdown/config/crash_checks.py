@@ -13,8 +13,10 @@ from strapdown.constants import ACCEL_UNITS, GYRO_UNITS, TIME_UNITS
 from strapdown.crash.severity import SEVERITY_MODELS
 from strapdown.errors import Finding, StrapdownError
 from strapdown.formats.columns import unit_of
-from strapdown.sensors.catalogue import KEYS, SENSORS, load_sensor
-from strapdown.sensors.uncertainty import SHEET_FACTS, SPREADS
+from strapdown.sensors.catalogue import SENSORS, load_sensor
+from strapdown.sensors.crash_unit import LONGEST as LONGEST_ASSUMED
+from strapdown.sensors.crash_unit import MOST_CHANGE, MOST_TURN
+from strapdown.sensors.uncertainty import STATED_KEYS
 
 fault = Fault.of
 
@@ -95,13 +97,12 @@ def _positions(spec: CaseSpec) -> Iterator[Fault]:
     places += [(("entry", "antenna_m"), spec.entry.antenna_m)]
     vehicle = spec.vehicle
     length, width, front = vehicle.length_m, vehicle.width_m, vehicle.front_m
-    if vehicle.outline_m:
-        corners = list(vehicle.outline_m)
-    elif front is None:
+    back, half = (-length, width) if front is None else (front - length, 0.5 * width)
+    if front is None:
         # With the origin anywhere in the vehicle, all positions that it may then cover.
-        corners = _rectangle(-length, length, width)
-    else:
-        corners = _rectangle(front - length, front, 0.5 * width)
+        front = length
+    sides = [(front, -half), (front, half), (back, half), (back, -half)]
+    corners = list(vehicle.outline_m) or sides
     for path, place in places:
         if place is None:
             continue
@@ -124,10 +125,6 @@ def _positions(spec: CaseSpec) -> Iterator[Fault]:
         elif down > HIGHEST:
             side = "below" if place[2] > 0 else "above"
             yield fault(path, f"config.position-{side}-origin", distance=down, hint=hint)
-
-
-def _rectangle(back: float, front: float, half: float) -> list[Corner]:
-    return [(front, -half), (front, half), (back, half), (back, -half)]
 
 
 def _outside(place: Corner, corners: Sequence[Corner]) -> float:
@@ -267,7 +264,6 @@ def _rest(at: KeyPath, unit: UnitSpec, spec: CaseSpec) -> Iterator[Fault]:
 # --- assumptions: for every missing axis, and for no other --------------------------------
 
 AXES = ("x", "y", "z")
-LONGEST_ASSUMED = 10.0  # s
 
 
 def _assumed(at: KeyPath, unit: UnitSpec) -> Iterator[Fault]:
@@ -310,8 +306,8 @@ def _assumed(at: KeyPath, unit: UnitSpec) -> Iterator[Fault]:
         yield fault((*path, "over_s"), "config.assumed-span-out-of-range", end=end - start)
 
 
-#: Largest plausible standard deviations: deg, m/s.
-_ASSUMED = {"turn_sd_deg": 45.0, "delta_v_sd_m_per_s": 60.0}
+#: Largest plausible standard deviations.
+_ASSUMED = {"turn_sd_deg": MOST_TURN, "delta_v_sd_m_per_s": MOST_CHANGE}
 
 
 def _unmeasured(triad: TriadSpec) -> list[str]:
@@ -401,15 +397,14 @@ def _sensor(at: KeyPath, kind: str, triad: TriadSpec) -> Iterator[Fault]:
 
 
 def _uncertainty(at: KeyPath, kind: str, stated: Mapping[str, Any]) -> Iterator[Fault]:
-    facts = (*SPREADS, *SHEET_FACTS)
-    known = {n: k.quantity for n, k in KEYS[kind].items() if k.quantity in facts}
+    known = STATED_KEYS[kind]
     by: dict[str, str] = {}
     for name, given in stated.items():
         path = (*at, "uncertainty", name)
         if name not in known:
             yield Fault(path, Finding("config.unknown-key", word=name[:100], known=known))
             continue
-        quantity = known[name]
+        quantity = known[name].quantity
         numbers = given if isinstance(given, tuple) else (given,)
         if quantity in by:
             other = At((*at, "uncertainty", by[quantity]))

@@ -13,6 +13,7 @@ from strapdown.config.alignment import (
     MOST_SAMPLES,
     AxesTable,
     EllipsoidName,
+    FixesTable,
     LogTable,
     PrefilterSpec,
     SensorName,
@@ -178,18 +179,14 @@ class GapsTable(Spec):
     beyond: Literal["refuse", "align", "coast"] = "refuse"
 
 
-class AidSpec(ChoiceSpec):
-    """A measurement besides the inertial sensors, under a name chosen by the user."""
+class AidSpec(FixesTable, ChoiceSpec):
+    """A measurement besides the inertial sensors, under a name chosen by the user.
+
+    Standard deviations are of fixes alone.
+    """
 
     #: Measured data; simulated if the record is simulated.
-    path: FileName | None = None
-    #: Column name by quantity, where it differs.
-    columns: dict[Word, Word] = Field(default_factory=dict)
-    #: Of fixes, replacing the values of the file.
-    position_sd_m: OneOrThree | None = None
-    velocity_sd_m_per_s: OneOrThree | None = None
-    #: Leave out unusable rows, and report them.
-    repair: StrictBool = False
+    path: FileName | None = None  # type: ignore[assignment]
 
 
 class TruthTable(Spec):

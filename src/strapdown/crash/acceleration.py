@@ -194,26 +194,14 @@ def resolved_acceleration(imu: pd.DataFrame, q_nb: ArrayLike, gravity: float) ->
         As `Acceleration`; or there is not one valid rotation per sample.
     """
     force, sampling, source = _force_of(imu)
-    q = attitude_of_samples(q_nb, sampling, len(force), source)
-    values = rotation.rotate(q, force) + np.array([0.0, 0.0, gravity])
-    return Acceleration(index_of(imu), values, "ned", sampling, source)
-
-
-def attitude_of_samples(
-    q_nb: ArrayLike, sampling: str, samples: int, source: str | None = None
-) -> Array:
-    """Attitude for rotating each sample, (n, 4): at its stamp, or in the middle of its interval.
-
-    `q_nb`, (n, 4), is at the stamps. `DataError`: there is not one rotation per sample.
-    """
     q = rotation.normalise(q_nb)
-    if q.shape != (samples, 4):
+    if q.shape != (len(force), 4):
         raise DataError(
             "crash.attitudes-shape-samples",
             file=source,
             quantity="q_nb",
             shape=q.shape,
-            samples=samples,
+            samples=len(force),
         )
     if sampling == "mean":
         # Half the rotation of the step, from its start.
@@ -222,7 +210,8 @@ def attitude_of_samples(
         )
         middle = rotation.compose(q[:-1], rotation.quaternion_from_rotation_vector(0.5 * turn))
         q = np.vstack([q[:1], middle])
-    return q
+    values = rotation.rotate(q, force) + np.array([0.0, 0.0, gravity])
+    return Acceleration(index_of(imu), values, "ned", sampling, source)
 
 
 # Sample weights of an integral over a window: the gradient of a delta-V.

@@ -6,17 +6,17 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pandas as pd
 
 from strapdown.bundle.seal import InputFiles, sha256
-from strapdown.config.crash_case import AssumedSpec, CaseSpec, ReferenceSpec, TriadSpec, UnitSpec
+from strapdown.config.crash_case import CaseSpec, ReferenceSpec, TriadSpec, UnitSpec
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.delta_v import delta_v
 from strapdown.crash.delta_v_bound import body_delta_v_bound
 from strapdown.crash.entry import Entry
 from strapdown.crash.events import EventRule
-from strapdown.crash.gnss_entry import GnssEntry
 from strapdown.crash.path import (
     CrashPath,
     PathComparison,
@@ -49,6 +49,9 @@ from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.crash_unit import Assumed, CrashUnit, Mounting, RecordedTriad
 from strapdown.sensors.uncertainty import stated_uncertainty
 from strapdown.systems.one_thread import one_thread
+
+if TYPE_CHECKING:
+    from strapdown.crash.gnss_entry import GnssEntry
 
 # Most numbers of a Monte Carlo in memory: half a gigabyte.
 MOST_NUMBERS = 64_000_000
@@ -163,7 +166,8 @@ def run_case(
 def whole_records(spec: CaseSpec) -> tuple[dict[str, CrashRecord], CaseSpec]:
     """Read the records of a case, and name each of several files by its folder."""
     read = {t.path: read_crash_record(t.path) for t in _triads(spec)}
-    moved = {path: str(_whole(path, record)) for path, record in read.items()}
+    several = {path for path, r in read.items() if len(r.files) > 1 and Path(path).is_file()}
+    moved = {path: str(Path(path).parent if path in several else Path(path)) for path in read}
     units = tuple(
         unit.model_copy(
             update={
@@ -182,12 +186,6 @@ def whole_records(spec: CaseSpec) -> tuple[dict[str, CrashRecord], CaseSpec]:
         moved[path]: replace(record, path=Path(moved[path])) for path, record in read.items()
     }
     return records, spec.model_copy(update={"units": units})
-
-
-def _whole(path: str, record: CrashRecord) -> Path:
-    """The file, or the folder that holds all files of the record."""
-    given = Path(path)
-    return given.parent if given.is_file() and len(record.files) > 1 else given
 
 
 def _triads(spec: CaseSpec) -> Iterator[TriadSpec]:
@@ -221,6 +219,8 @@ def _entry(spec: CaseSpec) -> Entry | GnssEntry | None:
     if entry.kind == "standstill":
         return None
     if entry.kind == "gnss":
+        from strapdown.crash.gnss_entry import GnssEntry
+
         assert entry.path is not None
         return GnssEntry(
             read_gnss(entry.path),
@@ -288,14 +288,21 @@ def case_unit(spec: UnitSpec, records: Mapping[str, CrashRecord]) -> CrashUnit:
     Raises `DataError` for a channel that is missing or unusable, `ConfigError` for an invalid
     sensor, key or number.
     """
-    count = len(spec.accelerometers)
+    several = len(spec.accelerometers) > 1
     accelerometers = tuple(
-        _triad(spec, triad, records, "acceleration", _name(triad, "accelerometer", k, count))
+        _triad(
+            spec,
+            triad,
+            records,
+            "acceleration",
+            f"accelerometer {k}" if several else "accelerometer",
+        )
         for k, triad in enumerate(spec.accelerometers, start=1)
     )
+    assumed = spec.assumed
     gyro = None
     if spec.gyro is not None:
-        gyro = _triad(spec, spec.gyro, records, "rate", spec.gyro.name or "gyro")
+        gyro = _triad(spec, spec.gyro, records, "rate", "gyro")
     return CrashUnit(
         spec.name,
         accelerometers,
@@ -304,21 +311,18 @@ def case_unit(spec: UnitSpec, records: Mapping[str, CrashRecord]) -> CrashUnit:
         gyro_from=spec.gyro_from,
         trigger=spec.trigger_s,
         trigger_sd=spec.trigger_sd_s,
-        assumed=None if spec.assumed is None else _assumed(spec.assumed),
+        assumed=None
+        if assumed is None
+        else Assumed(
+            assumed.turn_sd_deg, assumed.delta_v_sd_m_per_s, assumed.over_s, assumed.because
+        ),
     )
-
-
-def _name(triad: TriadSpec, kind: str, number: int, count: int) -> str:
-    return triad.name or (kind if count == 1 else f"{kind} {number}")
-
-
-def _assumed(spec: AssumedSpec) -> Assumed:
-    return Assumed(spec.turn_sd_deg, spec.delta_v_sd_m_per_s, spec.over_s, spec.because)
 
 
 def _triad(
     unit: UnitSpec, spec: TriadSpec, records: Mapping[str, CrashRecord], quantity: str, name: str
 ) -> RecordedTriad:
+    name = spec.name or name
     table = triad_of_channels(
         records[spec.path],
         {axis: spec.channels[axis] for axis in ("x", "y", "z") if axis in spec.channels},
@@ -452,7 +456,13 @@ def case_severity(spec: CaseSpec, unit: UnitReconstruction) -> tuple[SeverityAns
     inputs: dict[str, float | str] = {"delta_v": whole.resultant, "crash_type": kind}
     inputs |= spec.options.severity_inputs
     names = spec.options.severity
-    models = [find_severity_model(name) for name in names] if names is not None else _fitting(kind)
+    if names is not None:
+        models = [find_severity_model(name) for name in names]
+    else:
+        # Models of this type alone, or those of all crashes if there are none.
+        known = SEVERITY_MODELS.values()
+        models = [m for m in known if kind in m.applies.get("crash_type", ())]
+        models = models or [m for m in known if not m.applies]
     sd = {"delta_v": whole.bound.along(whole.delta_v.vector)}
     answers = []
     for model in models:
@@ -461,9 +471,3 @@ def case_severity(spec: CaseSpec, unit: UnitReconstruction) -> tuple[SeverityAns
         except DataError as error:
             answers.append(SeverityAnswer(model, None, error.finding))
     return tuple(answers)
-
-
-def _fitting(kind: str) -> list[SeverityModel]:
-    """Models of this type alone, or those of all crashes if there are none."""
-    own = [m for m in SEVERITY_MODELS.values() if kind in m.applies.get("crash_type", ())]
-    return own or [m for m in SEVERITY_MODELS.values() if not m.applies]

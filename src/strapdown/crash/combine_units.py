@@ -69,20 +69,26 @@ def combine_units(units: Sequence[PointKinematics], method: str = "weighted") ->
         raise ConfigError(
             "crash.units-cannot-combined", quantity="units", count=len(units), method=method
         )
-    if method == "median" and any(u.unmeasured is not None for u in units):
+    if method == "median" and any(u.unmeasured.any() for u in units):
         raise ConfigError(
             "crash.median-takes-every-unit-value",
-            file=next(u.name for u in units if u.unmeasured is not None),
+            file=next(u.name for u in units if u.unmeasured.any()),
             quantity="units",
         )
-    time = _common_stamps(units)
+    first, last = max(float(u.time[0]) for u in units), min(float(u.time[-1]) for u in units)
+    time = units[0].time
+    time = time[(time >= first) & (time <= last)]
+    if time.size < 2:
+        raise DataError("crash.units-share-samples", quantity="units", size=time.size)
     at = [_at(u, time) for u in units]
     force = np.array([u.force for u in at])
     if method == "weighted":
         weights = np.repeat(force_weights(at)[:, None], time.size, axis=1)
     else:
         weights = _median_weights(force)
-    counted = _turning_measured(at)
+    # Rotation is that of the units that measure it about the most axes; assumed axes do not count.
+    assumed = np.round([np.trace(u.unmeasured_turns) for u in at])
+    counted = np.asarray(assumed == assumed.min())
     turning = _rate_weights(at, counted)
     kind = "weighted mean" if method == "weighted" else method
     name = f"{kind} of {', '.join(u.name for u in units)}"
@@ -110,7 +116,14 @@ def combine_units(units: Sequence[PointKinematics], method: str = "weighted") ->
             for w, r, s, q in zip(weights, at_rest, share, turning, strict=True)
         ],
     )
-    mean = _mean_levelling(units, share)
+    levels = [u.levelling for u in units]
+    mean = Levelling(
+        float(share @ [v.roll_deg for v in levels]),
+        float(share @ [v.pitch_deg for v in levels]),
+        # One unknown of the vehicle, as its name says.
+        float(share @ [v.sd_deg for v in levels]),
+        all(v.from_rest for v in levels),
+    )
     if levelled and rest is not None and rest.accel_mean is not None:
         roll, pitch = level(rest.accel_mean)
         mean = replace(mean, roll_deg=roll, pitch_deg=pitch)
@@ -129,22 +142,6 @@ def combine_units(units: Sequence[PointKinematics], method: str = "weighted") ->
             [u.unmeasured_turns for u, counts in zip(units, counted, strict=True) if counts]
         ),
     )
-
-
-def _turning_measured(units: Sequence[PointKinematics]) -> NDArray[np.bool_]:
-    """Units that measure rotation about the most axes; assumed axes do not count."""
-    assumed = [0.0 if u.unmeasured_turns is None else np.trace(u.unmeasured_turns) for u in units]
-    return np.asarray(np.round(assumed) == np.round(min(assumed)))
-
-
-def _common_stamps(units: Sequence[PointKinematics]) -> Array:
-    first = max(float(u.time[0]) for u in units)
-    last = min(float(u.time[-1]) for u in units)
-    time = units[0].time
-    time = time[(time >= first) & (time <= last)]
-    if time.size < 2:
-        raise DataError("crash.units-share-samples", quantity="units", size=time.size)
-    return time
 
 
 def _at(unit: PointKinematics, time: Array) -> PointKinematics:
@@ -187,17 +184,6 @@ def _common_rest(units: Sequence[PointKinematics], time: Array) -> tuple[float, 
     start, end = max(r.start for r in rests), min(r.end for r in rests)
     within = (time >= start) & (time <= end)
     return (start, end) if within.sum() >= LEAST_SAMPLES else None
-
-
-def _mean_levelling(units: Sequence[PointKinematics], share: Array) -> Levelling:
-    levels = [u.levelling for u in units]
-    return Levelling(
-        float(share @ [v.roll_deg for v in levels]),
-        float(share @ [v.pitch_deg for v in levels]),
-        # One unknown of the vehicle, as its name says.
-        float(share @ [v.sd_deg for v in levels]),
-        all(v.from_rest for v in levels),
-    )
 
 
 def _level(levelling: Levelling) -> Array:
@@ -323,13 +309,10 @@ def force_weights(units: Sequence[PointKinematics]) -> Array:
     """
     covariance = velocity_covariance(units)
     missing = [u.unmeasured for u in units]
-    aligned = all(
-        p is None or np.abs(p - np.diag(np.diagonal(p))).max() < ROUNDING for p in missing
-    )
-    if not aligned:
+    if any(np.abs(p - np.diag(np.diagonal(p))).max() >= ROUNDING for p in missing):
         return _turned_weights(covariance, missing)
     weights = np.zeros((len(units), 3, 3))
-    lacks = np.array([np.zeros(3) if p is None else np.diagonal(p) for p in missing]) > 0.5
+    lacks = np.array([np.diagonal(p) for p in missing]) > 0.5
     cut = np.array([clipped_axes(u, CRASH_WINDOW) for u in units])
     for axis in range(3):
         counts = ~lacks[:, axis]
@@ -384,26 +367,22 @@ def least_variance(covariance: Array) -> Array:
     return np.asarray(found / found.sum())
 
 
-def by_none(projections: Sequence[Array | None]) -> Array | None:
-    """Projection onto the directions that none of several units measures."""
-    given = [p for p in projections if p is not None]
-    if len(given) < len(projections):
-        return None
-    values, vectors = np.linalg.eigh(np.mean(given, axis=0))
+def by_none(projections: Sequence[Array]) -> Array:
+    """Projection onto the directions that none of several units measures, (3, 3)."""
+    values, vectors = np.linalg.eigh(np.mean(projections, axis=0))
     kept = vectors[:, values > 1.0 - ROUNDING]
-    return np.asarray(kept @ kept.T) if kept.size else None
+    return np.asarray(kept @ kept.T)
 
 
-def _turned_weights(covariance: Array, missing: Sequence[Array | None]) -> Array:
+def _turned_weights(covariance: Array, missing: Sequence[Array]) -> Array:
     """Weights where a missing axis is not a vehicle axis, so that axes do not separate."""
     information = []
-    for k, unmeasured in enumerate(missing):
+    for k, gone in enumerate(missing):
         own = floored(np.diag(covariance[:, k, k]))
-        gone = np.zeros((3, 3)) if unmeasured is None else unmeasured
         kept = np.eye(3) - gone
         information.append(kept @ np.linalg.inv(kept @ own @ kept + gone) @ kept)
     none = by_none(missing)
-    if none is not None:
+    if none.any():
         # Along directions that no unit measures all units are equally good.
         size = float(np.mean(np.trace(information, axis1=-2, axis2=-1)))
         information = [i + size * none for i in information]

@@ -234,7 +234,12 @@ def noise_of_sums(at_point: PointKinematics, weights: Array) -> NoiseOfSums:
     """
     m = len(weights)
     prepared, moved, effects = at_point.prepared, at_point.moved, at_point.effects
-    within = _touched(at_point, weights)
+    # Samples with weight in a sum, and those used for their angular acceleration.
+    used = np.flatnonzero(weights.any(axis=0))
+    wide = 0 if moved is None else moved.slope.slope.shape[1]
+    within = slice(0)
+    if used.size:
+        within = slice(max(int(used[0]) - wide, 0), int(used[-1]) + wide + 1)
     few = weights[:, within]
     if prepared is None or moved is None:
         own = _diagonal(effects.force_noise[within])
@@ -250,15 +255,6 @@ def noise_of_sums(at_point: PointKinematics, weights: Array) -> NoiseOfSums:
         by_rate = moved.of_rates_in_sums(weights)[:, within]
         arm = np.einsum("anij,njk->aink", by_rate, turning).reshape(3 * m, -1)
     return NoiseOfSums(blocks.reshape(3 * m, 3 * m), arm, turned, at_point.gyro)
-
-
-def _touched(at_point: PointKinematics, weights: Array) -> slice:
-    """Samples with weight in a sum, and those used for their angular acceleration."""
-    used = np.flatnonzero(weights.any(axis=0))
-    if not used.size:
-        return slice(0, 0)
-    wide = 0 if at_point.moved is None else at_point.moved.slope.slope.shape[1]
-    return slice(max(int(used[0]) - wide, 0), int(used[-1]) + wide + 1)
 
 
 def _diagonal(sd: Array) -> Array:
@@ -674,8 +670,9 @@ def compare_units(
         for i, j in itertools.combinations(range(len(units)), 2)
     )
     kept = ~np.any(cut, axis=0)
-    together = _against_all(units, [v.of_pieces(kept) for v in increments], kept)
-    chi, freedom = together.chi_square, together.freedom
+    combined, combined_sd, against, chi, freedom = _against_all(
+        units, [v.of_pieces(kept) for v in increments], kept
+    )
     probability = chi_square_tail(chi, freedom)
     findings = [_left_out(u, edges, c) for u, c in zip(units, cut, strict=True) if c.any()]
     findings += [f for p in pairs for f in p.findings]
@@ -683,9 +680,9 @@ def compare_units(
     return UnitComparison(
         edges,
         pairs,
-        _curve(together.combined, kept) + together.told,
-        _curve_sd(together.covariance, kept) + together.told,
-        together.against,
+        combined,
+        combined_sd,
+        against,
         chi,
         freedom,
         probability,
@@ -762,25 +759,24 @@ def _pair(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Together:
-    """Weighted mean of the increments, its covariance, chi-square, and each unit against it."""
-
-    combined: Array
-    covariance: Array
-    told: Array
-    chi_square: float
-    freedom: int
-    against: tuple[UnitAgainstAll, ...]
-
-
 def _against_all(
     units: Sequence[PointKinematics], increments: Sequence[VelocityIncrements], kept: Flags
-) -> _Together:
-    """Combine `increments` of the kept intervals and compare each unit with the combination."""
+) -> tuple[Array, Array, tuple[UnitAgainstAll, ...], float, int]:
+    """Combine `increments` of the kept intervals and compare each unit with the combination.
+
+    Returns the combination's delta-V and its sd, (m + 1, 3), each unit against it, and chi-square
+    and degrees of freedom of all.
+    """
     size = increments[0].values.size
     if size == 0:
-        return _nothing_together(units, kept)
+        none = np.full((kept.size + 1, 3), np.nan)
+        return (
+            none,
+            none,
+            tuple(UnitAgainstAll(u.name, none, none, 0.0, 0, 1.0) for u in units),
+            0.0,
+            0,
+        )
     joint = floored(joint_covariance(increments))
     pieces, largest = size // 3, float(np.diagonal(joint).max())
     bases = [measured_by_all((u,)) for u in units]
@@ -814,27 +810,13 @@ def _against_all(
             )
         )
     several = measured_by_any(units)
-    freedom = pieces * (sum(b.shape[1] for b in bases) - several.shape[1])
-    return _Together(
-        combined,
-        np.asarray(covariance),
-        np.where(measured_axes(several), 0.0, np.nan),
-        chi_square_along(np.eye(3), left, joint)[0],
-        freedom,
+    told = np.where(measured_axes(several), 0.0, np.nan)
+    return (
+        _curve(combined, kept) + told,
+        _curve_sd(np.asarray(covariance), kept) + told,
         tuple(against),
-    )
-
-
-def _nothing_together(units: Sequence[PointKinematics], kept: Flags) -> _Together:
-    """Return the result where all intervals were left out."""
-    none = np.full((kept.size + 1, 3), np.nan)
-    return _Together(
-        np.zeros(0),
-        np.zeros((0, 0)),
-        np.full(3, np.nan),
-        0.0,
-        0,
-        tuple(UnitAgainstAll(u.name, none, none, 0.0, 0, 1.0) for u in units),
+        chi_square_along(np.eye(3), left, joint)[0],
+        pieces * (sum(b.shape[1] for b in bases) - several.shape[1]),
     )
 
 
@@ -984,7 +966,7 @@ MOST = 0.9
 
 def measured_by_all(units: Sequence[PointKinematics]) -> Array:
     """Orthonormal columns spanning the directions that every unit measures, (3, r)."""
-    total = sum((_unmeasured(u) for u in units), np.zeros((3, 3)))
+    total = np.sum([u.unmeasured for u in units], axis=0)
     if not total.any():
         return np.eye(3)
     values, vectors = np.linalg.eigh(total)
@@ -993,7 +975,7 @@ def measured_by_all(units: Sequence[PointKinematics]) -> Array:
 
 def measured_by_any(units: Sequence[PointKinematics]) -> Array:
     """Orthonormal columns spanning the directions that at least one unit measures, (3, r)."""
-    measured = np.mean([np.eye(3) - _unmeasured(u) for u in units], axis=0)
+    measured = np.mean([np.eye(3) - u.unmeasured for u in units], axis=0)
     values, vectors = np.linalg.eigh(measured)
     return np.asarray(vectors[:, values > ROUNDING])
 
@@ -1011,10 +993,6 @@ def chi_square_along(basis: Array, difference: Array, covariance: Array) -> tupl
     if not difference.size:
         return 0.0, 0
     return float(difference @ np.linalg.solve(floored(covariance), difference)), difference.size
-
-
-def _unmeasured(unit: PointKinematics) -> Array:
-    return np.zeros((3, 3)) if unit.unmeasured is None else unit.unmeasured
 
 
 # Intervals in which a unit was clipped without a wider range.

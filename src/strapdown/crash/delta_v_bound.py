@@ -130,22 +130,17 @@ def _noise_between(path: CrashPath, start: float, end: float) -> Array:
         start, end = end, start
     here, there = _at(path.time, noise, start)[0], _at(path.time, noise, end)[0]
     if start >= entry - 1e-9 or end < start:
-        tilt = _turn_effect(path, start, end)
+        gained = path.table[["VN", "VE", "VD"]].to_numpy()[None]
+        felt = (_at(path.time, gained, end) - _at(path.time, gained, start))[0]
+        # A rotation of the attitude turns the measured specific force, not gravity.
+        felt[2] -= GRAVITY * (end - start)
+        tilt = -cross_matrix(felt)
         carried = tilt @ here[ATTITUDE, VELOCITY]
         # var(v1 - v0) = P11 + P00 - P10 - P01, with v1 = v0 + tilt phi0 + new noise.
         both = here[VELOCITY, VELOCITY] + carried
         return np.asarray(there[VELOCITY, VELOCITY] + here[VELOCITY, VELOCITY] - both - both.T)
     # The two sides of the entry have independent noise.
     return np.asarray(there[VELOCITY, VELOCITY] + here[VELOCITY, VELOCITY])
-
-
-def _turn_effect(path: CrashPath, start: float, end: float) -> Array:
-    """Effect of a rotation of the attitude at `start` on the velocity at `end`: (3, 3), m/s/rad."""
-    gained = path.table[["VN", "VE", "VD"]].to_numpy()[None]
-    felt = (_at(path.time, gained, end) - _at(path.time, gained, start))[0]
-    # The attitude rotates the measured specific force, not gravity.
-    felt[2] -= GRAVITY * (end - start)
-    return -cross_matrix(felt)
 
 
 def _bound(

@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
-from strapdown.errors import ConfigError, Finding
+from strapdown.errors import ConfigError, Finding, check_choice
 from strapdown.nav_state import NavState
 from strapdown.sensors.triad_errors import finite, triple
 
@@ -134,10 +134,7 @@ class Entry:
         if abs(speed) > 150.0:
             raise ConfigError("crash.no-speed-road-vehicle", quantity="entry, speed", speed=speed)
         for name in others:
-            if name not in OTHERS:
-                raise ConfigError(
-                    "crash.entry-no", quantity="entry", name=name, word=name, known=OTHERS
-                )
+            check_choice("crash.entry-no", OTHERS, quantity="entry", name=name)
         course = math.radians(heading_deg + slip_deg)
         along = (math.cos(course), math.sin(course), 0.0)
         across = (-math.sin(course), math.cos(course), 0.0)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from strapdown._kernels import crash_events as kernel
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.acceleration import Acceleration
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, check_choice
 from strapdown.tables.imu import SAMPLINGS
 
 # One event of a crash.
@@ -164,14 +164,7 @@ class EventRule:
             least = 0.0 if f.name == "quiet" else math.ulp(0.0)
             if not (math.isfinite(value) and value >= least):
                 raise ConfigError("crash.no-threshold-or-window", quantity=f.name, value=value)
-        if self.zero_at not in ZERO_AT:
-            raise ConfigError(
-                "crash.no-place-time-zero",
-                quantity="zero_at",
-                zero_at=self.zero_at,
-                word=self.zero_at,
-                known=ZERO_AT,
-            )
+        check_choice("crash.no-place-time-zero", ZERO_AT, quantity="zero_at", zero_at=self.zero_at)
         if max(self.wake_window, self.lateral_window) >= self.trigger_window:
             raise ConfigError(
                 "crash.not-longer-than-windows-time",

@@ -28,7 +28,7 @@ from strapdown.crash.entry_estimate import (
 )
 from strapdown.crash.measuring_point import PointKinematics
 from strapdown.ellipsoids import WGS84
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, check_choice
 from strapdown.evaluation.control_points import rigid_fit
 from strapdown.frames import geodetic_from_ned, place_difference
 from strapdown.increments import motion_increments
@@ -262,14 +262,7 @@ class GnssEntry:
                 )
         triple(self.antenna, "GNSS entry, antenna", "sensors.point-not-three-numbers")
         for name in self.priors:
-            if name not in OTHER_PRIORS:
-                raise ConfigError(
-                    "crash.no-prior",
-                    quantity="GNSS entry, priors",
-                    name=name,
-                    word=str(name),
-                    known=OTHER_PRIORS,
-                )
+            check_choice("crash.no-prior", OTHER_PRIORS, quantity="GNSS entry, priors", name=name)
         EntryPriors(gyro=TriadUncertainty(), accel=TriadUncertainty(), **self.priors)
 
 

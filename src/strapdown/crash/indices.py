@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.dsp.running_integral import running_integral
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, check_choice
 
 Array = NDArray[np.float64]
 # Stamps are rounded; steps that differ by more than this fraction are not uniform.
@@ -217,10 +217,7 @@ def four_pole(time: Array, values: Array, frequency: float, cutoff: str = "whole
     """
     from scipy.signal import butter, sosfiltfilt
 
-    if cutoff not in CUTOFFS:
-        raise ConfigError(
-            "crash.no-kind-cut-off", quantity="cutoff", cutoff=cutoff, word=cutoff, known=CUTOFFS
-        )
+    check_choice("crash.no-kind-cut-off", CUTOFFS, quantity="cutoff", cutoff=cutoff)
     step = step_of(time)
     if 1.0 / step < 10.0 * frequency:
         raise DataError(
@@ -702,14 +699,9 @@ def _inputs(
     sideways: float,
     phd_average: str,
 ) -> tuple[Array, Array, Array]:
-    if phd_average not in PHD_AVERAGES:
-        raise ConfigError(
-            "crash.no-average-phd",
-            quantity="phd_average",
-            phd_average=phd_average,
-            word=phd_average,
-            known=PHD_AVERAGES,
-        )
+    check_choice(
+        "crash.no-average-phd", PHD_AVERAGES, quantity="phd_average", phd_average=phd_average
+    )
     for name, distance in (("forward", forward), ("sideways", sideways)):
         if not (math.isfinite(distance) and distance > 0.0):
             raise ConfigError("crash.no-way-fly", quantity=name, distance=distance)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -18,7 +18,14 @@ from strapdown.sensors.crash_unit import SHAPES, Assumed, RecordedTriad, assumed
 from strapdown.sensors.lever_arm import MovedImu, move_unit
 from strapdown.sensors.pre_crash import FROM_GRAVITY, Levelling, PreparedUnit
 from strapdown.sensors.rest import RestStretch
-from strapdown.sensors.unmeasured import AXES, TURNS, axis_names, unmeasured_axes, unmeasured_turns
+from strapdown.sensors.unmeasured import (
+    AXES,
+    NO_GYRO,
+    TURNS,
+    axis_names,
+    unmeasured_axes,
+    unmeasured_turns,
+)
 from strapdown.tables import ACCEL, GYRO
 
 Array = NDArray[np.float64]
@@ -27,6 +34,8 @@ Array = NDArray[np.float64]
 VEHICLE = "vehicle"
 # Signal parts faster than this count as vibration.
 VIBRATION = 0.025  # s
+XYZ = "xyz"
+NONE = np.zeros(3)
 
 
 def unit_effects(prepared: PreparedUnit, moved: MovedImu, *, time_sd: float = 0.0) -> SampleEffects:
@@ -49,23 +58,18 @@ class _UnitEffects:
         unit = prepared.unit
         if unit.gyro is None:
             raise DataError("crash.no-gyro-nor-borrowed", file=unit.name, quantity="gyro")
-        self.prepared, self.time_sd = prepared, time_sd
-        lender = unit.lender or unit
-        assert lender.gyro is not None
-        self.lender, self.gyro = lender, lender.gyro
-        self.turn, self.gyro_turn = unit.mounting.C_vs, lender.mounting.C_vs
+        self.prepared, self.moved, self.time_sd = prepared, moved, time_sd
+        self.unit, self.lender = unit, unit.lender or unit
+        self.turn, self.gyro_turn = unit.mounting.C_vs, self.lender.mounting.C_vs
         self.time = prepared.imu.index.to_numpy(dtype=np.float64)
         self.force = prepared.imu[ACCEL].to_numpy(dtype=np.float64)
         self.rate = prepared.imu[GYRO].to_numpy(dtype=np.float64)
         # In sensor axes.
-        self.felt, self.turned = self.force @ self.turn, self.rate @ self.gyro_turn
+        self.felt, self.rest_felt = self.force @ self.turn, np.zeros(3)
         rest = prepared.rest
-        has_rest = rest is not None and rest.accel_mean is not None
-        self.rest_felt = (
-            np.asarray(rest.accel_mean) @ self.turn if has_rest and rest else np.zeros(3)
-        )
-        self.has_rest = has_rest
-        self.moved = moved
+        self.has_rest = rest is not None and rest.accel_mean is not None
+        if rest is not None and rest.accel_mean is not None:
+            self.rest_felt = np.asarray(rest.accel_mean) @ self.turn
         self.names: list[str] = []
         self.contributors: list[str] = []
         self.forces: list[Array] = []
@@ -78,14 +82,16 @@ class _UnitEffects:
         self.level = rotation.dcm_from_euler([level.roll_deg, level.pitch_deg, 0.0])
 
     def collect(self) -> SampleEffects:
-        for number in range(len(self.prepared.unit.accelerometers)):
+        for number in range(len(self.unit.accelerometers)):
             self._range(number)
         self._gyro()
         self._mounting()
         self._timing()
         self._levelling()
-        self._assumed()
+        for name, contributor, force, rate in assumed_effects(self.prepared):
+            self._add(f"{VEHICLE} {name}", contributor, force, rate)
         count, n = len(self.names), len(self.time)
+        noise = self.prepared.noise_covariance + self.moved.added
         return SampleEffects(
             tuple(self.names),
             tuple(self.contributors),
@@ -95,7 +101,7 @@ class _UnitEffects:
             np.array(self.tilts).reshape(count, 3),
             # Gyro noise through the lever arm is treated as independent for each sample. This is
             # conservative: the noise of successive slopes has opposite signs.
-            _sd(self._noise()),
+            _sd(self.measured @ noise @ self.measured),
             _sd(self.prepared.gyro_noise_covariance),
         )
 
@@ -104,9 +110,8 @@ class _UnitEffects:
         name: str,
         contributor: str,
         force: Array | None,
-        rate: Array | None,
-        rest: Array,
-        owner: str = "",
+        rate: Array | None = None,
+        rest: Array = NONE,
         tilt: Array | None = None,
         through_arm: bool = True,
     ) -> None:
@@ -124,7 +129,9 @@ class _UnitEffects:
             along = along / np.sqrt(along @ along)
             taken = (rest @ along) * along
             added, rest = added - taken, rest - taken
-        name = f"{owner or self.prepared.unit.name} {name}"
+        if tilt is None:
+            from_rest = self.prepared.levelling.from_rest
+            tilt = level_turned_by(rest, self.level) if from_rest else NONE
         # Two parts of one name have separate unknowns.
         again = sum(known.split("#")[0] == name for known in self.names)
         self.names.append(f"{name}#{again + 1}" if again else name)
@@ -132,34 +139,53 @@ class _UnitEffects:
         self.forces.append(added)
         self.rates.append(np.zeros((n, 3)) if rate is None else rate)
         self.rests.append(rest)
-        self.tilts.append(self._tilted(rest) if tilt is None else tilt)
-
-    def _tilted(self, rest: Array) -> Array:
-        if not self.prepared.levelling.from_rest:
-            return np.zeros(3)
-        return level_turned_by(rest, self.level)
+        self.tilts.append(tilt)
 
     def _range(self, number: int) -> None:
-        triad = self.prepared.unit.accelerometers[number]
+        triad = self.unit.accelerometers[number]
         spoke = self.prepared.range_spoken == number
         source = self.prepared.bias_from[number]
         # Ranges whose bias was taken from this one carry its stationary error.
         heirs = np.isin(self.prepared.range_spoken, self._heirs(number))
         if not (spoke.any() or heirs.any()):
             return
-        sd = triad.uncertainty
-        bias = sd.axis("bias") if source is None else self.prepared.bias_sd[number]
+        name = f"{self.unit.name} {triad.name}"
+        # The effect at rest comes first.
+        felt = np.vstack([self.rest_felt, self.felt])
+        bias = triad.uncertainty.axis("bias") if source is None else self.prepared.bias_sd[number]
+        what = "bias" if source is None else "bias against the lower range"
+        errors: list[InputError] = [
+            (f"{what} {XYZ[axis]}", ACCEL_BIAS, axis, np.full(len(felt), bias[axis]))
+            for axis in range(3)
+            if bias[axis] > 0.0
+        ]
+        calibrated = source is not None and source != FROM_GRAVITY
+        for label, contributor, axis, values in (*errors, *input_errors(triad, felt)):
+            of_bias = contributor == ACCEL_BIAS
+            at_rest = float(values[0]) if self.has_rest or of_bias else 0.0
+            since_rest = calibrated and not of_bias
+            one, here = np.zeros(len(self.time)), spoke[:, axis]
+            one[here] = values[1:][here]
+            if since_rest:
+                one[here] -= at_rest
+            one[heirs[:, axis]] = 0.0 if since_rest else at_rest
+            direction = self.turn[:, axis]
+            rest = at_rest * direction if not calibrated and self.has_rest else NONE
+            self._add(f"{name} {label}", contributor, np.outer(one, direction), rest=rest)
+        sd = triad.uncertainty.axis("vibration_rectification")
+        if not any(sd):
+            return
+        from scipy.ndimage import uniform_filter1d
+
+        step = float(np.median(np.diff(self.time)))
+        width = max(3, 2 * round(0.5 * VIBRATION / step) + 1)
+        fast = self.felt - uniform_filter1d(self.felt, width, axis=0, mode="nearest")
+        variance = np.asarray(uniform_filter1d(fast**2, width, axis=0, mode="nearest"))
         for axis in range(3):
-            if bias[axis] > 0.0:
-                what = "bias" if source is None else "bias against the lower range"
-                what, one = f"{what} {XYZ[axis]}", constant(bias[axis])
-                self._axis_effect(number, axis, spoke, heirs, one, what, "accelerometer bias", True)
-        for name, contributor, effects in triad_curves(triad):
-            for axis, label, effect in effects:
-                self._axis_effect(
-                    number, axis, spoke, heirs, effect, f"{name}{label}", contributor, False
-                )
-        self._vibration(triad, spoke)
+            if sd[axis] > 0.0:
+                one = sd[axis] * np.where(spoke[:, axis], variance[:, axis], 0.0)
+                force = np.outer(one, self.turn[:, axis])
+                self._add(f"{name} rectification {XYZ[axis]}", "vibration rectification", force)
 
     def _heirs(self, number: int) -> list[int]:
         found: list[int] = []
@@ -168,104 +194,43 @@ class _UnitEffects:
                 found.append(other)
         return found
 
-    def _axis_effect(
-        self,
-        number: int,
-        axis: int,
-        spoke: NDArray[np.bool_],
-        heirs: NDArray[np.bool_],
-        effect: Curve,
-        name: str,
-        contributor: str,
-        constant: bool,
-    ) -> None:
-        at_rest = float(effect(self.rest_felt[None, :])[0]) if self.has_rest or constant else 0.0
-        source = self.prepared.bias_from[number]
-        calibrated = source is not None and source != FROM_GRAVITY
-        one = np.zeros(len(self.time))
-        here = spoke[:, axis]
-        one[here] = effect(self.felt)[here]
-        if calibrated and not constant:
-            one[here] -= at_rest
-        one[heirs[:, axis]] = 0.0 if calibrated and not constant else at_rest
-        direction = self.turn[:, axis]
-        rest = at_rest * direction if not calibrated and self.has_rest else np.zeros(3)
-        triad = self.prepared.unit.accelerometers[number]
-        self._add(f"{triad.name} {name}", contributor, np.outer(one, direction), None, rest)
-
-    def _vibration(self, triad: RecordedTriad, spoke: NDArray[np.bool_]) -> None:
-        sd = triad.uncertainty.axis("vibration_rectification")
-        if not any(sd):
-            return
-        variance = self._vibrating()
-        for axis in range(3):
-            if sd[axis] > 0.0:
-                one = sd[axis] * np.where(spoke[:, axis], variance[:, axis], 0.0)
-                force = np.outer(one, self.turn[:, axis])
-                self._add(
-                    f"{triad.name} rectification {XYZ[axis]}",
-                    "vibration rectification",
-                    force,
-                    None,
-                    np.zeros(3),
-                )
-
-    def _vibrating(self) -> Array:
-        from scipy.ndimage import uniform_filter1d
-
-        step = float(np.median(np.diff(self.time)))
-        width = max(3, 2 * round(0.5 * VIBRATION / step) + 1)
-        smooth = uniform_filter1d(self.felt, width, axis=0, mode="nearest")
-        return np.asarray(
-            uniform_filter1d((self.felt - smooth) ** 2, width, axis=0, mode="nearest")
-        )
-
     def _gyro(self) -> None:
-        sd, owner, none = self.gyro.uncertainty, self.lender.name, np.zeros(3)
+        gyro, owner = self.lender.gyro, self.lender.name
+        assert gyro is not None
         # Prepared in the axes of this unit; a stationary bias is along the part's axes.
         square = (self.gyro_turn.T @ self.turn) ** 2
         biases = np.sqrt(square @ np.square(self.prepared.gyro_bias_sd))
         felt = (self.force - self.turn @ self.rest_felt) @ self.gyro_turn
+        errors = list(input_errors(gyro, self.rate @ self.gyro_turn))
         for axis in range(3):
             direction = self.gyro_turn[:, axis]
-            bias = biases[axis]
-            if bias > 0.0:
-                rate = np.tile(bias * direction, (len(self.time), 1))
-                self._add(f"gyro bias {XYZ[axis]}", GYRO_BIAS, None, rate, none, owner)
-            for name, contributor, one in self._gyro_curves(axis):
-                self._add(name, contributor, None, np.outer(one, direction), none, owner)
-            slope = sd.axis("g_sensitivity")[axis]
+            if biases[axis] > 0.0:
+                rate = np.tile(biases[axis] * direction, (len(self.time), 1))
+                self._add(f"{owner} gyro bias {XYZ[axis]}", GYRO_BIAS, None, rate)
+            for name, contributor, of_axis, one in errors:
+                if of_axis == axis:
+                    rate = np.outer(one, direction)
+                    self._add(f"{owner} gyro {name}", f"gyro {contributor}", None, rate)
+            slope = gyro.uncertainty.axis("g_sensitivity")[axis]
             if slope > 0.0:
                 for j in range(3):
-                    one = slope * felt[:, j]
-                    self._add(
-                        f"g-sensitivity {XYZ[axis]} of {XYZ[j]}",
-                        "gyro g-sensitivity",
-                        None,
-                        np.outer(one, direction),
-                        none,
-                        owner,
-                    )
-
-    def _gyro_curves(self, axis: int) -> Iterator[tuple[str, str, Array]]:
-        for name, contributor, effects in triad_curves(self.gyro):
-            for a, label, effect in effects:
-                if a == axis:
-                    yield f"gyro {name}{label}", f"gyro {contributor}", effect(self.turned)
+                    name = f"{owner} g-sensitivity {XYZ[axis]} of {XYZ[j]}"
+                    rate = np.outer(slope * felt[:, j], direction)
+                    self._add(name, "gyro g-sensitivity", None, rate)
 
     def _mounting(self) -> None:
-        mounting = self.prepared.unit.mounting
+        mounting, own = self.unit.mounting, self.unit.name
         angle = np.radians(mounting.angles_sd_deg)
-        rest = self.turn @ self.rest_felt if self.has_rest else np.zeros(3)
-        lent = self.lender is not self.prepared.unit
+        rest = self.turn @ self.rest_felt if self.has_rest else NONE
+        lent = self.lender is not self.unit
         for axis in range(3):
             unit, name = np.eye(3)[axis], f"mounting {TURNS[axis]}"
             if angle > 0.0:
                 felt, left = self.force, rest
                 if self.prepared.bias_from[0] == FROM_GRAVITY:
-                    felt, left = self.force - rest, np.zeros(3)
+                    felt, left = self.force - rest, NONE
                 self._add(
-                    name,
+                    f"{own} {name}",
                     MOUNTING,
                     angle * np.cross(unit, felt),
                     None if lent else angle * np.cross(unit, self.rate),
@@ -274,19 +239,11 @@ class _UnitEffects:
             turned = np.radians(self.lender.mounting.angles_sd_deg)
             if lent and turned > 0.0:
                 rate = turned * np.cross(unit, self.rate)
-                self._add(name, MOUNTING, None, rate, np.zeros(3), self.lender.name)
+                self._add(f"{self.lender.name} {name}", MOUNTING, None, rate)
             if mounting.position_sd > 0.0:
                 # The sensor is further along the axis, so that the arm is shorter there.
                 force = self.moved.lever @ (-mounting.position_sd * unit)
-                self._add(f"lever arm {XYZ[axis]}", LEVER_ARM, force, None, np.zeros(3))
-
-    def _noise(self) -> Array:
-        of_both = self.prepared.noise_covariance + self.moved.added
-        return np.asarray(self.measured @ of_both @ self.measured)
-
-    def _assumed(self) -> None:
-        for of in assumed_effects(self.prepared):
-            self._add(of.name, of.contributor, of.force, of.rate, np.zeros(3), VEHICLE)
+                self._add(f"{own} lever arm {XYZ[axis]}", LEVER_ARM, force)
 
     def _levelling(self) -> None:
         sd = np.radians(self.prepared.levelling.sd_deg)
@@ -300,30 +257,29 @@ class _UnitEffects:
                 shift = self.unmeasured @ shift
             if sd > 0.0:
                 force = np.tile(shift, (n, 1))
-                self._add(f"levelling {name}", LEVELLING, force, None, shift, VEHICLE, tilt)
+                self._add(f"{VEHICLE} levelling {name}", LEVELLING, force, rest=shift, tilt=tilt)
         steady = self.prepared.rest_accel_sd
         if steady > 0.0 and self.prepared.bias_from[0] == FROM_GRAVITY:
             for axis in range(3):
                 force = np.tile(steady * np.eye(3)[axis], (n, 1))
-                name = f"steady acceleration {XYZ[axis]}"
-                self._add(name, "accelerometer bias", force, None, np.zeros(3), VEHICLE)
+                self._add(f"{VEHICLE} steady acceleration {XYZ[axis]}", ACCEL_BIAS, force)
 
     def _timing(self) -> None:
-        none = np.zeros(3)
+        name = f"{self.unit.name} timing"
         slope = np.gradient(self.rate, self.time, axis=0)
-        if self.lender is not self.prepared.unit:
+        if self.lender is not self.unit:
             # The clock of a borrowed gyro is that of its owner.
             if self.time_sd > 0.0:
                 force = self.time_sd * np.gradient(self.force, self.time, axis=0)
-                self._add("timing", "timing", force, None, none)
+                self._add(name, "timing", force)
             late = self.lender.trigger_sd
             if late > 0.0:
-                self._add("timing", "timing", None, late * slope, none, self.lender.name)
+                self._add(f"{self.lender.name} timing", "timing", None, late * slope)
         elif self.time_sd > 0.0:
             # Force and rate are delayed together, and so is the lever-arm term.
             at_point = self.moved.imu[ACCEL].to_numpy(dtype=np.float64)
             force = self.time_sd * np.gradient(at_point, self.time, axis=0)
-            self._add("timing", "timing", force, self.time_sd * slope, none, through_arm=False)
+            self._add(name, "timing", force, self.time_sd * slope, through_arm=False)
 
 
 def _sd(covariances: Array) -> Array:
@@ -333,14 +289,8 @@ def _sd(covariances: Array) -> Array:
 # Unknowns of assumed axes and rotation that a unit does not measure.
 
 
-@dataclass(frozen=True, eq=False)
-class AssumedEffect:
-    """Effect of one standard deviation of an unknown: force, m/s², and rate, rad/s, (n, 3)."""
-
-    name: str
-    contributor: str
-    force: Array | None
-    rate: Array | None
+#: Name, line of the error budget, and effect of one sd on force, m/s², and rate, rad/s, (n, 3).
+AssumedEffect = tuple[str, str, Array | None, Array | None]
 
 
 def assumed_effects(prepared: PreparedUnit) -> Iterator[AssumedEffect]:
@@ -365,9 +315,8 @@ def assumed_effects(prepared: PreparedUnit) -> Iterator[AssumedEffect]:
         shapes = assumed_shapes(time, unit.assumed.over, sampling)
         for name, along in _directions(unit.assumed.sd_of("delta_v_sd"), axes, AXES):
             for shape, how in zip(shapes, SHAPES, strict=True):
-                yield AssumedEffect(
-                    f"assumed velocity {name} {how}", MISSING_AXIS, np.outer(shape, along), None
-                )
+                force = np.outer(shape, along)
+                yield f"assumed velocity {name} {how}", MISSING_AXIS, force, None
 
 
 def _of_turning(
@@ -380,15 +329,15 @@ def _of_turning(
     for name, degrees in _directions(assumed.sd_of("turn_sd_deg"), turns, TURNS):
         about = np.radians(degrees)
         for shape, how in zip(shapes, SHAPES, strict=True):
-            yield AssumedEffect(f"assumed {name} {how}", NO_TURNING, None, np.outer(shape, about))
+            yield f"assumed {name} {how}", NO_TURNING, None, np.outer(shape, about)
         variance = float(about @ about)
         axis = about / math.sqrt(variance)
         across = force - np.outer(force @ axis, axis)
         mean = -0.5 * variance * turned[:, None] * across
         means += mean
-        yield AssumedEffect(f"assumed {name} squared", NO_TURNING, math.sqrt(2.0) * mean, None)
+        yield f"assumed {name} squared", NO_TURNING, math.sqrt(2.0) * mean, None
     if means.any():
-        yield AssumedEffect("assumed turns squared", NO_TURNING, means, None)
+        yield "assumed turns squared", NO_TURNING, means, None
 
 
 def _directions(
@@ -403,71 +352,36 @@ def _directions(
 
 # Errors of a triad that depend on its input: one standard deviation of each.
 
-#: From the input of a triad, (n, 3), to the addition to the output of one axis, (n,).
-Curve = Callable[[Array], Array]
-#: The axis it is added to, the end of the unknown's name, the curve.
-AxisCurve = tuple[int, str, Curve]
-
-XYZ = "xyz"
+#: Name, line of the error budget, axis of the output, and addition to that axis, (n,).
+InputError = tuple[str, str, int, Array]
 
 
-def triad_curves(triad: RecordedTriad) -> Iterator[tuple[str, str, list[AxisCurve]]]:
+def input_errors(triad: RecordedTriad, felt: Array) -> Iterator[InputError]:
     """List scale factor, misalignment and nonlinearity of a triad where their sd is not zero.
 
-    Yields name, line of the error budget, and curves as (axis, end of the name, curve).
+    `felt`, (n, 3): input of the triad, in its axes.
     """
     sd = triad.uncertainty
     scale, skew = sd.axis("scale"), sd.axis("misalignment")
     bend, full = sd.axis("nonlinearity_2"), sd.axis("full_scale")
-    yield (
-        "scale",
-        "scale factor",
-        [(a, f" {XYZ[a]}", _part(scale[a], a)) for a in range(3) if scale[a] > 0.0],
-    )
-    yield (
-        "misalignment",
-        "misalignment",
-        [
-            (a, f" {XYZ[j]}→{XYZ[a]}", _part(skew[a], j))
-            for a in range(3)
-            for j in range(3)
-            if j != a and skew[a] > 0.0
-        ],
-    )
-    yield (
-        "nonlinearity",
-        "nonlinearity",
-        [(a, f" {XYZ[a]}", _square(bend[a] / full[a], a)) for a in range(3) if bend[a] > 0.0],
-    )
-
-
-def _part(gain: float, axis: int) -> Curve:
-    def curve(felt: Array) -> Array:
-        return np.asarray(gain * felt[:, axis])
-
-    return curve
-
-
-def _square(gain: float, axis: int) -> Curve:
-    def curve(felt: Array) -> Array:
-        return np.asarray(gain * felt[:, axis] ** 2)
-
-    return curve
-
-
-def constant(value: float) -> Curve:
-    """Return a curve that does not depend on the input."""
-
-    def curve(felt: Array) -> Array:
-        return np.full(len(felt), value)
-
-    return curve
+    for a, axis in enumerate(XYZ):
+        if scale[a] > 0.0:
+            yield f"scale {axis}", "scale factor", a, scale[a] * felt[:, a]
+    for a, axis in enumerate(XYZ):
+        for j, other in enumerate(XYZ):
+            if j != a and skew[a] > 0.0:
+                yield f"misalignment {other}→{axis}", "misalignment", a, skew[a] * felt[:, j]
+    for a, axis in enumerate(XYZ):
+        if bend[a] > 0.0:
+            added = (bend[a] / full[a]) * felt[:, a] ** 2
+            yield f"nonlinearity {axis}", "nonlinearity", a, added
 
 
 # Effect of the unknowns of a unit on every sample at a point of the vehicle.
 
 
-#: Lines of the error budget that other modules look up.
+#: Lines of the error budget.
+ACCEL_BIAS = "accelerometer bias"
 GYRO_BIAS = "gyro bias"
 LEVELLING = "levelling"
 LEVER_ARM = "lever arm"
@@ -515,10 +429,6 @@ def level_turned_by(rest: Array, level: Array) -> Array:
 # Kinematics of a unit at a point of the vehicle, with the effects of its unknowns.
 
 
-#: Name that units without gyro have instead of that of a gyro's owner.
-NO_GYRO = "no gyro"
-
-
 @dataclass(frozen=True, eq=False)
 class PointKinematics:
     """Kinematics from a unit, or the mean of several, at a point of the vehicle.
@@ -526,7 +436,7 @@ class PointKinematics:
     `imu` in vehicle axes, time from the common trigger; `rest_accel_sd`, m/s²: of the vehicle's own
     acceleration over the stationary interval; `prepared` and `moved` are None for a mean of
     several; `unmeasured`, `unmeasured_turns`, (3, 3): projections onto the directions along which
-    the force, and about which the rotation, is assumed; None where all are measured.
+    the force, and about which the rotation, is assumed; zero where all are measured.
     """
 
     name: str
@@ -537,17 +447,13 @@ class PointKinematics:
     rest_accel_sd: float = 0.0
     prepared: PreparedUnit | None = field(default=None, repr=False)
     moved: MovedImu | None = field(default=None, repr=False)
-    unmeasured: Array | None = field(default=None, repr=False)
-    unmeasured_turns: Array | None = field(default=None, repr=False)
+    unmeasured: Array = field(default_factory=lambda: np.zeros((3, 3)), repr=False)
+    unmeasured_turns: Array = field(default_factory=lambda: np.zeros((3, 3)), repr=False)
 
     @property
     def assumed_axes(self) -> tuple[str, ...]:
         """Assumed axes: of ``forward right down`` and ``roll pitch heading``."""
-        none = np.zeros((3, 3))
-        return axis_names(
-            none if self.unmeasured is None else self.unmeasured,
-            none if self.unmeasured_turns is None else self.unmeasured_turns,
-        )
+        return axis_names(self.unmeasured, self.unmeasured_turns)
 
     @property
     def time(self) -> Array:
@@ -567,7 +473,7 @@ class PointKinematics:
     @property
     def gyro(self) -> str:
         """Name of the unit that has the gyro, which others may borrow; or `NO_GYRO`."""
-        if self.unmeasured_turns is not None and np.trace(self.unmeasured_turns) > 2.5:
+        if np.trace(self.unmeasured_turns) > 2.5:
             return NO_GYRO
         lender = None if self.prepared is None else self.prepared.unit.lender
         return self.name if lender is None else lender.name
@@ -622,8 +528,8 @@ def at_point(
         prepared.rest_accel_sd,
         prepared,
         moved,
-        axes if axes.any() else None,
-        turns if turns.any() else None,
+        axes,
+        turns,
     )
 
 

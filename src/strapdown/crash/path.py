@@ -332,7 +332,7 @@ def reconstruct_path(
     """
     time = imu.index.to_numpy(dtype=np.float64)
     mechanization = mechanization or NorthEastDown()
-    origin = entry or _standing()
+    origin = entry or STANDING
     first, anchor, last = path_rows(imu, origin.time, window)
     # Without an entry the velocity belongs to the sample, at whatever instant.
     there = to_stamp(imu, effects, float(time[anchor]) if entry is None else origin.time, anchor)
@@ -379,11 +379,8 @@ class _Begin:
     missing: Array
 
 
-def _standing() -> Entry:
-    """The entry of a vehicle that was stationary, in its axes at time zero."""
-    return Entry(time=0.0, velocity=(0.0, 0.0, 0.0), heading_deg=0.0)
-
-
+#: The entry of a vehicle that was stationary, in its axes at time zero.
+STANDING = Entry(time=0.0, velocity=(0.0, 0.0, 0.0), heading_deg=0.0)
 _NO_NAMES: tuple[str, ...] = ()
 _NOTHING = (_NO_NAMES, _NO_NAMES, np.zeros((0, 9)), np.zeros(3))
 
@@ -412,7 +409,7 @@ def _carried(
     zeroed: bool,
 ) -> _Begin:
     """Propagate the attitude and its errors from the leveling to the entry."""
-    origin, anchor = entry or _standing(), there.row
+    origin, anchor = entry or STANDING, there.row
     time = imu.index.to_numpy(dtype=np.float64)
     at = anchor if level_time is None else int(np.searchsorted(time, level_time - 1e-9))
     if at > anchor:
@@ -561,7 +558,13 @@ def path_rows(imu: pd.DataFrame, at: float, window: Sequence[float] | None) -> t
             time=time[0],
             time_2=time[-1],
         )
-    begin, end = (float(x) for x in (_usual(time, at) if window is None else window))
+    if window is None:
+        # As far as recorded, and with the entry.
+        window = (
+            min(max(WINDOW[0], float(time[0])), at),
+            max(min(WINDOW[1], float(time[-1])), at + 1e-6),
+        )
+    begin, end = (float(x) for x in window)
     if not begin < end or begin < time[0] - slack or end > time[-1] + slack:
         # Intersection of record and window, in whole ms.
         low = max(begin, math.ceil(1e3 * float(time[0])) / 1e3)
@@ -581,14 +584,6 @@ def path_rows(imu: pd.DataFrame, at: float, window: Sequence[float] | None) -> t
     first = min(int(np.searchsorted(time, begin - 1e-9)), anchor)
     last = max(int(np.searchsorted(time, end + 1e-9, side="right")) - 1, anchor)
     return first, anchor, last
-
-
-def _usual(time: Array, at: float) -> tuple[float, float]:
-    """The default window as far as recorded; always contains the entry."""
-    return (
-        min(max(WINDOW[0], float(time[0])), at),
-        max(min(WINDOW[1], float(time[-1])), at + 1e-6),
-    )
 
 
 # Integration from the instant of an entry to the nearest sample: at most half a step.
@@ -791,17 +786,16 @@ def sample_paths(
 def _check(path: object, runs: object, seed: object, workers: object) -> None:
     if not isinstance(path, CrashPath):
         raise ConfigError("crash.path-of-wrong-type", quantity="path", name=type(path).__name__)
-    if not _is_whole(runs, 2, MOST_RUNS):
+    whole = int | np.integer
+    if not (isinstance(runs, whole) and 2 <= runs <= MOST_RUNS):
         raise ConfigError(
             "crash.runs-out-of-range", quantity="runs", runs=runs, most_runs=MOST_RUNS
         )
     for name, given, least in (("seed", seed, 0), ("workers", workers, 1)):
-        if not (_is_whole(given, least) or (name == "workers" and given is None)):
+        if name == "workers" and given is None:
+            continue
+        if not (isinstance(given, whole) and given >= least):
             raise ConfigError("crash.count-not-whole", quantity=name, given=given, least=least)
-
-
-def _is_whole(given: object, least: int, most: float = math.inf) -> bool:
-    return isinstance(given, int | np.integer) and least <= int(given) <= most
 
 
 # A reconstructed path against a reference: cameras, or the truth of a simulation.
@@ -895,10 +889,11 @@ def compare_with_reference(path: CrashPath, reference: pd.DataFrame) -> PathComp
     at_origin = np.array([np.interp(entry, time, sd[:, k]) for k in range(3)])
     origin = origin - own(entry)
     difference = own(time[inside]) - (values[inside] - origin)
-    covariance = _covariance(path, time[inside])
+    place = path.covariance[:, PLACE, PLACE].reshape(len(path.time), 9)
+    rows = np.column_stack([np.interp(time[inside], path.time, place[:, k]) for k in range(9)])
     # The reading at the origin is a further independent one.
     own_noise = sd[inside] ** 2 + at_origin**2
-    covariance = covariance + np.einsum("ni,ij->nij", own_noise, np.eye(3))
+    covariance = rows.reshape(-1, 3, 3) + np.einsum("ni,ij->nij", own_noise, np.eye(3))
     bound = TWO_SIDED_95 * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
     largest = difference[np.abs(difference).argmax(axis=0), range(3)]
     from scipy.stats import chi2
@@ -913,12 +908,6 @@ def compare_with_reference(path: CrashPath, reference: pd.DataFrame) -> PathComp
         float(difference[-1] @ np.linalg.pinv(covariance[-1]) @ difference[-1]),
         float(chi2.ppf(0.95, 3)),
     )
-
-
-def _covariance(path: CrashPath, time: Array) -> Array:
-    place = path.covariance[:, PLACE, PLACE].reshape(len(path.time), 9)
-    rows = np.column_stack([np.interp(time, path.time, place[:, k]) for k in range(9)])
-    return np.asarray(rows.reshape(-1, 3, 3))
 
 
 def _columns(reference: pd.DataFrame) -> tuple[Array, Array, Array]:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown.crash.acceleration import Acceleration
 from strapdown.crash.delta_v import DeltaV, delta_v
-from strapdown.errors import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError, check_choice
 from strapdown.rotation import within_half_turn
 
 Array = NDArray[np.float64]
@@ -202,14 +202,9 @@ CONVENTIONS: dict[str, PdofConvention] = {
 
 
 def _convention(name: str) -> PdofConvention:
-    if name not in CONVENTIONS:
-        raise ConfigError(
-            "crash.no-convention-direction-force",
-            quantity="convention",
-            name=name,
-            word=name,
-            known=CONVENTIONS,
-        )
+    check_choice(
+        "crash.no-convention-direction-force", CONVENTIONS, quantity="convention", name=name
+    )
     return CONVENTIONS[name]
 
 

@@ -15,7 +15,7 @@ from strapdown.crash.acceleration import force_at_rest
 from strapdown.crash.entry import Entry
 from strapdown.crash.measuring_point import PointKinematics, at_point
 from strapdown.crash.path import reconstruct_path
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, check_choice
 from strapdown.rotation import level
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad, UnitArrays, check_unit
 from strapdown.sensors.pre_crash import (
@@ -29,6 +29,7 @@ from strapdown.sensors.pre_crash import (
 )
 from strapdown.sensors.range_merge import (
     MergedRanges,
+    Range,
     agreement_findings,
     bias_from_lower_range,
     merge_ranges,
@@ -36,7 +37,7 @@ from strapdown.sensors.range_merge import (
 from strapdown.sensors.rest import RestStretch, rest_between
 from strapdown.sensors.saturation import RangeLimits, find_limits
 from strapdown.sensors.synchronise import SynchronisedUnit, SynchronisedUnits
-from strapdown.sensors.triad_errors import ZERO, Triad, check_sd, finite, triad_of, triple
+from strapdown.sensors.triad_errors import ZERO, Triad, check_sd, finite, span, triad_of, triple
 from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.sensors.unmeasured import assumed_findings, with_filled_axes, with_gyro
 from strapdown.tables import ACCEL, imu_table
@@ -92,14 +93,9 @@ class Preparation:
         """Options by name. `ConfigError`: a name is unknown."""
         known = [f.name for f in fields(cls)]
         for name in given:
-            if name not in known:
-                raise ConfigError(
-                    "crash.preparation-option-unknown",
-                    quantity="preparation",
-                    name=name,
-                    word=str(name),
-                    known=known,
-                )
+            check_choice(
+                "crash.preparation-option-unknown", known, quantity="preparation", name=name
+            )
         return cls(**given)
 
     def check(self, unit: str) -> None:
@@ -108,7 +104,7 @@ class Preparation:
             raise ConfigError(
                 "crash.gravity-nowhere-ground", file=unit, quantity="gravity", gravity=self.gravity
             )
-        if not (isinstance(self.rest, str) and self.rest == "auto") and not _is_stretch(self.rest):
+        if not (isinstance(self.rest, str) and self.rest == "auto") and span(self.rest) is None:
             raise ConfigError("crash.no-stretch", file=unit, quantity="rest", rest=self.rest)
         if self.levelling is not None:
             code = "crash.levelling-not-three-numbers"
@@ -128,14 +124,6 @@ class Preparation:
                 )
         check_sd(self.steady_acceleration, "steady_acceleration", "m/s²", unit)
         check_sd(self.steady_rate, "steady_rate", "rad/s", unit)
-
-
-def _is_stretch(given: Any) -> bool:
-    try:
-        start, end = given
-    except (TypeError, ValueError):
-        return False
-    return finite(start) and finite(end) and start < end
 
 
 def prepare_unit(unit: CrashUnit, options: Preparation = Preparation()) -> PreparedUnit:
@@ -171,25 +159,27 @@ def prepare_unit(unit: CrashUnit, options: Preparation = Preparation()) -> Prepa
     gyro_noise = _noise(data.time, gyro)
     findings: list[Finding] = [*data.findings, *assumed_findings(unit)]
     findings += saturation_findings(unit, data, limits, gyro_limits)
-    limits = [_with_held(limit, t) for limit, t in zip(limits, triads, strict=True)]
+    ranges = [
+        Range(y, _with_held(limit, t), s, t.uncertainty.bandwidth)
+        for y, limit, s, t in zip(data.accelerometers, limits, noise, triads, strict=True)
+    ]
 
     own = _find_rest(unit, data, options, noise[0], gyro_noise)
     findings += rest_findings(unit, data.time, own, options)
     unknown = steady_acceleration if own is not None and own.grade == "steady" else 0.0
-    turn = _where_there(
-        gyro_bias_from(own, gyro.axis("bias"), steady_rate=options.steady_rate), unit.gyro.absent
+    turn = gyro_bias_from(own, gyro.axis("bias"), steady_rate=options.steady_rate)
+    # Assumptions for missing axes are reported elsewhere.
+    keep = [k not in unit.gyro.absent for k in range(3)]
+    turn = BiasEstimate(
+        triad_of(np.where(keep, turn.bias, 0.0)), triad_of(np.where(keep, turn.sd, 0.0))
     )
 
-    bias, bias_from, bias_sd = _range_biases(unit, data, limits, own)
+    bias, bias_from, bias_sd = _range_biases(unit, data.time, ranges, own)
     findings += bias_findings(unit, bias, bias_from, own)
-    findings += agreement_findings(unit, data, limits, noise)
+    findings += agreement_findings(unit, ranges)
     merged = merge_ranges(
         data.time,
-        data.accelerometers,
-        limits,
-        noise,
-        bias=bias,
-        bandwidth=[t.uncertainty.bandwidth for t in triads],
+        [replace(one, bias=b) for one, b in zip(ranges, bias, strict=True)],
         margin=options.margin,
         hysteresis=options.hysteresis,
         fade=options.fade,
@@ -200,9 +190,8 @@ def prepare_unit(unit: CrashUnit, options: Preparation = Preparation()) -> Prepa
     standing = None if own is None else in_axes(own, C)
     force = merged.values @ C.T
     if levelling is not None:
-        level, shift = from_stated_attitude(
-            levelling, standing, _stated_sd(triads[0].uncertainty, C), unknown, gravity
-        )
+        stated = np.sqrt(C**2 @ np.asarray(triads[0].uncertainty.axis("bias")) ** 2)
+        level, shift = from_stated_attitude(levelling, standing, stated, unknown, gravity)
         if shift is not None:
             # All ranges are relative to the lowest and shift with it.
             force = force - shift
@@ -268,21 +257,22 @@ def _find_rest(
 
 
 def _range_biases(
-    unit: CrashUnit, data: UnitArrays, limits: Sequence[RangeLimits], rest: RestStretch | None
+    unit: CrashUnit, time: Array, ranges: Sequence[Range], rest: RestStretch | None
 ) -> tuple[list[Array], tuple[int | None, ...], tuple[Triad, ...]]:
     """Bias of every range relative to the lowest: each is tied to the next lower one."""
     bias: list[Array] = [np.zeros(3)]
     origin: list[int | None] = [None]
     sd: list[Triad] = [ZERO]
-    for j in range(1, len(data.accelerometers)):
+    for j in range(1, len(ranges)):
         found = None
         if rest is not None:
-            within = (data.time >= rest.start) & (data.time <= rest.end)
+            low, high = ranges[j - 1], ranges[j]
+            within = (time >= rest.start) & (time <= rest.end)
             found = bias_from_lower_range(
-                data.time,
-                data.accelerometers[j],
-                data.accelerometers[j - 1],
-                within[:, None] & ~limits[j - 1].clipped & ~limits[j].clipped,
+                time,
+                high.values,
+                low.values,
+                within[:, None] & ~low.limits.clipped & ~high.limits.clipped,
                 quantization=unit.accelerometers[j].uncertainty.axis("quantization"),
             )
         if found is None:
@@ -317,19 +307,6 @@ def _noise(time: Array, uncertainty: TriadUncertainty) -> Array:
     return np.hypot(white, np.asarray(uncertainty.quantization) / math.sqrt(12.0))
 
 
-def _where_there(found: BiasEstimate, absent: tuple[int, ...]) -> BiasEstimate:
-    """Omit missing axes: their assumptions are reported elsewhere."""
-    keep = [k not in absent for k in range(3)]
-    return BiasEstimate(
-        triad_of(np.where(keep, found.bias, 0.0)), triad_of(np.where(keep, found.sd, 0.0))
-    )
-
-
-def _stated_sd(uncertainty: TriadUncertainty, C: Array) -> Array:
-    """Stated standard deviation of the bias of the lowest range, in vehicle axes."""
-    return np.asarray(np.sqrt(C**2 @ np.asarray(uncertainty.axis("bias")) ** 2))
-
-
 # Joint preparation of units of one vehicle: units without a stationary interval are leveled
 # from units with one.
 
@@ -358,7 +335,16 @@ def prepare_together(
             lent = _attitude_at_start(unit, done[unit.lender])
             if lent is not None:
                 own["levelling"] = lent
-        hint = _gyro_to_borrow(unit, turning)
+        hint = None
+        if turning and unit.lender is None and not _turns(unit):
+            # It has no gyro and borrows none although other units have one.
+            hint = Finding(
+                "crash.gyro-not-borrowed" if len(turning) == 1 else "crash.gyros-not-borrowed",
+                file=unit.unit.name,
+                quantity="gyro",
+                turning=turning,
+                lender=turning[0],
+            )
         try:
             prepared = prepare_unit(unit.unit, Preparation.of(own))
         except DataError as error:
@@ -382,19 +368,6 @@ def _turns(unit: SynchronisedUnit) -> bool:
     """Whether the unit has a gyro that measures, not a substitute for an assumption."""
     gyro = unit.unit.gyro
     return gyro is not None and len(gyro.absent) < 3
-
-
-def _gyro_to_borrow(unit: SynchronisedUnit, turning: Sequence[str]) -> Finding | None:
-    """Report a unit without gyro that borrows none although other units have one."""
-    if unit.lender is not None or _turns(unit) or not turning:
-        return None
-    return Finding(
-        "crash.gyro-not-borrowed" if len(turning) == 1 else "crash.gyros-not-borrowed",
-        file=unit.unit.name,
-        quantity="gyro",
-        turning=turning,
-        lender=turning[0],
-    )
 
 
 def _attitude_at_start(

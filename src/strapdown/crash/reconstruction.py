@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -28,16 +28,18 @@ from strapdown.crash.delta_v_bound import (
 )
 from strapdown.crash.entry import Entry
 from strapdown.crash.events import PART_563, CrashEvents, EventRule, detect_events
-from strapdown.crash.gnss_entry import GnssEntry, start_from_gnss
-from strapdown.crash.measuring_point import PointKinematics, SampleEffects
+from strapdown.crash.measuring_point import PointKinematics
 from strapdown.crash.path import VELOCITY, CrashPath, path_line, reconstruct_path
 from strapdown.crash.preparation import prepare_together
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.mechanization import NorthEastDown
 from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.sensors.synchronise import SynchronisedUnits, synchronise
-from strapdown.sensors.triad_errors import FARTHEST, finite, triple
+from strapdown.sensors.triad_errors import FARTHEST, finite, span, triple
 from strapdown.tables import NED
+
+if TYPE_CHECKING:
+    from strapdown.crash.gnss_entry import GnssEntry
 
 Row = tuple[str, str, float, float, float]
 
@@ -219,8 +221,8 @@ class CrashOptions:
             raise ConfigError(
                 "crash.vehicle-origin", quantity="point", place=place, hypot=math.hypot(*place)
             )
-        if self.window is not None:
-            _check_window(self.window)
+        if self.window is not None and span(self.window) is None:
+            raise ConfigError("crash.window-not-a-pair", quantity="window", window=self.window)
         if not (finite(self.peak_window) and self.peak_window > 0.0):
             raise ConfigError(
                 "crash.no-length", quantity="peak_window", peak_window=self.peak_window
@@ -258,12 +260,18 @@ def reconstruct_unit(
     DataError, DivergenceError
         As `reconstruct_path`.
     """
-    gravity, mechanization, peak_window = (
-        options.gravity,
-        options.mechanization,
-        options.peak_window,
-    )
-    check_standing(at_point, entry)
+    gravity, mechanization = options.gravity, options.mechanization
+    peak_window = options.peak_window
+    rest = at_point.rest
+    if entry is None and rest is not None and rest.grade == "steady":
+        # At zero speed, where the quiet interval may be one of driving.
+        raise DataError(
+            "crash.entry-speed-unknown-quiet",
+            file=at_point.name,
+            quantity="entry",
+            start=rest.start,
+            end=rest.end,
+        )
     at_rest, rest_sd = at_point.resting_force(gravity)
     acceleration = body_acceleration(at_point.imu, at_rest.tolist())
     effects = at_point.effects
@@ -277,11 +285,11 @@ def reconstruct_unit(
         at_point.imu,
         effects,
         at_point.levelling,
-        None if at_point.rest is None else at_point.rest.end,
+        None if rest is None else rest.end,
         entry,
         window=options.window,
         mechanization=mechanization,
-        zeroed_at_rest=at_point.rest is not None,
+        zeroed_at_rest=rest is not None,
     )
     first = int(np.searchsorted(at_point.imu.index, path.time[0] - 1e-9))
     part = at_point.imu.iloc[first : first + len(path.time)]
@@ -292,30 +300,39 @@ def reconstruct_unit(
     findings = [
         *events.findings,
         *entry_findings(at_point, entry, path, events, mechanization),
-        *_unseen(at_point, events),
     ]
+    blind = [axis for axis in at_point.assumed_axes if axis in ("forward", "right")]
+    if blind and not events.events:
+        # An impact along an assumed axis is not among the events.
+        findings.append(
+            Finding(
+                "crash.impact-along-would-not-show",
+                file=at_point.name,
+                quantity="delta-V",
+                blind=blind,
+            )
+        )
     for event in events.events:
-        ends = event.time_zero_sd, 0.0 if math.isnan(event.end_sd) else event.end_sd
+        ends = -event.time_zero_sd, 0.0 if math.isnan(event.end_sd) else event.end_sd
         start, end = event.time_zero, min(event.end, acceleration.end)
         peak = trailing_delta_v(acceleration, peak_window, min(start + peak_window, end), end).peak
         whole = delta_v(acceleration, start, end, across_gaps=True)
-        body.append(
-            EventChanges(
-                _along(effects, peak, "peak", rest_sd, None),
-                _along(effects, whole, "event", rest_sd, _moved(whole, ends)),
-            )
-        )
+        changes = []
+        for window, change in (("peak", peak), ("event", whole)):
+            at_ends = _at_ends(change, ends) if window == "event" else None
+            bound = body_delta_v_bound(effects, change.weights, rest_sd=rest_sd, at_ends=at_ends)
+            changes.append(velocity_change(window, change, bound))
+        body.append(EventChanges(*changes))
         if path.time[0] <= min(start, peak.start) and max(end, peak.end) <= path.time[-1]:
             course = np.unwrap(path.table["heading"], period=360.0)
             heading = float(np.interp(start, path.time, course)) % 360.0
-            spans = (peak.start, peak.end), (start, end)
-            peak, whole = (delta_v(resolved, *span, across_gaps=True) for span in spans)
-            ned.append(
-                EventChanges(
-                    _resolved(path, peak, "peak", heading, None),
-                    _resolved(path, whole, "event", heading, _moved(whole, ends)),
-                )
-            )
+            changes = []
+            for window, span in (("peak", (peak.start, peak.end)), ("event", (start, end))):
+                change = delta_v(resolved, *span, across_gaps=True)
+                at_ends = _at_ends(change, ends) if window == "event" else None
+                bound = resolved_delta_v_bound(path, *span, at_ends=at_ends)
+                changes.append(velocity_change(window, change, bound, heading))
+            ned.append(EventChanges(*changes))
         else:
             ned.append(None)
             findings.append(
@@ -358,35 +375,9 @@ def reconstruct_unit(
     )
 
 
-def _unseen(at_point: PointKinematics, events: CrashEvents) -> list[Finding]:
-    """Report that an impact along an assumed axis is not among the events."""
-    blind = [axis for axis in at_point.assumed_axes if axis in ("forward", "right")]
-    if events.events or not blind:
-        return []
-    return [
-        Finding(
-            "crash.impact-along-would-not-show", file=at_point.name, quantity="delta-V", blind=blind
-        )
-    ]
-
-
-def _moved(change: DeltaV, ends: tuple[float, float]) -> Array:
+def _at_ends(change: DeltaV, ends: tuple[float, float]) -> Array:
     """Effect on the change of one standard deviation of either end of an event."""
-    return np.array([-change.start_rate * ends[0], change.end_rate * ends[1]])
-
-
-def _along(
-    effects: SampleEffects, change: DeltaV, window: str, rest_sd: Array, at_ends: Array | None
-) -> VelocityChange:
-    bound = body_delta_v_bound(effects, change.weights, rest_sd=rest_sd, at_ends=at_ends)
-    return velocity_change(window, change, bound)
-
-
-def _resolved(
-    path: CrashPath, change: DeltaV, window: str, heading: float, at_ends: Array | None
-) -> VelocityChange:
-    bound = resolved_delta_v_bound(path, change.start, change.end, at_ends=at_ends)
-    return velocity_change(window, change, bound, heading)
+    return np.array([change.start_rate * ends[0], change.end_rate * ends[1]])
 
 
 # Consistency of the stated entry with the record.
@@ -396,19 +387,6 @@ def _resolved(
 SIGMAS = 4.0
 # A vehicle steeper than this at the impact is on a slope: braking does not pitch it so far.
 SLOPE_DEG = 4.0
-
-
-def check_standing(at_point: PointKinematics, entry: Entry | None) -> None:
-    """Refuse a start at zero speed where the quiet interval may be one of driving."""
-    rest = at_point.rest
-    if entry is None and rest is not None and rest.grade == "steady":
-        raise DataError(
-            "crash.entry-speed-unknown-quiet",
-            file=at_point.name,
-            quantity="entry",
-            start=rest.start,
-            end=rest.end,
-        )
 
 
 def entry_findings(
@@ -610,8 +588,14 @@ def reconstruct_crash(
         A path left the range of vehicle motion.
     """
     _check_units(units)
-    if not (entry is None or isinstance(entry, Entry | GnssEntry)):
-        raise _wrong_type("entry", entry)
+    of_fixes = None
+    if not (entry is None or isinstance(entry, Entry)):
+        # Estimation from fixes is loaded where it is needed.
+        from strapdown.crash.gnss_entry import GnssEntry, start_from_gnss
+
+        if not isinstance(entry, GnssEntry):
+            raise _wrong_type("entry", entry)
+        of_fixes = entry
     _check_preparation(options.preparation or {}, {unit.name for unit in units})
     point, combine = options.point, options.combine
     together = synchronise(
@@ -623,10 +607,10 @@ def reconstruct_crash(
         findings += () if of.prepared is None else of.prepared.findings
     # Before each unit estimates its own biases, which absorbs part of the differences.
     comparison = compare_units(there) if len(there) > 1 else None
-    tied: list[Entry | None] = [None if isinstance(entry, GnssEntry) else entry] * len(there)
-    if isinstance(entry, GnssEntry):
+    tied = [entry if isinstance(entry, Entry) else None] * len(there)
+    if of_fixes is not None:
         for k, of in enumerate(there):
-            there[k], tied[k], state = start_from_gnss(of, entry, point)
+            there[k], tied[k], state = start_from_gnss(of, of_fixes, point)
             findings += state.findings
 
     found = tuple(
@@ -677,15 +661,6 @@ def _check_units(units: object) -> None:
     for unit in units:
         if not isinstance(unit, CrashUnit):
             raise _wrong_type("units", unit)
-
-
-def _check_window(window: Any) -> None:
-    try:
-        begin, end = (float(x) for x in window)
-    except (TypeError, ValueError):
-        begin = end = math.nan
-    if not (math.isfinite(begin) and math.isfinite(end) and begin < end):
-        raise ConfigError("crash.window-not-a-pair", quantity="window", window=window)
 
 
 def _wrong_type(quantity: str, given: object) -> ConfigError:

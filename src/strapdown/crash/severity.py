@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, check_choice
 
 #: Units of speed, in m/s. Inputs with these units are given in m/s; others in their stated unit.
 SPEEDS: dict[str, float] = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
@@ -176,14 +176,7 @@ def injury_risk(
 def _check_options(
     model: SeverityModel, sd: Mapping[str, float], coverage: float, outside: str
 ) -> None:
-    if outside not in OUTSIDE:
-        raise ConfigError(
-            "crash.outside-option-unknown",
-            quantity="outside",
-            outside=outside,
-            word=outside,
-            known=OUTSIDE,
-        )
+    check_choice("crash.outside-option-unknown", OUTSIDE, quantity="outside", outside=outside)
     if not 0.0 < coverage < 1.0:
         raise ConfigError("crash.coverage-none", quantity="coverage", coverage=coverage)
     for name, value in sd.items():
@@ -339,14 +332,7 @@ def find_severity_model(name: str) -> SeverityModel:
     ConfigError
         There is none of that name; the message suggests the nearest.
     """
-    if name not in SEVERITY_MODELS:
-        raise ConfigError(
-            "crash.no-severity-model",
-            quantity="severity model",
-            name=name,
-            word=name,
-            known=SEVERITY_MODELS,
-        )
+    check_choice("crash.no-severity-model", SEVERITY_MODELS, quantity="severity model", name=name)
     return SEVERITY_MODELS[name]
 
 

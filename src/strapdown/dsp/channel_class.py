@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.dsp.samples import as_channels, positive_step
-from strapdown.errors import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError, check_choice
 
 Array = NDArray[np.float64]
 
@@ -69,14 +69,12 @@ def cfc_coefficients(cfc: float, step: float, standard: str = "iso") -> CfcCoeff
             word=str(cfc),
             known=[str(c) for c in CHANNEL_CLASSES],
         )
-    if standard not in DESIGN_FREQUENCY:
-        raise ConfigError(
-            "dsp.no-standard-channel-frequency-classes",
-            quantity="standard",
-            standard=standard,
-            word=str(standard),
-            known=DESIGN_FREQUENCY,
-        )
+    check_choice(
+        "dsp.no-standard-channel-frequency-classes",
+        DESIGN_FREQUENCY,
+        quantity="standard",
+        standard=standard,
+    )
     rate = 1.0 / step
     if rate < LEAST_RATE * cfc * (1.0 - 1e-9):
         fits = [c for c in CHANNEL_CLASSES if rate >= LEAST_RATE * c * (1.0 - 1e-9)]

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.errors import ConfigError
+from strapdown.errors import ConfigError, check_choice
 from strapdown.estimation.sensor_states import COUPLING, SensorStates, StateBlock
 from strapdown.sensors.triad_errors import Triad, TriadLike, triad_of
 from strapdown.sensors.uncertainty import BiasDrift, ImuUncertainty, TriadUncertainty
@@ -348,14 +348,9 @@ def stated_states(
     bounds = {one.block.name: one for one in standard_states(sensors, separate=False)}
     out = []
     for name in names:
-        if name not in STATED_STATES:
-            raise ConfigError(
-                "estimation.no-error-sensor-filter-can",
-                quantity="states",
-                name=name,
-                word=name,
-                known=STATED_STATES,
-            )
+        check_choice(
+            "estimation.no-error-sensor-filter-can", STATED_STATES, quantity="states", name=name
+        )
         if list(names).count(name) > 1:
             raise ConfigError("estimation.stands-twice", quantity="states", name=name)
         out.append(_block(name, sensors, bounds, names))

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import ConfigError
+from strapdown.errors import ConfigError, check_choice
 
 Array = NDArray[np.float64]
 
@@ -164,10 +164,7 @@ class StateLayout:
 
     def __getitem__(self, name: str) -> slice:
         """Position of a block; a `ConfigError` lists the existing ones."""
-        if name not in self.places:
-            raise ConfigError(
-                "estimation.no-state", quantity="states", name=name, word=name, known=self.places
-            )
+        check_choice("estimation.no-state", self.places, quantity="states", name=name)
         return self.places[name]
 
     def labels(self) -> Iterator[str]:

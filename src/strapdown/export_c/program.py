@@ -18,7 +18,7 @@ from strapdown._kernels import arithmetic
 from strapdown.attitude_algorithms import AttitudeAlgorithm
 from strapdown.attitude_algorithms.cost import count_cost, kernel_home, step_kernel
 from strapdown.constants import CORTEX_M4F_CYCLES
-from strapdown.errors import ConfigError
+from strapdown.errors import ConfigError, check_choice
 from strapdown.export_c.kernels import Function, Kernels
 from strapdown.export_c.translate import WIDTH, Translator, comment, number
 from strapdown.increments.angle import INTERPOLATIONS
@@ -79,14 +79,12 @@ def export_c(
 
 
 def _kind(interpolation: str, sampling: str | None, imu: pd.DataFrame | None) -> str:
-    if interpolation not in INTERPOLATIONS:
-        raise ConfigError(
-            "attitude.no-interpolation",
-            quantity="interpolation",
-            interpolation=interpolation,
-            word=interpolation,
-            known=INTERPOLATIONS,
-        )
+    check_choice(
+        "attitude.no-interpolation",
+        INTERPOLATIONS,
+        quantity="interpolation",
+        interpolation=interpolation,
+    )
     if imu is not None:
         check_imu(imu)
         sampling = sampling or imu.attrs["sampling"]
@@ -98,14 +96,7 @@ def _kind(interpolation: str, sampling: str | None, imu: pd.DataFrame | None) ->
                 attrs=imu.attrs["sampling"],
             )
     sampling = sampling or KINDS[0]
-    if sampling not in KINDS:
-        raise ConfigError(
-            "attitude.no-kind-sampling-2",
-            quantity="sampling",
-            sampling=sampling,
-            word=sampling,
-            known=KINDS,
-        )
+    check_choice("attitude.no-kind-sampling-2", KINDS, quantity="sampling", sampling=sampling)
     return "mean" if sampling == "mean" else interpolation
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.constants import TIME_UNITS
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, check_choice
 from strapdown.formats.arrays import numbers, ticks_of
 from strapdown.formats.clocks import RELATIVE, Clock, Stamps, clock_of_name, read_stamps, with_clock
 from strapdown.formats.columns import EULERS, QUATERNIONS, factor_of, parse_axes, parse_unit
@@ -255,10 +255,7 @@ def sampling_of_rates(raw: RawLog, options: ReadOptions, findings: list[Finding]
             )
         )
         return "instantaneous"
-    if asked not in SAMPLINGS:
-        raise ConfigError(
-            "io.sampling-unknown", quantity="--sampling", asked=asked, word=asked, known=SAMPLINGS
-        )
+    check_choice("io.sampling-unknown", SAMPLINGS, quantity="--sampling", asked=asked)
     return asked
 
 

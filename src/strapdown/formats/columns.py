@@ -15,7 +15,7 @@ from strapdown.constants import (
     MAG_UNITS,
     TIME_UNITS,
 )
-from strapdown.errors import ConfigError
+from strapdown.errors import ConfigError, check_choice
 
 __all__ = [
     "QUANTITIES",
@@ -331,14 +331,7 @@ def parse_column_option(items: list[str]) -> dict[str, str]:
         quantity, equals, column = (piece.strip() for piece in item.partition("="))
         if not equals or not column:
             raise ConfigError("io.no-form-understood", quantity="--columns", item=item)
-        if quantity not in known:
-            raise ConfigError(
-                "io.unknown-quantity",
-                quantity="--columns",
-                of_what=quantity,
-                word=quantity,
-                known=known,
-            )
+        check_choice("io.unknown-quantity", known, quantity="--columns", of_what=quantity)
         out[quantity] = column
     return out
 

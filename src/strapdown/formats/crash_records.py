@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
-from strapdown.errors import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError, check_choice
 from strapdown.formats import crash_json, crash_nhtsa, crash_table, mme_reader
 from strapdown.formats.crash_record import CrashRecord, clean
 from strapdown.formats.crash_table import record_of
@@ -145,10 +145,8 @@ def read_crash_record(
         Not recognized, or damaged; the message names file, row, quantity and remedy.
     """
     file = Path(path)
-    if format is not None and format not in CRASH_READERS:
-        raise ConfigError(
-            "io.unknown-reader", quantity="format", format=format, word=format, known=CRASH_READERS
-        )
+    if format is not None:
+        check_choice("io.unknown-reader", CRASH_READERS, quantity="format", format=format)
     try:
         # Messages name a record by the last part of its path, which "." does not have.
         return _read(file if file.name not in ("", "..") else file.resolve(), format)

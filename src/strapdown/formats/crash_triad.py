@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, check_choice
 from strapdown.formats.clocks import EPOCH
 from strapdown.formats.crash_record import (
     FACTORS,
@@ -100,10 +100,7 @@ def triad_of_channels(
         A channel does not exist or holds another quantity, its unit is not stated and not
         evident, a value is missing, or time does not advance; with the row.
     """
-    if quantity not in _COLUMNS:
-        raise ConfigError(
-            "io.unknown-triad", quantity="quantity", of_what=quantity, word=quantity, known=_COLUMNS
-        )
+    check_choice("io.unknown-triad", _COLUMNS, quantity="quantity", of_what=quantity)
     findings: list[Finding] = []
     chosen = _chosen(record, channels, findings)
     parts = []
@@ -267,14 +264,8 @@ def _check_finite(channel: CrashChannel, stamps: Array, values: Array) -> None:
 def _sampling(
     record: CrashRecord, parts: list[_Axis], stated: str | None, findings: list[Finding]
 ) -> str:
-    if stated is not None and stated not in SAMPLINGS:
-        raise ConfigError(
-            "io.triad-sampling-unknown",
-            quantity="sampling",
-            stated=stated,
-            word=stated,
-            known=SAMPLINGS,
-        )
+    if stated is not None:
+        check_choice("io.triad-sampling-unknown", SAMPLINGS, quantity="sampling", stated=stated)
     kinds = {"mean" if p.mean else p.channel.sampling for p in parts} - {None}
     if len(kinds) > 1 or (stated and kinds and stated not in kinds):
         raise ConfigError(

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import ConfigError
+from strapdown.errors import check_choice
 from strapdown.formats import csv, hdf5, numpy_files
 from strapdown.tables import ACCEL, EULER, GYRO, QUATERNION
 
@@ -89,14 +89,7 @@ def log_formats(names: Sequence[str]) -> tuple[str, ...]:
     exist.
     """
     for name in names:
-        if name not in (*LOG_WRITERS, "all"):
-            raise ConfigError(
-                "io.unknown-writer",
-                quantity="--format",
-                name=name,
-                word=name,
-                known=[*LOG_WRITERS, "all"],
-            )
+        check_choice("io.unknown-writer", (*LOG_WRITERS, "all"), quantity="--format", name=name)
     return tuple(LOG_WRITERS) if "all" in names else tuple(names)
 
 

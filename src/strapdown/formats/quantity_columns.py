@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from strapdown.constants import TIME_UNITS
-from strapdown.errors import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError, check_choice
 from strapdown.formats.columns import CLOCKS, unit_of
 from strapdown.formats.columns import UNIT_OF as UNITS_OF_LOGS
 from strapdown.formats.recording import RawLog
@@ -139,15 +139,9 @@ def find_quantities(
             )
         if name not in columns and name.isdecimal() and 1 <= int(name) <= len(columns):
             name = columns[int(name) - 1]
-        if name not in columns:
-            raise ConfigError(
-                "io.no-column-3",
-                file=file,
-                quantity=f"columns {quantity}",
-                name=name,
-                word=name,
-                known=columns,
-            )
+        check_choice(
+            "io.no-column-3", columns, quantity=f"columns {quantity}", file=file, name=name
+        )
         wanted[name] = quantity
     found: dict[str, Found] = {}
     for name in columns:

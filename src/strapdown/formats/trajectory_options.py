@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
 from strapdown.ellipsoids import WGS84, Ellipsoid
-from strapdown.errors import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError, check_choice
 
 __all__ = ["TUM_FRAMES", "TrajectoryFileOptions"]
 
@@ -75,22 +75,10 @@ class TrajectoryFileOptions:
                 quantity="most_points",
                 most_points=self.most_points,
             )
-        if self.tum_frame not in TUM_FRAMES:
-            raise ConfigError(
-                "io.no-frame-tum-file",
-                quantity="tum_frame",
-                tum_frame=self.tum_frame,
-                word=str(self.tum_frame),
-                known=TUM_FRAMES,
-            )
-        if self.digits not in DIGITS:
-            raise ConfigError(
-                "io.digits-unknown",
-                quantity="digits",
-                digits=self.digits,
-                word=str(self.digits),
-                known=DIGITS,
-            )
+        check_choice(
+            "io.no-frame-tum-file", TUM_FRAMES, quantity="tum_frame", tum_frame=self.tum_frame
+        )
+        check_choice("io.digits-unknown", DIGITS, quantity="digits", digits=self.digits)
 
     def require_wgs84(self, form: str) -> None:
         """Refuse positions that a format would misinterpret.

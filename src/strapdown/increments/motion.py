@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown._kernels import motion_increments as kernel
-from strapdown.errors import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError, check_choice
 from strapdown.increments.angle import INTERPOLATIONS as BETWEEN_STAMPS
 from strapdown.tables import ACCEL, GYRO, MOTION, check_imu, check_motion_increments, imu_table
 from strapdown.tables.checks import as_array, check_same_length, check_time
@@ -103,14 +103,7 @@ def _check(imu: pd.DataFrame, samples: int, interpolation: str, rows: str) -> bo
         ("interpolation", interpolation, INTERPOLATIONS),
         ("rows", rows, ROWS),
     ):
-        if value not in known:
-            raise ConfigError(
-                "mechanization.no-choice",
-                quantity=quantity,
-                value=value,
-                word=str(value),
-                known=known,
-            )
+        check_choice("mechanization.no-choice", known, quantity=quantity, value=value)
     if samples > 1 and interpolation != "linear":
         raise ConfigError(
             "mechanization.steps-block-share-polynomial",
@@ -165,14 +158,12 @@ class IncrementStream:
     interpolation: str = "linear"
 
     def __post_init__(self) -> None:
-        if self.interpolation not in STREAMED:
-            raise ConfigError(
-                "mechanization.no-choice-2",
-                quantity="interpolation",
-                interpolation=self.interpolation,
-                word=str(self.interpolation),
-                known=STREAMED,
-            )
+        check_choice(
+            "mechanization.no-choice-2",
+            STREAMED,
+            quantity="interpolation",
+            interpolation=self.interpolation,
+        )
 
     def begin(self, sampling: str = "instantaneous") -> IncrementStreamState:
         """Return the state before the first sample.

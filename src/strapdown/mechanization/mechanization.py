@@ -30,7 +30,7 @@ from strapdown._kernels.ned import (
     trajectory_rows,
 )
 from strapdown.ellipsoids import WGS84, Ellipsoid, find_ellipsoid
-from strapdown.errors import ConfigError, DataError, DivergenceError, Finding
+from strapdown.errors import ConfigError, DataError, DivergenceError, Finding, check_choice
 from strapdown.frames import q_ne
 from strapdown.nav_state import NavState
 from strapdown.tables import MOTION, TRAJECTORY, check_trajectory
@@ -74,14 +74,9 @@ class Mechanization(ABC):
 
     def __post_init__(self) -> None:
         find_ellipsoid(self.ellipsoid)
-        if self.height not in HEIGHTS:
-            raise ConfigError(
-                "mechanization.nothing-height-can",
-                quantity="height",
-                height=self.height,
-                word=str(self.height),
-                known=HEIGHTS,
-            )
+        check_choice(
+            "mechanization.nothing-height-can", HEIGHTS, quantity="height", height=self.height
+        )
         for name, low, high in (
             ("height_time_constant", 1.0, 1000.0),
             ("latitude_limit_deg", 0.0, 89.999),

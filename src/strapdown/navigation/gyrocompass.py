@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.alignment.alignment import Alignment, Site
+from strapdown.alignment.coarse_alignments import COARSE_ALIGNMENTS
 from strapdown.alignment.fine import BIASED, ROCKS, FineAlignment, FineResult
-from strapdown.alignment.inertial_frame import InertialFrame
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.earth import gravity
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
@@ -295,7 +295,7 @@ def _aligned_anew(
     first, last = np.searchsorted(time, [begin - 1e-6, end + 1e-6])
     part = imu.iloc[first:last]
     part.attrs = dict(imu.attrs)
-    coarse = InertialFrame().align(part, site, sensors)
+    coarse = COARSE_ALIGNMENTS["inertial_frame"]().align(part, site, sensors)
     return FineAlignment().align(part, site, sensors, coarse), coarse
 
 

@@ -13,7 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.alignment.alignment import Site
-from strapdown.errors import ConfigError, DataError, DivergenceError
+from strapdown.errors import ConfigError, DataError, DivergenceError, check_choice
 from strapdown.estimation.error_filter import FilterState
 from strapdown.navigation.handover import align, from_state, handed_over, unused_fixes
 from strapdown.navigation.modes import (
@@ -355,13 +355,12 @@ class NavigationPipeline:
             raise ConfigError("navigation.no-alignment-after-gap", quantity="gaps")
         for command in self.commands:
             self._check_word(command.word)
-        if self.fixes is not None and self.fixes not in self.navigator.tables:
-            raise ConfigError(
+        if self.fixes is not None:
+            check_choice(
                 "navigation.no-aid-table-2",
+                self.navigator.tables,
                 quantity="fixes",
                 fixes=self.fixes,
-                word=self.fixes,
-                known=self.navigator.tables,
             )
 
     @property

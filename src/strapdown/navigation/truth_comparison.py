@@ -68,6 +68,9 @@ PARTS = {
 }
 # A mark belongs to the first row after it, if that is not more steps of the recorder away.
 NEAR = 1.5
+# Share of a variance that is not determined by other components: with less, rounding of the nine
+# leaves a normalized square fewer than three digits.
+OWN_VARIANCE = 1e3 * 9 * np.finfo(np.float64).eps
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +93,8 @@ class TruthComparison:
     nees : DataFrame
         By time: normalized squares of the `PARTS` that can be computed.
     freedom : dict of str to int
-        Number of components in each; components without a state in the run are left out.
+        Number of components in each; without those that have no variance of their own, as the
+        vertical velocity of a held height.
     inside : dict of str to float
         Share of the epochs at which each is below its 95 % bound (chi-square, one-sided);
         ``horizontal``: inside of the 95 % ellipse.
@@ -289,7 +293,8 @@ def _comparison(
     findings: tuple[Finding, ...],
 ) -> TruthComparison:
     variance = np.diagonal(P, axis1=1, axis2=2)
-    told = np.asarray(np.isfinite(errors).all(axis=0) & (variance > 0.0).all(axis=0))
+    known = np.asarray(np.isfinite(errors).all(axis=0) & (variance > 0.0).all(axis=0))
+    told = _independent(known, P)
     squares, freedom, inside = {}, {}, {}
     for part, members in PARTS.items():
         kept = [k for k in members if told[k]]
@@ -315,6 +320,21 @@ def _comparison(
         _table(errors, sd, told, inside),
         findings,
     )
+
+
+def _independent(known: NDArray[np.bool_], P: Array) -> NDArray[np.bool_]:
+    """Which known components are not linear functions of those before them, at any epoch."""
+    sd = np.sqrt(np.where(known, np.diagonal(P, axis1=1, axis2=2), 1.0))
+    correlation = P / (sd[:, :, None] * sd[:, None, :])
+    kept: list[int] = []
+    for k in np.flatnonzero(known).tolist():
+        row = correlation[:, k, kept, None]
+        others = correlation[:, kept][:, :, kept]
+        own = 1.0 - np.sum(row * np.linalg.solve(others, row), axis=(1, 2))
+        # A covariance that is not positive definite is refused with its squares.
+        if not np.any(np.abs(own) <= OWN_VARIANCE):
+            kept.append(k)
+    return np.isin(np.arange(known.size), kept)
 
 
 def _table(

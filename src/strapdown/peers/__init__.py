@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from strapdown.errors import ConfigError, Finding
+from strapdown.errors import ConfigError, Finding, check_choice
 from strapdown.peers import peer_ahrs, peer_imufusion, peer_vqf
 from strapdown.peers.peer import (
     AIDINGS,
@@ -46,10 +46,7 @@ def _chosen(names: Sequence[str]) -> list[tuple[Peer, str]]:
     pairs: list[tuple[Peer, str]] = []
     for word in names:
         name, _, one = word.strip().lower().partition(":")
-        if name not in PEERS:
-            raise ConfigError(
-                "peers.no-library-known-here", quantity="peers", name=name, word=name, known=PEERS
-            )
+        check_choice("peers.no-library-known-here", PEERS, quantity="peers", name=name)
         peer = PEERS[name]
         if one and one not in peer.filters:
             raise ConfigError(

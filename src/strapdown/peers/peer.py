@@ -14,7 +14,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
-from strapdown.errors import ConfigError, DataError, DivergenceError, Finding
+from strapdown.errors import ConfigError, DataError, DivergenceError, Finding, check_choice
 from strapdown.tables import ACCEL, GYRO, MAG, attitude_table, check_imu
 
 Array = NDArray[np.float64]
@@ -164,10 +164,7 @@ class Peer:
 
 
 def _known_aiding(aiding: str) -> None:
-    if aiding not in AIDINGS:
-        raise ConfigError(
-            "peers.no-aiding", quantity="aiding", aiding=aiding, word=aiding, known=AIDINGS
-        )
+    check_choice("peers.no-aiding", AIDINGS, quantity="aiding", aiding=aiding)
 
 
 def load(name: str) -> Any:

@@ -11,7 +11,7 @@ import pandas as pd
 
 from strapdown import __version__
 from strapdown.attitude_comparison.comparison import AttitudeComparison
-from strapdown.errors import ConfigError
+from strapdown.errors import ConfigError, check_choice
 from strapdown.evaluation.differences import attitude_at
 from strapdown.report import attitude_tables as tables
 from strapdown.report.attitude_charts import charts
@@ -292,10 +292,7 @@ def plot(bench: AttitudeComparison, kind: str = "cost") -> ChartFigure:
     ConfigError
         The chart does not exist, or the bench lacks its data.
     """
-    if kind not in KINDS:
-        raise ConfigError(
-            "report.no-chart-bench", quantity="kind", kind=kind, word=kind, known=KINDS
-        )
+    check_choice("report.no-chart-bench", KINDS, quantity="kind", kind=kind)
     drawn = {chart.slug: chart for chart in charts(bench)}
     if kind not in drawn:
         raise ConfigError(

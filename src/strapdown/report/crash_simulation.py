@@ -16,7 +16,7 @@ from strapdown.bundle.seal import Seal, check_destination, to_json
 from strapdown.bundle.writing import write_bundle
 from strapdown.config import CrashSimulationSpec
 from strapdown.crash.pdof import pdof
-from strapdown.errors import ConfigError
+from strapdown.errors import check_choice
 from strapdown.formats.crash_record import QUANTITIES, CrashChannel, CrashRecord
 from strapdown.formats.crash_writers import (
     ACCEL_HEADINGS,
@@ -108,14 +108,12 @@ def write_crash_simulation(
 
 def _formats(spec: CrashSimulationSpec) -> tuple[str, ...]:
     for name in spec.formats:
-        if name not in (*RECORD_WRITERS, "all"):
-            raise ConfigError(
-                "report.no-writer-crash-records",
-                quantity="--format",
-                name=name,
-                word=name,
-                known=[*RECORD_WRITERS, "all"],
-            )
+        check_choice(
+            "report.no-writer-crash-records",
+            (*RECORD_WRITERS, "all"),
+            quantity="--format",
+            name=name,
+        )
     return tuple(RECORD_WRITERS) if "all" in spec.formats else tuple(dict.fromkeys(spec.formats))
 
 

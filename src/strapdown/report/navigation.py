@@ -303,7 +303,7 @@ def _score(score: Score) -> dict[str, Any]:
         f"largest_{unit}": json_number(score.largest),
         "largest_at_s": score.largest_at,
         f"bound_95_rms_{unit}": json_number(score.bound),
-        "share_within_bound": score.share,
+        "share_within_bound": json_number(score.share),
     }
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -16,7 +17,6 @@ from strapdown.config.navigation import make_aids
 from strapdown.constants import TWO_SIDED_95
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import Finding
-from strapdown.evaluation.control_points import ControlPointScore
 from strapdown.evaluation.plane_bound import plane_bound, plane_reach
 from strapdown.navigation.consistency import (
     ComponentConsistency,
@@ -24,7 +24,6 @@ from strapdown.navigation.consistency import (
     consistency_of,
 )
 from strapdown.navigation.measurements.measurement import lasting
-from strapdown.navigation.outage_test import Withheld as WithheldScores
 from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.navigation.truth_comparison import (
     SmootherConsistency,
@@ -38,6 +37,10 @@ from strapdown.report.document import Trust, reason
 from strapdown.report.values import plain, shown_unit
 from strapdown.systems.navigation_run import NavigationRun, withheld_aid
 from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
+
+if TYPE_CHECKING:
+    from strapdown.evaluation.control_points import ControlPointScore
+    from strapdown.navigation.outage_test import Withheld as WithheldScores
 
 
 @dataclass(frozen=True, eq=False)
@@ -342,7 +345,8 @@ class Score:
     bound : float
         Root mean square of the 95 % bounds.
     share : float
-        Share of the time in which the error is within its bound.
+        Share of the time in which the error is within its bound; NaN for a quantity without a
+        variance of its own, as a height that is held.
     """
 
     quantity: str
@@ -397,6 +401,10 @@ class NavigationErrors:
             dict.fromkeys(NED, "m") | dict.fromkeys(VELOCITY, "m/s") | dict.fromkeys(EULER, "deg")
         )
         found = [self._score(n, u, self.error(n), self.bound(n)) for n, u in units.items()]
+        inside = self.comparison.table["inside"]
+        for k, score in enumerate(found):
+            if np.isnan(inside.get(score.quantity, 0.0)):
+                found[k] = replace(score, share=np.nan)
         size = np.hypot(*(self.error(n) for n in NED[:2]))
         return self._score("horizontal", "m", size, self._plane(size)), *found
 
@@ -720,6 +728,8 @@ def _errors(found: NavigationEvaluation) -> list[Finding]:
         *((a, a) for a in reversed(EULER)),
     ):
         score = found.errors.score(name)
+        if np.isnan(score.share):
+            continue
         out.append(
             reason(
                 bool(score.share >= _ENOUGH),

@@ -14,7 +14,7 @@ from strapdown.bundle.seal import Seal, check_destination, sensor_file, to_json
 from strapdown.bundle.writing import write_bundle
 from strapdown.config import SimulateSpec, TrajectorySpec
 from strapdown.ellipsoids import WGS84, Ellipsoid, find_ellipsoid
-from strapdown.errors import ConfigError
+from strapdown.errors import check_choice
 from strapdown.formats.log_writers import LOG_WRITERS, log_formats, write_attitude_csv
 from strapdown.formats.trajectory_csv import one_line
 from strapdown.formats.trajectory_maps import thin
@@ -174,15 +174,13 @@ def write_trajectory_simulation(
     check_destination(out, force)
     formats = log_formats(spec.formats)
     for name in spec.trajectory_formats:
-        if name not in TRAJECTORY_WRITERS:
-            raise ConfigError(
-                "report.no-writer",
-                file=f"{spec.name}.toml",
-                quantity="trajectory_formats",
-                name=name,
-                word=name,
-                known=TRAJECTORY_WRITERS,
-            )
+        check_choice(
+            "report.no-writer",
+            TRAJECTORY_WRITERS,
+            quantity="trajectory_formats",
+            file=f"{spec.name}.toml",
+            name=name,
+        )
     motion, errors, imu, attitude, trajectory = made or simulate_trajectory(spec)
     configuration = spec.model_dump(mode="json", exclude_none=True)
     seals: list[Seal] = []

@@ -13,7 +13,15 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.sensors.triad_errors import FARTHEST, ZERO, Triad, check_sd, finite, triple
+from strapdown.sensors.triad_errors import (
+    FARTHEST,
+    ZERO,
+    Triad,
+    check_sd,
+    finite,
+    span,
+    triple,
+)
 from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.tables import ACCEL, GYRO, SAMPLINGS, find_gaps
 from strapdown.tables.checks import check_rows, check_time, index_of
@@ -225,7 +233,19 @@ def check_unit(unit: CrashUnit) -> UnitArrays:
         raise DataError(
             "sensors.some-triads-instantaneous-values-some", file=unit.name, quantity="sampling"
         )
-    return UnitArrays(time, forces, rates, samplings.pop(), _gaps(unit, time))
+    gaps = tuple(
+        Finding(
+            "sensors.gap-after-trigger" if gap.end > 0.0 else "sensors.gap-before-trigger",
+            file=unit.name,
+            row=gap.sample + 1,
+            quantity="time",
+            length=1000.0 * gap.length,
+            start=gap.start,
+            usual=1000.0 * gap.usual,
+        )
+        for gap in find_gaps(time)
+    )
+    return UnitArrays(time, forces, rates, samplings.pop(), gaps)
 
 
 def _values(unit: CrashUnit, triad: RecordedTriad, columns: list[str]) -> Array:
@@ -274,21 +294,6 @@ def _same_stamps(unit: CrashUnit, triad: RecordedTriad, time: Array) -> None:
         time=time[0],
         time_2=time[-1],
         name=unit.accelerometers[0].name,
-    )
-
-
-def _gaps(unit: CrashUnit, time: Array) -> tuple[Finding, ...]:
-    return tuple(
-        Finding(
-            "sensors.gap-after-trigger" if gap.end > 0.0 else "sensors.gap-before-trigger",
-            file=unit.name,
-            row=gap.sample + 1,
-            quantity="time",
-            length=1000.0 * gap.length,
-            start=gap.start,
-            usual=1000.0 * gap.usual,
-        )
-        for gap in find_gaps(time)
     )
 
 
@@ -360,7 +365,12 @@ class Assumed:
             given = getattr(self, name)
             if given is not None:
                 object.__setattr__(self, name, _sds(given, name, said))
-        object.__setattr__(self, "over", _stretch(self.over))
+        over = span(self.over)
+        if over is None or over[1] - over[0] > LONGEST:
+            raise ConfigError(
+                "sensors.no-stretch", quantity="assumed, over", given=self.over, longest=LONGEST
+            )
+        object.__setattr__(self, "over", over)
         if not isinstance(self.because, str):
             raise ConfigError(
                 "sensors.reason-not-text",
@@ -407,15 +417,3 @@ def _sds(given: object, name: str, limits: dict[str, Any]) -> Triad:
             "sensors.assumed-out-of-range", quantity=quantity, given=repr(given), **limits
         )
     return numbers
-
-
-def _stretch(given: object) -> tuple[float, float]:
-    try:
-        start, end = (float(x) for x in given)  # type: ignore[attr-defined]
-    except (TypeError, ValueError):
-        start = end = math.nan
-    if not (math.isfinite(start) and math.isfinite(end) and 0.0 < end - start <= LONGEST):
-        raise ConfigError(
-            "sensors.no-stretch", quantity="assumed, over", given=given, longest=LONGEST
-        )
-    return start, end

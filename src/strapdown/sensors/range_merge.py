@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.sensors.crash_unit import CrashUnit, UnitArrays
+from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.sensors.pre_crash import BiasEstimate
 from strapdown.sensors.rest import sd_of_mean
 from strapdown.sensors.saturation import RangeLimits
-from strapdown.sensors.triad_errors import triad_of
+from strapdown.sensors.triad_errors import ZERO, Triad, triad_of
 from strapdown.tables.checks import check_rows, check_time
 
 Array = NDArray[np.float64]
@@ -24,6 +24,22 @@ Mask = NDArray[np.bool_]
 # After saturation the filter before the sampler still contains the clipped part: e⁻⁵ = 0.7 % after
 # five of its time constants.
 MEMORY = 5.0
+
+
+@dataclass(frozen=True, eq=False)
+class Range:
+    """One range of a triad.
+
+    `values` ((n, 3), u): as recorded. `limits`: from `saturation.find_limits`. `noise` ((n, 3), u):
+    standard deviation of each sample. `bandwidth` (Hz): of the low-pass before the sampler. `bias`
+    ((3,), u): subtracted after the saturation test, so that the ranges join without a step.
+    """
+
+    values: Array
+    limits: RangeLimits
+    noise: Array
+    bandwidth: float = math.inf
+    bias: Array | Triad = ZERO
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,38 +65,29 @@ class MergedRanges:
 
 def merge_ranges(
     time: Array,
-    values: Sequence[Array],
-    limits: Sequence[RangeLimits],
-    noise: Sequence[Array],
+    ranges: Sequence[Range],
     *,
-    bias: Sequence[Array] | None = None,
-    bandwidth: Sequence[float] | None = None,
     margin: float = 0.1,
     hysteresis: float = 0.1,
     fade: float = 0.0,
 ) -> MergedRanges:
     """Use the lowest range while it is clear of its end, and the next one beyond.
 
-    `time` ((n,), s). `values` ((n, 3), u): as recorded, in order of increasing range, all at the
-    same stamps in the same axes. `limits`: from `saturation.find_limits`. `noise` ((n, 3), u):
-    standard deviation of each sample. `bias` ((3,), u): subtracted from each range after the
-    saturation test, so that the ranges join without a step. `bandwidth` (Hz): bandwidth of the
-    low-pass before each sampler. `margin`: fraction of full scale from its end at which a range is
-    left. `hysteresis`: fraction of full scale by which a range must be further inside before it is
-    used again, so that noise about the threshold does not cause repeated switching. `fade` (s):
-    length of the cross-fade, on the side where both ranges are clear; zero for none. DataError: a
-    value is not finite, time does not increase, or shapes disagree. ConfigError: margins are not
-    within [0, 1), or the fade is negative.
+    `time` ((n,), s). `ranges`: in increasing order, all at the same stamps in the same axes.
+    `margin`: fraction of full scale from its end at which a range is left. `hysteresis`: fraction
+    of full scale by which a range must be further inside before it is used again, so that noise
+    about the threshold does not cause repeated switching. `fade` (s): length of the cross-fade, on
+    the side where both ranges are clear; zero for none. DataError: a value is not finite, time does
+    not increase, or shapes disagree. ConfigError: margins are not within [0, 1), or the fade is
+    negative.
 
     Each axis is treated separately. The higher range is also used for the sample before an
     excursion, and afterwards for one sample and for five time constants ``1 / (2 pi bandwidth)``,
     because a filter behind the saturated element still outputs the clipped signal. Within a
     cross-fade with weight w the variance is ``w² s_low² + (1 - w)² s_high²``.
     """
-    _check(time, values, limits, noise, margin, hysteresis, fade)
-    count, n = len(values), time.size
-    offsets = [np.zeros(3) if bias is None else np.asarray(bias[j]) for j in range(count)]
-    memory = [0.0 if bandwidth is None else _memory(bandwidth[j]) for j in range(count)]
+    _check(time, ranges, margin, hysteresis, fade)
+    count, n = len(ranges), time.size
     out = np.empty((n, 3))
     sd = np.empty((n, 3))
     spoken = np.zeros((n, 3), dtype=np.int8)
@@ -90,38 +97,26 @@ def merge_ranges(
     for k in range(3):
         # From the top down: the signal merged so far is used wherever the next lower range is not
         # clear.
-        top = count - 1
-        y, s = values[top][:, k] - offsets[top][k], np.array(noise[top][:, k])
-        who, cut = np.full(n, top, dtype=np.int8), limits[top].clipped[:, k].copy()
+        top = ranges[-1]
+        y, s = top.values[:, k] - top.bias[k], np.array(top.noise[:, k])
+        who, cut = np.full(n, count - 1, dtype=np.int8), top.limits.clipped[:, k].copy()
         for j in range(count - 2, -1, -1):
-            clear = _clear(time, values[j][:, k], limits[j], k, margin, hysteresis, memory[j])
-            low = values[j][:, k] - offsets[j][k]
-            step[j, k], step_sd[j, k], switches[j, k] = _step(
-                clear, y - low, s**2 + noise[j][:, k] ** 2
-            )
+            one = ranges[j]
+            clear = _clear(time, one, k, margin, hysteresis)
+            low, noise = one.values[:, k] - one.bias[k], one.noise[:, k]
+            step[j, k], step_sd[j, k], switches[j, k] = _step(clear, y - low, s**2 + noise**2)
             weight = _weight(time, clear, fade)
             y = weight * low + (1.0 - weight) * y
-            s = np.hypot(weight * noise[j][:, k], (1.0 - weight) * s)
+            s = np.hypot(weight * noise, (1.0 - weight) * s)
             who[weight > 0.5] = j
-            cut[weight > 0.5] = limits[j].clipped[weight > 0.5, k]
+            cut[weight > 0.5] = one.limits.clipped[weight > 0.5, k]
         out[:, k], sd[:, k], spoken[:, k], clipped[:, k] = y, s, who, cut
     return MergedRanges(out, sd, spoken, clipped, step, step_sd, switches)
 
 
-def _memory(bandwidth: float) -> float:
-    return MEMORY / (2.0 * math.pi * bandwidth) if bandwidth > 0.0 else 0.0
-
-
-def _clear(
-    time: Array,
-    y: Array,
-    limits: RangeLimits,
-    k: int,
-    margin: float,
-    hysteresis: float,
-    memory: float,
-) -> Mask:
-    """Where a range is clear of its end, with hysteresis, neighbors and the filter's memory."""
+def _clear(time: Array, one: Range, k: int, margin: float, hysteresis: float) -> Mask:
+    """Where an axis is clear of its end, with hysteresis, neighbors and the filter's memory."""
+    y, limits = one.values[:, k], one.limits
     low, high = float(limits.lower[k]), float(limits.upper[k])
     if not (math.isfinite(low) or math.isfinite(high)):
         return np.ones(y.size, dtype=np.bool_)
@@ -139,6 +134,7 @@ def _clear(
     if bad.size:
         previous = np.searchsorted(bad, np.arange(y.size), side="right") - 1
         there = previous >= 0
+        memory = MEMORY / (2.0 * math.pi * one.bandwidth)
         since = np.full(y.size, math.inf)
         at = bad[np.maximum(previous, 0)]
         since[there] = (time - time[at])[there]
@@ -169,31 +165,18 @@ def _step(clear: Mask, difference: Array, variance: Array) -> tuple[float, float
 
 
 def _check(
-    time: Array,
-    values: Sequence[Array],
-    limits: Sequence[RangeLimits],
-    noise: Sequence[Array],
-    margin: float,
-    hysteresis: float,
-    fade: float,
+    time: Array, ranges: Sequence[Range], margin: float, hysteresis: float, fade: float
 ) -> None:
-    if not values or not len(values) == len(limits) == len(noise):
-        raise DataError(
-            "sensors.ranges-limits-noise",
-            quantity="ranges",
-            count=len(values),
-            count_2=len(limits),
-            count_3=len(noise),
-        )
     check_time(time, None)
-    for j, y in enumerate(values):
-        if y.shape != (time.size, 3) or noise[j].shape != y.shape:
+    for j, one in enumerate(ranges):
+        y = one.values
+        if y.shape != (time.size, 3) or one.noise.shape != y.shape:
             raise DataError(
                 "sensors.range-shape-noise-stamps",
                 quantity="ranges",
                 j=j,
                 shape=y.shape,
-                shape_2=noise[j].shape,
+                shape_2=one.noise.shape,
                 size=time.size,
             )
         check_rows(y, [f"range {j} {axis}" for axis in "xyz"], None)
@@ -254,19 +237,18 @@ def _correlation(left: Array) -> Array:
     return np.asarray(np.clip(lag, 0.0, 0.99), dtype=np.float64)
 
 
-def agreement_findings(
-    unit: CrashUnit, data: UnitArrays, limits: Sequence[RangeLimits], noise: Sequence[Array]
-) -> list[Finding]:
+def agreement_findings(unit: CrashUnit, ranges: Sequence[Range]) -> list[Finding]:
     """Find ranges with swapped or inverted axes, or that are never both unsaturated.
 
-    `noise` ((n, 3), m/s²). Empty if the motion is insufficient: gravity alone is, because the bias
+    Empty if the motion is insufficient: gravity alone is, because the bias
     of the higher range may be as large.
     """
     found: list[Finding] = []
-    for j in range(1, len(limits)):
+    for j in range(1, len(ranges)):
         low, high = unit.accelerometers[j - 1], unit.accelerometers[j]
         source = f"{unit.name}, {high.name}"
-        clear = np.asarray(~(limits[j - 1].clipped | limits[j].clipped).any(axis=1))
+        below, above = ranges[j - 1], ranges[j]
+        clear = np.asarray(~(below.limits.clipped | above.limits.clipped).any(axis=1))
         clear[1:-1] &= clear[:-2] & clear[2:]
         if int(clear.sum()) < LEAST_SAMPLES:
             found.append(
@@ -279,10 +261,10 @@ def agreement_findings(
                 )
             )
             continue
-        upper, lower = data.accelerometers[j][clear], data.accelerometers[j - 1][clear]
+        upper, lower = above.values[clear], below.values[clear]
         # Noise in the lower range biases the slope toward zero: use only motion well above it.
         swing = lower.std(axis=0)
-        moved = swing > np.maximum(3.0 * np.median(noise[j - 1], axis=0), LEAST_PART * swing.max())
+        moved = swing > np.maximum(3.0 * np.median(below.noise, axis=0), LEAST_PART * swing.max())
         matrix, sd = regress_range(upper, lower)
         for row, axis in enumerate("xyz"):
             told = (sd[row] < MOST_SD) & moved

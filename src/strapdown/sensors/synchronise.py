@@ -157,8 +157,16 @@ def synchronise(
     by_name = {u.name: u for u in units}
     check_lenders(by_name)
     given = [_channels(u) for u in units]
-    check_rate(rate, [g.step for u in given for t in _triads(u) for g in t.groups])
-    findings = [f for u in given for t in _triads(u) for f in t.findings]
+    fastest = 1.0 / min(g.step for u in given for t in u.triads for g in t.groups)
+    if rate > MOST_FASTER * fastest:
+        raise ConfigError(
+            "sensors.hz-more-than-times-hz",
+            quantity="rate",
+            rate=rate,
+            most_faster=MOST_FASTER,
+            fastest=fastest,
+        )
+    findings = [f for u in given for t in u.triads for f in t.findings]
     # With missing axes the vector is shorter, so its magnitude does not indicate the unit.
     findings += compare_sizes(
         [
@@ -245,10 +253,6 @@ def _parts(u: UnitChannels) -> list[tuple[TriadChannels, RecordedTriad, list[str
     if u.gyro is not None and u.unit.gyro is not None:
         parts.append((u.gyro, u.unit.gyro, GYRO))
     return parts
-
-
-def _triads(u: UnitChannels) -> tuple[TriadChannels, ...]:
-    return (*u.accelerometers, *(() if u.gyro is None else (u.gyro,)))
 
 
 def _channels(unit: CrashUnit) -> UnitChannels:
@@ -478,23 +482,6 @@ def check_options(
         if given not in known:
             data = {quantity: given, "word": str(given), "known": [k for k in known if k]}
             raise ConfigError(code, quantity=quantity, data=data)
-
-
-def check_rate(rate: float, steps: Sequence[float]) -> None:
-    """Raise if the common rate far exceeds that of every record.
-
-    `rate` (Hz). `steps` (s): of the records. ConfigError: the rate is more than ten times that of
-    the fastest.
-    """
-    fastest = 1.0 / min(steps)
-    if rate > MOST_FASTER * fastest:
-        raise ConfigError(
-            "sensors.hz-more-than-times-hz",
-            quantity="rate",
-            rate=rate,
-            most_faster=MOST_FASTER,
-            fastest=fastest,
-        )
 
 
 def compare_sizes(

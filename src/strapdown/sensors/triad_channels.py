@@ -99,7 +99,14 @@ def triad_channels(unit: CrashUnit, triad: RecordedTriad, columns: list[str]) ->
             sampling=sampling,
             map=map(repr, SAMPLINGS),
         )
-    stamps = _stamps(table, source)
+    if table.index.dtype.kind not in "fiu":
+        raise DataError(
+            "sensors.table-index-holds-not-seconds",
+            file=source,
+            quantity="time",
+            dtype=table.index.dtype,
+        )
+    stamps = np.asarray(table.index.to_numpy(), dtype=np.float64)
     check_time(stamps, source)
     values = np.column_stack([_numbers(table[c], c, source) for c in columns])
     check_rows(np.where(np.isnan(values), 0.0, values), columns, source)
@@ -191,17 +198,6 @@ def _group(
     return AxisGroup(axes, time, block, step)
 
 
-def _stamps(table: pd.DataFrame, source: str) -> Array:
-    if table.index.dtype.kind not in "fiu":
-        raise DataError(
-            "sensors.table-index-holds-not-seconds",
-            file=source,
-            quantity="time",
-            dtype=table.index.dtype,
-        )
-    return np.asarray(table.index.to_numpy(), dtype=np.float64)
-
-
 def _numbers(column: pd.Series, name: str, source: str) -> Array:
     try:
         return np.asarray(column.to_numpy(dtype=np.float64))
@@ -217,17 +213,6 @@ def _numbers(column: pd.Series, name: str, source: str) -> Array:
         ) from None
 
 
-def _quiet_mean(unit: CrashUnit, groups: tuple[AxisGroup, ...]) -> Array:
-    """Mean before the trigger; of the first tenth without a trigger or with too few samples."""
-    out = np.zeros(3)
-    for g in groups:
-        before = g.time < (math.inf if unit.trigger is None else unit.trigger - 10.0 * g.step)
-        if unit.trigger is None or before.sum() < 10:
-            before = np.arange(len(g.time)) < max(10, len(g.time) // 10)
-        out[list(g.axes)] = g.values[before].mean(axis=0)
-    return out
-
-
 def _judge_force(
     source: str, unit: CrashUnit, triad: RecordedTriad, groups: tuple[AxisGroup, ...]
 ) -> list[Finding]:
@@ -235,7 +220,14 @@ def _judge_force(
     if triad.absent:
         # Gravity may be along the absent axis.
         return found
-    length = float(np.linalg.norm(_quiet_mean(unit, groups)))
+    # Mean before the trigger; of the first tenth without a trigger or with too few samples.
+    mean = np.zeros(3)
+    for g in groups:
+        before = g.time < (math.inf if unit.trigger is None else unit.trigger - 10.0 * g.step)
+        if unit.trigger is None or before.sum() < 10:
+            before = np.arange(len(g.time)) < max(10, len(g.time) // 10)
+        mean[list(g.axes)] = g.values[before].mean(axis=0)
+    length = float(np.linalg.norm(mean))
     if IN_G[0] <= length <= IN_G[1]:
         if max(triad.uncertainty.axis("bias")) < BIAS_SPEAKS:
             raise DataError(

@@ -252,6 +252,17 @@ def triple(given: Any, quantity: str, code: str, file: str | None = None, **valu
     return x, y, z
 
 
+def span(given: Any) -> tuple[float, float] | None:
+    """Return two finite, increasing numbers; None if the value is not such a pair."""
+    try:
+        start, end = given
+    except (TypeError, ValueError):
+        return None
+    if not (finite(start) and finite(end) and start < end):
+        return None
+    return float(start), float(end)
+
+
 def finite(given: Any) -> bool:
     """Whether the value is one real, finite number."""
     return is_number(given) and math.isfinite(given)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown.constants import GYRO_UNITS
 from strapdown.errors import ConfigError
-from strapdown.sensors.catalogue import KEYS, Key, Sensor, Spread
+from strapdown.sensors.catalogue import KEYS, Key, Sensor
 from strapdown.sensors.error_chain import Seed, child
 from strapdown.sensors.triad_errors import Triad, TriadErrors, TriadLike, matrix_of, triad_of
 from strapdown.tables.checks import is_number
@@ -181,7 +181,9 @@ def uncertainty_of(sensor: Sensor, triad: str, **overrides: TriadLike) -> TriadU
     errors = sensor.imu_errors.gyro if triad == "gyro" else sensor.imu_errors.accel
     values: dict[str, Any] = {name: getattr(errors, name) for name in SHEET_FACTS}
     spreads = sensor.spreads.get(triad, {})
-    values.update((SPREADS[name], _sd(spread)) for name, spread in spreads.items())
+    for name, spread in spreads.items():
+        part = 1.0 if spread.kind == "sd" else 1.0 / math.sqrt(3.0)
+        values[SPREADS[name]] = tuple(x * part for x in spread.size)
     try:
         return TriadUncertainty(**{**values, **overrides})
     except TypeError:
@@ -190,12 +192,6 @@ def uncertainty_of(sensor: Sensor, triad: str, **overrides: TriadLike) -> TriadU
         raise ConfigError(
             "sensors.triad-no", quantity="overrides", wrong=wrong, known=known
         ) from None
-
-
-def _sd(spread: Spread) -> Triad:
-    part = 1.0 if spread.kind == "sd" else 1.0 / math.sqrt(3.0)
-    x, y, z = spread.size
-    return (x * part, y * part, z * part)
 
 
 # Uncertainty of gyros and accelerometers for alignment and navigation.
@@ -283,13 +279,10 @@ class ImuUncertainty:
 Stated = float | Sequence[float]
 
 
-def _usable(keys: Mapping[str, Key]) -> dict[str, Key]:
-    return {
-        k: key for k, key in keys.items() if key.quantity in SPREADS or key.quantity in SHEET_FACTS
-    }
-
-
-STATED_KEYS: dict[str, dict[str, Key]] = {triad: _usable(keys) for triad, keys in KEYS.items()}
+STATED_KEYS: dict[str, dict[str, Key]] = {
+    triad: {k: key for k, key in keys.items() if key.quantity in (*SPREADS, *SHEET_FACTS)}
+    for triad, keys in KEYS.items()
+}
 
 
 def stated_uncertainty(

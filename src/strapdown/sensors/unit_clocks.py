@@ -56,13 +56,32 @@ class UnitChannels:
     accelerometers: tuple[TriadChannels, ...]
     gyro: TriadChannels | None
 
+    @property
+    def triads(self) -> tuple[TriadChannels, ...]:
+        """Accelerometers, and the gyro if it has one."""
+        return (*self.accelerometers, *(() if self.gyro is None else (self.gyro,)))
+
 
 def clocks_by_trigger(units: Sequence[UnitChannels]) -> list[UnitClock]:
     """Use each unit's own trigger as zero.
 
-    DataError: a unit has no trigger.
+    DataError: a unit has no trigger, or one outside of its record.
     """
-    return [UnitClock(_trigger_within(u), u.unit.trigger_sd, "trigger") for u in units]
+    clocks = []
+    for u in units:
+        trigger = _trigger(u.unit)
+        start, end = min(c.start for c in u.triads), max(c.end for c in u.triads)
+        if not start - OUTSIDE <= trigger <= end + OUTSIDE:
+            raise DataError(
+                "sensors.trigger-not-within-record",
+                file=u.unit.name,
+                quantity="trigger",
+                trigger=trigger,
+                start=start,
+                end=end,
+            )
+        clocks.append(UnitClock(trigger, u.unit.trigger_sd, "trigger"))
+    return clocks
 
 
 def clocks_by_correlation(
@@ -116,22 +135,6 @@ def _trigger(unit: CrashUnit) -> float:
         )
     check_sd(unit.trigger_sd, "trigger_sd", "s", unit.name)
     return unit.trigger
-
-
-def _trigger_within(u: UnitChannels) -> float:
-    trigger = _trigger(u.unit)
-    parts = (*u.accelerometers, *(() if u.gyro is None else (u.gyro,)))
-    start, end = min(c.start for c in parts), max(c.end for c in parts)
-    if not start - OUTSIDE <= trigger <= end + OUTSIDE:
-        raise DataError(
-            "sensors.trigger-not-within-record",
-            file=u.unit.name,
-            quantity="trigger",
-            trigger=trigger,
-            start=start,
-            end=end,
-        )
-    return trigger
 
 
 def _lag(u: UnitChannels, what: str) -> float:
@@ -288,7 +291,20 @@ def onto_stamps(
         clipped[:, axes] = at.touched
         whole &= at.whole
         methods.append(method)
-        findings += _said(channels.source, [columns[a] for a in axes], g, method, rate)
+        own = 1.0 / g.step
+        # Interpolation at a similar rate loses no information worth reporting.
+        if method == "interpolated" and own * SAME_RATE <= rate:
+            findings.append(
+                Finding(
+                    "sensors.hz-slower-than-common-stamps",
+                    file=channels.source,
+                    quantity="time",
+                    names=[columns[a] for a in axes],
+                    own=own,
+                    rate=rate,
+                    own_2=own / 8.0,
+                )
+            )
     table = pd.DataFrame(values, index=pd.Index(stamps, name="time"), columns=columns)
     table.attrs = {**triad.table.attrs, "sampling": sampling, "source": channels.source}
     order = ("decimated", "averaged", "interpolated", "as recorded")
@@ -389,21 +405,3 @@ def _resample(
         return interpolated_means(centred, g.values, at, 1.0 / rate, marked=held), "interpolated"
     middle = at - (0.5 / rate if sampling == "mean" else 0.0)
     return interpolate(centred, g.values, middle, marked=held), "interpolated"
-
-
-def _said(source: str, names: list[str], g: AxisGroup, method: str, rate: float) -> list[Finding]:
-    own = 1.0 / g.step
-    # Interpolation at a similar rate loses no information worth reporting.
-    if method != "interpolated" or own * SAME_RATE > rate:
-        return []
-    return [
-        Finding(
-            "sensors.hz-slower-than-common-stamps",
-            file=source,
-            quantity="time",
-            names=names,
-            own=own,
-            rate=rate,
-            own_2=own / 8.0,
-        )
-    ]

@@ -225,7 +225,13 @@ class Camera:
 
     def __post_init__(self) -> None:
         sds = "reading_sd position_sd angles_sd_deg focal_sd k1_sd clock_sd"
-        check_numbers(self, positive="focal rate", not_negative=sds, finite="k1 clock_offset")
+        check_numbers(
+            self,
+            positive="focal rate",
+            not_negative=sds,
+            finite="k1 clock_offset",
+            file=self.name,
+        )
         if min(self.size) < 1:
             raise ConfigError(
                 "simulation.camera-size", quantity="size", name=self.name, value=self.size

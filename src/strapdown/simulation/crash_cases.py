@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.errors import ConfigError
+from strapdown.errors import ConfigError, check_choice
 from strapdown.sensors.crash_unit import CrashUnit, Mounting
 from strapdown.sensors.error_chain import child
 from strapdown.simulation.cameras import Camera, film, paper_cameras, path_from_cameras
@@ -190,10 +190,7 @@ def find_case(name: str) -> CrashCase:
     ConfigError
         The name is unknown; the message gives the nearest.
     """
-    if name not in CASES:
-        raise ConfigError(
-            "simulation.no-simulated-crash", quantity="crash", name=name, word=name, known=CASES
-        )
+    check_choice("simulation.no-simulated-crash", CASES, quantity="crash", name=name)
     return CASES[name]
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import WGS84, Ellipsoid
-from strapdown.errors import ConfigError
+from strapdown.errors import ConfigError, check_choice
 from strapdown.simulation.earth_motion import (
     EarthMotion,
     Kinematics,
@@ -614,8 +614,5 @@ def find_crash(name: str) -> CrashScenario:
     ConfigError
         The name is unknown; the message gives the nearest.
     """
-    if name not in CRASHES:
-        raise ConfigError(
-            "simulation.no-simulated-crash", quantity="crash", name=name, word=name, known=CRASHES
-        )
+    check_choice("simulation.no-simulated-crash", CRASHES, quantity="crash", name=name)
     return CRASHES[name]

@@ -45,15 +45,13 @@ def record_crash(
     end: float | None = None,
     ringing: Sequence[Any] = (),
     sampling: str = "instantaneous",
-    mounted: bool = False,
 ) -> tuple[CrashUnit, RecorderTruth]:
     """Simulate the record of a crash recorder on a vehicle.
 
     Parameters
     ----------
     motion : Motion
-        Motion of the vehicle's origin in vehicle axes, or (`mounted`) of the sensors in sensor
-        axes.
+        Motion of the vehicle's origin in vehicle axes.
     design : RecorderDesign
     impact : float, s
         Instant of the trigger on the motion's clock.
@@ -65,8 +63,6 @@ def record_crash(
     ringing : sequence of Ringing
         Ringing of the structure at the mounting point.
     sampling : {'instantaneous', 'mean'}
-    mounted : bool
-        The motion is that of the sensors and already includes mounting and ringing.
 
     Returns
     -------
@@ -84,7 +80,7 @@ def record_crash(
     begin, stop = _bounds(motion, design, impact, start, end, sampling)
     root = child(seed, zlib.crc32(design.name.encode()))
     truth = draw_truth(design, root)
-    felt, vibration = _felt(motion, truth.mounting, tuple(ringing), mounted)
+    felt, vibration = _felt(motion, truth.mounting, tuple(ringing))
     felt = RememberedMotion(felt)
 
     def record(
@@ -173,11 +169,10 @@ def _bounds(
 
 
 def _felt(
-    motion: Motion, mounting: Mounting, ringing: tuple[Any, ...], mounted: bool
+    motion: Motion, mounting: Mounting, ringing: tuple[Any, ...]
 ) -> tuple[Motion, Callable[[Array], Array] | None]:
     """Motion of the sensors, and the vibration it contains."""
-    plain = not ringing and not any(mounting.position) and not any(mounting.angles_deg)
-    if mounted or plain:
+    if not ringing and not any(mounting.position) and not any(mounting.angles_deg):
         return motion, None
     from strapdown.simulation.mounted_motion import MountedMotion
 
@@ -369,7 +364,7 @@ class TriadDesign:
     errors: TriadErrors | None = None
 
     def __post_init__(self) -> None:
-        check_numbers(self, positive="rate")
+        check_numbers(self, positive="rate", file=self.part)
 
 
 @dataclass(frozen=True)
@@ -393,7 +388,12 @@ class WarmUp:
     elapsed: float = 0.0
 
     def __post_init__(self) -> None:
-        check_numbers(self, positive="time_constant", not_negative="accel gyro elapsed")
+        check_numbers(
+            self,
+            positive="time_constant",
+            not_negative="accel gyro elapsed",
+            file="warm-up",
+        )
 
     @property
     def left(self) -> float:
@@ -447,7 +447,12 @@ class RecorderDesign:
     def __post_init__(self) -> None:
         if not self.accelerometers:
             raise ConfigError("simulation.recorder-none", quantity="accelerometers", name=self.name)
-        check_numbers(self, not_negative="trigger_sd high_g_bias", finite="clock_offset")
+        check_numbers(
+            self,
+            not_negative="trigger_sd high_g_bias",
+            finite="clock_offset",
+            file=self.name,
+        )
         if not abs(self.clock_drift_ppm) <= MOST_DRIFT:
             raise ConfigError(
                 "simulation.recorder-drift",

@@ -22,9 +22,17 @@ Quaternion = tuple[float, float, float, float]
 
 
 def check_numbers(
-    owner: object, *, positive: str = "", not_negative: str = "", finite: str = ""
+    owner: object,
+    *,
+    positive: str = "",
+    not_negative: str = "",
+    finite: str = "",
+    file: str | None = None,
 ) -> None:
-    """Raise ConfigError unless attributes, named with blanks between, are in their range."""
+    """Raise ConfigError unless attributes, named with blanks between, are in their range.
+
+    `file`: name of the owner, for the location of the finding.
+    """
     for names, code, lowest in (
         (positive, "simulation.not-positive", math.ulp(0.0)),
         (not_negative, "simulation.negative", 0.0),
@@ -33,7 +41,7 @@ def check_numbers(
         for name in names.split():
             value = getattr(owner, name)
             if not (lowest <= value and math.isfinite(value)):
-                raise ConfigError(code, quantity=name, value=value)
+                raise ConfigError(code, file=file, quantity=name, value=value)
 
 
 def euler_attitude(angles: Array, q_nb: Quaternion) -> Array:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from strapdown.errors import ConfigError
+from strapdown.errors import check_choice
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation.attitude_motions import Coning, Gesture, Handling, SmoothRandom, gesture
 from strapdown.simulation.motion import Motion, Pulse, PulseMotion, Track
@@ -88,8 +88,5 @@ def find_scenario(name: str) -> Scenario:
 
     ConfigError: the name is unknown; the message gives the nearest.
     """
-    if name not in SCENARIOS:
-        raise ConfigError(
-            "simulation.no-scenario", quantity="scenario", name=name, word=name, known=SCENARIOS
-        )
+    check_choice("simulation.no-scenario", SCENARIOS, quantity="scenario", name=name)
     return SCENARIOS[name]

@@ -66,9 +66,11 @@ def read_alignment_source(spec: AlignmentSpec) -> AlignmentSource:
     if spec.log is None:
         return _simulated(spec)
     recording, imu, findings = body_record(spec.log, spec.axes)
-    gnss = None
+    gnss, inputs = None, [input_files("log", spec.log.path, recording.files)]
     if spec.gnss is not None:
-        gnss, shifted = on_clock_of(read_gnss(spec.gnss.path), recording.imu)
+        inputs.append(input_files("gnss", spec.gnss.path, files_of(spec.gnss.path)))
+        fixes = read_gnss(spec.gnss.path, spec.gnss.options())
+        gnss, shifted = on_clock_of(fixes, recording.imu)
         findings = (*findings, *gnss.attrs["findings"], *([shifted] if shifted else []))
     return AlignmentSource(
         recording.name,
@@ -78,15 +80,7 @@ def read_alignment_source(spec: AlignmentSpec) -> AlignmentSource:
         recording.start,
         gnss,
         recording.readings,
-        (
-            input_files("log", spec.log.path, recording.files),
-            *(
-                ()
-                if spec.gnss is None
-                else (input_files("gnss", spec.gnss.path, files_of(spec.gnss.path)),)
-            ),
-            *_sensor_file(spec),
-        ),
+        (*inputs, *_sensor_file(spec)),
         findings,
     )
 

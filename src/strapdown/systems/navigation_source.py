@@ -22,7 +22,6 @@ from strapdown.formats import files_of
 from strapdown.formats.aid_table import read_aid_table, read_control_points
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import read_gnss
-from strapdown.formats.gnss_fixes import GnssOptions
 from strapdown.formats.recording import Reading, StatedStart
 from strapdown.formats.trajectory_readers import read_trajectory
 from strapdown.navigation.measurements.measurement import TabulatedMeasurement
@@ -200,15 +199,7 @@ def read_aid(given: AidSpec) -> pd.DataFrame:
     entry = SLOTS["aiding"].entries[given.kind]
     assert issubclass(entry, TabulatedMeasurement)
     if set(entry.columns) == set(GNSS):
-        return read_gnss(
-            given.path,
-            GnssOptions(
-                columns=given.columns,
-                position_sd=given.position_sd_m,
-                velocity_sd=given.velocity_sd_m_per_s,
-                repair=given.repair,
-            ),
-        )
+        return read_gnss(given.path, given.options())
     units = entry.column_units()
     return read_aid_table(given.path, units, names=given.columns, repair=given.repair)
 

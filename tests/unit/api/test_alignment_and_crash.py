@@ -15,7 +15,8 @@ from strapdown.crash.case import run_case
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats.log_writers import LOG_WRITERS
 from strapdown.sensors.catalogue import load_sensor
-from strapdown.simulation import Origin, StationaryMotion, simulate_imu
+from strapdown.simulation import Origin, PathMotion, StationaryMotion, simulate_imu
+from strapdown.simulation.motion import Track
 
 SITE = (55.75, 37.62, 150.0)
 SENSOR = "fog-1000"
@@ -48,6 +49,60 @@ def test_an_alignment_of_a_table_is_that_of_its_file_and_is_verified(rest, tmp_p
     path = tmp_path / "out" / "attitude.csv"
     path.write_text(path.read_text().replace("1", "2", 1))
     assert sd.verify(tmp_path / "out").verdict == "changed"
+
+
+def test_an_alignment_reads_fixes_as_they_were_read(tmp_path):
+    """Columns, standard deviations and repair, as arguments of `read_gnss` and as keys."""
+    drive = PathMotion(
+        30.0,
+        Origin(*SITE),
+        30.0,
+        speed=Track((0.0, 15.0), (12.0, 18.0)),
+        turn_rate=Track((0.0,), (4.0,)),
+    )
+    imu, _ = simulate_imu(drive, load_sensor("icm-42688-p").draw(7), rate=50.0, seed=7)
+    LOG_WRITERS["npz"](tmp_path / "imu.npz", imu, None)
+    time = np.arange(0.0, 30.0, 0.5)
+    rows = drive.trajectory(time)[["lat", "lon", "alt", "VN", "VE", "VD"]].round(9)
+    rows.columns = ["breite", "lon_deg", "alt_m", "VN_m_s", "VE_m_s", "VD_m_s"]
+    rows.index.name = "time_s"
+    rows.to_csv(tmp_path / "fixes.csv")
+    with (tmp_path / "fixes.csv").open("a") as file:
+        file.write("29.6,nan,1,2,3,4,5\n")
+    stated = {
+        "columns": {"lat": "breite"},
+        "position_sd_m": 1.0,
+        "velocity_sd_m_per_s": 0.05,
+        "repair": True,
+    }
+    asked = {"sensor": "icm-42688-p", "method": "gnss_course", "site": SITE}
+    fixes = sd.read_gnss(tmp_path / "fixes.csv", **stated)
+    run = sd.align(tmp_path / "imu.npz", gnss=fixes, **asked)
+    assert run.spec.gnss.options().repair
+    assert run.end.roll_pitch_heading[2] == pytest.approx(
+        np.interp(run.attitude.index[-1], time, drive.trajectory(time)["heading"]), abs=3.0
+    )
+    (tmp_path / "align.toml").write_text(
+        f"""
+        site = {{ lat_deg = {SITE[0]}, lon_deg = {SITE[1]}, alt_m = {SITE[2]} }}
+        log.path = "imu.npz"
+        sensors.sensor = "icm-42688-p"
+        coarse.kind = "gnss_course"
+        fine.kind = "none"
+        [gnss]
+        path = "fixes.csv"
+        columns.lat = "breite"
+        position_sd_m = 1.0
+        velocity_sd_m_per_s = 0.05
+        repair = true
+        """
+    )
+    by_keys = sd.align(tmp_path / "align.toml")
+    pd.testing.assert_frame_equal(run.attitude, by_keys.attitude, check_exact=True)
+    run.save(tmp_path / "out", report=False)
+    assert sd.verify(tmp_path / "out").verdict == "identical"
+    with pytest.raises(DataError):
+        sd.align(tmp_path / "imu.npz", gnss=tmp_path / "fixes.csv", **asked)
 
 
 @pytest.mark.parametrize(

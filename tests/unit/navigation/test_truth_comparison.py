@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown import rotation
+from strapdown.config.navigation import NavigationSpec
 from strapdown.errors import DataError
 from strapdown.mechanization import NorthEastDown
 from strapdown.mechanization.mechanization import state_error
@@ -15,8 +17,10 @@ from strapdown.navigation.truth_comparison import (
     compare_with_truth,
     state_errors,
 )
+from strapdown.report.navigation_evaluation import NavigationErrors
 from strapdown.simulation.earth_motion import Origin
 from strapdown.simulation.spline_motion import SineVelocityMotion
+from strapdown.systems.navigation_run import run_navigation
 from strapdown.tables import trajectory_table
 
 MOTION = SineVelocityMotion(
@@ -124,6 +128,52 @@ def test_what_the_run_has_no_state_of_is_left_out(run):
     assert out.freedom["all"] == 8
     assert out.freedom["position"] == 2
     assert np.isnan(out.table.loc["down", "inside"])
+
+
+def test_a_held_height_has_no_vertical_velocity_of_its_own():
+    """Its error is that of the level, a linear function of the position's, in every epoch."""
+    start = {"lat_deg": 55.0, "lon_deg": 37.0, "alt_m": 150.0, "heading_deg": 30.0}
+    drive = [
+        {"do": "accelerate", "to_km_per_h": 50.0, "duration_s": 6.0},
+        {"do": "turn_left", "radius_m": 50.0},
+    ]
+    spec = NavigationSpec.checked(
+        {
+            "simulation": {
+                "rate_hz": 20.0,
+                "motion": {"kind": "car", **start, "manoeuvres": drive},
+            },
+            "sensors": {"sensor": "mpu-9250"},
+            "start": {**start, "roll_deg": 0.0, "pitch_deg": 0.0},
+            "mechanization": {"kind": "wander_azimuth", "height": "held"},
+            "filter": {"kind": "error_state", "error_model": "quaternions"},
+            "aiding": {"gnss": {}},
+        }
+    )
+    run = run_navigation(spec)
+    assert (run.record.covariance[:, 5, 5] > 0.0).all()
+    out = compare_with_truth(
+        run.trajectory, run.record.sd.index, run.record.covariance, run.source.truth
+    )
+    assert out.freedom == {
+        "all": 7,
+        "position": 2,
+        "velocity": 2,
+        "attitude": 3,
+        "horizontal": 2,
+    }
+    assert np.isfinite(out.nees.to_numpy()).all()
+    assert np.isnan(out.table.loc["VD", "inside"])
+    scores = {one.quantity: one for one in NavigationErrors(out).scores}
+    assert [name for name, one in scores.items() if np.isnan(one.share)] == ["down", "VD"]
+
+
+def test_a_covariance_that_cannot_be_one_is_refused(run):
+    time, _, P, trajectory = run
+    P = P.copy()
+    P[0, 8] = P[8, 0] = 1.1 * SD[0] * SD[8]
+    with pytest.raises(DataError, check=coded("evaluation.covariance-not-positive-definite")):
+        compare_with_truth(trajectory, time, np.broadcast_to(P, (len(time), 9, 9)), MOTION)
 
 
 def test_a_mark_between_samples_is_of_the_row_after_it(run):

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tests.coded import coded
 
 from strapdown.errors import ConfigError, DataError
-from strapdown.sensors.range_merge import merge_ranges
+from strapdown.sensors.range_merge import Range, merge_ranges
 from strapdown.sensors.saturation import find_limits
 
 RATE = 1000.0
@@ -27,11 +27,13 @@ def two_ranges(time, truth, *, sd=(0.0, 0.0), bias=(0.0, 0.0), seed=0):
     return (low, high), (limits_of(time, low, LOW), limits_of(time, high, HIGH))
 
 
-def merged(time, truth, *, sd=(0.0, 0.0), bias=(0.0, 0.0), seed=0, **options):
+def merged(time, truth, *, sd=(0.0, 0.0), bias=(0.0, 0.0), seed=0, bandwidth=np.inf, **options):
     values, limits = two_ranges(time, truth, sd=sd, bias=bias, seed=seed)
-    noise = [np.full(truth.shape, s) for s in sd]
-    offsets = [np.full(3, b) for b in bias]
-    return merge_ranges(time, values, limits, noise, bias=offsets, **options)
+    ranges = [
+        Range(y, limit, np.full(truth.shape, s), bandwidth, np.full(3, b))
+        for y, limit, s, b in zip(values, limits, sd, bias, strict=True)
+    ]
+    return merge_ranges(time, ranges, **options)
 
 
 def pulse(peak, n=1000):
@@ -46,7 +48,7 @@ def pulse(peak, n=1000):
     st.floats(0.0, 0.4),
     st.floats(0.0, 0.4),
     st.sampled_from([0.0, 0.003, 0.02]),
-    st.sampled_from([None, 50.0, 400.0]),
+    st.sampled_from([np.inf, 50.0, 400.0]),
 )
 @settings(max_examples=60, deadline=None)
 def test_two_perfect_ranges_give_back_the_truth(peak, bias, margin, hysteresis, fade, bandwidth):
@@ -58,7 +60,7 @@ def test_two_perfect_ranges_give_back_the_truth(peak, bias, margin, hysteresis, 
         margin=margin,
         hysteresis=hysteresis,
         fade=fade,
-        bandwidth=None if bandwidth is None else [bandwidth, bandwidth],
+        bandwidth=bandwidth,
     )
     # A bias put on and taken off again, and a weighted sum: four roundings of 1000.
     assert np.abs(out.values - truth).max() <= 4 * np.spacing(1000.0)
@@ -88,7 +90,7 @@ def test_a_step_between_the_ranges_is_measured():
     time, truth = pulse(300.0)
     values, limits = two_ranges(time, truth, sd=(0.01, 0.2), bias=(0.0, 3.0))
     noise = [np.full(truth.shape, s) for s in (0.01, 0.2)]
-    out = merge_ranges(time, values, limits, noise)
+    out = merge_ranges(time, [Range(*one) for one in zip(values, limits, noise, strict=True)])
     assert out.switches[0].tolist() == [2, 2, 0]
     # Two switch-overs: the sd of the mean is that of the difference over root two.
     assert out.step_sd[0, 0] == pytest.approx(np.hypot(0.01, 0.2) / np.sqrt(2))
@@ -107,7 +109,7 @@ def test_noise_about_the_threshold_does_not_chatter():
 
 def test_the_memory_of_the_filter_keeps_the_low_range_silent():
     time, truth = pulse(300.0)
-    out = merged(time, truth, bandwidth=[50.0, 50.0], hysteresis=0.0)
+    out = merged(time, truth, bandwidth=50.0, hysteresis=0.0)
     end = time[np.flatnonzero(truth[:, 0] > 0.9 * LOW)[-1]]
     back = time[np.flatnonzero(out.spoken[:, 0] == 1)[-1]]
     # Five time constants of 1/(2 pi 50 Hz), to a sample.
@@ -122,7 +124,8 @@ def test_three_ranges_each_speak_where_they_should():
     values = [np.clip(truth, -f, f) for f in full]
     noise = [np.full(truth.shape, s) for s in (0.01, 0.1, 1.0)]
     out = merge_ranges(
-        time, values, [limits_of(time, v, f) for v, f in zip(values, full, strict=True)], noise
+        time,
+        [Range(v, limits_of(time, v, f), s) for v, f, s in zip(values, full, noise, strict=True)],
     )
     assert np.array_equal(out.values, truth)
     assert set(np.unique(out.spoken[:, 0])) == {0, 1, 2}
@@ -140,7 +143,7 @@ def test_clipping_of_the_last_range_is_flagged_and_that_of_the_first_is_not():
 def test_one_range_alone_is_passed_through():
     time, truth = pulse(30.0)
     low = np.clip(truth, -LOW, LOW)
-    out = merge_ranges(time, [low], [limits_of(time, low, LOW)], [np.full(truth.shape, 0.1)])
+    out = merge_ranges(time, [Range(low, limits_of(time, low, LOW), np.full(truth.shape, 0.1))])
     assert np.array_equal(out.values, low)
     assert np.array_equal(out.clipped, np.abs(truth) >= LOW)
 
@@ -150,10 +153,11 @@ def test_what_is_no_number_is_refused_with_its_row():
     values, limits = two_ranges(time, truth)
     values[1][7, 1] = np.nan
     with pytest.raises(DataError, match="row 8, range 1 y"):
-        merge_ranges(time, values, limits, [truth, truth])
+        merge_ranges(time, [Range(v, end, truth) for v, end in zip(values, limits, strict=True)])
+    one = [Range(truth, limits[0], truth)]
     with pytest.raises(DataError, check=coded("tables.time-does-not-advance-followed")):
-        merge_ranges(time[::-1].copy(), [truth], limits[:1], [truth])
+        merge_ranges(time[::-1].copy(), one)
     with pytest.raises(ConfigError, check=coded("sensors.margin-hysteresis-leave-no-range")):
-        merge_ranges(time, [truth], limits[:1], [truth], margin=0.6, hysteresis=0.5)
+        merge_ranges(time, one, margin=0.6, hysteresis=0.5)
     with pytest.raises(ConfigError, check=coded("sensors.no-length-cross-fade", quantity="fade")):
-        merge_ranges(time, [truth], limits[:1], [truth], fade=-1.0)
+        merge_ranges(time, one, fade=-1.0)

@@ -266,4 +266,6 @@ def test_what_is_not_seen_is_told():
 def test_a_camera_that_cannot_be_is_refused(more, quantity):
     with pytest.raises(ConfigError) as caught:
         replace(paper_cameras()[0], **more)
-    assert caught.value.finding.quantity == quantity
+    finding = caught.value.finding
+    assert finding.quantity == quantity
+    assert paper_cameras()[0].name in (finding.file, finding.data.get("name"))

@@ -43,7 +43,7 @@ def design(accel=PERFECT, gyro=PERFECT, rate=200.0, **more):
 
 
 def record(what, motion=MOTION, **more):
-    return record_crash(motion, what, impact=2.0, **{"seed": 0, "mounted": True, **more})
+    return record_crash(motion, what, impact=2.0, **{"seed": 0, **more})
 
 
 def test_a_perfect_recorder_writes_the_motion():
@@ -203,7 +203,7 @@ def test_the_true_mounting_is_drawn_about_the_told(monkeypatch):
     monkeypatch.setitem(sys.modules, "strapdown.simulation.mounted_motion", module)
     told = Mounting((0.6, -0.5, 0.2), (1.0, 2.0, 90.0), position_sd=0.01, angles_sd_deg=1.5)
     for seed in range(60):
-        unit, truth = record(design(mounting=told), seed=seed, mounted=False, start=1.9, end=2.0)
+        unit, truth = record(design(mounting=told), seed=seed, start=1.9, end=2.0)
         assert unit.mounting is told
         assert truth.mounting is seen[-1]
     low, high = chi2.ppf([5e-7, 1 - 5e-7], 180) / 180
@@ -216,6 +216,9 @@ def test_the_true_mounting_is_drawn_about_the_told(monkeypatch):
 def test_the_platforms_of_the_paper():
     units = {d.name: d for d in paper_units()}
     assert list(units) == ["LAB1", "LAB2", "IMU1", "IMU2"]
+    assert units["IMU1"].mounting.position[1] == -units["IMU2"].mounting.position[1] < 0.0
+    # The motion is that of the sensors.
+    units = {name: replace(d, mounting=Mounting()) for name, d in units.items()}
     for d in units.values():
         kw = {"start": 1.9} if d.gyro is None else {}
         unit, truth = record(d, seed=2, **kw)
@@ -232,11 +235,10 @@ def test_the_platforms_of_the_paper():
             assert np.abs(truth.accelerometers[1].bias).max() <= HIGH_G_BIAS
     imu1, imu2 = (record(units[name], seed=2)[1] for name in ("IMU1", "IMU2"))
     assert imu1.accelerometers[0].bias != imu2.accelerometers[0].bias
-    assert units["IMU1"].mounting.position[1] == -units["IMU2"].mounting.position[1] < 0.0
 
 
 def test_the_same_seed_writes_the_same_and_a_part_does_not_move_another():
-    imu1 = paper_units()[2]
+    imu1 = replace(paper_units()[2], mounting=Mounting())
     one, _ = record(imu1, seed=4)
     two, _ = record(replace(imu1, gyro=None, high_g_bias=0.0), seed=4)
     first, again = (u.accelerometers[0].table for u in (one, two))
@@ -255,19 +257,19 @@ def test_the_same_seed_writes_the_same_and_a_part_does_not_move_another():
 )
 def test_what_cannot_be_recorded_is_refused(more, message):
     with pytest.raises(ConfigError, match=message):
-        record_crash(MOTION, design(), **{"impact": 2.0, "seed": 0, "mounted": True, **more})
+        record_crash(MOTION, design(), **{"impact": 2.0, "seed": 0, **more})
 
 
 @pytest.mark.parametrize(
     ("make", "message"),
     [
         (lambda: RecorderDesign("one", ()), "' has no ranges"),
-        (lambda: TriadDesign("part", PERFECT, 0.0), "rate: 0 is not above zero"),
-        (lambda: design(trigger_sd=-1.0), "trigger_sd"),
+        (lambda: TriadDesign("part", PERFECT, 0.0), "part, rate: 0 is not above zero"),
+        (lambda: design(trigger_sd=-1.0), "one, trigger_sd"),
         (lambda: design(clock_drift_ppm=5000.0), "clock_drift_ppm"),
-        (lambda: design(clock_offset=np.inf), "clock_offset"),
-        (lambda: WarmUp(0.1, 0.1, 0.0), "time_constant"),
-        (lambda: WarmUp(-0.1, 0.1, 1.0), "accel"),
+        (lambda: design(clock_offset=np.inf), "one, clock_offset"),
+        (lambda: WarmUp(0.1, 0.1, 0.0), "warm-up, time_constant"),
+        (lambda: WarmUp(-0.1, 0.1, 1.0), "warm-up, accel"),
     ],
 )
 def test_a_design_that_cannot_be_is_refused(make, message):

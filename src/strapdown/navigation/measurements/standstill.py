@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from strapdown._kernels.level import AXIS
 from strapdown.constants import MAD_TO_SD
-from strapdown.errors import ConfigError
+from strapdown.errors import check_choice
 from strapdown.estimation.covariance import Observation
 from strapdown.estimation.error_model import PHYSICAL
 from strapdown.navigation.measurements.measurement import (
@@ -127,15 +127,7 @@ class StandstillAid(ImuDerivedMeasurement):
             ("threshold_rule", "navigation.unknown-threshold-rule", STANDSTILL_THRESHOLDS),
         ):
             value = getattr(self, name)
-            if value not in table:
-                raise ConfigError(
-                    code,
-                    file=self.name or None,
-                    quantity=name,
-                    value=value,
-                    word=str(value),
-                    known=table,
-                )
+            check_choice(code, table, quantity=name, file=self.name or None, value=value)
         for name in ("window", "threshold", "threshold_time"):
             check_number(self, name, low=0.0, above=True)
         for name in ("rate_sd_deg_per_s", "force_sd", "gravity"):

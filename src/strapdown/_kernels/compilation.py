@@ -21,8 +21,9 @@ from numba.extending import intrinsic
 # The caller holds the arrays until the kernel returns, so that no counting is needed. Not for a
 # kernel that allocates or returns arrays, assigns to slices, or calls one that does: numba refuses
 # to compile it. The option is undocumented: without it kernels are slower, and correct.
-UNCOUNTED = {"_nrt": False} if hasattr(CPUTargetOptions, "_nrt") else {}
-GIVEN: dict[str, Any] = {"cache": True, "error_model": "numpy", **UNCOUNTED}
+IN_PLACE: dict[str, Any] = {"cache": True, "error_model": "numpy"}
+if hasattr(CPUTargetOptions, "_nrt"):
+    IN_PLACE["_nrt"] = False
 
 
 @intrinsic
@@ -35,7 +36,7 @@ def fma(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
     return types.float64(types.float64, types.float64, types.float64), generate
 
 
-@njit(**GIVEN, forceinline=True)
+@njit(**IN_PLACE, forceinline=True)
 def dot(a, b, n):
     """Return the scalar product of the first n numbers of two rows, in eight partial sums."""
     s0 = s1 = s2 = s3 = s4 = s5 = s6 = s7 = 0.0

@@ -1,0 +1,55 @@
+"""Specifications of a log or a simulated one, and of a run of the simulator."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field, FiniteFloat
+
+from strapdown.config.spec import Spec
+
+__all__ = ["CrashSimulationSpec", "LogSpec", "ScenarioSpec", "SimulateSpec"]
+
+
+class ScenarioSpec(Spec):
+    """A simulated log; `sensor` replaces the scenario's own errors."""
+
+    kind: Literal["scenario"] = "scenario"
+    name: str
+    rate_hz: FiniteFloat = 100.0
+    sampling: str = "instantaneous"
+    seed: int = Field(default=0, ge=0)
+    sensor: str | None = None
+
+
+class LogSpec(Spec):
+    """A recorded log and how to read it; None means as stated in the log."""
+
+    kind: Literal["log"] = "log"
+    path: str
+    columns: dict[str, str] = Field(default_factory=dict)
+    gyro_unit: str | None = None
+    accel_unit: str | None = None
+    time_unit: str | None = None
+    axes: str | None = None
+    sampling: str | None = None
+    rate_hz: FiniteFloat | None = None
+    repair: bool = False
+
+
+class SimulateSpec(Spec):
+    """One run of the simulator."""
+
+    scenario: ScenarioSpec
+    formats: tuple[str, ...] = ("csv",)
+
+
+class CrashSimulationSpec(Spec):
+    """One crash and its recorders; without a rate each recorder uses its own."""
+
+    name: str
+    units: tuple[str, ...] = ()
+    rate_hz: FiniteFloat | None = Field(default=None, gt=0.0)
+    sampling: Literal["instantaneous", "mean"] = "instantaneous"
+    seed: int = Field(default=0, ge=0)
+    formats: tuple[str, ...] = ("csv",)
