@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from strapdown.errors import ConfigError, DataError, StrapdownError
+from strapdown.errors import ConfigError, DataError, StrapdownError, check_choice
 from strapdown.formats import (
     asl,
     broad,
@@ -200,9 +200,7 @@ def open_stream(path: str | Path, stream: str, form: str | None = None) -> Raw:
     else:
         reader = READERS.get(form) or plugin("reader", form, Reader)
         if reader is None:
-            raise ConfigError(
-                "io.unknown-format-of-log", quantity="format", form=form, word=form, known=READERS
-            )
+            check_choice("io.unknown-format-of-log", READERS, quantity="format", form=form)
     if reader is None:
         raise _not_recognized(path)
     for key in (stream, TABLE):

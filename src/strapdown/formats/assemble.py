@@ -28,12 +28,13 @@ from strapdown.formats.triad_units import (
     units_of_triads,
     values_of_triads,
 )
-from strapdown.tables import SAMPLINGS, attitude_table, find_gaps, imu_table
+from strapdown.tables import ACCEL, SAMPLINGS, attitude_table, find_gaps, imu_table
 
 __all__ = [
     "assemble",
     "clock_of_log",
     "finite_rows",
+    "require_accel",
     "sampling_of_rates",
     "stamps_of_log",
     "time_reading",
@@ -53,6 +54,11 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     found = find_columns(raw, options)
     require_gyro(raw, found)
     findings = list(raw.findings)
+    used = {column.source for column in found.values()}
+    if unused := [name for name in raw.columns if name not in used and name]:
+        findings.append(
+            Finding("io.columns-not-used", file=raw.name, severity="note", names=unused)
+        )
     values = values_of_triads(raw, found, findings)
     ticks, dated = ticks_of(raw, found["time"]) if "time" in found else (None, False)
     said = told_by_numbers(raw, found, options, values, ticks, dated)
@@ -120,6 +126,31 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
         findings=tuple(findings),
         start=raw.start,
     )
+
+
+def require_accel(recording: Recording) -> None:
+    """Refuse a log without specific force; the message says what became of its columns.
+
+    DataError: no accelerometer was recognized, or none with gravity.
+    """
+    found = {f.code: f for f in recording.findings}
+    if ACCEL[0] not in recording.imu.columns:
+        left_out = [f for f in recording.findings if f.code.startswith("io.left-out")]
+        unused = found.get("io.columns-not-used")
+        raise DataError(
+            "io.no-accelerometer-left-out" if left_out else "io.no-accelerometer",
+            file=recording.name,
+            quantity="accel",
+            left_out=left_out,
+            names=unused.data["names"] if unused else ["none"],
+        )
+    if "io.no-gravity" in found:
+        raise DataError(
+            "io.no-specific-force",
+            file=recording.name,
+            quantity="accel",
+            reason=found["io.no-gravity"],
+        )
 
 
 def _turned(

@@ -108,9 +108,8 @@ def _at_once(data: bytes, name: str, files: tuple[Path, ...]) -> RawLog | None:
     columns = columns_at_once(data, len(top.names), top.separator, start)
     if columns is None:
         return None
-    # A line of text between rows makes text of a column of numbers.
-    begins = [is_data(f) for f in fields_of(top.data[0][1], top.separator)]
-    if any(c.dtype.kind == "O" and data for c, data in zip(columns, begins, strict=False)):
+    # A line of text between rows makes text of every column.
+    if all(c.dtype.kind == "O" for c in columns):
         return None
     return _log(name, files, top, columns, np.arange(first, first + columns[0].size), [])
 
@@ -155,25 +154,20 @@ def _top(numbered: list[tuple[int, str]], comments: list[str]) -> _Top:
     first, separator, width = _first_row(numbered)
     preamble = [line for _, line in numbered[:first]]
     above = [_named(line, separator, width) for line in preamble[-3:]][::-1]
-    names, units = None, {}
-    if above and above[0] is not None:
-        below = _units(preamble[-1], separator, width)
-        if below and len(above) > 1 and above[1] is not None:
-            names, above = above[1], above[1:]
-        else:
-            names, below = above[0], None
-        bare = [_UNIT.sub("", n) for n in names if n]
-        if (
-            len(set(bare)) < len(bare)
-            and len(above) > 1
-            and above[1] is not None
-            and _are_groups(above[1])
-        ):
-            names = [f"{g} {n}".strip() for g, n in zip(_filled(above[1]), names, strict=True)]
-        if below:
-            units = {n: u for n, u in zip(_unique(names), below, strict=False) if u}
+    units: dict[str, str] = {}
+    names = above[0] if above else None
     if names is None:
         names = _above(comments + preamble, width, separator)
+        return _Top(names, units, separator, numbered[first:], comments + preamble)
+    over = above[1] if len(above) > 1 else None
+    below = _units(preamble[-1], separator, width)
+    if below and over is not None:
+        names, over = over, above[2] if len(above) > 2 else None
+        units = {n: u for n, u in zip(_unique(names), below, strict=True) if u}
+    bare = [_UNIT.sub("", n) for n in names if n]
+    if over is not None and len(set(bare)) < len(bare) and _are_groups(over):
+        names = [f"{g} {n}".strip() for g, n in zip(_filled(over), names, strict=True)]
+        units = {n: u for n, u in zip(_unique(names), below or [], strict=False) if u}
     return _Top(names, units, separator, numbered[first:], comments + preamble)
 
 

@@ -348,4 +348,7 @@ def read_gnss(path: str | Path, options: GnssOptions | None = None) -> pd.DataFr
     if path.is_file() and comma2k19.belongs(path):
         raise DataError("io.fixes-comma-k-segment-two", file=path.name, parent=path.parent)
     raw = open_stream(path, "gnss", asked.format)
-    return table_of_fixes(raw if isinstance(raw, Fixes) else fixes_of_columns(raw, asked), asked)
+    if isinstance(raw, RawLog):
+        raw = fixes_of_columns(raw, asked)
+    assert isinstance(raw, Fixes)  # of a format with fixes
+    return table_of_fixes(raw, asked)

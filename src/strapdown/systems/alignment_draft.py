@@ -13,6 +13,7 @@ from strapdown.config.alignment import STAGES, AxesTable, LogTable
 from strapdown.config.choice import SLOTS, Kinds, Slot, options_of
 from strapdown.config.toml_text import ASK, Asked, Page, inline, string
 from strapdown.errors import Finding
+from strapdown.formats.assemble import require_accel
 from strapdown.formats.recording import Recording
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.triad_errors import NAMED_AXES
@@ -70,6 +71,7 @@ def draft_alignment(log: LogTable, *, folder: Path, axes: str | None = None) -> 
         Orientation of the sensor's axes, as `AxesTable.axes`.
     """
     recording, imu, findings = body_record(log, AxesTable(axes=axes))
+    require_accel(recording)
     page = Page()
     page.say(
         f"An alignment of {recording.name}: find roll, pitch and heading of a body that stands.",

@@ -15,6 +15,7 @@ from strapdown.config.alignment import AlignmentSpec, AxesTable, LogTable
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import Finding
 from strapdown.formats import files_of, read_log
+from strapdown.formats.assemble import require_accel
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.recording import Reading, ReadOptions, Recording, StatedStart
@@ -66,6 +67,7 @@ def read_alignment_source(spec: AlignmentSpec) -> AlignmentSource:
     if spec.log is None:
         return _simulated(spec)
     recording, imu, findings = body_record(spec.log, spec.axes)
+    require_accel(recording)
     gnss, inputs = None, [input_files("log", spec.log.path, recording.files)]
     if spec.gnss is not None:
         inputs.append(input_files("gnss", spec.gnss.path, files_of(spec.gnss.path)))

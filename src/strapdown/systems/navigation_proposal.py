@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from strapdown.config.alignment import AxesTable, LogTable
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, Finding
+from strapdown.formats.assemble import require_accel
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.gnss_fixes import GnssOptions
@@ -135,6 +136,7 @@ def propose(
         How to read the fixes; as those of a code receiver, if not given.
     """
     recording, imu, findings = body_record(log, AxesTable(axes=axes))
+    require_accel(recording)
     table: dict[str, Any] = {"log": log.model_dump(exclude_none=True), "axes": {"axes": axes}}
     fixes = None
     if gnss is not None:

@@ -20,6 +20,7 @@ from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import ConfigError, DataError, DivergenceError, Finding
 from strapdown.formats import files_of
 from strapdown.formats.aid_table import read_aid_table, read_control_points
+from strapdown.formats.assemble import require_accel
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.recording import Reading, StatedStart
@@ -114,6 +115,7 @@ def read_navigation_source(spec: NavigationSpec) -> NavigationSource:
     if spec.log is None:
         return _simulated(spec, tables, truth, points, inputs, findings)
     recording, imu, of_log = body_record(spec.log, spec.axes)
+    require_accel(recording)
     for name, table in tables.items():
         tables[name], shifted = on_clock_of(table, recording.imu)
         findings += [] if shifted is None else [shifted]
