@@ -38,7 +38,7 @@ from strapdown.formats import (
     xsens,
 )
 from strapdown.formats.assemble import assemble
-from strapdown.formats.columns import read_name
+from strapdown.formats.find_columns import names_of_quantities
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.recording import NoStreamError, RawLog, ReadOptions, Recording
 from strapdown.plugins import plugin, plugins
@@ -265,9 +265,7 @@ def _has_sensors(path: Path) -> bool:
         raw = read_raw(path)
     except StrapdownError:
         return False
-    said = [quantity for quantity, _ in raw.stated.values()]
-    said += [str(read_name(column).quantity) for column in raw.columns]
-    return any(quantity.startswith(("gyro", "accel")) for quantity in said)
+    return any(q.startswith(("gyro", "accel")) for q in names_of_quantities(raw))
 
 
 def read_joined(paths: Sequence[str | Path], options: ReadOptions | None = None) -> Recording:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from typing import Any
 
@@ -17,6 +18,7 @@ from strapdown.formats.clocks import RELATIVE, Clock, Stamps, clock_of_name, rea
 from strapdown.formats.columns import EULERS, QUATERNIONS, factor_of, parse_axes, parse_unit
 from strapdown.formats.find_columns import AXES, Column, find_columns, require_gyro
 from strapdown.formats.inference import Inference
+from strapdown.formats.join import join
 from strapdown.formats.judge import SUMS, UNITS, intervals, sampling_of_sums
 from strapdown.formats.recording import Origin, Questions, RawLog, Reading, ReadOptions, Recording
 from strapdown.formats.triad_units import (
@@ -53,12 +55,13 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     """
     found = find_columns(raw, options)
     require_gyro(raw, found)
-    findings = list(raw.findings)
-    used = {column.source for column in found.values()}
-    if unused := [name for name in raw.columns if name not in used and name]:
-        findings.append(
-            Finding("io.columns-not-used", file=raw.name, severity="note", names=unused)
+    unused = _unused(raw, found)
+    if parts := _by_sensor(raw, found):
+        raw = dataclasses.replace(
+            join(parts, raw.name, raw.files), axes=raw.axes, sampling=raw.sampling, clock=raw.clock
         )
+        found = find_columns(raw, dataclasses.replace(options, columns={}))
+    findings = [*raw.findings, *unused]
     values = values_of_triads(raw, found, findings)
     ticks, dated = ticks_of(raw, found["time"]) if "time" in found else (None, False)
     said = told_by_numbers(raw, found, options, values, ticks, dated)
@@ -126,6 +129,52 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
         findings=tuple(findings),
         start=raw.start,
     )
+
+
+def _unused(raw: RawLog, found: dict[str, Column]) -> list[Finding]:
+    """List the columns that no quantity takes."""
+    used = {column.source for column in found.values()}
+    names = [name for name in raw.columns if name and name not in used]
+    if not names:
+        return []
+    return [Finding("io.columns-not-used", file=raw.name, severity="note", names=names)]
+
+
+#: A table whose sensors have their own rows leaves out at least this share of one of them.
+OWN_ROWS = 0.2
+
+
+def _by_sensor(raw: RawLog, found: dict[str, Column]) -> list[RawLog]:
+    """Take apart a wide table whose sensors have rows of their own, with the other cells empty.
+
+    Empty if every triad has a value in most rows, or there is no time.
+    """
+    if "time" not in found:
+        return []
+    there: dict[str, NDArray[np.bool_]] = {}
+    for triad in ("gyro", "accel", "mag"):
+        columns = [raw.columns[found[q].source] for a in AXES if (q := f"{triad}_{a}") in found]
+        if len(columns) == 3 and all(c.dtype.kind == "f" for c in columns):
+            there[triad] = ~np.logical_and.reduce([np.isnan(c) for c in columns])
+    shares = [float(rows.mean()) for rows in there.values()]
+    if "gyro" not in there or min(shares) > 1.0 - OWN_ROWS or min(shares) == 0.0:
+        return []
+    rows = np.arange(1, there["gyro"].size + 1) if raw.rows is None else raw.rows
+    parts = []
+    for triad, keep in there.items():
+        mine = [found["time"], *(found[f"{triad}_{a}"] for a in AXES)]
+        names = ["time", *(f"{triad}_{a}" for a in AXES)]
+        parts.append(
+            RawLog(
+                name=raw.name,
+                files=raw.files,
+                columns={c.source: raw.columns[c.source][keep] for c in mine},
+                rows=rows[keep],
+                stated={c.source: (n, c.unit) for c, n in zip(mine, names, strict=True)},
+                findings=raw.findings if triad == "gyro" else [],
+            )
+        )
+    return parts
 
 
 def require_accel(recording: Recording) -> None:

@@ -68,6 +68,13 @@ def find_columns(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
     return found
 
 
+def names_of_quantities(raw: RawLog) -> set[str]:
+    """List the quantities that a log states, or that the names of its columns say."""
+    if raw.stated:
+        return {quantity for quantity, _ in raw.stated.values()}
+    return {str(read_name(name).quantity) for name in raw.columns}
+
+
 def require_gyro(raw: RawLog, found: dict[str, Column]) -> None:
     """Refuse a log without three rates; the message lists its columns."""
     missing = [f"gyro_{a}" for a in AXES if f"gyro_{a}" not in found]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -10,12 +11,12 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.constants import TIME_UNITS
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, StrapdownError
 from strapdown.formats import comma2k19, open_stream
 from strapdown.formats.arrays import numbers, ticks_of
 from strapdown.formats.clocks import GPS, RELATIVE, UNIX, WEEK, Clock, clock_of_name
 from strapdown.formats.columns import CLOCKS, TIMES
-from strapdown.formats.find_columns import Column
+from strapdown.formats.find_columns import Column, names_of_quantities
 from strapdown.formats.gnss_fixes import (
     RADIUS,
     UNSTATED_VERTICAL,
@@ -40,6 +41,7 @@ __all__ = [
     "QUANTITIES",
     "GnssOptions",
     "fixes_of_columns",
+    "has_fixes",
     "read_gnss",
 ]
 
@@ -145,6 +147,7 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
     is above the geoid.
     """
     found = quantities_of(raw, QUANTITIES, options.columns)
+    raw = _rows_of_fixes(raw, found)
     over_sea = "alt" not in found and "alt_msl" in found
     missing = [q for q in _NEEDED if q not in found and not (q == "alt" and over_sea)]
     if missing:
@@ -221,6 +224,40 @@ def _height(found: dict[str, Found], values: Callable[[str], Array], raw: RawLog
         )
     )
     return np.asarray(values("alt_msl") + values("geoid"))
+
+
+def _rows_of_fixes(raw: RawLog, found: dict[str, Found]) -> RawLog:
+    """Leave out rows of a table of inertial samples that have no fix, or the last one again."""
+    if not {"lat", "lon"} <= found.keys() or "gyro_x" not in names_of_quantities(raw):
+        return raw
+    place = [
+        np.asarray(numbers(raw, Column(found[q].source, None, ""), q), dtype=np.float64)
+        for q in ("lat", "lon", "alt", "alt_msl", "speed", "course", *VELOCITY)
+        if q in found
+    ]
+    known = np.isfinite(place[0]) & np.isfinite(place[1])
+    rows = np.flatnonzero(known)
+    new = np.zeros(rows.size, dtype=bool)
+    for values in place:
+        step = np.diff(values[rows])
+        new[1:] |= (step != 0.0) & np.isfinite(step)
+    new[:1] = True
+    keep = rows[new]
+    if not keep.size or keep.size == known.size:
+        return raw
+    finding = Finding(
+        "io.rows-of-samples-without-new-fix",
+        severity="note",
+        file=raw.name,
+        used=keep.size,
+        count=known.size,
+    )
+    return dataclasses.replace(
+        raw,
+        columns={name: column[keep] for name, column in raw.columns.items()},
+        rows=keep + 2 if raw.rows is None else raw.rows[keep],
+        findings=[*raw.findings, finding],
+    )
 
 
 def _over_ground(
@@ -321,6 +358,17 @@ def _quality(raw: RawLog, found: dict[str, Found], values: Callable[[str], Array
         )
     )
     return np.array([QUALITY[int(q)] for q in codes], dtype=np.float64)
+
+
+def has_fixes(path: str | Path) -> bool:
+    """Whether a recording has a stream of fixes."""
+    try:
+        raw = open_stream(path, "gnss")
+        if not isinstance(raw, RawLog):
+            return True
+        return {"time", "lat", "lon"} <= quantities_of(raw, QUANTITIES, {}).keys()
+    except StrapdownError:
+        return False
 
 
 def read_gnss(path: str | Path, options: GnssOptions | None = None) -> pd.DataFrame:

@@ -16,7 +16,7 @@ from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, Finding
 from strapdown.formats.assemble import require_accel
 from strapdown.formats.clocks import on_clock_of
-from strapdown.formats.gnss_files import read_gnss
+from strapdown.formats.gnss_files import has_fixes, read_gnss
 from strapdown.formats.gnss_fixes import GnssOptions
 from strapdown.formats.recording import Recording
 from strapdown.navigation.measurements.gnss_clock import time_offset, velocity_delay
@@ -126,6 +126,7 @@ def propose(
     axes : str, optional
         Orientation of the sensor's axes, as `AxesTable.axes`.
     gnss : Path, optional
+        By default the log itself, if it has fixes.
     sensor : str, optional
         A sensor of the catalogue, or a file; the one with the nearest noise, if not given.
     site : tuple of float, optional
@@ -139,6 +140,8 @@ def propose(
     require_accel(recording)
     table: dict[str, Any] = {"log": log.model_dump(exclude_none=True), "axes": {"axes": axes}}
     fixes = None
+    if gnss is None and has_fixes(log.path):
+        gnss = Path(log.path)
     if gnss is not None:
         fixes, shifted = on_clock_of(read_gnss(gnss, fixes_as or CODE_RECEIVER), recording.imu)
         findings = (*findings, *fixes.attrs["findings"], *([shifted] if shifted else []))

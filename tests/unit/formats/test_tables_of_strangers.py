@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 from tests.coded import coded
 
+import strapdown as sd
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import ReadOptions, read_log
 from strapdown.formats.columns import read_name
+from strapdown.formats.gnss_files import has_fixes
 from strapdown.tables import ACCEL, GYRO
 
 RATES = np.array([0.1, -0.2, 0.3])  # rad/s
@@ -176,3 +178,31 @@ def test_of_two_stamps_the_samples_own_is_used(tmp_path):
         tmp_path, ["%time,field.header.seq,field.header.stamp,field.header.frame_id," + axes, *body]
     )
     check(log)
+
+
+def test_sensors_at_their_own_rates_in_one_wide_table(tmp_path):
+    lines = ["time_s,gx_deg_s,gy_deg_s,gz_deg_s,ax_g,ay_g,az_g,temp"]
+    for k in range(200):
+        gyro = ",".join(f"{v:.6f}" for v in np.degrees(RATES)) if k % 2 == 0 else ",,"
+        accel = ",".join(f"{v:.6f}" for v in FORCE / STANDARD_GRAVITY) if k % 2 else ",,"
+        lines.append(f"{0.005 * k:.3f},{gyro},{accel},20")
+    log = read(tmp_path, lines)
+    check(log, 99)  # between the first and the last sample of the accelerometer
+    codes = {f.code for f in log.findings}
+    assert {"io.interpolated-stamps-gyro-not-own", "io.columns-not-used"} <= codes
+
+
+def test_a_log_with_fixes_in_its_rows_gives_both(tmp_path):
+    path = tmp_path / "phone.csv"
+    lines = [HEADER + ",latitude,longitude,altitude,horizontal accuracy (m),battery"]
+    for k, row in enumerate(rows(400)):
+        fix = "" if k < 50 else f"{55.0 + 1e-5 * (k // 100):.6f}"
+        lines.append(
+            f"{row},{fix},{'37.1' if fix else ''},{'150' if fix else ''},{'5' if fix else ''},98"
+        )
+    path.write_text("\n".join(lines) + "\n")
+    streams = sd.read(path)
+    assert len(streams["imu"]) == 400
+    assert streams["gnss"].index.tolist() == pytest.approx([0.5, 1.0, 2.0, 3.0])
+    assert has_fixes(path)
+    check(read_log(path), 400)
