@@ -92,6 +92,7 @@ class GnssFile:
     def keys(self) -> dict[str, Any]:
         """The equivalent keys of a measurement's configuration table."""
         told = {
+            "format": self.options.format,
             "columns": dict(self.options.columns) or None,
             "position_sd_m": self.options.position_sd,
             "velocity_sd_m_per_s": self.options.velocity_sd,
@@ -213,6 +214,7 @@ def read_imu(
     path: str | Path,
     *,
     axes: str | None = None,
+    format: str | None = None,  # noqa: A002 (the name of the option and of the key)
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
     sampling: str | None = None,
@@ -229,6 +231,8 @@ def read_imu(
     axes : str, optional
         Directions of the sensor's x, y and z (``forward-left-up``), or the sensor axes that point
         forward, right, down (``x,-y,-z``); by default as stated in the file.
+    format : str, optional
+        A format of `strapdown modules`; by default found by the content.
     columns : mapping of str to str, optional
         Quantity (``time``, ``gyro_x`` …, or ``gyro``, ``accel`` for three) to the name of its
         column, or its number counted from 1.
@@ -264,6 +268,7 @@ def read_imu(
     log = specify(
         LogTable,
         path=str(path),
+        format=format,
         columns=dict(columns or {}),
         sampling=sampling,
         rate_hz=rate_hz,
@@ -278,6 +283,7 @@ def read_imu(
 def read_gnss(
     path: str | Path,
     *,
+    format: str | None = None,  # noqa: A002 (the name of the option and of the key)
     columns: Mapping[str, str] | None = None,
     position_sd_m: float | tuple[float, float, float] | None = None,
     velocity_sd_m_per_s: float | tuple[float, float, float] | None = None,
@@ -290,6 +296,8 @@ def read_gnss(
     path : str or Path
         RTKLIB .pos, NMEA 0183, a table with named columns, or another format of
         `strapdown modules`.
+    format : str, optional
+        A format of `strapdown modules`; by default found by the content.
     columns : mapping of str to str, optional
         Quantity (``time``, ``lat`` …) to the name of its column, or its number counted from 1.
     position_sd_m, velocity_sd_m_per_s : float or tuple of float, optional
@@ -308,6 +316,7 @@ def read_gnss(
         The file cannot be used; the message names file, row, quantity and remedy.
     """
     options = GnssOptions(
+        format=format,
         columns=dict(columns or {}),
         position_sd=position_sd_m,
         velocity_sd=velocity_sd_m_per_s,

@@ -48,6 +48,10 @@ class AttitudeSpec(Spec):
     duration_s: FiniteFloat | None = None
 
 
+#: Options of how a log is read.
+READING = ("format", "columns", "gyro_unit", "accel_unit", "time_unit", "axes", "repair")
+
+
 @dataclass(frozen=True)
 class AttitudeOptions:
     """Options of a comparison of attitude algorithms.
@@ -91,7 +95,7 @@ class AttitudeOptions:
         Seed of a scenario's noise; 0 if not given.
     sensor : str or Path, optional
         For a scenario: a sensor of the catalogue, or a file like its entries.
-    columns, gyro_unit, accel_unit, time_unit, axes, repair
+    format, columns, gyro_unit, accel_unit, time_unit, axes, repair
         How to read a log, as in `formats.recording.ReadOptions`.
     """
 
@@ -112,6 +116,7 @@ class AttitudeOptions:
     sampling: str | None = None
     seed: int | None = None
     sensor: str | Path | None = None
+    format: str | None = None
     columns: Mapping[str, str] = field(default_factory=dict)
     gyro_unit: str | None = None
     accel_unit: str | None = None
@@ -180,9 +185,7 @@ class AttitudeOptions:
         if not name:
             raise ConfigError("attitude.nothing-named", quantity="source")
         reading = {
-            key: value
-            for key in ("columns", "gyro_unit", "accel_unit", "time_unit", "axes", "repair")
-            if (value := getattr(self, key)) not in (None, False, {})
+            key: value for key in READING if (value := getattr(self, key)) not in (None, False, {})
         }
         if "columns" in reading:
             reading["columns"] = dict(self.columns)

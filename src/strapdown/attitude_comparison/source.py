@@ -70,6 +70,7 @@ def scenario_errors(spec: ScenarioSpec) -> ImuErrors:
 def read_options(spec: LogSpec) -> ReadOptions:
     """Return the options of a specification for reading its log."""
     return ReadOptions(
+        format=spec.format,
         columns=dict(spec.columns),
         gyro_unit=spec.gyro_unit,
         accel_unit=spec.accel_unit,

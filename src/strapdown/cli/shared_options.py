@@ -64,6 +64,9 @@ class LogFlags:
             "instantaneous (the rate at the stamp) or mean (over the interval that ends there).",
         ),
     ] = None
+    format: Annotated[
+        str | None, reading("FORMAT", "Format of the log (strapdown modules), if it is not found.")
+    ] = None
     columns: Annotated[
         list[str] | None,
         reading(
@@ -117,6 +120,7 @@ def log_keys(given: Mapping[str, Any]) -> dict[str, Any]:
 
     check_part(given["from_s"], given["to_s"], given["duration"])
     return {
+        "format": given["format"],
         "columns": parse_column_option(given["columns"] or []),
         "gyro_unit": given["gyro_unit"],
         "accel_unit": given["accel_unit"],
@@ -233,6 +237,7 @@ LOG_FLAGS = {
     "log, duration_s": "--duration",
     "log, sampling": "--sampling",
     "log, rate_hz": "--rate",
+    "log, format": "--format",
     "log, columns": "--columns",
     "log, repair": "--repair",
     "log, gyro_unit": "--gyro-unit",

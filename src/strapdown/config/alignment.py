@@ -59,6 +59,7 @@ class LogTable(Spec):
     """A recorded log, how to read it, and the part to use."""
 
     path: FileName = Field(description="the log, from the folder of this file")
+    format: Word | None = None
     columns: dict[Word, Word] = Field(default_factory=dict)
     gyro_unit: Annotated[Word, accepted_by(parse_unit, "gyro")] | None = None
     accel_unit: Annotated[Word, accepted_by(parse_unit, "accel")] | None = None
@@ -91,6 +92,7 @@ class FixesTable(Spec):
     """A file of fixes, and statements about it."""
 
     path: FileName
+    format: Word | None = None
     #: Column name by quantity, where it differs.
     columns: dict[Word, Word] = Field(default_factory=dict)
     #: Standard deviations, replacing those of the file.
@@ -102,6 +104,7 @@ class FixesTable(Spec):
     def options(self) -> GnssOptions:
         """The statements, as a reader of fixes takes them."""
         return GnssOptions(
+            format=self.format,
             columns=self.columns,
             position_sd=self.position_sd_m,
             velocity_sd=self.velocity_sd_m_per_s,

@@ -27,6 +27,7 @@ class LogSpec(Spec):
 
     kind: Literal["log"] = "log"
     path: str
+    format: str | None = None
     columns: dict[str, str] = Field(default_factory=dict)
     gyro_unit: str | None = None
     accel_unit: str | None = None

@@ -206,7 +206,14 @@ def open_stream(path: str | Path, stream: str, form: str | None = None) -> Raw:
     for key in (stream, TABLE):
         if key in reader.streams:
             _log.info("%s: read as %s (%s)", path.name, form, reader.title)
-            return reader.streams[key](path)
+            try:
+                return reader.streams[key](path)
+            except (ArithmeticError, LookupError, TypeError, ValueError) as error:
+                # What is in the file of a stranger can break any reader.
+                _log.debug("%s", path.name, exc_info=True)
+                raise DataError(
+                    "io.not-of-format", file=path.name, title=reader.title, reason=repr(error)
+                ) from None
     raise NoStreamError(path.name, stream, reader.title, list(reader.streams))
 
 

@@ -41,6 +41,7 @@ def find_columns(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
     found = {
         quantity: Column(source, unit, "stated by the file")
         for source, (quantity, unit) in raw.stated.items()
+        if source in raw.columns
     }
     if not raw.stated:
         found |= _by_name(raw, options)

@@ -118,6 +118,7 @@ def body_record(
 
 def _options(log: LogTable, axes: str | None) -> ReadOptions:
     return ReadOptions(
+        format=log.format,
         columns=dict(log.columns),
         gyro_unit=log.gyro_unit,
         accel_unit=log.accel_unit,
