@@ -29,8 +29,10 @@ from strapdown.formats import (
     parquet,
     phyphox,
     psins,
+    px4,
     pyins,
     ronin,
+    ros,
     sensor_folder,
     sensor_logger,
     sensorlog,
@@ -93,6 +95,28 @@ class Reader:
 
 #: In the order of detection: formats of known recordings first, general formats last.
 READERS: dict[str, Reader] = {
+    "px4": Reader(
+        px4.TITLE,
+        px4.detect,
+        {
+            "imu": px4.read,
+            "gnss": px4.read_fixes,
+            "reference": px4.read_reference,
+            "magnetometer": px4.read_magnetometer,
+            "barometer": px4.read_barometer,
+        },
+    ),
+    "ros": Reader(
+        ros.TITLE,
+        ros.detect,
+        {
+            "imu": ros.read,
+            "gnss": ros.read_fixes,
+            "reference": ros.read_reference,
+            "magnetometer": ros.read_magnetometer,
+            "barometer": ros.read_barometer,
+        },
+    ),
     "mpu6050": Reader(
         "folder of an MPU-6050 in MATLAB files", mpu6050.detect, {"imu": mpu6050.read}
     ),
