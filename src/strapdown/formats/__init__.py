@@ -16,6 +16,7 @@ from strapdown.formats import (
     broad,
     comma2k19,
     csv,
+    dataflash,
     foot_mounted,
     gnss_logger,
     gnss_nmea,
@@ -25,6 +26,7 @@ from strapdown.formats import (
     kf_gins,
     kitti,
     mpu6050,
+    novatel,
     numpy_files,
     parquet,
     phyphox,
@@ -105,6 +107,22 @@ READERS: dict[str, Reader] = {
             "magnetometer": px4.read_magnetometer,
             "barometer": px4.read_barometer,
         },
+    ),
+    "dataflash": Reader(
+        dataflash.TITLE,
+        dataflash.detect,
+        {
+            "imu": dataflash.read,
+            "gnss": dataflash.read_fixes,
+            "reference": dataflash.read_reference,
+            "magnetometer": dataflash.read_magnetometer,
+            "barometer": dataflash.read_barometer,
+        },
+    ),
+    "novatel": Reader(
+        novatel.TITLE,
+        novatel.detect,
+        {"imu": novatel.read, "gnss": novatel.read_fixes, "reference": novatel.read_reference},
     ),
     "ros": Reader(
         ros.TITLE,

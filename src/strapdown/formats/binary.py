@@ -16,9 +16,11 @@ from strapdown.errors import DataError, Finding, StrapdownError
 from strapdown.formats.clocks import Clock, with_clock
 from strapdown.tables import trajectory_table
 
-__all__ = ["damage", "first_bytes", "interpolated", "solution", "turned"]
+__all__ = ["Quantities", "damage", "first_bytes", "interpolated", "solution", "turned"]
 
 Array = NDArray[np.float64]
+#: Argument of `RawLog.of`.
+Quantities = dict[str, tuple[NDArray[Any], str | None]]
 
 
 def first_bytes(path: Path, count: int) -> bytes:

@@ -19,7 +19,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
-from strapdown.formats.binary import damage, first_bytes, interpolated, solution, turned
+from strapdown.formats.binary import Quantities, damage, first_bytes, interpolated, solution, turned
 from strapdown.formats.clocks import RELATIVE, Clock
 from strapdown.formats.join import join
 from strapdown.formats.recording import NoStreamError, RawLog, library
@@ -44,7 +44,7 @@ def _topics(path: Path, stream: str, *names: str) -> tuple[dict[str, Topic], lis
     wanted = [n for name in names for n in name.split("|")]
     with damage(path):
         log = library("pyulog", path).ULog(str(path), wanted)
-    found = {d.name: d.data for d in reversed(sorted(log.data_list, key=lambda d: d.multi_id))}
+    found = {d.name: d.data for d in sorted(log.data_list, key=lambda d: -d.multi_id)}
     findings = []
     if log.file_corruption:
         findings.append(_note("io.log-partly-damaged", path, None, "warning"))
@@ -82,23 +82,23 @@ def read(path: Path) -> RawLog:
             dt, late = data["delta_angle_dt"].astype(np.float64), np.zeros(time.size, np.int64)
             time = data["timestamp_sample"].astype(np.int64)
             gyro = [data[f"delta_angle[{k}]"] * (1e6 / dt) for k in range(3)]
-            own = data["delta_velocity_dt"].astype(np.float64)
-            accel = [data[f"delta_velocity[{k}]"] * (1e6 / own) for k in range(3)]
-        gyros = {f"gyro_{a}": (v, "rad/s") for a, v in zip("xyz", gyro, strict=True)}
-        accels = {f"accel_{a}": (v, "m/s2") for a, v in zip("xyz", accel, strict=True)}
+            other = data["delta_velocity_dt"].astype(np.float64)
+            accel = [data[f"delta_velocity[{k}]"] * (1e6 / other) for k in range(3)]
+        gyros: Quantities = {f"gyro_{a}": (v, "rad/s") for a, v in zip("xyz", gyro, strict=True)}
+        accels: Quantities = {f"accel_{a}": (v, "m/s2") for a, v in zip("xyz", accel, strict=True)}
         step = float(np.median(np.diff(time))) if time.size > 1 else 0.0
         share = float(np.median(dt)) / step if step > 0.0 else 1.0
     # Logs of a lower rate keep some of the samples: their means are of a part of the interval.
     if not 0.9 < share < 1.1:
         findings.append(_note("io.means-of-a-part", path, "sampling", "warning", share=share))
     said = {"axes": AXES, "sampling": "mean" if 0.9 < share < 1.1 else "instantaneous"}
-    stamps = {"time": (time, "us")}
+    stamps: Quantities = {"time": (time, "us")}
     valid = late != NO_STAMP
     if not (late[valid] != 0).any():
         return RawLog.of(
             path, {**stamps, **gyros, **accels}, findings=findings, clock=RELATIVE, **said
         )
-    own = {"time": (time[valid] + late[valid].astype(np.int64), "us")}
+    own: Quantities = {"time": (time[valid] + late[valid].astype(np.int64), "us")}
     part = {q: (v[valid], u) for q, (v, u) in accels.items()}
     logs = [RawLog.of(path, {**own, **part}, **said)]
     logs.insert(0, RawLog.of(path, {**stamps, **gyros}, findings=findings, **said))
@@ -130,7 +130,11 @@ def read_fixes(path: Path) -> RawLog:
         lat, lon, alt, _ = _place(data)
         sd = np.where(data["s_variance_m_s"] > 0.0, data["s_variance_m_s"], np.nan)
         known = data["vel_ned_valid"] != 0
-        out = {"time": (time.astype(np.int64), "us"), "lat": (lat, "deg"), "lon": (lon, "deg")}
+        out: Quantities = {
+            "time": (time.astype(np.int64), "us"),
+            "lat": (lat, "deg"),
+            "lon": (lon, "deg"),
+        }
         out |= {"alt": (alt, "m"), "horizontal_accuracy": (data["eph"], "m")}
         out |= {"vertical_accuracy": (data["epv"], "m")}
         for axis in "NED":
@@ -205,7 +209,10 @@ def read_barometer(path: Path) -> RawLog:
         pressure = data["baro_pressure_pa" if "baro_pressure_pa" in data else "pressure"]
         # sensor_baro had millibar before 1.14; no atmosphere has both.
         unit = "mbar" if float(np.median(pressure)) < 2000.0 else "Pa"
-        out = {"time": (data["timestamp"].astype(np.int64), "us"), "pressure": (pressure, unit)}
+        out: Quantities = {
+            "time": (data["timestamp"].astype(np.int64), "us"),
+            "pressure": (pressure, unit),
+        }
         names = ("baro_temp_celcius", "temperature", "ambient_temperature")
         warm = next((data[n] for n in names if n in data), None)
     out |= {} if warm is None else {"temperature": (warm, "degC")}

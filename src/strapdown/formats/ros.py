@@ -23,7 +23,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
-from strapdown.formats.binary import damage, first_bytes, solution
+from strapdown.formats.binary import Quantities, damage, first_bytes, solution
 from strapdown.formats.clocks import RELATIVE, UNIX, Clock
 from strapdown.formats.recording import NoStreamError, RawLog, library
 
@@ -126,7 +126,7 @@ def _topic(
     if len(topics) > 1:
         note = {"topic": picked[0], "others": [t for t in topics if t != picked[0]]}
         findings.append(Finding("io.ros-topic-taken", file=path.name, severity="note", data=note))
-    return picked[0]
+    return str(picked[0])
 
 
 def _vector(prefix: str, v: Any) -> dict[str, float]:
@@ -142,7 +142,7 @@ def read(path: Path) -> RawLog:
         return values | {"accel_none": m.linear_acceleration_covariance[0] == -1.0}
 
     columns, findings, clock = _read(path, "imu", IMU, take)
-    out = {"time": (columns["time"], "ns")}
+    out: Quantities = {"time": (columns["time"], "ns")}
     for triad, unit in (("gyro", "rad/s"), ("accel", "m/s2")):
         part = {f"{triad}_{a}": (columns[f"{triad}_{a}"], unit) for a in "xyz"}
         size = float(np.median(np.linalg.norm([v for v, _ in part.values()], axis=0)))
@@ -171,8 +171,8 @@ def read_fixes(path: Path) -> RawLog:
         return values | {"status": m.status.status, "frame": m.header.frame_id}
 
     columns, findings, clock = _read(path, "gnss", FIX, take)
-    out = {q: (columns[q], u) for q, u in (("time", "ns"), ("lat", "deg"), ("lon", "deg"))}
-    out["alt"] = (columns["alt"], "m")
+    units = {"time": "ns", "lat": "deg", "lon": "deg", "alt": "m"}
+    out: Quantities = {q: (columns[q], u) for q, u in units.items()}
     quality = [QUALITY.get(int(s), 0) for s in columns["status"]]
     out["quality"] = (np.array(quality), None)
     sd = np.sqrt(np.where(columns["variance"] > 0.0, columns["variance"], np.nan))
@@ -236,7 +236,7 @@ def read_magnetometer(path: Path) -> RawLog:
         path, "magnetometer", FIELD, lambda m: _vector("mag", m.magnetic_field)
     )
     units = {"time": "ns"} | {f"mag_{a}": "T" for a in "xyz"}
-    out = {q: (columns[q], u) for q, u in units.items()}
+    out: Quantities = {q: (columns[q], u) for q, u in units.items()}
     return RawLog.of(path, out, clock=clock, findings=findings)
 
 
@@ -245,5 +245,5 @@ def read_barometer(path: Path) -> RawLog:
     columns, findings, clock = _read(
         path, "barometer", PRESSURE, lambda m: {"pressure": m.fluid_pressure}
     )
-    out = {"time": (columns["time"], "ns"), "pressure": (columns["pressure"], "Pa")}
+    out: Quantities = {"time": (columns["time"], "ns"), "pressure": (columns["pressure"], "Pa")}
     return RawLog.of(path, out, clock=clock, findings=findings)
