@@ -35,10 +35,13 @@ from strapdown.formats import (
     pyins,
     ronin,
     ros,
+    sbet,
+    sbf,
     sensor_folder,
     sensor_logger,
     sensorlog,
     sensorstream,
+    ubx,
     xsens,
 )
 from strapdown.formats.assemble import assemble
@@ -124,6 +127,17 @@ READERS: dict[str, Reader] = {
         novatel.detect,
         {"imu": novatel.read, "gnss": novatel.read_fixes, "reference": novatel.read_reference},
     ),
+    "sbf": Reader(sbf.TITLE, sbf.detect, {"imu": sbf.read, "gnss": sbf.read_fixes}),
+    "ubx": Reader(
+        ubx.TITLE,
+        ubx.detect,
+        {
+            "imu": ubx.read,
+            "gnss": ubx.read_fixes,
+            "reference": ubx.read_reference,
+            "wheel": ubx.read_wheel,
+        },
+    ),
     "ros": Reader(
         ros.TITLE,
         ros.detect,
@@ -201,6 +215,7 @@ READERS: dict[str, Reader] = {
         pyins.detect,
         {"imu": pyins.read, "gnss": pyins.read_fixes, "reference": pyins.read_truth},
     ),
+    "sbet": Reader(sbet.TITLE, sbet.detect, {"reference": sbet.read}),
     "npz": Reader("NumPy archive (.npz)", numpy_files.detect, {TABLE: numpy_files.read}),
     "parquet": Reader("Parquet (.parquet .pq)", parquet.detect, {TABLE: parquet.read}),
     "hdf5": Reader("HDF5 (.h5 .hdf5) and MATLAB v7.3 (.mat)", hdf5.detect, {TABLE: hdf5.read}),

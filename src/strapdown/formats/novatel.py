@@ -193,6 +193,6 @@ def read_reference(path: Path) -> pd.DataFrame:
     if not rows:
         raise DataError("io.solution-without-rows", file=path.name, quantity="reference")
     table = np.array(rows)
-    time, week = _of_week(table[:, 0])
-    parts = (time, table[:, 1:4], table[:, 4:7], table[:, 7:])
-    return solution(path, parts, Clock(GPS, 0.0, week), findings)
+    seconds, gps_week = _of_week(table[:, 0])
+    parts = (seconds, table[:, 1:4], table[:, 4:7], table[:, 7:])
+    return solution(path, parts, Clock(GPS, 0.0, gps_week), findings)
