@@ -38,8 +38,9 @@ SOLVED = (3, 6, 7)  # states of the inertial solution: good, free, alignment com
 QUALITY = {16: 1, 53: 1, 17: 2, 18: 2, 52: 2, 54: 2, 19: 6, 1: 7, 2: 7}
 QUALITY |= dict.fromkeys((48, 49, 50, 51, 56), 4) | dict.fromkeys((32, 33, 34, 55), 5)
 QUALITY |= dict.fromkeys((68, 69, 70, 73, 74, 77, 78, 79, 80), 2)
+FUSED = (19, 51, 52, 53, 54, 55, 56, 73, 74, 79, 80)
 FOOT, G = 0.3048, STANDARD_GRAVITY
-# Radians and m/s of a count by the type of the unit; None: a rate, and its rate in Hz.
+# Radians and m/s of a count by the type of the unit; some counts are rates, at the unit's Hz.
 _HG = (2.0**-33, 2.0**-27 * FOOT)
 _KVH, _FSAS = 0.1 / (3600.0 * 256.0), float(np.radians(0.1 / 256.0 / 3600.0))
 SCALES: dict[int, tuple[float, float]] = {
@@ -154,6 +155,9 @@ def read_fixes(path: Path) -> RawLog:
     if not kept:
         raise DataError("io.no-usable-fix", file=path.name, quantity="lat, lon")
     table = np.array(kept, dtype=np.float64)
+    if count := int(np.isin(table[:, 2], FUSED).sum()):
+        code = "io.fixes-of-fused-receiver"
+        findings.append(Finding(code, file=path.name, severity="note", count=count))
     time, week = _of_week(table[:, 0])
     out: Quantities = {"time": (time, "s"), "week": (np.full(time.size, week), None)}
     out |= {"lat": (table[:, 3], "deg"), "lon": (table[:, 4], "deg")}

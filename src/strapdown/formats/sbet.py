@@ -61,20 +61,20 @@ def read(path: Path) -> pd.DataFrame:
     wander = values[:, 10]
     cos, sin = np.cos(wander), np.sin(wander)
     x, y, z = values[:, 4:7].T
-    west = np.column_stack([x * cos - y * sin, -(x * sin + y * cos), -z])
-    east = np.column_stack([x * cos + y * sin, y * cos - x * sin, z])
+    ned = np.column_stack([x * cos - y * sin, -(x * sin + y * cos), -z])
+    plain = np.column_stack([x * cos + y * sin, y * cos - x * sin, z])
     moved = _moved(time, place)
     if moved.size and (size := _rms(moved)) > SLOWEST:
-        apart = [_rms(moved - 0.5 * (v[1:] + v[:-1])) for v in (west, east)]
+        apart = [_rms(moved - 0.5 * (v[1:] + v[:-1])) for v in (ned, plain)]
         if min(apart) > 0.3 * size:
             raise DataError("io.sbet-velocity", file=path.name, quantity="velocity")
         if apart[1] < 0.5 * apart[0]:
-            west = east
+            ned = plain
             findings.append(Finding("io.sbet-north-east-down", file=path.name, severity="note"))
     euler = np.degrees(np.column_stack([values[:, 7], values[:, 8], values[:, 9] - wander]))
     euler[:, 2] = (euler[:, 2] + 180.0) % 360.0 - 180.0
     clock = GPS if time.max() <= WEEK + 1.0 else RELATIVE
-    return solution(path, (time, place, west, euler), Clock(clock), findings)
+    return solution(path, (time, place, ned, euler), Clock(clock), findings)
 
 
 def _moved(time: Array, place: Array) -> Array:

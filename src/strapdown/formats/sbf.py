@@ -27,23 +27,26 @@ from strapdown.frames import C_ne, geodetic_from_ecef
 
 TITLE = "Septentrio SBF"
 SYNC = b"$@"
+LEAST_BLOCKS = 3  # of a stream that begins with something else
 CARTESIAN, GEODETIC, SENSORS = (4006, 5905, 5907), (4007, 5906, 5908), 4050
 UNKNOWN = -2e10
 RATE, FORCE = 1, 0  # types of a measurement
 # Kind of solution to field 6 of NMEA GGA: alone, differential, fixed place, RTK fixed and float,
 # SBAS, the same of a moving base, PPP.
 QUALITY = {1: 1, 2: 2, 3: 7, 4: 4, 5: 5, 6: 2, 7: 4, 8: 5, 10: 2}
-Blocks = dict[int, dict[float, bytes]]
+Blocks = dict[int, list[tuple[float, bytes]]]
 Array = NDArray[np.float64]
 
 
 def detect(path: Path) -> bool:
-    """Detect by a block with its CRC among the first bytes."""
-    return bool(_blocks(first_bytes(path, 65536)))
+    """Detect by blocks with their CRC: one at the start, or several among other lines."""
+    head = first_bytes(path, 65536)
+    count = sum(map(len, _blocks(head).values()))
+    return count >= LEAST_BLOCKS or bool(count and head.startswith(SYNC))
 
 
 def _blocks(data: bytes) -> Blocks:
-    """Return the blocks that are used, each by its GPS seconds."""
+    """Return the blocks by their numbers, each with its GPS seconds."""
     found: Blocks = {}
     k = 0
     while (k := data.find(SYNC, k)) >= 0 and k + 14 <= len(data):
@@ -53,11 +56,8 @@ def _blocks(data: bytes) -> Blocks:
             k += 2
             continue
         if tow != 0xFFFFFFFF and week != 0xFFFF:
-            time = week * WEEK + tow * 1e-3
-            held = found.setdefault(kind & 0x1FFF, {})
             body = data[k + 14 : k + size]
-            # Measurements of the sensors may come in several blocks of one instant.
-            held[time] = held[time] + body if kind & 0x1FFF == SENSORS and time in held else body
+            found.setdefault(kind & 0x1FFF, []).append((week * WEEK + tow * 1e-3, body))
         k += size
     return found
 
@@ -81,16 +81,15 @@ def read_fixes(path: Path) -> RawLog:
     """Read position, velocity and their standard deviations."""
     found = _read(path, "gnss")
     kinds = GEODETIC if GEODETIC[0] in found else CARTESIAN
-    form = "<BBdddffff" if kinds == GEODETIC else "<BBdddffff"
     with damage(path):
-        rows = {t: struct.unpack_from(form, b) for t, b in found[kinds[0]].items()}
+        rows = {t: struct.unpack_from("<BB3d4f", b) for t, b in found[kinds[0]]}
         use = {t: r for t, r in rows.items() if r[0] & 15 and not r[1] and r[2] > UNKNOWN}
         if not use:
             raise DataError("io.no-usable-fix", file=path.name, quantity="lat, lon")
         time = np.array(list(use))
         table = np.array(list(use.values()), dtype=np.float64)
         table[table == UNKNOWN] = np.nan
-        variances = [_variance(found.get(kind, {}), time) for kind in kinds[1:]]
+        variances = [_variance(dict(found.get(kind, [])), time) for kind in kinds[1:]]
     place, velocity = table[:, 2:5], table[:, 6:9]
     if kinds == CARTESIAN:
         place = geodetic_from_ecef(place)
@@ -136,16 +135,13 @@ def read(path: Path) -> RawLog:
     found = _read(path, "imu")
     values: dict[int, dict[float, Any]] = {RATE: {}, FORCE: {}}
     with damage(path):
-        for time, body in found[SENSORS].items():
-            k = 0
-            while k + 2 <= len(body):
-                count, size = body[k], body[k + 1]
-                for at in range(k + 2, k + 2 + count * size, size or 1):
-                    if body[at + 2] in values and size >= 28:
-                        triad = struct.unpack_from("<3d", body, at + 4)
-                        if min(triad) > UNKNOWN:
-                            values[body[at + 2]][time] = triad
-                k += 2 + count * size + (-(count * size + 2 + 14)) % 4
+        for time, body in found[SENSORS]:
+            count, size = body[0], body[1]
+            for at in range(2, 2 + count * size, size or 1):
+                if body[at + 2] in values and size >= 28:
+                    measured = struct.unpack_from("<3d", body, at + 4)
+                    if min(measured) > UNKNOWN:
+                        values[body[at + 2]][time] = measured
     if not values[RATE]:
         raise NoStreamError(path.name, "imu", TITLE, ["gnss"])
     logs = []

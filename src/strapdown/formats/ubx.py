@@ -14,6 +14,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 from datetime import UTC, datetime
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ from strapdown.formats.recording import NoStreamError, RawLog, library
 
 TITLE = "u-blox UBX stream"
 SYNC, MOST_PAYLOAD = b"\xb5\x62", 8192
+LEAST_FRAMES = 3  # of a stream that begins with something else
 PVT, PVAT, MEAS, RAW = b"\x01\x07", b"\x01\x17", b"\x10\x02", b"\x10\x03"
 NAMES = {"gnss": (PVT, PVAT), "reference": (PVAT,), "imu": (MEAS,), "wheel": (MEAS,)}
 GYRO, ACCEL, SPEED = (14, 13, 5), (16, 17, 18), 11  # types of data, x y z
@@ -35,8 +37,10 @@ SCALES = {**dict.fromkeys(GYRO, 2.0**-12), **dict.fromkeys(ACCEL, 2.0**-10), SPE
 
 
 def detect(path: Path) -> bool:
-    """Detect by a frame with its checksum among the first bytes."""
-    return next(_frames(first_bytes(path, 65536)), None) is not None
+    """Detect by frames with their checksums: one at the start, or several among other lines."""
+    head = first_bytes(path, 65536)
+    frames = list(islice(_frames(head), LEAST_FRAMES))
+    return len(frames) == LEAST_FRAMES or bool(frames and head.startswith(SYNC))
 
 
 def _frames(data: bytes) -> Iterator[bytes]:
@@ -143,8 +147,8 @@ def read_reference(path: Path) -> pd.DataFrame:
     fixed, times, findings = _solved(path, "reference")
     with damage(path):
         whole = [bool(m.vehRollValid and m.vehPitchValid and m.vehHeadingValid) for m in fixed]
-        names = ("lat", "lon", "height", "velN", "velE", "velD")
-        names += ("vehRoll", "vehPitch", "vehHeading")
+        names = ["lat", "lon", "height", "velN", "velE", "velD"]
+        names += ["vehRoll", "vehPitch", "vehHeading"]
         table = np.array([[getattr(m, n) for n in names] for m in fixed], dtype=np.float64)
     table[:, 2:6] *= 1e-3
     table[~np.array(whole), 6:] = np.nan
