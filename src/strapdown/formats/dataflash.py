@@ -68,7 +68,7 @@ def detect(path: Path) -> bool:
     )
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=1)
 def _records(path: Path, stamp: int) -> tuple[dict[str, Record], int]:
     """Read every record by name, and count the bytes between records that are none."""
     data = path.read_bytes()

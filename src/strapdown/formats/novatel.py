@@ -18,7 +18,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError, Finding
@@ -57,7 +56,8 @@ SCALES: dict[int, tuple[float, float]] = {
     62: (float(np.radians(0.008 / 65536.0)) / 200.0, 0.2e-3 / 65536.0 * G / 200.0),
     61: (float(np.radians(0.0151515 / 65536.0)) / 200.0, 0.4e-3 / 65536.0 * G / 200.0),
 }
-Frames = dict[int, list[tuple[float, bytes]]]
+WEEK_MS = 604_800_000
+Frames = dict[int, list[tuple[int, bytes]]]
 
 
 def detect(path: Path) -> bool:
@@ -67,7 +67,7 @@ def detect(path: Path) -> bool:
 
 
 def _frames(data: bytes) -> tuple[Frames, int]:
-    """Return messages by their number, with GPS seconds since 1980, and the bytes of no frame."""
+    """Return messages by their number, with GPS ms since 1980, and the count of other bytes."""
     found: Frames = {}
     k, lost = 0, 0
     while (at := data.find(b"\xaa\x44", k)) >= 0:
@@ -87,7 +87,7 @@ def _frames(data: bytes) -> tuple[Frames, int]:
         if end + 4 > len(data) or _crc(data[k:end]) != struct.unpack_from("<I", data, end)[0]:
             k, lost = k + 2, lost + 2
             continue
-        found.setdefault(kind, []).append((week * WEEK + ms * 1e-3, data[k + begin : end]))
+        found.setdefault(kind, []).append((week * WEEK_MS + ms, data[k + begin : end]))
         k = end + 4
     return found, lost + len(data) - k
 
@@ -111,11 +111,6 @@ def _read(path: Path, stream: str) -> tuple[Frames, list[Finding]]:
     return frames, findings
 
 
-def _of_week(seconds: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
-    week = int(seconds[0] // WEEK)
-    return seconds - week * WEEK, week
-
-
 def read(path: Path) -> RawLog:
     """Read the increments of the inertial unit, m/s and rad in each interval."""
     frames, findings = _read(path, "imu")
@@ -132,14 +127,20 @@ def read(path: Path) -> RawLog:
     if unit not in SCALES:
         raise DataError("io.novatel-unit-unknown", file=path.name, quantity="imu", unit=unit)
     angle, speed = SCALES[unit]
-    time = np.array([r[0] * WEEK + r[1] for r in rows])
+    time = np.array([(r[0] - rows[0][0]) * WEEK + r[1] for r in rows])
     counts = np.array([r[3:] for r in rows], dtype=np.float64)
     # z, -y, x of velocity, then of angle
     turned = counts[:, [2, 1, 0, 5, 4, 3]] * np.tile([1.0, -1.0, 1.0], 2)
-    out: Quantities = {"time": (_of_week(time)[0], "s")}
-    out |= {f"gyro_{a}": (angle * turned[:, 3 + k], "rad") for k, a in enumerate("xyz")}
-    out |= {f"accel_{a}": (speed * turned[:, k], "m/s") for k, a in enumerate("xyz")}
-    return RawLog.of(path, out, clock=GPS, sampling="mean", findings=findings)
+    columns = {"time": time}
+    columns |= {f"dtheta_{a}": angle * turned[:, 3 + k] for k, a in enumerate("xyz")}
+    columns |= {f"dv_{a}": speed * turned[:, k] for k, a in enumerate("xyz")}
+    stated: dict[str, tuple[str, str | None]] = {"time": ("time", "s")}
+    stated |= {f"dtheta_{a}": (f"gyro_{a}", "rad") for a in "xyz"}
+    stated |= {f"dv_{a}": (f"accel_{a}", "m/s") for a in "xyz"}
+    name = path.resolve().name
+    return RawLog(
+        name, (path,), columns, stated=stated, sampling="mean", clock=GPS, findings=findings
+    )
 
 
 def read_fixes(path: Path) -> RawLog:
@@ -158,14 +159,15 @@ def read_fixes(path: Path) -> RawLog:
     if count := int(np.isin(table[:, 2], FUSED).sum()):
         code = "io.fixes-of-fused-receiver"
         findings.append(Finding(code, file=path.name, severity="note", count=count))
-    time, week = _of_week(table[:, 0])
-    out: Quantities = {"time": (time, "s"), "week": (np.full(time.size, week), None)}
+    stamps = np.array([r[0] for r in kept], dtype=np.int64)
+    time, week = stamps % WEEK_MS, stamps // WEEK_MS
+    out: Quantities = {"time": (time, "ms"), "week": (week, None)}
     out |= {"lat": (table[:, 3], "deg"), "lon": (table[:, 4], "deg")}
     out["alt"] = (table[:, 5] + table[:, 6], "m")
     out |= {f"{n}_sd": (table[:, 8 + k], "m") for k, n in enumerate(("north", "east", "down"))}
     out["quality"] = (np.array([QUALITY.get(int(k), 1) for k in table[:, 2]]), None)
     ned = np.full((time.size, 3), np.nan)
-    for k, stamp in enumerate(table[:, 0]):
+    for k, stamp in enumerate(stamps.tolist()):
         if (v := velocities.get(stamp)) and v[0] == 0 and v[1] != 0:
             course = np.radians(v[5])
             ned[k] = (v[4] * np.cos(course), v[4] * np.sin(course), -v[6])
@@ -187,16 +189,16 @@ def read_reference(path: Path) -> pd.DataFrame:
         for stamp, m in frames[kind]:
             if kind == INSPVAX:  # its height is over the sea
                 state, _, lat, lon, sea, up, *rest = struct.unpack_from("<II3df6d", m)
-                time, alt = stamp, sea + up
+                (week, ms), alt = divmod(stamp, WEEK_MS), sea + up
+                second = ms * 1e-3
             else:
                 week, second, lat, lon, alt, *rest, state = struct.unpack_from("<Id9dI", m)
-                time = week * WEEK + second
             vn, ve, vu, roll, pitch, azimuth = rest
             if state in SOLVED:
-                rows.append((time, lat, lon, alt, vn, ve, -vu, roll, pitch, azimuth))
+                rows.append((week, second, lat, lon, alt, vn, ve, -vu, roll, pitch, azimuth))
     if not rows:
         raise DataError("io.solution-without-rows", file=path.name, quantity="reference")
     table = np.array(rows)
-    seconds, gps_week = _of_week(table[:, 0])
-    parts = (seconds, table[:, 1:4], table[:, 4:7], table[:, 7:])
-    return solution(path, parts, Clock(GPS, 0.0, gps_week), findings)
+    time = table[:, 1] + WEEK * (table[:, 0] - table[0, 0])
+    parts = (time, table[:, 2:5], table[:, 5:8], table[:, 8:])
+    return solution(path, parts, Clock(GPS, 0.0, int(table[0, 0])), findings)

@@ -11,6 +11,8 @@ are accuracies in m. ``vehicle_attitude`` rotates body axes to north-east-down, 
 
 from __future__ import annotations
 
+import io
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -42,8 +44,10 @@ def detect(path: Path) -> bool:
 def _topics(path: Path, stream: str, *names: str) -> tuple[dict[str, Topic], list[Finding], Any]:
     """Read the first instance of topics; the first of `names` is needed, "a|b": either."""
     wanted = [n for name in names for n in name.split("|")]
-    with damage(path):
-        log = library("pyulog", path).ULog(str(path), wanted)
+    reader = library("pyulog", path)
+    # The library prints what it finds damaged.
+    with damage(path), path.open("rb") as file, redirect_stdout(io.StringIO()):
+        log = reader.ULog(file, wanted)
     found = {d.name: d.data for d in sorted(log.data_list, key=lambda d: -d.multi_id)}
     findings = []
     if log.file_corruption:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
 from strapdown.formats.binary import Quantities, damage, first_bytes
-from strapdown.formats.clocks import GPS, WEEK
+from strapdown.formats.clocks import GPS
 from strapdown.formats.join import join
 from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.frames import C_ne, geodetic_from_ecef
@@ -34,7 +34,8 @@ RATE, FORCE = 1, 0  # types of a measurement
 # Kind of solution to field 6 of NMEA GGA: alone, differential, fixed place, RTK fixed and float,
 # SBAS, the same of a moving base, PPP.
 QUALITY = {1: 1, 2: 2, 3: 7, 4: 4, 5: 5, 6: 2, 7: 4, 8: 5, 10: 2}
-Blocks = dict[int, list[tuple[float, bytes]]]
+WEEK_MS = 604_800_000
+Blocks = dict[int, list[tuple[int, bytes]]]
 Array = NDArray[np.float64]
 
 
@@ -46,7 +47,7 @@ def detect(path: Path) -> bool:
 
 
 def _blocks(data: bytes) -> Blocks:
-    """Return the blocks by their numbers, each with its GPS seconds."""
+    """Return the blocks by their numbers, each with its GPS ms since 1980."""
     found: Blocks = {}
     k = 0
     while (k := data.find(SYNC, k)) >= 0 and k + 14 <= len(data):
@@ -57,7 +58,7 @@ def _blocks(data: bytes) -> Blocks:
             continue
         if tow != 0xFFFFFFFF and week != 0xFFFF:
             body = data[k + 14 : k + size]
-            found.setdefault(kind & 0x1FFF, []).append((week * WEEK + tow * 1e-3, body))
+            found.setdefault(kind & 0x1FFF, []).append((week * WEEK_MS + tow, body))
         k += size
     return found
 
@@ -72,11 +73,6 @@ def _read(path: Path, stream: str) -> Blocks:
     return found
 
 
-def _of_week(seconds: Array) -> Quantities:
-    week = np.floor(seconds / WEEK)
-    return {"time": (seconds - WEEK * week, "s"), "week": (week, None)}
-
-
 def read_fixes(path: Path) -> RawLog:
     """Read position, velocity and their standard deviations."""
     found = _read(path, "gnss")
@@ -86,7 +82,7 @@ def read_fixes(path: Path) -> RawLog:
         use = {t: r for t, r in rows.items() if r[0] & 15 and not r[1] and r[2] > UNKNOWN}
         if not use:
             raise DataError("io.no-usable-fix", file=path.name, quantity="lat, lon")
-        time = np.array(list(use))
+        time = np.array(list(use), dtype=np.int64)
         table = np.array(list(use.values()), dtype=np.float64)
         table[table == UNKNOWN] = np.nan
         variances = [_variance(dict(found.get(kind, [])), time) for kind in kinds[1:]]
@@ -99,7 +95,7 @@ def read_fixes(path: Path) -> RawLog:
     else:
         place = place * [np.degrees(1.0), np.degrees(1.0), 1.0]
         velocity = velocity * [1.0, 1.0, -1.0]
-    out = _of_week(time)
+    out: Quantities = {"time": (time % WEEK_MS, "ms"), "week": (time // WEEK_MS, None)}
     out |= {n: (place[:, k], u) for k, (n, u) in enumerate((("lat", "deg"), ("lon", "deg")))}
     out["alt"] = (place[:, 2], "m")
     out["quality"] = (np.array([QUALITY.get(int(r) & 15, 1) for r in table[:, 0]]), None)
@@ -117,10 +113,10 @@ def read_fixes(path: Path) -> RawLog:
     return RawLog.of(path, out, clock=GPS, findings=findings)
 
 
-def _variance(blocks: dict[float, bytes], time: Array) -> Array:
+def _variance(blocks: dict[int, bytes], time: NDArray[np.int64]) -> Array:
     """Covariance of three axes at each stamp, (n, 3, 3); NaN where there is none."""
     out = np.full((time.size, 3, 3), np.nan)
-    for k, stamp in enumerate(time):
+    for k, stamp in enumerate(time.tolist()):
         if stamp not in blocks:
             continue
         _, error, xx, yy, zz, _, xy, xz, _, yz = struct.unpack_from("<BB8f", blocks[stamp])
@@ -133,7 +129,7 @@ def _variance(blocks: dict[float, bytes], time: Array) -> Array:
 def read(path: Path) -> RawLog:
     """Read rates and specific force of the inertial unit."""
     found = _read(path, "imu")
-    values: dict[int, dict[float, Any]] = {RATE: {}, FORCE: {}}
+    values: dict[int, dict[int, Any]] = {RATE: {}, FORCE: {}}
     with damage(path):
         for time, body in found[SENSORS]:
             count, size = body[0], body[1]
@@ -145,12 +141,12 @@ def read(path: Path) -> RawLog:
     if not values[RATE]:
         raise NoStreamError(path.name, "imu", TITLE, ["gnss"])
     logs = []
-    week = WEEK * np.floor(min(values[RATE]) / WEEK)
+    week = min(values[RATE]) // WEEK_MS * WEEK_MS
     for kind, triad, unit in ((RATE, "gyro", "deg/s"), (FORCE, "accel", "m/s2")):
         if not values[kind]:
             continue
         table = np.array(list(values[kind].values()))
-        out: Quantities = {"time": (np.array(list(values[kind])) - week, "s")}
+        out: Quantities = {"time": (np.array(list(values[kind]), dtype=np.int64) - week, "ms")}
         out |= {f"{triad}_{a}": (table[:, k], unit) for k, a in enumerate("xyz")}
         logs.append(RawLog.of(path, out))
     raw = join(logs, path.name, (path,)) if len(logs) > 1 else logs[0]
