@@ -16,6 +16,7 @@ from strapdown.formats import (
     broad,
     comma2k19,
     csv,
+    dataflash,
     foot_mounted,
     gnss_logger,
     gnss_nmea,
@@ -25,19 +26,26 @@ from strapdown.formats import (
     kf_gins,
     kitti,
     mpu6050,
+    novatel,
     numpy_files,
     parquet,
     phyphox,
     psins,
+    px4,
     pyins,
     ronin,
+    ros,
+    sbet,
+    sbf,
     sensor_folder,
     sensor_logger,
     sensorlog,
     sensorstream,
+    ubx,
     xsens,
 )
 from strapdown.formats.assemble import assemble
+from strapdown.formats.binary import first_bytes
 from strapdown.formats.find_columns import names_of_quantities
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.recording import NoStreamError, RawLog, ReadOptions, Recording
@@ -46,8 +54,10 @@ from strapdown.plugins import plugin, plugins
 _log = logging.getLogger("strapdown")
 
 __all__ = [
+    "FOREIGN",
     "READERS",
     "STREAMS",
+    "Foreign",
     "NoStreamError",
     "ReadOptions",
     "Reader",
@@ -93,6 +103,55 @@ class Reader:
 
 #: In the order of detection: formats of known recordings first, general formats last.
 READERS: dict[str, Reader] = {
+    "px4": Reader(
+        px4.TITLE,
+        px4.detect,
+        {
+            "imu": px4.read,
+            "gnss": px4.read_fixes,
+            "reference": px4.read_reference,
+            "magnetometer": px4.read_magnetometer,
+            "barometer": px4.read_barometer,
+        },
+    ),
+    "dataflash": Reader(
+        dataflash.TITLE,
+        dataflash.detect,
+        {
+            "imu": dataflash.read,
+            "gnss": dataflash.read_fixes,
+            "reference": dataflash.read_reference,
+            "magnetometer": dataflash.read_magnetometer,
+            "barometer": dataflash.read_barometer,
+        },
+    ),
+    "ros": Reader(
+        ros.TITLE,
+        ros.detect,
+        {
+            "imu": ros.read,
+            "gnss": ros.read_fixes,
+            "reference": ros.read_reference,
+            "magnetometer": ros.read_magnetometer,
+            "barometer": ros.read_barometer,
+        },
+    ),
+    "novatel": Reader(
+        novatel.TITLE,
+        novatel.detect,
+        {"imu": novatel.read, "gnss": novatel.read_fixes, "reference": novatel.read_reference},
+    ),
+    "sbf": Reader(sbf.TITLE, sbf.detect, {"imu": sbf.read, "gnss": sbf.read_fixes}),
+    "ubx": Reader(
+        ubx.TITLE,
+        ubx.detect,
+        {
+            "imu": ubx.read,
+            "gnss": ubx.read_fixes,
+            "reference": ubx.read_reference,
+            "wheel": ubx.read_wheel,
+        },
+    ),
     "mpu6050": Reader(
         "folder of an MPU-6050 in MATLAB files", mpu6050.detect, {"imu": mpu6050.read}
     ),
@@ -159,6 +218,7 @@ READERS: dict[str, Reader] = {
         pyins.detect,
         {"imu": pyins.read, "gnss": pyins.read_fixes, "reference": pyins.read_truth},
     ),
+    "sbet": Reader(sbet.TITLE, sbet.detect, {"reference": sbet.read}),
     "npz": Reader("NumPy archive (.npz)", numpy_files.detect, {TABLE: numpy_files.read}),
     "parquet": Reader("Parquet (.parquet .pq)", parquet.detect, {TABLE: parquet.read}),
     "hdf5": Reader("HDF5 (.h5 .hdf5) and MATLAB v7.3 (.mat)", hdf5.detect, {TABLE: hdf5.read}),
@@ -233,6 +293,95 @@ def read_raw(path: str | Path, form: str | None = None) -> RawLog:
     return raw
 
 
+@dataclass(frozen=True)
+class Foreign:
+    """A format that is known and not read.
+
+    Attributes
+    ----------
+    what : str
+    way : str
+        How its content gets in: program, or the export of the maker's program.
+    magics : tuple of bytes
+        First bytes; empty if only the ending tells.
+    suffixes : tuple of str
+        Endings; if `magics` are given, empty for any.
+    offset : int
+        Where the first bytes are.
+    """
+
+    what: str
+    way: str
+    magics: tuple[bytes, ...] = ()
+    suffixes: tuple[str, ...] = ()
+    offset: int = 0
+
+
+#: Formats that are recognized to say how they get in; the first that fits decides.
+FOREIGN = (
+    Foreign(
+        "a blackbox log of Betaflight, Cleanflight or INAV",
+        "blackbox_decode --unit-acceleration m/s2 --unit-rotation deg/s LOG, which writes CSV",
+        (b"H Product:Blackbox",),
+    ),
+    Foreign(
+        "packets of an OpenIMU or another unit of Aceinna",
+        "the parser of python-openimu (openimu parse), which writes CSV",
+        tuple(b"UU" + kind for kind in (b"z1", b"a1", b"a2", b"s1", b"s2", b"e1", b"e2", b"zT")),
+    ),
+    Foreign(
+        "a log of ArduPilot as text",
+        "mavlogdump.py --format csv of pymavlink",
+        (b"FMT, 128, 89",),
+    ),
+    Foreign(
+        "a telemetry log of MAVLink", "mavlogdump.py --format csv of pymavlink", (), (".tlog",)
+    ),
+    Foreign(
+        "a log of a DJI aircraft", "DatCon, which writes CSV", (b"BUILD",), (".dat",), offset=16
+    ),
+    Foreign("a binary log of Xsens", "MT Manager, exported as text", (b"\xfa\xff",), (".mtb",)),
+    Foreign("a measurement file MDF", "asammdf, exported as CSV or MATLAB", (b"MDF     ",)),
+    Foreign("a bus log of Vector (BLF)", "python-can, exported as CSV", (b"LOGG",)),
+    Foreign("a TDMS file of LabVIEW", "npTDMS, exported as CSV", (b"TDSm",)),
+    Foreign(
+        "observations of a receiver (RINEX)",
+        "rnx2rtkp of RTKLIB, which computes a .pos of fixes",
+        (b"RINEX VERSION / TYPE", b"CRINEX VERS   / TYPE"),
+        offset=60,
+    ),
+    Foreign(
+        "corrections or observations in RTCM 3",
+        "convbin and rnx2rtkp of RTKLIB, which compute a .pos of fixes",
+        (b"\xd3\x00",),
+        (".rtcm", ".rtcm3"),
+    ),
+    Foreign(
+        "a video", "its telemetry: exiftool -ee, or the GPMF track of a GoPro", (b"ftyp",), offset=4
+    ),
+    Foreign("a workbook of Excel 97", "saved as .xlsx or CSV", (b"\xd0\xcf\x11\xe0",)),
+    Foreign("a database of SQLite", "its tables, exported as CSV", (b"SQLite format 3\0",)),
+    Foreign(
+        "a Python pickle, which is never opened", "numpy.savez or a CSV", (), (".pkl", ".pickle")
+    ),
+    Foreign(
+        "a compressed file",
+        "the file in it, unpacked",
+        (b"\x1f\x8b", b"BZh", b"\xfd7zXZ", b"7z\xbc\xaf", b"Rar!", b"\x28\xb5\x2f\xfd"),
+    ),
+)
+
+
+def _foreign(path: Path) -> Foreign | None:
+    """Return the known format that is not read, of a file that no reader recognizes."""
+    head, suffix = first_bytes(path, 128), path.suffix.lower()
+    for one in FOREIGN:
+        begins = not one.magics or head[one.offset :].startswith(one.magics)
+        if begins and (not one.suffixes or suffix in one.suffixes):
+            return one
+    return None
+
+
 #: Most names of a folder that are searched, and that a message lists.
 MOST_NAMES, MOST_SHOWN = 1000, 6
 #: Largest file that is searched for a gyro or an accelerometer, bytes.
@@ -242,10 +391,10 @@ MOST_BYTES = 64 * 1024 * 1024
 def _not_recognized(path: Path) -> DataError:
     """Make the error for a file or folder of no known format; it names the logs in a folder."""
     if path.is_file():
-        kinds = "; ".join(r.title for r in READERS.values())
-        return DataError(
-            "io.ending-no-known-format", file=path.name, suffix=path.suffix, kinds=kinds
-        )
+        if (other := _foreign(path)) is not None:
+            return DataError("io.foreign-format", file=path.name, what=other.what, way=other.way)
+        head = first_bytes(path, 8).hex(" ")
+        return DataError("io.ending-no-known-format", file=path.name, suffix=path.suffix, head=head)
     inside = sorted(path.iterdir())[:MOST_NAMES]
     may_be = [p for p in inside if any(r.detect(p) for r in READERS.values())]
     logs = [p.name for p in may_be if _has_sensors(p)]

@@ -1,0 +1,84 @@
+"""Common part of the readers of binary logs: damage, first bytes, and own solutions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown import rotation
+from strapdown.errors import DataError, Finding, StrapdownError
+from strapdown.formats.clocks import Clock, with_clock
+from strapdown.tables import trajectory_table
+
+__all__ = ["Quantities", "damage", "first_bytes", "interpolated", "solution", "turned"]
+
+Array = NDArray[np.float64]
+#: Argument of `RawLog.of`.
+Quantities = dict[str, tuple[NDArray[Any], str | None]]
+
+
+def first_bytes(path: Path, count: int) -> bytes:
+    """Return the first bytes of a file; none of a folder or an unreadable file."""
+    try:
+        with path.open("rb") as stream:
+            return stream.read(count)
+    except OSError:
+        return b""
+
+
+@contextmanager
+def damage(path: Path) -> Iterator[None]:
+    """Report whatever a library raises on damaged content as a DataError of this file."""
+    try:
+        yield
+    except StrapdownError:
+        raise
+    except Exception as error:  # libraries document no common class of their errors
+        reason = f"{type(error).__name__}: {error}".strip(": ")[:200]
+        raise DataError("io.log-damaged", file=path.name, reason=reason) from None
+
+
+def interpolated(time: Array, own: Array, values: Sequence[NDArray[Any]]) -> Array:
+    """Interpolate columns linearly to other stamps; (n, columns), NaN outside."""
+    return np.column_stack([np.interp(time, own, v, left=np.nan, right=np.nan) for v in values])
+
+
+def turned(time: Array, own: Array, q: Array) -> Array:
+    """Interpolate attitude quaternions to other stamps within theirs; roll, pitch, heading, deg."""
+    flips = np.cumprod(np.concatenate([[1.0], np.where((q[1:] * q[:-1]).sum(axis=1) < 0, -1, 1)]))
+    at = interpolated(np.clip(time, own[0], own[-1]), own, list((q * flips[:, None]).T))
+    return rotation.euler_from_quaternion(at / np.linalg.norm(at, axis=1, keepdims=True))
+
+
+def solution(
+    path: Path, columns: Sequence[Array], clock: Clock, findings: Sequence[Finding] = ()
+) -> pd.DataFrame:
+    """Make a Trajectory of the solution that a recorder computed itself.
+
+    `columns`: time (s), position, velocity and attitude, (n,) and three of (n, 3); rows with a
+    value that is not a number are left out. DataError: no row is left, or as `trajectory_table`.
+    """
+    everything = np.column_stack(columns)
+    use = np.isfinite(everything).all(axis=1)
+    use &= np.diff(everything[:, 0], prepend=-np.inf) > 0.0
+    if not use.any():
+        raise DataError("io.solution-without-rows", file=path.name, quantity="reference")
+    kept = everything[use]
+    table = trajectory_table(kept[:, 0], kept[:, 1:4], kept[:, 4:7], kept[:, 7:], source=path.name)
+    table.attrs["ellipsoid"] = "wgs84"
+    own = Finding(
+        "io.reference-own-solution",
+        file=path.name,
+        quantity="reference",
+        severity="note",
+        count=int(use.sum()),
+        size=use.size,
+    )
+    table.attrs["findings"] = (own, *findings)
+    return with_clock(table, clock)

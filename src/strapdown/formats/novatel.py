@@ -1,0 +1,204 @@
+"""Binary logs of NovAtel OEM7 and OEM6 receivers (``.gps .bin``), with SPAN.
+
+Frames: https://docs.novatel.com/OEM7/Content/Messages/Binary.htm and
+Description_of_Short_Headers.htm: AA 44 12 with a header of 28 bytes or AA 44 13 with one of 12, the
+GPS week and milliseconds, the message, and a CRC of 32 bits. Messages, in Content/Logs and
+SPAN_Logs: BESTPOS (height over the sea and undulation), BESTVEL (speed, course, up, and its
+latency), INSPVA (height over the ellipsoid; roll, pitch, azimuth of the vehicle in deg), RAWIMU and
+RAWIMUX: counts of velocity and angle in each interval, z, -y, x of the sensor, scaled by the type
+of the unit (table Raw IMU Scale Factors). CORRIMU is without gravity and the Earth's rate: it is no
+sensor's output, and is not read. Stamps are GPS seconds of week.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from strapdown.constants import STANDARD_GRAVITY
+from strapdown.errors import DataError, Finding
+from strapdown.formats.binary import Quantities, damage, first_bytes, solution
+from strapdown.formats.clocks import GPS, WEEK, Clock
+from strapdown.formats.recording import NoStreamError, RawLog
+
+TITLE = "NovAtel OEM binary log"
+SYNCS = (b"\xaa\x44\x12", b"\xaa\x44\x13")
+BESTPOS, BESTVEL, INSPVA, INSPVAS, INSPVAX = 42, 99, 507, 508, 1465
+RAWIMU, RAWIMUS, RAWIMUX, RAWIMUSX, INSCONFIG = 268, 325, 1461, 1462, 1945
+CORRECTED = (812, 813, 1362, 2264)
+STREAMS = {"imu": (RAWIMU, RAWIMUS, RAWIMUX, RAWIMUSX), "gnss": (BESTPOS,)}
+STREAMS |= {"reference": (INSPVA, INSPVAS, INSPVAX)}
+SOLVED = (3, 6, 7)  # states of the inertial solution: good, free, alignment complete
+# Type of position to field 6 of NMEA GGA; 50s are aided by the inertial unit.
+QUALITY = {16: 1, 53: 1, 17: 2, 18: 2, 52: 2, 54: 2, 19: 6, 1: 7, 2: 7}
+QUALITY |= dict.fromkeys((48, 49, 50, 51, 56), 4) | dict.fromkeys((32, 33, 34, 55), 5)
+QUALITY |= dict.fromkeys((68, 69, 70, 73, 74, 77, 78, 79, 80), 2)
+FUSED = (19, 51, 52, 53, 54, 55, 56, 73, 74, 79, 80)
+FOOT, G = 0.3048, STANDARD_GRAVITY
+# Radians and m/s of a count by the type of the unit; some counts are rates, at the unit's Hz.
+_HG = (2.0**-33, 2.0**-27 * FOOT)
+_KVH, _FSAS = 0.1 / (3600.0 * 256.0), float(np.radians(0.1 / 256.0 / 3600.0))
+SCALES: dict[int, tuple[float, float]] = {
+    **dict.fromkeys((1, 5, 11, 20, 27, 28), _HG),
+    **dict.fromkeys((4, 12), (2.0**-33, 2.0**-26 * FOOT)),
+    8: (2.0**-19, 2.0**-14),
+    13: (_FSAS, 0.05 * 2.0**-15),
+    **dict.fromkeys((16, 33), (_KVH, 0.05 * 2.0**-15)),
+    **dict.fromkeys((26, 52), (1e-9, 2e-8)),
+    31: (float(np.radians(720.0 / 2.0**31)), 200.0 / 2.0**31),
+    **dict.fromkeys((32, 56), (float(np.radians(2.0**-21)), 2.0**-22)),
+    **dict.fromkeys((58, 68, 69), (2.0**-33, 2.0**-29)),
+    41: (float(np.radians(0.008 / 65536.0)) / 125.0, 0.2e-3 / 65536.0 * G / 125.0),
+    62: (float(np.radians(0.008 / 65536.0)) / 200.0, 0.2e-3 / 65536.0 * G / 200.0),
+    61: (float(np.radians(0.0151515 / 65536.0)) / 200.0, 0.4e-3 / 65536.0 * G / 200.0),
+}
+WEEK_MS = 604_800_000
+Frames = dict[int, list[tuple[int, bytes]]]
+
+
+def detect(path: Path) -> bool:
+    """Detect by two frames with their CRC among the first bytes."""
+    head = first_bytes(path, 8192)
+    return any(s in head for s in SYNCS) and sum(map(len, _frames(head)[0].values())) >= 2
+
+
+def _frames(data: bytes) -> tuple[Frames, int]:
+    """Return messages by their number, with GPS ms since 1980, and the count of other bytes."""
+    found: Frames = {}
+    k, lost = 0, 0
+    while (at := data.find(b"\xaa\x44", k)) >= 0:
+        lost += at - k
+        k = at
+        head = data[k : k + 28]
+        if head[:3] == SYNCS[0] and len(head) == 28 and head[3] >= 28:
+            begin, (kind, size) = head[3], (head[4] | head[5] << 8, head[8] | head[9] << 8)
+            week, ms = struct.unpack_from("<HI", head, 14)
+        elif head[:3] == SYNCS[1] and len(head) >= 12:
+            begin, size = 12, head[3]
+            kind, week, ms = struct.unpack_from("<HHI", head, 4)
+        else:
+            k, lost = k + 2, lost + 2
+            continue
+        end = k + begin + size
+        if end + 4 > len(data) or _crc(data[k:end]) != struct.unpack_from("<I", data, end)[0]:
+            k, lost = k + 2, lost + 2
+            continue
+        found.setdefault(kind, []).append((week * WEEK_MS + ms, data[k + begin : end]))
+        k = end + 4
+    return found, lost + len(data) - k
+
+
+def _crc(data: bytes) -> int:
+    """CRC of 32 bits that begins with 0 and is not inverted."""
+    return zlib.crc32(data, 0xFFFFFFFF) ^ 0xFFFFFFFF
+
+
+def _read(path: Path, stream: str) -> tuple[Frames, list[Finding]]:
+    with damage(path):
+        frames, lost = _frames(path.read_bytes())
+    findings: list[Finding] = []
+    if lost:
+        findings.append(Finding("io.bytes-left-out", file=path.name, severity="note", count=lost))
+    if not any(kind in frames for kind in STREAMS[stream]):
+        if stream == "imu" and any(kind in frames for kind in CORRECTED):
+            raise DataError("io.novatel-corrected-only", file=path.name, quantity="imu")
+        has = [s for s, kinds in STREAMS.items() if any(k in frames for k in kinds)]
+        raise NoStreamError(path.name, stream, TITLE, has or ["other messages"])
+    return frames, findings
+
+
+def read(path: Path) -> RawLog:
+    """Read the increments of the inertial unit, m/s and rad in each interval."""
+    frames, findings = _read(path, "imu")
+    kind = next(k for k in STREAMS["imu"][::-1] if k in frames)
+    with damage(path):
+        if kind in (RAWIMUX, RAWIMUSX):
+            form, unit = "<BBHdI6i", frames[kind][0][1][1]
+            rows = [struct.unpack_from(form, m)[2:] for _, m in frames[kind]]
+        else:
+            rows = [struct.unpack_from("<IdI6i", m) for _, m in frames[kind]]
+            told = [m[1] for k in (RAWIMUX, RAWIMUSX) for _, m in frames.get(k, [])]
+            told += [struct.unpack_from("<I", m)[0] for _, m in frames.get(INSCONFIG, [])]
+            unit = told[0] if told else 0
+    if unit not in SCALES:
+        raise DataError("io.novatel-unit-unknown", file=path.name, quantity="imu", unit=unit)
+    angle, speed = SCALES[unit]
+    time = np.array([(r[0] - rows[0][0]) * WEEK + r[1] for r in rows])
+    counts = np.array([r[3:] for r in rows], dtype=np.float64)
+    # z, -y, x of velocity, then of angle
+    turned = counts[:, [2, 1, 0, 5, 4, 3]] * np.tile([1.0, -1.0, 1.0], 2)
+    columns = {"time": time}
+    columns |= {f"dtheta_{a}": angle * turned[:, 3 + k] for k, a in enumerate("xyz")}
+    columns |= {f"dv_{a}": speed * turned[:, k] for k, a in enumerate("xyz")}
+    stated: dict[str, tuple[str, str | None]] = {"time": ("time", "s")}
+    stated |= {f"dtheta_{a}": (f"gyro_{a}", "rad") for a in "xyz"}
+    stated |= {f"dv_{a}": (f"accel_{a}", "m/s") for a in "xyz"}
+    name = path.resolve().name
+    return RawLog(
+        name, (path,), columns, stated=stated, sampling="mean", clock=GPS, findings=findings
+    )
+
+
+def read_fixes(path: Path) -> RawLog:
+    """Read BESTPOS, with the velocity of BESTVEL at the same instants."""
+    frames, findings = _read(path, "gnss")
+    with damage(path):
+        rows = [(t, *struct.unpack_from("<IIdddfI3f", m)) for t, m in frames[BESTPOS]]
+        velocities = {t: struct.unpack_from("<II2f3d", m) for t, m in frames.get(BESTVEL, [])}
+    kept = [r for r in rows if r[1] == 0 and r[2] != 0]
+    if len(kept) < len(rows):
+        code, count = "io.fixes-without-position-left-out", len(rows) - len(kept)
+        findings.append(Finding(code, file=path.name, severity="note", count=count))
+    if not kept:
+        raise DataError("io.no-usable-fix", file=path.name, quantity="lat, lon")
+    table = np.array(kept, dtype=np.float64)
+    if count := int(np.isin(table[:, 2], FUSED).sum()):
+        code = "io.fixes-of-fused-receiver"
+        findings.append(Finding(code, file=path.name, severity="note", count=count))
+    stamps = np.array([r[0] for r in kept], dtype=np.int64)
+    time, week = stamps % WEEK_MS, stamps // WEEK_MS
+    out: Quantities = {"time": (time, "ms"), "week": (week, None)}
+    out |= {"lat": (table[:, 3], "deg"), "lon": (table[:, 4], "deg")}
+    out["alt"] = (table[:, 5] + table[:, 6], "m")
+    out |= {f"{n}_sd": (table[:, 8 + k], "m") for k, n in enumerate(("north", "east", "down"))}
+    out["quality"] = (np.array([QUALITY.get(int(k), 1) for k in table[:, 2]]), None)
+    ned = np.full((time.size, 3), np.nan)
+    for k, stamp in enumerate(stamps.tolist()):
+        if (v := velocities.get(stamp)) and v[0] == 0 and v[1] != 0:
+            course = np.radians(v[5])
+            ned[k] = (v[4] * np.cos(course), v[4] * np.sin(course), -v[6])
+    if np.isfinite(ned).any():
+        late = max((v[2] for v in velocities.values()), default=0.0)
+        if late > 0.0:
+            code = "io.velocity-late"
+            findings.append(Finding(code, file=path.name, severity="note", late=late))
+        out |= {f"V{a}": (ned[:, k], "m/s") for k, a in enumerate("NED")}
+    return RawLog.of(path, out, clock=GPS, findings=findings)
+
+
+def read_reference(path: Path) -> pd.DataFrame:
+    """Read the inertial solution of the receiver."""
+    frames, findings = _read(path, "reference")
+    kind = next(k for k in STREAMS["reference"] if k in frames)
+    rows = []
+    with damage(path):
+        for stamp, m in frames[kind]:
+            if kind == INSPVAX:  # its height is over the sea
+                state, _, lat, lon, sea, up, *rest = struct.unpack_from("<II3df6d", m)
+                (week, ms), alt = divmod(stamp, WEEK_MS), sea + up
+                second = ms * 1e-3
+            else:
+                week, second, lat, lon, alt, *rest, state = struct.unpack_from("<Id9dI", m)
+            vn, ve, vu, roll, pitch, azimuth = rest
+            if state in SOLVED:
+                rows.append((week, second, lat, lon, alt, vn, ve, -vu, roll, pitch, azimuth))
+    if not rows:
+        raise DataError("io.solution-without-rows", file=path.name, quantity="reference")
+    table = np.array(rows)
+    time = table[:, 1] + WEEK * (table[:, 0] - table[0, 0])
+    parts = (time, table[:, 2:5], table[:, 5:8], table[:, 8:])
+    return solution(path, parts, Clock(GPS, 0.0, int(table[0, 0])), findings)

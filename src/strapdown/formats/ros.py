@@ -1,0 +1,249 @@
+"""Bags of ROS 1 (``.bag``) and ROS 2 (folder, ``.db3``, ``.mcap``), by rosbags.
+
+Messages: sensor_msgs/Imu, NavSatFix, MagneticField and FluidPressure of
+https://github.com/ros2/common_interfaces, by REP 103 and REP 145: rad/s, m/s² of specific force, T,
+Pa, and a covariance that begins with -1 where a sensor does not measure. The axes are those of the
+sensor, which only a tree of transforms relates to the body: they stay open. NavSatFix: deg, m over
+the ellipsoid, covariance in m² east, north, up. A TwistStamped (or TwistWithCovarianceStamped) with
+the frame and the stamps of the fixes is their velocity, east, north, up. Stamps are those of the
+headers, in ns. The reference is INSPVAX or INSPVA of novatel_oem7_msgs.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.errors import DataError, Finding
+from strapdown.formats.binary import Quantities, damage, first_bytes, solution
+from strapdown.formats.clocks import RELATIVE, UNIX, Clock
+from strapdown.formats.recording import NoStreamError, RawLog, library
+
+TITLE = "bag of ROS 1 or ROS 2 (.bag .db3 .mcap, folder)"
+MAGIC = {b"#ROSBAG V2.0": ".bag", b"\x89MCAP0\r\n": ".mcap", b"SQLite format 3\0": ".db3"}
+IMU, FIX = ("sensor_msgs/msg/Imu",), ("sensor_msgs/msg/NavSatFix",)
+FIELD, PRESSURE = ("sensor_msgs/msg/MagneticField",), ("sensor_msgs/msg/FluidPressure",)
+TWISTS = tuple(f"geometry_msgs/msg/Twist{w}Stamped" for w in ("WithCovariance", ""))
+SOLUTIONS = tuple(f"novatel_oem7_msgs/msg/{m}" for m in ("INSPVAX", "INSPVA"))
+STREAMS = {"imu": IMU, "gnss": FIX, "reference": SOLUTIONS, "magnetometer": FIELD}
+STREAMS |= {"barometer": PRESSURE}
+QUALITY = {-1: 0, 0: 1, 1: 2, 2: 2}  # status of NavSatFix to field 6 of NMEA GGA
+SOLVED = (3, 6, 7)  # states of an inertial solution: good, free, alignment complete
+LEAST_FORCE = 5.0  # m/s²
+MODERN = 10**18  # ns, 2001: a clock since the start of a device never counts so far
+Columns = dict[str, NDArray[Any]]
+
+
+def detect(path: Path) -> bool:
+    """Detect by the first bytes; of a database, by its tables; of a folder, by its metadata."""
+    if path.is_dir():
+        return b"rosbag2_bagfile_information" in first_bytes(path / "metadata.yaml", 4096)
+    kind = _suffix(path)
+    if kind != ".db3":
+        return kind is not None
+    try:
+        with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)) as base:
+            names = {name for (name,) in base.execute("select name from sqlite_master")}
+    except sqlite3.Error:
+        return False
+    return {"messages", "topics"} <= names
+
+
+def _suffix(path: Path) -> str | None:
+    head = first_bytes(path, 16)
+    return next((suffix for magic, suffix in MAGIC.items() if head.startswith(magic)), None)
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    """Open a bag; the library goes by the ending, which a file may have lost."""
+    bags, types = library("rosbags.highlevel", path), library("rosbags.typesys", path)
+    known = types.get_typestore(types.Stores.LATEST)
+    with damage(path), tempfile.TemporaryDirectory() as folder:
+        own = path
+        if path.is_file() and path.suffix != (suffix := _suffix(path)):
+            own = Path(folder) / f"bag{suffix}"
+            own.symlink_to(path.resolve())
+        with bags.AnyReader([own], default_typestore=known) as bag:
+            yield bag
+
+
+def _read(
+    path: Path,
+    stream: str,
+    kinds: Sequence[str],
+    take: Callable[[Any], dict[str, Any]],
+    topic: str | None = None,
+) -> tuple[Columns, list[Finding], str]:
+    """Read one topic: stamps in ns and what `take` gives of each message, findings, the clock."""
+    findings: list[Finding] = []
+    samples: dict[str, list[Any]] = {"time": [], "record": []}
+    with _opened(path) as bag:
+        found = [c for c in bag.connections if c.msgcount > 0]
+        topic = topic or _topic(path, stream, found, kinds, findings)
+        chosen = [c for c in found if c.topic == topic]
+        for one, record, data in bag.messages(connections=chosen):
+            message = bag.deserialize(data, one.msgtype)
+            stamp = message.header.stamp
+            samples["time"].append(int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec))
+            samples["record"].append(int(record))
+            for name, value in take(message).items():
+                samples.setdefault(name, []).append(value)
+    columns = {name: np.array(values) for name, values in samples.items()}
+    record_time = columns.pop("record")
+    if not columns["time"].any():
+        findings.append(Finding("io.ros-stamps-of-record", file=path.name, quantity="time"))
+        columns["time"] = record_time
+    clock = UNIX if columns["time"].max(initial=0) > MODERN else RELATIVE
+    return columns, findings, clock
+
+
+def _topic(
+    path: Path, stream: str, found: Sequence[Any], kinds: Sequence[str], findings: list[Finding]
+) -> str:
+    """Choose the topic of a stream: the raw one of several, else refuse."""
+    kind = next((k for k in kinds if any(c.msgtype == k for c in found)), None)
+    if kind is None:
+        there = {c.msgtype for c in found}
+        has = [s for s, types in STREAMS.items() if there & set(types)]
+        raise NoStreamError(path.name, stream, TITLE, has or ["other messages"])
+    topics = sorted({c.topic for c in found if c.msgtype == kind})
+    left = [t for t in topics if "filter" not in t.lower()]
+    raw = [t for t in left if "raw" in t.lower().rpartition("/")[2]]
+    picked = next((some for some in (topics, left, raw) if len(some) == 1), None)
+    if picked is None:
+        raise DataError(
+            "io.ros-topics-of-one-kind", file=path.name, kind=kind, topics=topics, first=topics[0]
+        )
+    if len(topics) > 1:
+        note = {"topic": picked[0], "others": [t for t in topics if t != picked[0]]}
+        findings.append(Finding("io.ros-topic-taken", file=path.name, severity="note", data=note))
+    return str(picked[0])
+
+
+def _vector(prefix: str, v: Any) -> dict[str, float]:
+    return {f"{prefix}_x": v.x, f"{prefix}_y": v.y, f"{prefix}_z": v.z}
+
+
+def read(path: Path) -> RawLog:
+    """Read rates and specific force of the topic of type Imu; its orientation is not used."""
+
+    def take(m: Any) -> dict[str, Any]:
+        values = _vector("gyro", m.angular_velocity) | _vector("accel", m.linear_acceleration)
+        values["gyro_none"] = m.angular_velocity_covariance[0] == -1.0
+        return values | {"accel_none": m.linear_acceleration_covariance[0] == -1.0}
+
+    columns, findings, clock = _read(path, "imu", IMU, take)
+    out: Quantities = {"time": (columns["time"], "ns")}
+    for triad, unit in (("gyro", "rad/s"), ("accel", "m/s2")):
+        part = {f"{triad}_{a}": (columns[f"{triad}_{a}"], unit) for a in "xyz"}
+        size = float(np.median(np.linalg.norm([v for v, _ in part.values()], axis=0)))
+        if columns[f"{triad}_none"].all() and not any(v.any() for v, _ in part.values()):
+            if triad == "gyro":
+                raise DataError("io.ros-not-measured", file=path.name, quantity=triad)
+            findings.append(Finding("io.ros-not-measured", file=path.name, quantity=triad))
+            continue
+        # Some drivers publish acceleration without gravity; nothing falls for half of a recording.
+        if triad == "accel" and size < LEAST_FORCE:
+            findings.append(
+                Finding("io.force-without-gravity", file=path.name, quantity=triad, size=size)
+            )
+            continue
+        out |= part
+    return RawLog.of(path, out, clock=clock, findings=findings)
+
+
+def read_fixes(path: Path) -> RawLog:
+    """Read the topic of type NavSatFix, with the velocity of the same device if there is one."""
+
+    def take(m: Any) -> dict[str, Any]:
+        known = m.position_covariance_type != 0
+        variance = [m.position_covariance[k] if known else np.nan for k in (4, 0, 8)]
+        values = {"lat": m.latitude, "lon": m.longitude, "alt": m.altitude, "variance": variance}
+        return values | {"status": m.status.status, "frame": m.header.frame_id}
+
+    columns, findings, clock = _read(path, "gnss", FIX, take)
+    units = {"time": "ns", "lat": "deg", "lon": "deg", "alt": "m"}
+    out: Quantities = {q: (columns[q], u) for q, u in units.items()}
+    quality = [QUALITY.get(int(s), 0) for s in columns["status"]]
+    out["quality"] = (np.array(quality), None)
+    sd = np.sqrt(np.where(columns["variance"] > 0.0, columns["variance"], np.nan))
+    if np.isfinite(sd).any():
+        out |= {f"{n}_sd": (sd[:, k], "m") for k, n in enumerate(("north", "east", "down"))}
+    velocity = _velocity(path, columns, findings)
+    return RawLog.of(path, out | velocity, clock=clock, findings=findings)
+
+
+def _velocity(path: Path, fixes: Columns, findings: list[Finding]) -> dict[str, Any]:
+    """Return velocity and its standard deviation, by the stamps of the fixes."""
+
+    def take(m: Any) -> dict[str, Any]:
+        twist, variance = m.twist, [np.nan] * 3
+        if hasattr(twist, "covariance"):
+            variance, twist = [twist.covariance[k] for k in (7, 0, 14)], twist.twist
+        v = twist.linear
+        return {"ned": [v.y, v.x, -v.z], "variance": variance, "frame": m.header.frame_id}
+
+    with _opened(path) as bag:
+        topics = {c.topic for c in bag.connections if c.msgtype in TWISTS and c.msgcount > 0}
+    for topic in sorted(topics):
+        columns, _, _ = _read(path, "gnss", TWISTS, take, topic)
+        same, at, of = np.intersect1d(fixes["time"], columns["time"], return_indices=True)
+        if same.size < fixes["time"].size / 2 or fixes["frame"][0] != columns["frame"][0]:
+            continue
+        ned, sd = np.full((2, fixes["time"].size, 3), np.nan)
+        ned[at], sd[at] = columns["ned"][of], columns["variance"][of]
+        sd = np.sqrt(np.where(sd > 0.0, sd, np.nan))
+        note = {"topic": topic, "count": same.size}
+        findings.append(Finding("io.ros-velocity", file=path.name, severity="note", data=note))
+        out = {f"V{a}": (ned[:, k], "m/s") for k, a in enumerate("NED")}
+        stated = np.isfinite(sd).any()
+        return out | {f"V{a}_sd": (sd[:, k], "m/s") for k, a in enumerate("NED") if stated}
+    if topics:
+        left = {"topics": sorted(topics)}
+        findings.append(Finding("io.ros-twist-left", file=path.name, severity="note", data=left))
+    return {}
+
+
+def read_reference(path: Path) -> pd.DataFrame:
+    """Read the solution of a SPAN system: roll, pitch and azimuth are those of its vehicle."""
+
+    def take(m: Any) -> dict[str, Any]:
+        status, up = getattr(m, "ins_status", None), getattr(m, "undulation", 0.0)
+        status = m.status if status is None else status
+        place = [m.latitude, m.longitude, m.height + up]  # INSPVAX has the height over the geoid
+        velocity = [m.north_velocity, m.east_velocity, -m.up_velocity]
+        values = [*place, *velocity, m.roll, m.pitch, m.azimuth]
+        return {"values": values if status.status in SOLVED else [np.nan] * 9}
+
+    columns, findings, clock = _read(path, "reference", SOLUTIONS, take)
+    values, time = columns["values"], columns["time"] * 1e-9
+    parts = (time, values[:, :3], values[:, 3:6], values[:, 6:])
+    return solution(path, parts, Clock(clock), findings)
+
+
+def read_magnetometer(path: Path) -> RawLog:
+    """Read the topic of type MagneticField."""
+    columns, findings, clock = _read(
+        path, "magnetometer", FIELD, lambda m: _vector("mag", m.magnetic_field)
+    )
+    units = {"time": "ns"} | {f"mag_{a}": "T" for a in "xyz"}
+    out: Quantities = {q: (columns[q], u) for q, u in units.items()}
+    return RawLog.of(path, out, clock=clock, findings=findings)
+
+
+def read_barometer(path: Path) -> RawLog:
+    """Read the topic of type FluidPressure."""
+    columns, findings, clock = _read(
+        path, "barometer", PRESSURE, lambda m: {"pressure": m.fluid_pressure}
+    )
+    out: Quantities = {"time": (columns["time"], "ns"), "pressure": (columns["pressure"], "Pa")}
+    return RawLog.of(path, out, clock=clock, findings=findings)
