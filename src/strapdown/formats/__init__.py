@@ -121,7 +121,14 @@ READERS: dict[str, Reader] = {
     ),
     "sensorstream": Reader("Sensorstream IMU+GPS", sensorstream.detect, {"imu": sensorstream.read}),
     "sensor-logger": Reader(
-        "Sensor Logger: zip, folder, CSV, JSON", sensor_logger.detect, {"imu": sensor_logger.read}
+        "Sensor Logger: zip, folder, CSV, JSON",
+        sensor_logger.detect,
+        {
+            "imu": sensor_logger.read,
+            "gnss": sensor_logger.read_fixes,
+            "magnetometer": sensor_logger.read_magnetometer,
+            "barometer": sensor_logger.read_barometer,
+        },
     ),
     "sensorlog": Reader(
         "SensorLog of iOS, wide CSV", sensorlog.detect, {"imu": sensorlog.read, TABLE: csv.read}
@@ -131,7 +138,11 @@ READERS: dict[str, Reader] = {
         gnss_logger.detect,
         {"imu": gnss_logger.read, "gnss": gnss_logger.read_fixes},
     ),
-    "phyphox": Reader("phyphox: CSV, zip, folder", phyphox.detect, {"imu": phyphox.read}),
+    "phyphox": Reader(
+        "phyphox: CSV, zip, folder",
+        phyphox.detect,
+        {"imu": phyphox.read, "gnss": phyphox.read_fixes, "barometer": phyphox.read_barometer},
+    ),
     "gnss-ins-sim": Reader(
         gnss_ins_sim.TITLE,
         gnss_ins_sim.detect,

@@ -140,7 +140,8 @@ def _stamps(messages: list[Message]) -> tuple[NDArray[np.float64], str]:
 
 
 def _sensor(path: Path, messages: defaultdict[str, list[Message]], triad: str) -> RawLog:
-    kind, prefix, unit, sensor = SENSORS[triad]
+    kind, prefix, stated, sensor = SENSORS[triad]
+    unit: str | None = stated
     own = messages[kind]
     names = [f"calibrated_{prefix}_{a}" for a in "xyz"]
     calibrated = all(m.get(n) is not None for m in own for n in names)

@@ -84,10 +84,11 @@ def read_fixes(path: Path) -> RawLog:
 
 def read_reference(path: Path) -> pd.DataFrame:
     """Read the trajectory of the simulation."""
-    name, findings = path.resolve().name, []
+    name = path.resolve().name
+    findings: list[Finding] = []
     tables = [path / f"ref_{kind}.csv" for kind in ("pos", "vel", "att_euler")]
     if not all(table.is_file() for table in tables):
-        raise NoStreamError(name, "reference", TITLE, _streams(path))
+        raise lacking(path, "reference", TITLE, _streams(path))
     time = _columns(path, path / "time.csv", findings)["time"][0]
     held = [_columns(path, table, findings, time.size) for table in tables]
     place, velocity, euler = (np.column_stack([v for v, _ in h.values()]) for h in held)

@@ -282,7 +282,7 @@ def _from_json(path: Path) -> dict[str, Stream]:
     devices = [
         d for d in content.values() if isinstance(d, dict) and isinstance(d.get("streams"), dict)
     ]
-    found = max((d["streams"] for d in devices), key=len, default={})
+    found: dict[str, Any] = max((d["streams"] for d in devices), key=len, default={})
     streams = {}
     for key in ("GYRO", "ACCL", "MAGN", "GPS5", "GPS9"):
         samples = found[key].get("samples") if isinstance(found.get(key), dict) else None
