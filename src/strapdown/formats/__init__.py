@@ -12,11 +12,15 @@ import pandas as pd
 
 from strapdown.errors import ConfigError, DataError, StrapdownError
 from strapdown.formats import (
+    android_events,
+    apdm,
     asl,
     broad,
     comma2k19,
+    core_motion,
     csv,
     dji_srt,
+    excel,
     foot_mounted,
     garmin_fit,
     gnss_ins_sim,
@@ -25,21 +29,30 @@ from strapdown.formats import (
     gnss_pos,
     gopro,
     gpx,
+    gsdc,
     hdf5,
     join,
+    json_objects,
     kf_gins,
     kitti,
+    matlab_mobile,
+    microstrain,
     mpu6050,
+    navego,
     numpy_files,
     parquet,
     phyphox,
+    physics_toolbox,
     psins,
     pyins,
+    racechrono,
     ronin,
     sensor_folder,
     sensor_logger,
     sensorlog,
     sensorstream,
+    smartloc,
+    xio,
     xsens,
 )
 from strapdown.formats.assemble import assemble
@@ -131,12 +144,59 @@ READERS: dict[str, Reader] = {
         },
     ),
     "sensorlog": Reader(
-        "SensorLog of iOS, wide CSV", sensorlog.detect, {"imu": sensorlog.read, TABLE: csv.read}
+        "SensorLog of iOS, wide CSV",
+        sensorlog.detect,
+        {"imu": sensorlog.read, "gnss": sensorlog.read_fixes, TABLE: csv.read},
     ),
+    "core-motion": Reader("table of Core Motion", core_motion.detect, {"imu": core_motion.read}),
     "gnss-logger": Reader(
         "GnssLogger of Android, device_imu.csv",
         gnss_logger.detect,
         {"imu": gnss_logger.read, "gnss": gnss_logger.read_fixes},
+    ),
+    "gsdc": Reader(
+        "Smartphone Decimeter Challenge, ground_truth.csv of 2021",
+        gsdc.detect,
+        {"gnss": gsdc.read},
+    ),
+    "gsdc-raw": Reader(
+        "Smartphone Decimeter Challenge, pseudoranges",
+        gsdc.detect_raw,
+        dict.fromkeys(("imu", "gnss", "reference"), gsdc.refuse),
+    ),
+    "smartloc": Reader("smartLoc, CSV of raw GNSS data", smartloc.detect, {"gnss": smartloc.read}),
+    "racechrono": Reader(
+        racechrono.TITLE,
+        racechrono.detect,
+        {"imu": racechrono.read, "gnss": racechrono.read_fixes},
+    ),
+    "microstrain": Reader(
+        microstrain.TITLE,
+        microstrain.detect,
+        {"imu": microstrain.read, "barometer": microstrain.read_barometer},
+    ),
+    "apdm": Reader(apdm.TITLE, apdm.detect, {"imu": apdm.read}),
+    "x-imu3": Reader("x-IMU3: CSV, folder", xio.detect, {"imu": xio.read}, xio.files_of),
+    "physics-toolbox": Reader(
+        physics_toolbox.TITLE,
+        physics_toolbox.detect,
+        {"imu": physics_toolbox.read, "barometer": physics_toolbox.read_barometer},
+    ),
+    "matlab-mobile": Reader(
+        matlab_mobile.TITLE,
+        matlab_mobile.detect,
+        {"imu": matlab_mobile.read, "gnss": matlab_mobile.read_fixes},
+        matlab_mobile.files_of,
+    ),
+    "matlab-objects": Reader(
+        "objects of MATLAB (.mat)",
+        matlab_mobile.detect_objects,
+        dict.fromkeys(("imu", "gnss", "reference"), matlab_mobile.refuse),
+    ),
+    "navego": Reader(
+        navego.TITLE,
+        navego.detect,
+        {"imu": navego.read, "gnss": navego.read_fixes, "reference": navego.read_reference},
     ),
     "phyphox": Reader(
         "phyphox: CSV, zip, folder",
@@ -170,6 +230,13 @@ READERS: dict[str, Reader] = {
         sensor_folder.detect,
         {"imu": sensor_folder.read},
     ),
+    "android-events": Reader(
+        "log of Android sensor events, one a row",
+        android_events.detect,
+        {"imu": android_events.read},
+    ),
+    "json": Reader("JSON of samples: lines, list", json_objects.detect, {TABLE: json_objects.read}),
+    "excel": Reader("Excel workbook (.xlsx)", excel.detect, {TABLE: excel.read}),
     "rtklib": Reader("solution of RTKLIB (.pos)", gnss_pos.detect, {"gnss": gnss_pos.read}),
     "nmea": Reader(
         "NMEA 0183: GGA, RMC, VTG, ZDA, GST", gnss_nmea.detect, {"gnss": gnss_nmea.read}
