@@ -1,10 +1,10 @@
 """Logs of Android sensor events: one row an event of any sensor, its kind in the row.
 
-``kind, timestamp, x, y, z`` or ``timestamp, kind, x, y, z``, further fields unused; with or without a
-header. A kind is the number of a SensorEvent (1 accelerometer, 2 magnetic field, 4 gyroscope, 16
+``kind, timestamp, x, y, z`` or ``timestamp, kind, x, y, z``, further fields unused; with or without
+a header. A kind is the number of a SensorEvent (1 accelerometer, 2 magnetic field, 4 gyroscope, 16
 gyroscope uncalibrated, 35 accelerometer uncalibrated), its string type
-(``android.sensor.gyroscope``), or a short name (``gyro``, ``ACC``). Units, axes and the sign of gravity
-are those of Android: rad/s, m/s² with gravity, µT, x right, y up, z out of the screen
+(``android.sensor.gyroscope``), or a short name (``gyro``, ``ACC``). Units, axes and the sign of
+gravity are those of Android: rad/s, m/s² with gravity, µT, x right, y up, z out of the screen
 (developer.android.com/reference/android/hardware/SensorEvent). Linear acceleration and gravity are
 used only where there is no accelerometer: their sum. The unit of the stamps is inferred unless the
 header states it; Android's own are ns.

@@ -1,11 +1,12 @@
 """APDM Opal: CSV and HDF5 of Motion Studio, one or several monitors.
 
-CSV: ``Test Name:`` and ``Sample Rate:`` above the names ``Monitor/Angular Velocity/X`` …, their units
-under them, and rows that may have one more, empty field. HDF5 (attribute ``FileFormatVersion``):
-``Sensors/<id>/`` with ``Time`` in µs since 1970, ``Accelerometer`` in m/s², ``Gyroscope`` in rad/s
-and ``Magnetometer`` in µT, each (n, 3); before version 5 ``<id>/Calibrated/Accelerometers`` … and
-``<id>/Time`` (APDM, Motion Studio user guide, "Working with HDF5"). The first monitor is read; the
-columns of the others can be named. Axes are those printed on the monitor.
+CSV: ``Test Name:`` and ``Sample Rate:`` above the names ``Monitor/Angular Velocity/X`` …, their
+units under them, and rows that may have one more, empty field. HDF5 (attribute
+``FileFormatVersion``): ``Sensors/<id>/`` with ``Time`` in µs since 1970, ``Accelerometer`` in m/s²,
+``Gyroscope`` in rad/s and ``Magnetometer`` in µT, each (n, 3); before version 5
+``<id>/Calibrated/Accelerometers`` … and ``<id>/Time`` (APDM, Motion Studio user guide, "Working
+with HDF5"). The first monitor is read; the columns of the others can be named. Axes are those
+printed on the monitor.
 """
 
 from __future__ import annotations

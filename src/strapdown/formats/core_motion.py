@@ -3,9 +3,9 @@
 Names are those of CMDeviceMotion, in the spellings of applications and data sets:
 ``rotationRate.x``, ``motionRotationRateX``, ``rotation_rate_x(radians/s)``; ``userAcceleration.x``,
 ``user_acc_x(G)``; ``gravity.x``, ``gravity_x(G)``. Apple documents rad/s, and gravity and user
-acceleration in units of gravity, the sign opposite to specific force: a phone on its back has gravity
--z. The length of gravity shows where an application converted it to m/s². Specific force is minus
-the sum of both.
+acceleration in units of gravity, the sign opposite to specific force: a phone on its back has
+gravity -z. The length of gravity shows where an application converted it to m/s². Specific force is
+minus the sum of both.
 """
 
 from __future__ import annotations

@@ -5,8 +5,8 @@ The messages and their fields are those of the FIT profile (https://developer.ga
 in m/s and ``gps_accuracy`` in m; ``gyroscope_data``, ``accelerometer_data`` and
 ``magnetometer_data`` have arrays of samples, each with its offset in ms from the stamp of the
 message. Where a device did not calibrate them, ``three_d_sensor_calibration`` converts counts: less
-``level_shift`` and ``offset_cal``, times ``calibration_factor`` over ``calibration_divisor``, turned
-by ``orientation_matrix``. The profile does not say where the axes of a device point.
+``level_shift`` and ``offset_cal``, times ``calibration_factor`` over ``calibration_divisor``,
+turned by ``orientation_matrix``. The profile does not say where the axes of a device point.
 """
 
 from __future__ import annotations
@@ -166,7 +166,7 @@ def _sensor(path: Path, messages: defaultdict[str, list[Message]], triad: str) -
     if not calibrated:
         applied = _calibrated(messages, sensor, values)
         values, unit = (values, None) if applied is None else (applied, unit)
-    held = {"time": (np.concatenate(times), "s")}
+    held: dict[str, tuple[NDArray[Any], str | None]] = {"time": (np.concatenate(times), "s")}
     held |= {f"{triad}_{a}": (values[:, k], unit) for k, a in enumerate("xyz")}
     log = RawLog.of(path, held, clock=clock)
     log.name = f"{path.name}/{kind}"

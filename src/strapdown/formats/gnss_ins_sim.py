@@ -4,10 +4,10 @@
 ``mag-0.csv``, ``gps_time.csv``, ``gps-0.csv`` (``gps_lat (deg)`` … ``gps_vD (m/s)``),
 ``ref_pos.csv``, ``ref_vel.csv``, ``ref_att_euler.csv`` (yaw, pitch, roll); a number counts the runs
 of a simulation. Units are in the names. Layout and frames are those of its README and of
-``ins_data_manager.py`` (https://github.com/Aceinna/gnss-ins-sim, MIT): the body axes are those whose
-attitude to north-east-down is given, forward, right, down; the velocity is along the body axes in
-some versions and north, east, down in others, which the positions decide. In the virtual inertial
-frame (``ref_pos_x (m)``) there is no place on the Earth.
+``ins_data_manager.py`` (https://github.com/Aceinna/gnss-ins-sim, MIT): the body axes are those
+whose attitude to north-east-down is given, forward, right, down; the velocity is along the body
+axes in some versions and north, east, down in others, which the positions decide. In the virtual
+inertial frame (``ref_pos_x (m)``) there is no place on the Earth.
 """
 
 from __future__ import annotations

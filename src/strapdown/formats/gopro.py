@@ -5,12 +5,12 @@ big-endian values padded to four bytes; type 0 nests. ``DEVC`` is a payload of a
 ``STRM`` for each sensor; ``SCAL`` divides what follows it. ``GYRO`` (rad/s) and ``ACCL`` (m/s²,
 specific force) name the axis of each channel in ``ORIN``, small letters reversed (``YxZ``: y, -x,
 z), older cameras in the name of the stream (``Accelerometer (z,x,y)``). ``GPS5`` has latitude,
-longitude, height, speed over ground and in space, ``GPS9`` also days since 2000, seconds of the day,
-dilution and kind of fix; the height is over the sea if ``GPSA`` says MSLV, else over the ellipsoid
-of WGS 84. ``STMP`` counts µs at the first sample of a payload; without it the stamps of the MP4
-count, or the UTC of ``GPSU``. Samples are even between. Where the camera's axes point is not
-stated. JSON: ``streams`` of gopro-telemetry (https://github.com/JuanIrache/gopro-telemetry), with
-``cts`` in ms from the start of the video.
+longitude, height, speed over ground and in space, ``GPS9`` also days since 2000, seconds of the
+day, dilution and kind of fix; the height is over the sea if ``GPSA`` says MSLV, else over the
+ellipsoid of WGS 84. ``STMP`` counts µs at the first sample of a payload; without it the stamps of
+the MP4 count, or the UTC of ``GPSU``. Samples are even between. Where the camera's axes point is
+not stated. JSON: ``streams`` of gopro-telemetry (https://github.com/JuanIrache/gopro-telemetry),
+with ``cts`` in ms from the start of the video.
 """
 
 from __future__ import annotations
@@ -386,7 +386,7 @@ def _boxes(data: bytes, kind: bytes) -> Iterator[bytes]:
 
 
 def _box(stream: Any, end: int, kind: bytes) -> bytes:
-    """Return the content of a box of the file; it stands behind the pictures, which are not read."""
+    """Return the content of a box of the file, without reading the pictures before it."""
     at = 0
     while at + 8 <= end:
         stream.seek(at)

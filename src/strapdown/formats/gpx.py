@@ -1,8 +1,8 @@
 """GPX tracks (https://www.topografix.com/GPX/1/1/): fixes, read by gpxpy.
 
-Every ``trkpt`` of every track and segment, in their order: latitude and longitude in degrees of
-WGS 84, ``time`` in UTC. ``ele`` is over the sea, and ``geoidheight`` the height of the geoid over
-the ellipsoid, as in NMEA GGA; ``fix`` is the kind of solution; GPX 1.0 also has ``speed`` in m/s and
+Every ``trkpt`` of every track and segment, in their order: latitude and longitude in degrees of WGS
+84, ``time`` in UTC. ``ele`` is over the sea, and ``geoidheight`` the height of the geoid over the
+ellipsoid, as in NMEA GGA; ``fix`` is the kind of solution; GPX 1.0 also has ``speed`` in m/s and
 ``course`` in degrees from north.
 """
 

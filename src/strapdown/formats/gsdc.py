@@ -1,10 +1,11 @@
 """Google Smartphone Decimeter Challenge: ``ground_truth.csv`` of 2021, and what cannot be read.
 
 ``ground_truth.csv`` (kaggle.com/competitions/google-smartphone-decimeter-challenge/data):
-``millisSinceGpsEpoch`` without leap seconds, ``latDeg``, ``lngDeg``, ``heightAboveWgs84EllipsoidM``,
-``speedMps``, ``courseDegree`` from north. Its stamps are turned to Unix time, the clock of
-``device_imu.csv``. That of 2022 and later is a table of ``Fix`` lines (`gnss_logger`).
-``device_gnss.csv`` and ``…_derived.csv`` have pseudoranges, which are not positions.
+``millisSinceGpsEpoch`` without leap seconds, ``latDeg``, ``lngDeg``,
+``heightAboveWgs84EllipsoidM``, ``speedMps``, ``courseDegree`` from north. Its stamps are turned to
+Unix time, the clock of ``device_imu.csv``. That of 2022 and later is a table of ``Fix`` lines
+(`gnss_logger`). ``device_gnss.csv`` and ``…_derived.csv`` have pseudoranges, which are not
+positions.
 """
 
 from __future__ import annotations

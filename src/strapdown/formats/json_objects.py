@@ -82,7 +82,8 @@ def _objects(path: Path) -> tuple[list[dict[str, Any]], list[int], list[Finding]
         if not content or not all(isinstance(o, dict) for o in content):
             raise DataError("io.not-list-records", file=path.name)
         return content, list(range(1, len(content) + 1)), findings
-    objects, rows = [], []
+    objects: list[dict[str, Any]] = []
+    rows: list[int] = []
     lines = text.splitlines()
     for row, line in enumerate(lines, 1):
         if not line.strip():
@@ -126,8 +127,8 @@ def _events(
         if which is None:
             continue
         time = next((n for n in one if read_name(n).quantity == "time"), None)
-        axes = [next((n for n in one if n.lower().rpartition(".")[2] == a), None) for a in "xyz"]
-        if None in axes:
+        axes = [n for a in "xyz" for n in one if n.lower().rpartition(".")[2] == a]
+        if len(axes) != 3:
             axes = sorted(n for n in one if n.endswith(("[0]", "[1]", "[2]")))[:3]
         if (
             time is None

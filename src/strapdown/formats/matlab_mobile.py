@@ -1,11 +1,11 @@
 """MATLAB Mobile: sensor logs of a phone, as timetables in a ``.mat`` and as CSV of them.
 
-The application writes timetables ``Acceleration`` (m/s², with gravity), ``AngularVelocity`` (rad/s),
-``MagneticField`` (µT) and ``Position`` (degrees, ``altitude`` in m, ``speed`` in m/s, ``course``,
-``hacc`` in m) (MathWorks, "Sensor Data Collection with MATLAB Mobile"). MATLAB alone opens the objects of
-a ``.mat``; ``writetimetable`` writes each as CSV: ``Timestamp,X,Y,Z`` with ``14-Apr-2021
-15:33:42.123`` of a day in no stated time zone. Axes are those of the phone; the reference of the
-altitude is not stated.
+The application writes timetables ``Acceleration`` (m/s², with gravity), ``AngularVelocity``
+(rad/s), ``MagneticField`` (µT) and ``Position`` (degrees, ``altitude`` in m, ``speed`` in m/s,
+``course``, ``hacc`` in m) (MathWorks, "Sensor Data Collection with MATLAB Mobile"). MATLAB alone
+opens the objects of a ``.mat``; ``writetimetable`` writes each as CSV: ``Timestamp,X,Y,Z`` with
+``14-Apr-2021 15:33:42.123`` of a day in no stated time zone. Axes are those of the phone; the
+reference of the altitude is not stated.
 """
 
 from __future__ import annotations

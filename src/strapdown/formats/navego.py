@@ -1,10 +1,10 @@
 """NaveGo (https://github.com/rodralez/NaveGo): MATLAB structures of sensors, fixes and reference.
 
-A structure with ``t`` (s), ``fb`` (n, 3; specific force in m/s²) and ``wb`` (n, 3; rad/s) about body
-axes forward, right, down is an IMU; with ``t``, ``lat``, ``lon`` (rad), ``h`` (m) and ``vel`` (n, 3;
-north, east, down in m/s) a receiver, where ``stdm`` (m) and ``stdv`` (m/s) are the standard deviations
-of all its fixes; with ``roll``, ``pitch``, ``yaw`` (rad), too, a reference. Their names are free; of
-several of a kind the first is read.
+A structure with ``t`` (s), ``fb`` (n, 3; specific force in m/s²) and ``wb`` (n, 3; rad/s) about
+body axes forward, right, down is an IMU; with ``t``, ``lat``, ``lon`` (rad), ``h`` (m) and ``vel``
+(n, 3; north, east, down in m/s) a receiver, where ``stdm`` (m) and ``stdv`` (m/s) are the standard
+deviations of all its fixes; with ``roll``, ``pitch``, ``yaw`` (rad), too, a reference. Their names
+are free; of several of a kind the first is read.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """RaceChrono CSV (format 3): a table of fixes, laps and sensors of a phone.
 
-``This file is created using RaceChrono …``, lines of a name and a value, then ``timestamp,…``, a line
-of units (``unix time``, ``m``, ``deg``, ``G``, ``deg/s``) and one of the sources (``100: gps``,
-``calc``, ``101: acc``, ``102: gyro``). A field is empty where its source has no new value. Neither
-the reference of the altitude nor the axes and the sign of the accelerometer are stated.
+``This file is created using RaceChrono …``, lines of a name and a value, then ``timestamp,…``, a
+line of units (``unix time``, ``m``, ``deg``, ``G``, ``deg/s``) and one of the sources (``100:
+gps``, ``calc``, ``101: acc``, ``102: gyro``). A field is empty where its source has no new value.
+Neither the reference of the altitude nor the axes and the sign of the accelerometer are stated.
 """
 
 from __future__ import annotations

@@ -7,9 +7,9 @@ application. Every row has the latest value of every sensor, and each sensor its
 repeated in several rows. Core Motion reports acceleration and gravity with the sign opposite to
 specific force: a phone on its back has gravity -z (Apple, CMDeviceMotion and CMAccelerometerData).
 
-``locationLatitude(WGS84)`` … are those of CLLocation: ``locationAltitude(m)`` is over the sea, and what
-is not known is negative. Their stamps count from 1970 and those of the sensors from the start of the
-phone; the time of day of each row, ``loggingTime(txt)``, relates them.
+``locationLatitude(WGS84)`` … are those of CLLocation: ``locationAltitude(m)`` is over the sea, and
+what is not known is negative. Their stamps count from 1970 and those of the sensors from the start
+of the phone; the time of day of each row, ``loggingTime(txt)``, relates them.
 """
 
 from __future__ import annotations

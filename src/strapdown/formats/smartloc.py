@@ -2,8 +2,8 @@
 
 A row is one pseudorange, in front of it the reference at its epoch, of a NovAtel SPAN system:
 ``GPSWeek [weeks]``, ``GPSSecondsOfWeek [s]``, longitude and latitude in degrees, height above the
-ellipsoid, heading in rad from east, counterclockwise, speed along it, acceleration and yaw rate. One
-rate and one acceleration are not three axes: the file gives positions, once an epoch.
+ellipsoid, heading in rad from east, counterclockwise, speed along it, acceleration and yaw rate.
+One rate and one acceleration are not three axes: the file gives positions, once an epoch.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
 """Text exports of Xsens MT Manager (MTi, MTx, MTw Awinda) and of Xsens DOT.
 
 Lines of ``//`` at the top, among them ``// Update Rate: 100.0Hz``; then names as ``PacketCounter
-SampleTimeFine Acc_X … Gyr_X … Mag_X …``. Acceleration (with gravity) is in m/s², rates in rad/s
-for an MTi or MTw and deg/s for a DOT, the magnetic field in units of that at the factory (MTw
-Awinda User Manual, table of exported data). ``SampleTimeFine`` counts 0.1 ms in an MTi (MTi User
-Manual, section "Time stamp (Sample Time Fine)") and 1 µs in a DOT (Xsens DOT User Manual, section
-4.2.5); it has 32 bits, and ``PacketCounter`` 16 or 32. Where ``SampleTimeFine`` is empty in every row,
-the counter and the update rate are the stamps.
+SampleTimeFine Acc_X … Gyr_X … Mag_X …``. Acceleration (with gravity) is in m/s², rates in rad/s for
+an MTi or MTw and deg/s for a DOT, the magnetic field in units of that at the factory (MTw Awinda
+User Manual, table of exported data). ``SampleTimeFine`` counts 0.1 ms in an MTi (MTi User Manual,
+section "Time stamp (Sample Time Fine)") and 1 µs in a DOT (Xsens DOT User Manual, section 4.2.5);
+it has 32 bits, and ``PacketCounter`` 16 or 32. Where ``SampleTimeFine`` is empty in every row, the
+counter and the update rate are the stamps.
 """
 
 from __future__ import annotations
