@@ -4,7 +4,11 @@ Column names state quantity and unit, as in ``"Time (s)","Gyroscope x (rad/s)"``
 decimal sign are as chosen at the export. ``meta/time.csv`` has the starts and pauses. Units and the
 meaning of the sensors are those of https://github.com/phyphox/phyphox-docs,
 docs/file-format/input.md: gyroscope in rad/s, accelerometer in m/s² with gravity (9.81 when
-stationary), linear acceleration without it, magnetic field in µT; axes are Android's.
+stationary), linear acceleration without it, magnetic field in µT, pressure in hPa; axes are
+Android's. Custom experiments write ``"X (rad/s)"`` in ``Gyroscope.csv``, ``Accelerometer.csv``,
+``Linear Accelerometer.csv`` and ``Magnetometer.csv``. ``Location.csv`` has fixes; ``Height (m)`` is
+over the geoid EGM84 (component ``z``), accuracies are radii of the system, and -1 is an unknown
+velocity or direction.
 """
 
 from __future__ import annotations
@@ -16,7 +20,9 @@ import numpy as np
 
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
+from strapdown.formats.clocks import RELATIVE
 from strapdown.formats.join import join
+from strapdown.formats.known_text import lacking
 from strapdown.formats.phones import AXES, XYZ
 from strapdown.formats.recording import RawLog
 from strapdown.formats.sensor_folder import Member, file_member, first_line, members_of, peek
@@ -28,6 +34,23 @@ _TRIADS = {
     "mag": (re.compile(r"magnetic field ([xyz]) \([µμu]T\)", re.I), "uT"),
 }
 _LINEAR = re.compile(r"linear acceleration ([xyz]) \(m/s(?:\^2|²|2)\)", re.I)
+# Custom experiments name the axis alone; the sensor is the name of the table.
+_PLAIN = re.compile(r"([xyz]) \((rad/s|m/s(?:\^2|²|2)|[µμu]T)\)", re.I)
+_TABLES = {"gyroscope": "gyro", "accelerometer": "accel", "magnetometer": "mag"}
+_LINEARS = ("linear accelerometer", "linear acceleration")
+_FIXES = {
+    "lat": (re.compile(r"latitude \(°\)", re.I), "deg"),
+    "lon": (re.compile(r"longitude \(°\)", re.I), "deg"),
+    "alt_msl": (re.compile(r"height \(m\)", re.I), "m"),
+    "speed": (re.compile(r"velocity \(m/s\)", re.I), "m/s"),
+    "course": (re.compile(r"direction \(°\)", re.I), "deg"),
+    "horizontal_accuracy": (re.compile(r"horizontal accuracy \(m\)", re.I), "m"),
+    # Written with the sign of degrees by mistake.
+    "vertical_accuracy": (re.compile(r"vertical accuracy \((m|°)\)", re.I), "m"),
+}
+_PRESSURE = {"pressure": (re.compile(r"pressure \(hPa\)", re.I), "hPa")}
+_STREAMS = {"gnss": _FIXES, "barometer": _PRESSURE}
+TITLE = "recording of phyphox"
 _EVENTS = "meta/time.csv"
 
 
@@ -36,7 +59,7 @@ def detect(path: Path) -> bool:
     members = peek(path)
     if path.is_file() and path.suffix.lower() in csv.SUFFIXES:
         members = [file_member(path)]
-    return any(_sensors(m) for m in members)
+    return any(_sensors(m) or _stream_of(m) for m in members)
 
 
 def read(path: Path) -> RawLog:
@@ -48,9 +71,7 @@ def read(path: Path) -> RawLog:
         A file is damaged, or the gyroscope is missing.
     """
     name = path.resolve().name
-    members = [file_member(path)] if path.is_file() else []
-    if path.is_dir() or path.suffix.lower() == ".zip":
-        members = members_of(path)
+    members = _members(path)
     logs, files, findings = [], [], []
     for member in members:
         if member.name.endswith(_EVENTS):
@@ -59,20 +80,72 @@ def read(path: Path) -> RawLog:
         elif _sensors(member):
             files.append(member.file)
             logs.append(_log(member))
+    if not logs:
+        raise lacking(path, "imu", TITLE, filter(None, map(_stream_of, members)))
     unique = tuple(dict.fromkeys(files))
     raw = join(_mention_linear(logs), name, unique, rows_of_member=True)
     raw.findings[:0] = findings
     return raw
 
 
-def _sensors(member: Member) -> bool:
+def read_fixes(path: Path) -> RawLog:
+    """Read the fixes of the location; the height is over the geoid."""
+    return _read_stream(path, "gnss")
+
+
+def read_barometer(path: Path) -> RawLog:
+    """Read the pressure."""
+    return _read_stream(path, "barometer")
+
+
+def _read_stream(path: Path, stream: str) -> RawLog:
+    members = _members(path)
+    member = next((m for m in members if _stream_of(m) == stream), None)
+    if member is None:
+        there = [s for m in members if (s := _stream_of(m))]
+        there += ["imu"] * any(_sensors(m) for m in members)
+        raise lacking(path, stream, TITLE, there)
+    raw = csv.parse(member.read(), member.label, (member.file,))
+    stated: dict[str, tuple[str, str | None]] = {}
+    for column in raw.columns:
+        if _TIME.fullmatch(column):
+            stated[column] = ("time", "s")
+        for quantity, (pattern, unit) in _STREAMS[stream].items():
+            if pattern.fullmatch(column):
+                stated[column] = (quantity, unit)
+    raw.stated, raw.clock = stated, RELATIVE
+    return raw
+
+
+def _members(path: Path) -> list[Member]:
+    if path.is_dir() or path.suffix.lower() == ".zip":
+        return members_of(path)
+    return [file_member(path)]
+
+
+def _fields(member: Member) -> list[str]:
+    """Return the names of the columns, if the table has stamps of phyphox."""
     if member.suffix not in csv.SUFFIXES:
-        return False
+        return []
     fields = [f.strip().strip('"') for f in re.split(r"[\t;,]", first_line(member))]
-    patterns = [p for p, _ in _TRIADS.values()] + [_LINEAR]
-    return any(_TIME.fullmatch(f) for f in fields) and any(
-        p.fullmatch(f) for f in fields for p in patterns
-    )
+    return fields if any(_TIME.fullmatch(f) for f in fields) else []
+
+
+def _sensors(member: Member) -> bool:
+    fields = _fields(member)
+    plain = member.stem.lower() in (*_TABLES, *_LINEARS)
+    patterns = [p for p, _ in _TRIADS.values()] + [_LINEAR] + [_PLAIN] * plain
+    return any(p.fullmatch(f) for f in fields for p in patterns)
+
+
+def _stream_of(member: Member) -> str | None:
+    """Return the stream of a table with anything but one of the three sensors."""
+    fields = _fields(member)
+    for stream, known in _STREAMS.items():
+        needed = ("lat", "lon") if stream == "gnss" else tuple(known)
+        if all(any(known[q][0].fullmatch(f) for f in fields) for q in needed):
+            return stream
+    return None
 
 
 def _log(member: Member) -> RawLog:
@@ -84,6 +157,9 @@ def _log(member: Member) -> RawLog:
         for triad, (pattern, unit) in _TRIADS.items():
             if match := pattern.fullmatch(column):
                 stated[column] = (f"{triad}_{match[1].lower()}", unit)
+        table = _TABLES.get(member.stem.lower())
+        if table and (match := _PLAIN.fullmatch(column)):
+            stated[column] = (f"{table}_{match[1].lower()}", _TRIADS[table][1])
     raw.stated, raw.axes = stated, AXES
     return raw
 

@@ -11,6 +11,9 @@ UNITS.md, COORDINATES.md and CROSSPLATFORM.md. In short:
 - On iOS these have the opposite sign: gravity of a phone lying on its back is -z, on Android +z.
   With "Standardise Units & Frames" (1.29 and later; ``standardisation`` in Metadata) iOS follows
   Android.
+- ``Location`` has ``altitude`` over the ellipsoid of WGS 84, speed in m/s, ``bearing`` in degrees
+  from north, ``horizontalAccuracy`` as the radius of uncertainty; what is not known is negative.
+  ``Barometer`` has ``pressure`` in mbar.
 - ``AccelerometerUncalibrated`` includes gravity; on iOS in g unless standardized, else in m/s².
 """
 
@@ -27,8 +30,10 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
+from strapdown.formats.clocks import UNIX
 from strapdown.formats.join import join
-from strapdown.formats.phones import force_of, sensor_log
+from strapdown.formats.known_text import lacking
+from strapdown.formats.phones import AXES, force_of, sensor_log
 from strapdown.formats.recording import RawLog
 from strapdown.formats.sensor_folder import Member, file_member, first_line, members_of, peek
 
@@ -38,6 +43,23 @@ ACCELS = ("TotalAcceleration", "Accelerometer", "Gravity", "AccelerometerUncalib
 MAG = "Magnetometer"
 SENSORS = (*GYROS, *ACCELS, MAG)
 METADATA = "Metadata"
+TITLE = "recording of Sensor Logger"
+#: Quantities of the other tables, with column and unit; the fused position before the receiver's.
+FIXES = {
+    "lat": ("latitude", "deg"),
+    "lon": ("longitude", "deg"),
+    "alt": ("altitude", "m"),
+    "speed": ("speed", "m/s"),
+    "speed_sd": ("speedAccuracy", "m/s"),
+    "course": ("bearing", "deg"),
+    "horizontal_accuracy": ("horizontalAccuracy", "m"),
+    "vertical_accuracy": ("verticalAccuracy", "m"),
+}
+STREAMS: dict[str, tuple[tuple[str, ...], dict[str, tuple[str, str]]]] = {
+    "gnss": (("Location", "LocationGps"), FIXES),
+    "magnetometer": ((MAG,), {f"mag_{a}": (a, "uT") for a in "xyz"}),
+    "barometer": (("Barometer",), {"pressure": ("pressure", "hPa")}),
+}
 # A second download of a file is called "Gyroscope (1)" or "Gyroscope-2".
 _COPY = re.compile(r"[\s_-]*(\(\d+\)|\d+)$")
 
@@ -62,7 +84,9 @@ def detect(path: Path) -> bool:
     members = peek(path)
     if path.is_file() and path.suffix.lower() == ".csv":
         members = [file_member(path)]
-    return any(_sensor(m) in SENSORS and _has_header(m) for m in members)
+    return any(_sensor(m) in SENSORS and _has_header(m) for m in members) or any(
+        _is_located(m) for m in members
+    )
 
 
 def read(path: Path) -> RawLog:
@@ -80,6 +104,8 @@ def read(path: Path) -> RawLog:
     else:
         members = members_of(path) if path.is_dir() or path.suffix.lower() == ".zip" else []
         sensors, meta, files = _from_members(members or [file_member(path)])
+    if not sensors and path.is_file() and detect(path):
+        raise lacking(path, "imu", TITLE, ["gnss"])
     if not any(kind in sensors for kind in GYROS):
         raise DataError(
             "io.no-gyroscope-read-here-holds",
@@ -95,6 +121,61 @@ def read(path: Path) -> RawLog:
     raw = join(logs, name, files, rows_of_member=path.suffix.lower() != ".json")
     raw.findings[:0] = findings
     return raw
+
+
+def read_fixes(path: Path) -> RawLog:
+    """Read the fixes of ``Location``."""
+    return _read_stream(path, "gnss")
+
+
+def read_magnetometer(path: Path) -> RawLog:
+    """Read the magnetic field at its own stamps, about the axes of the phone."""
+    raw = _read_stream(path, "magnetometer")
+    raw.axes = AXES
+    return raw
+
+
+def read_barometer(path: Path) -> RawLog:
+    """Read the pressure."""
+    return _read_stream(path, "barometer")
+
+
+def _read_stream(path: Path, stream: str) -> RawLog:
+    kinds, wanted = STREAMS[stream]
+    if path.is_file() and path.suffix.lower() == ".json":
+        records = _records(path)[0]
+        names = ["time", *(c for c, _ in wanted.values())]
+        for kind in kinds:
+            if where := [k for k, r in enumerate(records) if r.get("sensor") == kind]:
+                there = [n for n in names if n in records[where[0]]]
+                columns = {n: _values(path, records, where, kind, n) for n in there}
+                raw = RawLog(path.name, (path,), columns, np.array(where) + 1)
+                return _stated(raw, wanted)
+        held = {str(r.get("sensor", "")) for r in records}
+    else:
+        inside = path.is_dir() or path.suffix.lower() == ".zip"
+        members = members_of(path) if inside else [file_member(path)]
+        for kind in kinds:
+            if found := [m for m in members if _sensor(m) == kind]:
+                raw = csv.parse(found[0].read(), found[0].label, (found[0].file,))
+                return _stated(raw, wanted)
+        held = {_sensor(m) for m in members}
+    there = [s for s, (k, _) in STREAMS.items() if set(k) & held]
+    there += ["imu"] * bool(set(GYROS) & held)
+    raise lacking(path, stream, TITLE, there)
+
+
+def _stated(raw: RawLog, wanted: dict[str, tuple[str, str]]) -> RawLog:
+    stated: dict[str, tuple[str, str | None]] = {"time": ("time", "ns")}
+    stated |= {c: (q, u) for q, (c, u) in wanted.items() if c in raw.columns}
+    raw.stated, raw.clock = stated, UNIX
+    return raw
+
+
+def _is_located(member: Member) -> bool:
+    fields = {f.strip().strip('"').lower() for f in first_line(member).split(",")}
+    named = _sensor(member) in STREAMS["gnss"][0]
+    return named and {"time", "seconds_elapsed", "latitude", "longitude"} <= fields
 
 
 def _sensor(member: Member) -> str:
@@ -142,7 +223,7 @@ def _require(name: str, columns: dict[str, NDArray[Any]]) -> None:
         )
 
 
-def _from_json(path: Path) -> tuple[dict[str, Sensor], dict[str, str]]:
+def _records(path: Path) -> tuple[list[dict[str, Any]], list[Finding]]:
     text, found = csv.decoded(path.read_bytes(), path.name)
     try:
         records = json.loads(text)
@@ -152,6 +233,11 @@ def _from_json(path: Path) -> tuple[dict[str, Sensor], dict[str, str]]:
         records = None
     if not isinstance(records, list) or not all(isinstance(r, dict) for r in records):
         raise DataError("io.not-list-records", file=path.name)
+    return records, found
+
+
+def _from_json(path: Path) -> tuple[dict[str, Sensor], dict[str, str]]:
+    records, found = _records(path)
     groups: dict[str, list[int]] = {}
     meta: dict[str, str] = {}
     for k, record in enumerate(records):

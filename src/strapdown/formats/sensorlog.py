@@ -6,6 +6,10 @@ application. Every row has the latest value of every sensor, and each sensor its
 (``motionTimestamp_sinceReboot(s)``, ``accelerometerTimestamp_sinceReboot(s)``), so a value may be
 repeated in several rows. Core Motion reports acceleration and gravity with the sign opposite to
 specific force: a phone on its back has gravity -z (Apple, CMDeviceMotion and CMAccelerometerData).
+
+``locationLatitude(WGS84)`` … are those of CLLocation: ``locationAltitude(m)`` is over the sea, and
+what is not known is negative. Their stamps count from 1970 and those of the sensors from the start
+of the phone; the time of day of each row, ``loggingTime(txt)``, relates them.
 """
 
 from __future__ import annotations
@@ -20,8 +24,10 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.arrays import ticks_of
+from strapdown.formats.clocks import RELATIVE, UNIX
 from strapdown.formats.find_columns import Column
 from strapdown.formats.join import join
+from strapdown.formats.known_text import column, lacking, optional, selected, stated_by
 from strapdown.formats.phones import force_of, sensor_log
 from strapdown.formats.recording import RawLog
 from strapdown.formats.sensor_folder import file_member, first_line
@@ -37,6 +43,19 @@ STAMPS = {
     FORCE: "accelerometerTimestamp_sinceReboot(s)",
 }
 WALL_CLOCK = "loggingTime(txt)"
+TITLE = "table of SensorLog"
+FIX_TIME = "locationTimestamp_since1970(s)"
+FIXES: dict[str, tuple[str, str | None]] = {
+    "lat": ("locationLatitude(WGS84)", "deg"),
+    "lon": ("locationLongitude(WGS84)", "deg"),
+    "alt_msl": ("locationAltitude(m)", "m"),
+    "speed": ("locationSpeed(m/s)", "m/s"),
+    "course": ("locationCourse(°)", "deg"),
+    "horizontal_accuracy": ("locationHorizontalAccuracy(m)", "m"),
+    "vertical_accuracy": ("locationVerticalAccuracy(m)", "m"),
+}
+# Time zones differ by quarters of an hour.
+ZONE = 900.0  # s
 
 
 def detect(path: Path) -> bool:
@@ -78,6 +97,28 @@ def read(path: Path) -> RawLog:
         )
     out = join(logs, path.name, (path,))
     return dataclasses.replace(out, findings=[*raw.findings, *findings, *out.findings])
+
+
+def read_fixes(path: Path) -> RawLog:
+    """Read the positions, each once, on the clock of the sensors if the rows relate the two."""
+    raw = csv.parse(path.read_bytes(), path.name, (path,))
+    if FIX_TIME not in raw.columns or FIXES["lat"][0] not in raw.columns:
+        raise lacking(path, "gnss", TITLE, ["imu"])
+    time = column(raw, FIX_TIME).astype(np.float64)
+    held = optional(raw, FIXES)
+    own = _changes(time) & np.isfinite(time) & np.isfinite(held["lat"][0])
+    clock = UNIX
+    motion = next((STAMPS[k] for k in (MOTION, GYRO) if STAMPS[k] in raw.columns), None)
+    if motion is not None and WALL_CLOCK in raw.columns:
+        wall = ticks_of(raw, Column(WALL_CLOCK, None, ""))[0] * 1e-9
+        ahead = float(np.nanmedian(wall - column(raw, motion)))
+        # The time of day may be that of the place.
+        ahead += ZONE * round(float(np.nanmedian((time - wall)[own])) / ZONE) if own.any() else 0.0
+        time, clock = time - ahead, RELATIVE
+        raw.findings.append(
+            Finding("io.fixes-since-start", file=path.name, quantity="time", severity="note")
+        )
+    return selected(stated_by(raw, {"time": (time, "s"), **held}, clock=clock), own)
 
 
 def _three(kind: str, unit: str) -> tuple[str, str, str]:

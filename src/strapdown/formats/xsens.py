@@ -1,11 +1,12 @@
 """Text exports of Xsens MT Manager (MTi, MTx, MTw Awinda) and of Xsens DOT.
 
 Lines of ``//`` at the top, among them ``// Update Rate: 100.0Hz``; then names as ``PacketCounter
-SampleTimeFine Acc_X … Gyr_X … Mag_X …``. Acceleration (with gravity) is in m/s², rates in rad/s
-for an MTi or MTw and deg/s for a DOT, the magnetic field in units of that at the factory (MTw
-Awinda User Manual, table of exported data). ``SampleTimeFine`` counts 0.1 ms in an MTi (MTi User
-Manual, section "Time stamp (Sample Time Fine)") and 1 µs in a DOT (Xsens DOT User Manual, section
-4.2.5); it has 32 bits, and ``PacketCounter`` 16 or 32.
+SampleTimeFine Acc_X … Gyr_X … Mag_X …``. Acceleration (with gravity) is in m/s², rates in rad/s for
+an MTi or MTw and deg/s for a DOT, the magnetic field in units of that at the factory (MTw Awinda
+User Manual, table of exported data). ``SampleTimeFine`` counts 0.1 ms in an MTi (MTi User Manual,
+section "Time stamp (Sample Time Fine)") and 1 µs in a DOT (Xsens DOT User Manual, section 4.2.5);
+it has 32 bits, and ``PacketCounter`` 16 or 32. Where ``SampleTimeFine`` is empty in every row, the
+counter and the update rate are the stamps.
 """
 
 from __future__ import annotations
@@ -43,8 +44,8 @@ def detect(path: Path) -> bool:
         lines = stream.read(HEAD).decode("utf-8-sig", "replace").splitlines()
     names = next((line for line in lines if line.strip() and not csv.is_comment(line)), "")
     fields = set(csv.fields_of(names, csv.separator_of(names)))
-    wanted = {f"{t}_{a}" for t in TRIADS for a in "XYZ"}
-    return bool({COUNTER, STAMP} & fields) and wanted <= fields
+    named = any({f"{t}_{a}" for a in "XYZ"} <= fields for t in TRIADS)
+    return bool({COUNTER, STAMP} & fields) and named
 
 
 def read(path: Path) -> RawLog:
@@ -63,6 +64,10 @@ def read(path: Path) -> RawLog:
     """
     data = path.read_bytes()
     raw = csv.parse(data, path.name, (path,))
+    if missing := [f"Gyr_{a}" for a in "XYZ" if f"Gyr_{a}" not in raw.columns]:
+        raise DataError(
+            "io.xsens-columns-missing", file=path.name, quantity="gyro", missing=missing
+        )
     match = _RATE.search(data[:HEAD].decode("utf-8-sig", "replace"))
     rate = float(match[1]) if match else None
     rate = rate if rate else None
@@ -70,6 +75,7 @@ def read(path: Path) -> RawLog:
         f"{name}_{axis}": (f"{triad}_{axis.lower()}", unit)
         for name, (triad, unit) in TRIADS.items()
         for axis in "XYZ"
+        if f"{name}_{axis}" in raw.columns
     }
     findings = list(raw.findings)
     if "Mag_X" in raw.columns:
@@ -91,7 +97,7 @@ def _stamps(
     raw: RawLog, rate: float | None, findings: list[Finding]
 ) -> tuple[str | None, NDArray[Any]]:
     """Return stamps in µs, and the column that they come from."""
-    if STAMP in raw.columns:
+    if STAMP in raw.columns and not _is_empty(raw.columns[STAMP]):
         ticks = _unwrapped(raw, STAMP, (32,), findings)
         tick = _tick(raw, ticks, rate)
         if tick != 1:
@@ -106,7 +112,7 @@ def _stamps(
                 )
             )
         return STAMP, ticks * tick
-    if rate is None:
+    if rate is None or COUNTER not in raw.columns:
         return None, np.empty(0)
     count = _unwrapped(raw, COUNTER, (16, 32), findings)
     findings.append(
@@ -120,6 +126,13 @@ def _stamps(
         )
     )
     return COUNTER, np.asarray((count - count[0]) * (1e6 / rate))
+
+
+def _is_empty(stamps: NDArray[Any]) -> bool:
+    """Whether a column stands in the header alone."""
+    if stamps.dtype.kind == "f":
+        return bool(np.isnan(stamps).all())
+    return stamps.dtype.kind == "O" and not any(str(s).strip() for s in stamps)
 
 
 def _unwrapped(

@@ -1,0 +1,189 @@
+"""Logs of Android sensor events: one row an event of any sensor, its kind in the row.
+
+``kind, timestamp, x, y, z`` or ``timestamp, kind, x, y, z``, further fields unused; with or without
+a header. A kind is the number of a SensorEvent (1 accelerometer, 2 magnetic field, 4 gyroscope, 16
+gyroscope uncalibrated, 35 accelerometer uncalibrated), its string type
+(``android.sensor.gyroscope``), or a short name (``gyro``, ``ACC``). Units, axes and the sign of
+gravity are those of Android: rad/s, m/s² with gravity, µT, x right, y up, z out of the screen
+(developer.android.com/reference/android/hardware/SensorEvent). Linear acceleration and gravity are
+used only where there is no accelerometer: their sum. The unit of the stamps is inferred unless the
+header states it; Android's own are ns.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.errors import DataError, Finding
+from strapdown.formats import csv
+from strapdown.formats.columns import read_name
+from strapdown.formats.join import join
+from strapdown.formats.known_text import head
+from strapdown.formats.phones import force_of, sensor_log
+from strapdown.formats.recording import RawLog
+
+KINDS = {
+    "gyro": ("4", "gyro", "gyr", "gyroscope"),
+    "gyro uncalibrated": ("16", "gyroscopeuncalibrated", "uncalgyro", "gyrouncalibrated"),
+    "accel": ("1", "acc", "accel", "accelerometer", "acce"),
+    "accel uncalibrated": ("35", "accelerometeruncalibrated", "uncalaccel", "accuncalibrated"),
+    "linear": ("10", "linearacceleration", "linacc", "linearaccelerometer", "lacc"),
+    "gravity": ("9", "gravity", "grav"),
+    "mag": ("2", "mag", "magn", "magnetometer", "magneticfield"),
+}
+UNITS = {"gyro": "rad/s", "accel": "m/s2", "mag": "uT"}
+_OF = {word: kind for kind, words in KINDS.items() for word in words}
+_STAMP = re.compile(r"\d{6,}|\d+\.\d+")
+# Rows at the top by which the layout is told.
+TOP = 200
+
+
+def kind_of(field: str) -> str | None:
+    """Return the kind of sensor that a field names."""
+    word = field.strip(" \"'").lower().removeprefix("android.sensor.").removeprefix("type_")
+    return _OF.get(re.sub(r"[^a-z0-9]", "", word))
+
+
+def detect(path: Path) -> bool:
+    """Detect by a gyroscope and another sensor among the kinds of the first rows."""
+    return csv.detect(path) and _layout(head(path, 1 << 16)) is not None
+
+
+def _layout(text: str) -> tuple[int, int, str | None] | None:
+    """Return the fields of kind and stamp, and the unit of stamps in a header."""
+    lines = [line for line in text.splitlines()[:TOP] if line.strip() and not csv.is_comment(line)]
+    if len(lines) < 3:
+        return None
+    separator = csv.separator_of(lines[1])
+    rows = [csv.fields_of(line, separator) for line in lines]
+    unit = read_name(rows[0][0]).unit or (read_name(rows[0][1]).unit if rows[0][1:] else None)
+    body = [r for r in rows[1:-1] if len(r) >= 5]
+    if len(body) < 0.9 * (len(rows) - 2):
+        return None
+    for kind, stamp in ((0, 1), (1, 0)):
+        # A counter of samples takes every number once, a kind of sensor returns.
+        fields = Counter(r[kind] for r in body)
+        kinds = {kind_of(field) for field, count in fields.items() if count > 1} - {None}
+        usual = 2 * len(fields) <= len(body) and not any(
+            "." in f and f[:1].isdigit() for f in fields
+        )
+        if usual and all(_STAMP.fullmatch(r[stamp]) for r in body) and len(kinds) > 1:
+            return (kind, stamp, unit) if kinds & {"gyro", "gyro uncalibrated"} else None
+    return None
+
+
+def read(path: Path) -> RawLog:
+    """Read the gyro, with the other sensors interpolated to its stamps.
+
+    Raises
+    ------
+    DataError
+        A row has too few fields, or a value is not a number.
+    """
+    text, findings = csv.decoded(path.read_bytes(), path.name)
+    layout = _layout(text[: 1 << 16])
+    if layout is None:
+        raise DataError("io.no-gyroscope-holds", file=path.name, quantity="gyro", held="other rows")
+    kind, stamp, unit = layout
+    separator = None
+    events: dict[str, list[tuple[Any, ...]]] = {}
+    unknown: set[str] = set()
+    lines = text.splitlines()
+    for row, line in enumerate(lines, 1):
+        if not line.strip() or csv.is_comment(line):
+            continue
+        separator = separator or csv.separator_of(line)
+        fields = csv.fields_of(line, separator)
+        which = kind_of(fields[kind]) if len(fields) > kind else None
+        if which is None:
+            unknown.add(fields[kind] if len(fields) > kind else line)
+            continue
+        if len(fields) < 5:
+            if row == len(lines) and not text.endswith("\n"):
+                findings.append(
+                    Finding("io.last-line-cut-left-out", file=path.name, row=row, severity="note")
+                )
+                continue
+            raise DataError(
+                "io.fields-expected", file=path.name, row=row, count=len(fields), width=5
+            )
+        events.setdefault(which, []).append((row, fields[stamp], *fields[2:5]))
+    others = sorted(u for u in unknown if u and not read_name(u).quantity)[:6]
+    if others:
+        findings.append(
+            Finding("io.events-not-used", file=path.name, severity="note", kinds=others)
+        )
+    return joined(path, {k: _columns(path, k, rows) for k, rows in events.items()}, unit, findings)
+
+
+def _columns(path: Path, kind: str, rows: list[tuple[Any, ...]]) -> dict[str, NDArray[Any]]:
+    """Convert the fields of one kind to numbers; whole stamps stay integers."""
+    whole = all(str(r[1]).isdigit() for r in rows)
+    out: dict[str, NDArray[Any]] = {"row": np.array([r[0] for r in rows])}
+    for k, name in enumerate(("time", "x", "y", "z"), 1):
+        values: list[float] = []
+        for r in rows:
+            try:
+                values.append(int(r[k]) if whole and k == 1 else float(r[k]))
+            except ValueError:
+                raise DataError(
+                    "io.value-not-a-number",
+                    file=path.name,
+                    row=r[0],
+                    quantity=kind,
+                    values=r[k],
+                    source=name,
+                ) from None
+        out[name] = np.array(values)
+    return out
+
+
+def joined(
+    path: Path,
+    events: Mapping[str, dict[str, NDArray[Any]]],
+    unit: str | None,
+    findings: list[Finding],
+) -> RawLog:
+    """Join the events of each kind on the stamps of the gyro."""
+
+    def log(kind: str, triad: str) -> RawLog:
+        held = {n: events[kind][n] for n in ("time", "x", "y", "z")}
+        return sensor_log(
+            f"{path.name}/{kind}",
+            path,
+            held,
+            triad,
+            UNITS[triad],
+            time=("time", unit or ""),
+            rows=events[kind]["row"],
+        )
+
+    logs = []
+    for triad in UNITS:
+        kind = next((k for k in (triad, f"{triad} uncalibrated") if k in events), None)
+        if kind is not None:
+            logs.append(log(kind, triad))
+            if kind != triad and triad == "gyro":
+                findings.append(
+                    Finding(
+                        "io.uncalibrated-gyro", file=path.name, quantity="gyro", severity="note"
+                    )
+                )
+        elif triad == "accel" and {"linear", "gravity"} <= events.keys():
+            logs.append(force_of(log("linear", "accel"), log("gravity", "accel")))
+        elif triad == "accel" and "linear" in events:
+            findings.append(
+                Finding("io.left-out-without-gravity-no", file=path.name, quantity="accel")
+            )
+    for one in logs:
+        one.stated = {c: (q, u or None) for c, (q, u) in one.stated.items()}
+    out = join(logs, path.name, (path,))
+    out.findings[:0] = findings
+    return out
