@@ -67,7 +67,9 @@ def test_a_value_that_is_no_number(method, stood):
     imu, _, sensors = stood
     broken = changed(imu)
     broken.iloc[77, 1] = np.nan
-    with pytest.raises(DataError, match="row 78, gyro_y: not a finite number"):
+    with pytest.raises(
+        DataError, check=coded("tables.not-finite-number", row=78, quantity="gyro_y")
+    ):
         method.align(broken, SITE, sensors)
 
 

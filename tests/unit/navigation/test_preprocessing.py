@@ -109,11 +109,16 @@ def test_what_cannot_be_is_named_with_its_row(cut):
         fed(time, values)
     time, values = samples()
     time[500] = 3.0
-    with pytest.raises(DataError, match=r"log.csv, row 501.*does not increase"):
+    with pytest.raises(
+        DataError, check=coded("navigation.time-decreases", row=501, file="log.csv")
+    ):
         fed(time, values)
     time, values = samples()
     time[600] = np.nan
-    with pytest.raises(DataError, match=r"log.csv, row 601.*time"):
+    with pytest.raises(
+        DataError,
+        check=coded("navigation.not-finite-number", row=601, file="log.csv", quantity="time"),
+    ):
         fed(time, values)
 
 
