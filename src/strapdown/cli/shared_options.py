@@ -18,11 +18,6 @@ import typer
 
 from strapdown.errors import ConfigError
 
-LOG_PANEL = "How to read the log"
-RUN_PANEL = "What to run"
-WITH_PANEL = "Where, and with what"
-OUT_PANEL = "What to write"
-
 
 def options(panel: str) -> Callable[..., Any]:
     """Return a maker of the options that the help lists together."""
@@ -33,7 +28,10 @@ def options(panel: str) -> Callable[..., Any]:
     return option
 
 
-reading, running, with_what, writing = map(options, (LOG_PANEL, RUN_PANEL, WITH_PANEL, OUT_PANEL))
+reading = options("How to read the log")
+running = options("What to run")
+with_what = options("Where, and with what")
+writing = options("What to write")
 BEGIN = "Begin at this stamp; {}, if not given."
 END = "End at this stamp; the last, if not given."
 LENGTH = "Length of the part to use, instead of --to."

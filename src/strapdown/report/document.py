@@ -9,6 +9,7 @@ import re
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
+from functools import cache, cached_property
 from importlib.resources import files
 from itertools import count
 from pathlib import Path
@@ -185,6 +186,16 @@ class Document:
     footer: str = ""
     links: tuple[tuple[str, str], ...] = ()
 
+    @cached_property
+    def plain(self) -> Document:
+        """The document with every text as `plain_text`, idempotent.
+
+        Paragraphs, items and captions have up to 4000 characters, facts and cells 1000, titles and
+        notes of a key figure 300, its value 40, other words 160; slugs 80 letters, digits, ``_``
+        and ``-``.
+        """
+        return _plain(self, _LABEL)
+
 
 def paragraph(text: str | None, kind: str = "plain") -> Paragraph | None:
     """Make a paragraph if there is a text."""
@@ -332,20 +343,6 @@ _SLUG = re.compile(r"[^A-Za-z0-9_-]+")
 T = TypeVar("T")
 
 
-def plain_document(document: Document) -> Document:
-    """Return a document in which every text is plain and of bounded length.
-
-    Returns
-    -------
-    Document
-        Texts as `plain_text`: paragraphs, items and captions to 4000 characters, facts and cells to
-        1000, titles and the notes of a key figure to 300, its value to 40, other words to 160;
-        slugs to 80 letters, digits, ``_`` and ``-``. The page and the PDF call this themselves;
-        call it before writing charts to separate files. The operation is idempotent.
-    """
-    return _plain(document, _LABEL)
-
-
 def _plain(value: T, limit: int) -> T:
     """Copy of a value of any depth with plain texts."""
     made: Any = value
@@ -450,11 +447,7 @@ def draw_stills(document: Document) -> tuple[str, ...]:
     tuple of str
         One SVG per chart, in document order.
     """
-    return tuple(still(chart) for chart in _charts(plain_document(document)))
-
-
-def _charts(document: Document) -> list[Chart]:
-    return [block for block in drawings(document) if isinstance(block, Chart)]
+    return tuple(still(c) for c in drawings(document.plain) if isinstance(c, Chart))
 
 
 def document_data(
@@ -485,7 +478,7 @@ def document_data(
     ValueError
         If a row of a table does not have as many cells as there are columns.
     """
-    plain = plain_document(document)
+    plain = document.plain
     writer = _Writer(iter(stills), place, alive)
     return {
         "title": plain.title,
@@ -673,7 +666,7 @@ def document_page(document: Document, *, stills: Sequence[str] | None = None) ->
     Parameters
     ----------
     document : Document
-        Texts are made plain by `plain_document`, then escaped.
+        Its texts are made plain, then escaped.
     stills : sequence of str, optional
         Drawn charts from `draw_stills`, if already made.
 
@@ -685,7 +678,6 @@ def document_page(document: Document, *, stills: Sequence[str] | None = None) ->
         which cannot run scripts or fetch resources. A content policy in the page allows its own
         script and no other.
     """
-    from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
     drawn = draw_stills(document) if stills is None else stills
@@ -703,6 +695,17 @@ def document_page(document: Document, *, stills: Sequence[str] | None = None) ->
             continue
         alive = True
     script = files("strapdown.report").joinpath("templates", "document.js").read_text("utf-8")
+    return _template().render(
+        document=data,
+        script=Markup(script) if alive else "",
+        policy=_digest(script) if alive else "'none'",
+    )
+
+
+@cache
+def _template() -> Any:
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
     environment = Environment(
         loader=PackageLoader("strapdown.report"),
         autoescape=True,
@@ -710,11 +713,7 @@ def document_page(document: Document, *, stills: Sequence[str] | None = None) ->
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return environment.get_template("document.html").render(
-        document=data,
-        script=Markup(script) if alive else "",
-        policy=_digest(script) if alive else "'none'",
-    )
+    return environment.get_template("document.html")
 
 
 def _image(svg: str) -> str:

@@ -38,7 +38,6 @@ from strapdown.report.navigation_evaluation import (
     NavigationEvaluation,
     ShownStates,
     at_marks,
-    blocks_of,
     chi_square_far,
     heading_shown,
     unwrapped,
@@ -192,9 +191,9 @@ def _true(found: NavigationEvaluation, column: str, navigated: Array) -> Line:
     return curve("truth", stamps, values, BLACK, "dot", 1.1, buckets=BUCKETS)
 
 
-def state_charts(record: NavigationRecord) -> tuple[Chart, ...]:
+def state_charts(found: NavigationEvaluation) -> tuple[Chart, ...]:
     """Estimated sensor and measurement errors, with their bounds."""
-    return tuple(_block_chart(record, block) for block in blocks_of(record))
+    return tuple(_block_chart(found.filtered, block) for block in found.states)
 
 
 def _block_chart(record: NavigationRecord, block: ShownStates) -> Chart:

@@ -41,7 +41,6 @@ from strapdown.report.navigation_charts import (
 )
 from strapdown.report.navigation_evaluation import (
     NavigationEvaluation,
-    blocks_of,
     distance_over_ground,
     trust,
     worst_within,
@@ -252,7 +251,7 @@ def _not_told(found: NavigationEvaluation) -> list[tuple[str, str]]:
     if len(sd) < 2:
         return []
     names = []
-    for block in blocks_of(found.filtered):
+    for block in found.states:
         first = sd[list(block.columns)].iloc[0].to_numpy()
         last = sd[list(block.columns)].iloc[-1].to_numpy()
         some = [
@@ -457,7 +456,7 @@ def state_table(found: NavigationEvaluation) -> TableBlock | None:
     if record.sensors.empty or not len(record.sensors.columns):
         return None
     rows = []
-    for block in blocks_of(record):
+    for block in found.states:
         for column, label in zip(block.columns, block.labels, strict=True):
             value = block.factor * float(record.sensors[column].iloc[-1])
             first, last = (block.factor * half(record.sensors_sd[column].iloc[k]) for k in (0, -1))
@@ -696,7 +695,7 @@ def navigation_document(
             "sensors",
             "Errors of the sensors and the aids",
             state_table(found),
-            *charts.state_charts(found.filtered),
+            *charts.state_charts(found),
         ),
         section("observations", "Observations", *_observations(found)),
         section("outages", "Outages", withheld_table(found), outage_table(found)),

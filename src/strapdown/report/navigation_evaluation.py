@@ -88,6 +88,11 @@ class NavigationEvaluation:
         return self.forward or self.record
 
     @cached_property
+    def states(self) -> tuple[ShownStates, ...]:
+        """Sensor and measurement error states of the filter, for display."""
+        return blocks_of(self.filtered)
+
+    @cached_property
     def agreements(self) -> tuple[Agreement, ...]:
         """Consistency of each observation that has innovations."""
         return agreements(self.record, self.lasting)

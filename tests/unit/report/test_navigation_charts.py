@@ -197,7 +197,7 @@ def test_bounds_are_of_95_percent():
 
 
 def test_states_are_in_units_that_people_use():
-    gyro, offset = charts.state_charts(record())
+    gyro, offset = charts.state_charts(told(record()))
     assert gyro.panels[1].y_label == "x, deg/h"
     assert gyro.panels[1].lines[0].y[0] == pytest.approx(np.degrees(2e-6) * 3600.0)
     assert offset.title == "Rtk: time offset"
@@ -310,7 +310,7 @@ def test_short_and_lonely_runs_are_drawn(make):
         charts.height_chart(given),
         charts.velocity_chart(given),
         charts.attitude_chart(given),
-        *charts.state_charts(given.record),
+        *charts.state_charts(given),
     ]
     drawn += [innovation_chart(given.record, one) for one in agreements(given.record)]
     for chart in drawn:
