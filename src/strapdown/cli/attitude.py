@@ -301,7 +301,7 @@ def print_comparison(bench: AttitudeComparison) -> None:
     if not bench.scores:
         page.print(tables.HOW_TO_REFERENCE)
     if offers := tables.offer_lines(bench):
-        page.print("These rests look alike, and could be reference points:")
+        page.print("Rests of similar attitude, possible reference points:")
     for line in offers:
         page.print(f"  {line}")
 

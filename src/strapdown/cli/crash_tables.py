@@ -20,6 +20,6 @@ def print_crash(result: CaseResult) -> None:
     out.print(spaced(headline(result)), style="bold")
     found = limitations(result)
     if found:
-        out.print("\nWhat limits it (more in the report):")
-        for head, _ in found:
+        out.print("\nLimitations (details in the report):")
+        for _, head, _ in found:
             out.print(f"  - {spaced(head)}")

@@ -36,7 +36,7 @@ BEGIN = "Begin at this stamp; {}, if not given."
 END = "End at this stamp; the last, if not given."
 LENGTH = "Length of the part to use, instead of --to."
 SENSOR = (
-    "How good the sensors are: a sensor of the catalogue (strapdown modules), or a .toml file of "
+    "Sensor error model: a sensor of the catalogue (strapdown modules), or a .toml file of "
     "your own."
 )
 
@@ -94,7 +94,7 @@ class LogFlags:
         bool,
         reading(
             None,
-            "Leave out rows that cannot be used, undo a wrapped clock, and say so.",
+            "Drop rows that cannot be used, unwrap the clock, and report both.",
             "--repair",
         ),
     ] = False
@@ -149,7 +149,7 @@ def log_level(level: int) -> Callable[[bool], bool]:
 
 Quiet = Annotated[
     bool,
-    writing(None, "Print nothing but errors.", "--quiet", "-q", callback=log_level(logging.ERROR)),
+    writing(None, "Print errors only.", "--quiet", "-q", callback=log_level(logging.ERROR)),
 ]
 Verbose = Annotated[
     bool,

@@ -202,9 +202,9 @@ def paragraph(text: str | None, kind: str = "plain") -> Paragraph | None:
     return Paragraph(text, kind) if text else None
 
 
-def taken_for_given(*texts: str) -> tuple[Block, ...]:
+def assumed(*texts: str) -> tuple[Block, ...]:
     """Return the assumptions of a report."""
-    return Paragraph("Taken for given:"), Items(tuple(("", text) for text in texts))
+    return Paragraph("Assumptions:"), Items(tuple(("", text) for text in texts))
 
 
 def run_again(name: str) -> tuple[Block, ...]:
@@ -212,7 +212,7 @@ def run_again(name: str) -> tuple[Block, ...]:
     if not name:
         return ()
     return (
-        Paragraph("To run it again and compare every byte:"),
+        Paragraph("To repeat the run and compare every byte:"),
         Paragraph(f"strapdown verify {name}", "mono"),
     )
 
@@ -243,9 +243,9 @@ def finding_json(finding: Finding, words: Words = "file") -> dict[str, Any]:
 
 MOST_SAID = 2  # reasons against an answer in one sentence
 WORDS = {
-    "trusted": "It can be trusted",
+    "trusted": "The result can be trusted",
     "reserve": "Use with caution",
-    "distrusted": "It should not be trusted",
+    "distrusted": "Do not trust the result",
 }
 
 
@@ -299,12 +299,12 @@ class Trust:
     def blocks(self) -> tuple[Block, ...]:
         """Every reason, for and against."""
         said = tuple(
-            ("For it" if one.severity == "note" else "Against it", f"{one.sentence()}.")
+            ("For" if one.severity == "note" else "Against", f"{one.sentence()}.")
             for one in self.reasons
         )
         if not said:
             return ()
-        return Paragraph("What speaks for the answer, and what against it:"), Items(said)
+        return Paragraph("Evidence for and against the answer:"), Items(said)
 
     def json(self) -> dict[str, Any]:
         """Return the verdict for programs."""
@@ -695,11 +695,12 @@ def document_page(document: Document, *, stills: Sequence[str] | None = None) ->
             continue
         alive = True
     script = files("strapdown.report").joinpath("templates", "document.js").read_text("utf-8")
-    return _template().render(
+    page: str = _template().render(
         document=data,
         script=Markup(script) if alive else "",
         policy=_digest(script) if alive else "'none'",
     )
+    return page
 
 
 @cache

@@ -56,12 +56,12 @@ from strapdown.report.report_bundle import (
 )
 from strapdown.report.verdict import (
     answer,
+    check_words,
     first_words,
-    light_section,
+    integrity_section,
     promise,
     repeated_words,
     verdict_document,
-    witness_words,
 )
 from strapdown.systems.navigation_run import NavigationRun, run_navigation
 from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
@@ -84,7 +84,7 @@ def _write_all(
     write_navigation_files(result, folder)
     if report:
         write_verdict(result, name, folder)
-        document = navigation_document(found, name, light_section(result))
+        document = navigation_document(found, name, integrity_section(result))
         write_report(document, folder, progress, figures=result.spec.output.figures)
 
 
@@ -513,12 +513,12 @@ def verdict_json(result: NavigationRun) -> dict[str, Any]:
             "borne_out": bool(trust.consistency) and trust.against_bounds is None,
         },
         "heading": {
-            "meaning": {k.lower(): _plain(v) for k, v in promise(trust)},
+            "meaning": {c: _plain(v) for c, (_, v) in zip(COLOURS, promise(trust), strict=True)},
             "green_below_deg": light.green,
             "red_beyond_deg": light.red,
             "borne_out": not trust.unwitnessed,
             "why_not": [finding_json(f) for f in trust.unwitnessed],
-            "borne_out_by": witness_words(trust) or None,
+            "borne_out_by": check_words(trust) or None,
             "share": {c: light.share(c) for c in COLOURS},
             "at_end": spans[-1].colour if spans else None,
             "spans": [

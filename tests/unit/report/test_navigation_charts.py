@@ -135,7 +135,7 @@ def test_fixes_outside_of_the_picture_do_not_widen_it():
     fixes = given.fixes["rtk"].copy()
     fixes.iloc[3, fixes.columns.get_loc("lat")] += 1.0
     far = told(made, fixes={"rtk": fixes})
-    assert "1 fix lies outside" in plan_chart(far).panels[0].title + plan_chart(far).caption
+    assert "1 fix is outside" in plan_chart(far).panels[0].title + plan_chart(far).caption
     assert plan_chart(far).panels[0].height == plan_chart(given).panels[0].height
 
 
@@ -251,7 +251,7 @@ def test_innovations_far_off_are_drawn_at_the_edge():
     (edge,) = named(panel, "beyond")
     assert edge.x.tolist() == [21.0]
     assert edge.symbol == "triangle-up"
-    assert "3 lie beyond the edge" in chart.caption  # one a component
+    assert "3 are beyond the axis" in chart.caption  # one a component
     # 1.96 standard deviations of 2 m.
     assert np.nanmax(panel.fills[0].high) == pytest.approx(3.919928)
     assert np.isnan(panel.fills[0].high).any()
@@ -275,7 +275,7 @@ def test_normalised_squares_are_those_of_the_record():
     (one,) = agreements(made)
     table = made.innovations["rtk.position"]
     squares = sum(table[f"nu {x}"] ** 2 / table[f"s {x}"] for x in one.labels)
-    (points,) = named(nis_chart(made, (one,)).panels[1], "an epoch")
+    (points,) = named(nis_chart(made, (one,)).panels[1], "epoch")
     assert points.y == pytest.approx(squares.to_numpy())
     assert one.mean_nis == pytest.approx(squares.mean())
     low, high = one.band
