@@ -673,7 +673,7 @@ def offer_lines(bench: AttitudeComparison) -> list[str]:
 def places_json(bench: AttitudeComparison) -> dict[str, Any]:
     """Positions, proposed reference points and the second log as plain data."""
     return {
-        "places": [asdict(place) for place in bench.places],
+        "positions": [asdict(place) for place in bench.places],
         "offered_references": [asdict(offer) for offer in bench.offers],
         "second_log": None if bench.second is None else _second_json(bench.second),
     }

@@ -99,7 +99,7 @@ def shown_truth(bundle: Path, records: Path | None = None) -> str | None:
     if kind == "crash":
         return None if records is None else _crash_truth(_json(records / "scenario.json"))
     if kind == "coast":
-        return str(told["tried"]) if told["tried"] else None
+        return str(told["measured"]) if told["measured"] else None
     return _navigation_truth(told)
 
 
@@ -190,8 +190,8 @@ def _navigation_truth(told: dict[str, Any]) -> str | None:
         return (
             f"{points['points']} control points, after a fit of origin and heading: error "
             f"{plain(points['rms_m'], 2)} m (RMS), {plain(points['largest_m'], 2)} m at most, over "
-            f"{plain(points['way_m'], 1)} m: "
-            f"{plain(100.0 * points['rms_m'] / points['way_m'], 2)} %."
+            f"{plain(points['path_length_m'], 1)} m: "
+            f"{plain(100.0 * points['rms_m'] / points['path_length_m'], 2)} %."
         )
     if told["against"]:
         errors = told["against"]["errors"]
@@ -206,8 +206,8 @@ def _navigation_truth(told: dict[str, Any]) -> str | None:
             )
             + "."
         )
-    if told["withheld"]:
-        return _withheld_truth(told["withheld"])
+    if told["gnss_outage_tests"]:
+        return _withheld_truth(told["gnss_outage_tests"])
     return None
 
 

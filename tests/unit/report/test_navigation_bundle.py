@@ -80,7 +80,7 @@ def test_the_json_is_the_record(result, found):
     assert told["end"]["heading_sd_deg"] == float(record.sd["heading"].iloc[-1])
     assert told["end"]["horizontal_bound_95_m"] == float(plane_bound(record.covariance)[-1])
     (outage,) = told["outages"]
-    assert outage["aid"] == "rtk"
+    assert outage["measurement"] == "rtk"
     assert 11.0 <= outage["from_s"] <= 12.0
     assert 20.0 <= outage["to_s"] <= 21.0
     inside = (record.sd.index >= outage["from_s"]) & (record.sd.index <= outage["to_s"])
